@@ -1,1 +1,187 @@
-//! Room `cli`.
+//! The command line: arguments in, exit status out. One file per command, each with its `Args` and
+//! a `run` that returns an [`Outcome`]; only this room prints, draws bars and chooses the status.
+//!
+//! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
+
+pub mod friction;
+pub mod identify;
+pub mod lsq;
+pub mod simulate;
+pub mod torque;
+pub mod validate;
+
+mod arguments;
+mod context;
+mod error;
+mod exit;
+mod outcome;
+mod outputs;
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Parser, Subcommand};
+
+pub use arguments::Destination;
+pub use context::{Context, Progress};
+pub use error::{CliError, with_sources};
+pub use exit::Exit;
+pub use outcome::Outcome;
+pub use outputs::check as check_outputs;
+
+/// Identification of robot dynamics from logged joint positions and torques.
+#[derive(Debug, Parser)]
+#[command(name = "cft-ident", version, max_term_width = 80)]
+pub struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options that every command takes.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Options of every command")]
+struct Common {
+    /// Write the result as one JSON document to FILE (`-`: to standard output, and nothing else
+    /// there)
+    #[arg(long, value_name = "FILE", global = true)]
+    json: Option<Destination>,
+    /// No progress and no notes; warnings and errors stay
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Number of threads; the result does not depend on it [default: all]
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+impl Command {
+    fn run(&self, _context: &Context) -> Result<Outcome, CliError> {
+        match *self {}
+    }
+}
+
+/// The process: reads its arguments, runs, and returns the status for the shell.
+pub fn main() -> ExitCode {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    if let Err(error) = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)) {
+        // Without the handler Ctrl-C ends the process as it does by default.
+        let _ = writeln!(std::io::stderr(), "warning: no graceful Ctrl-C: {error}");
+    }
+    run(std::env::args_os(), interrupted).into()
+}
+
+/// Runs one command line, the program's name first.
+pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<AtomicBool>) -> Exit {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(answer) => {
+            // Help and version are answers on standard output, the rest are errors.
+            let _ = answer.print();
+            return match answer.use_stderr() {
+                true => Exit::Usage,
+                false => Exit::Success,
+            };
+        }
+    };
+    match execute(&cli, interrupted) {
+        Ok(exit) => exit,
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "{error}");
+            error.exit()
+        }
+    }
+}
+
+fn execute(cli: &Cli, interrupted: Arc<AtomicBool>) -> Result<Exit, CliError> {
+    if let Some(threads) = cli.common.threads {
+        // A pool that is there already (a second run in one process) keeps its size: the result
+        // does not depend on it.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global();
+    }
+    let json = cli.common.json.as_ref();
+    if let Some(path) = json.and_then(Destination::file) {
+        check_outputs(&[], &[path])?;
+    }
+    let context = Context::new(cli.common.quiet, interrupted);
+    let outcome = cli.command.run(&context)?;
+    outcome::show(
+        &outcome,
+        json,
+        &mut std::io::stdout().lock(),
+        &mut std::io::stderr().lock(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    /// One command's arguments on a parser of their own.
+    #[derive(Debug, Parser)]
+    struct Alone<T: clap::Args> {
+        #[command(flatten)]
+        args: T,
+    }
+
+    fn parse<T: clap::Args>(line: &str) -> Result<T, clap::error::ErrorKind> {
+        let words = std::iter::once("command").chain(line.split_whitespace());
+        Alone::<T>::try_parse_from(words)
+            .map(|alone| alone.args)
+            .map_err(|error| error.kind())
+    }
+
+    #[test]
+    fn the_lines_of_the_contract_are_understood() {
+        let args: super::friction::Args =
+            parse("a.csv b.csv -r cft.toml --joint q4 -m old.toml -o new.toml").unwrap();
+        assert_eq!(args.logs, ["a.csv", "b.csv"]);
+        assert_eq!(args.joint.as_deref(), Some("q4"));
+        let args: super::lsq::Args =
+            parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
+        assert_eq!(args.estimator, super::lsq::Estimator::Ols);
+        let args: super::validate::Args =
+            parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")
+                .unwrap();
+        assert_eq!(args.max_relative_error, Some(0.02));
+        assert_eq!(args.plot.len(), 2);
+        parse::<super::torque::Args>("v.csv -m m.toml -o t.csv").unwrap();
+        let args: super::identify::Args = parse("").unwrap();
+        assert!(args.campaign.is_none());
+        let args: super::simulate::Args = parse(
+            "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
+        )
+        .unwrap();
+        assert_eq!(args.effects, ["payload:mass=1", "ripple:q5"]);
+        assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
+    }
+
+    #[test]
+    fn lines_that_contradict_the_contract_are_refused() {
+        use clap::error::ErrorKind::*;
+        let two = "-r cft.toml --move q4 --reference t.toml -o a.csv";
+        let kind = parse::<super::simulate::Args>(two).unwrap_err();
+        assert_eq!(kind, ArgumentConflict);
+        let kind = parse::<super::simulate::Args>("-r cft.toml -o a.xyz").unwrap_err();
+        assert_eq!(kind, ValueValidation);
+        let kind = parse::<super::friction::Args>("-r cft.toml -o m.toml").unwrap_err();
+        assert_eq!(kind, MissingRequiredArgument);
+        let line = "a.csv -r cft.toml -o m.toml --estimator magic";
+        assert_eq!(parse::<super::lsq::Args>(line).unwrap_err(), InvalidValue);
+        let line = "a.csv -m m.toml --max-relative-error nan";
+        assert_eq!(
+            parse::<super::validate::Args>(line).unwrap_err(),
+            ValueValidation
+        );
+    }
+}

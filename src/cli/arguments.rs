@@ -1,0 +1,96 @@
+//! Values on the command line that several commands share, and their parsers.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Where a document goes: `-` is standard output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Destination {
+    Stdout,
+    File(PathBuf),
+}
+
+impl Destination {
+    /// The file, if it is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Destination::Stdout => None,
+            Destination::File(path) => Some(path),
+        }
+    }
+}
+
+impl FromStr for Destination {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "-" => Destination::Stdout,
+            path => Destination::File(PathBuf::from(path)),
+        })
+    }
+}
+
+impl fmt::Display for Destination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Destination::Stdout => f.write_str("-"),
+            Destination::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// A finite number above zero (a duration, a limit).
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        Ok(_) => Err("must be a finite number above 0".into()),
+        Err(_) => Err("is not a number".into()),
+    }
+}
+
+/// A log to be written: the ending chooses the format.
+pub(super) fn csv_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "csv")
+}
+
+/// A picture to be written.
+pub(super) fn svg_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "svg")
+}
+
+fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension() {
+        Some(found) if found.eq_ignore_ascii_case(ending) => Ok(path),
+        _ => Err(format!("must end in .{ending}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dash_is_standard_output_and_anything_else_a_file() {
+        assert_eq!("-".parse(), Ok(Destination::Stdout));
+        let file: Destination = "./-".parse().unwrap();
+        assert_eq!(file.file(), Some(Path::new("./-")));
+    }
+
+    #[test]
+    fn numbers_that_make_no_sense_are_refused_while_parsing() {
+        assert_eq!(positive("0.5"), Ok(0.5));
+        for wrong in ["0", "-1", "inf", "NaN", "ten", ""] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_ending_of_an_output_is_checked_while_parsing() {
+        assert!(csv_file("runs/a.CSV").is_ok());
+        assert_eq!(csv_file("a.txt"), Err("must end in .csv".into()));
+        assert!(svg_file("csv").is_err());
+    }
+}

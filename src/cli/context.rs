@@ -1,0 +1,120 @@
+//! What every command is given beside its own arguments: where messages go, whether the user has
+//! asked to stop, and the progress bar.
+
+use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::error::{CliError, indented};
+
+/// The circumstances of a run.
+#[derive(Debug, Clone)]
+pub struct Context {
+    quiet: bool,
+    bars: bool,
+    interrupted: Arc<AtomicBool>,
+}
+
+impl Context {
+    /// A context that draws bars when standard error is a terminal and `quiet` is false.
+    /// `interrupted` is set from outside when the run is to stop.
+    pub fn new(quiet: bool, interrupted: Arc<AtomicBool>) -> Self {
+        Context {
+            quiet,
+            bars: !quiet && std::io::stderr().is_terminal(),
+            interrupted,
+        }
+    }
+
+    /// Whether the user has asked to stop; long loops look at it between blocks.
+    pub fn interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
+    /// The flag behind [`Context::interrupted`], for a room that takes one.
+    pub fn stop_flag(&self) -> &AtomicBool {
+        &self.interrupted
+    }
+
+    /// [`Context::interrupted`] as an error, to be left with `?` before anything is written.
+    pub fn check(&self) -> Result<(), CliError> {
+        if self.interrupted() {
+            Err(CliError::interrupted())
+        } else {
+            Ok(())
+        }
+    }
+
+    /// A line on standard error for the person who waits; `-q` silences it.
+    pub fn note(&self, text: &str) {
+        if !self.quiet {
+            // A closed standard error is no reason to lose a result.
+            let _ = writeln!(std::io::stderr(), "{}", indented(text));
+        }
+    }
+
+    /// A progress bar over `total` steps (a spinner for `None`), removed when it is dropped.
+    pub fn progress(&self, label: &str, total: Option<u64>) -> Progress {
+        let target = if self.bars {
+            ProgressDrawTarget::stderr_with_hz(10)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(total, target);
+        let template = match total {
+            Some(_) => "{msg:<24} [{bar:32}] {percent:>3} %  {eta} left",
+            None => "{msg:<24} {spinner} {elapsed}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.set_message(label.to_owned());
+        Progress { bar }
+    }
+}
+
+/// A running bar; its methods may be called from any thread.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// `steps` more are done.
+    pub fn advance(&self, steps: u64) {
+        self.bar.inc(steps);
+    }
+
+    /// `steps` are done in all.
+    pub fn set(&self, steps: u64) {
+        self.bar.set_position(steps);
+    }
+
+    /// What is being done now.
+    pub fn label(&self, label: &str) {
+        self.bar.set_message(label.to_owned());
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_flag_ends_the_command_with_130() {
+        let flag = Arc::new(AtomicBool::new(false));
+        let context = Context::new(true, Arc::clone(&flag));
+        assert!(context.check().is_ok());
+        flag.store(true, Ordering::Relaxed);
+        let error = context.check().unwrap_err();
+        assert_eq!(error.exit().code(), 130);
+    }
+}

@@ -1,0 +1,152 @@
+//! What ends a command early, decorated for the terminal: the message of a room, the place in the
+//! file, and the way out.
+//!
+//! Rooms have an error enum each; here they become a [`CliError`] through `From`, which chooses the
+//! exit status and moves place and remedy to lines of their own.
+
+use std::error::Error;
+use std::fmt;
+
+use super::exit::Exit;
+
+/// An error ready to be shown: `error: ...`, then the places, then `hint: ...`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CliError {
+    exit: Exit,
+    message: String,
+    places: Vec<String>,
+    hints: Vec<String>,
+}
+
+impl CliError {
+    fn new(exit: Exit, message: impl fmt::Display) -> Self {
+        CliError {
+            exit,
+            message: message.to_string(),
+            places: Vec::new(),
+            hints: Vec::new(),
+        }
+    }
+
+    /// The arguments contradict each other in a way that the parser cannot see (exit 2).
+    pub fn usage(message: impl fmt::Display) -> Self {
+        Self::new(Exit::Usage, message)
+    }
+
+    /// A file or value that was given cannot be used (exit 3).
+    pub fn input(message: impl fmt::Display) -> Self {
+        Self::new(Exit::BadInput, message)
+    }
+
+    /// The data determine nothing that was asked (exit 4).
+    pub fn undetermined(message: impl fmt::Display) -> Self {
+        Self::new(Exit::Undetermined, message)
+    }
+
+    /// A result cannot be written (exit 5).
+    pub fn output(message: impl fmt::Display) -> Self {
+        Self::new(Exit::OutputFailed, message)
+    }
+
+    /// The run was asked to stop (exit 130).
+    pub fn interrupted() -> Self {
+        Self::new(Exit::Interrupted, "interrupted, nothing was written")
+    }
+
+    /// Adds a place: `file:line`, or the name of a setting.
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        self.places.push(place.to_string());
+        self
+    }
+
+    /// Adds a way out.
+    pub fn hint(mut self, hint: impl fmt::Display) -> Self {
+        self.hints.push(hint.to_string());
+        self
+    }
+
+    /// The status that this error ends the process with.
+    pub fn exit(&self) -> Exit {
+        self.exit
+    }
+}
+
+impl fmt::Display for CliError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "error: {}", indented(&self.message))?;
+        for place in &self.places {
+            write!(f, "\n  --> {}", indented(place))?;
+        }
+        for hint in &self.hints {
+            write!(f, "\nhint: {}", indented(hint))?;
+        }
+        Ok(())
+    }
+}
+
+impl Error for CliError {}
+
+/// The message of an error with those of its sources, `outer: inner`, each once.
+pub fn with_sources(error: &(dyn Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(inner) = source {
+        let message = inner.to_string();
+        if !text.contains(&message) {
+            text.push_str(": ");
+            text.push_str(&message);
+        }
+        source = inner.source();
+    }
+    text
+}
+
+/// Later lines of a message are indented, and control characters that a file's text may carry into
+/// it (escape sequences, say) are shown instead of being sent to the terminal.
+pub(super) fn indented(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.trim_end().chars() {
+        match c {
+            '\n' => shown.push_str("\n  "),
+            '\t' => shown.push(' '),
+            c if c.is_control() => shown.extend(c.escape_default()),
+            c => shown.push(c),
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_shows_message_place_and_hint_in_that_order() {
+        let error = CliError::input("time runs backwards: 0.013 s after 0.014 s")
+            .at("q4.csv:15")
+            .hint("sort the log by t");
+        assert_eq!(
+            error.to_string(),
+            "error: time runs backwards: 0.013 s after 0.014 s\n  --> q4.csv:15\nhint: sort the log by t"
+        );
+        assert_eq!(error.exit(), Exit::BadInput);
+    }
+
+    #[test]
+    fn control_characters_from_a_file_do_not_reach_the_terminal() {
+        let error = CliError::input("column \"\u{1b}[31mq1\" is unknown\nin the header");
+        assert_eq!(
+            error.to_string(),
+            "error: column \"\\u{1b}[31mq1\" is unknown\n  in the header"
+        );
+    }
+
+    #[test]
+    fn sources_are_told_once() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("cannot read a.csv")]
+        struct Outer(#[source] std::fmt::Error);
+        let text = with_sources(&Outer(std::fmt::Error));
+        assert_eq!(text, format!("cannot read a.csv: {}", std::fmt::Error));
+    }
+}

@@ -1,0 +1,155 @@
+//! How a finished command is told: tables or the JSON document on standard output, warnings and
+//! missed limits on standard error. Commands return an [`Outcome`] and print nothing themselves, so
+//! `--json -` cannot be spoilt by one of them.
+
+use std::io::{self, Write};
+
+use super::Destination;
+use super::error::{CliError, indented};
+use super::exit::Exit;
+use crate::report::json::Document;
+
+/// What a command hands back.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Tables for a person, ending in a line end.
+    pub text: String,
+    /// The same for a script; its warnings are shown on standard error too.
+    pub document: Document,
+    /// Limits that the user set and the result misses, one sentence each; they make exit status 1.
+    pub missed: Vec<String>,
+}
+
+/// Shows `outcome` and returns the status that it stands for.
+///
+/// `stdout` receives either the tables or, for `--json -`, the document, and nothing else.
+pub(super) fn show(
+    outcome: &Outcome,
+    json: Option<&Destination>,
+    stdout: &mut dyn Write,
+    stderr: &mut dyn Write,
+) -> Result<Exit, CliError> {
+    // A closed standard error is no reason to lose a result, so its errors are dropped.
+    for warning in outcome.document.warnings() {
+        let _ = writeln!(stderr, "warning: {}", indented(warning));
+    }
+    match json {
+        Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
+        Some(Destination::File(path)) => {
+            super::outputs::write_text(path, &outcome.document.text())?;
+            write_for_a_person(stdout, &outcome.text)?;
+        }
+        None => write_for_a_person(stdout, &outcome.text)?,
+    }
+    for limit in &outcome.missed {
+        let _ = writeln!(stderr, "limit missed: {}", indented(limit));
+    }
+    Ok(if outcome.missed.is_empty() {
+        Exit::Success
+    } else {
+        Exit::LimitMissed
+    })
+}
+
+fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
+    stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+        .map_err(|error| CliError::output(format!("cannot write to standard output: {error}")))
+}
+
+/// Like [`write`], but a reader that has seen enough (`| head`) is no error.
+fn write_for_a_person(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::output(format!(
+            "cannot write to standard output: {error}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn outcome(missed: &[&str]) -> Outcome {
+        let warnings = ["gap of 0.4 s at 3.1 s".to_owned()];
+        let body = json!({"joints": [{"joint": "q1", "rmse": f64::NAN}]});
+        Outcome {
+            text: "joint  rmse\n".into(),
+            document: Document::new("validate", &[], &warnings, &body).unwrap(),
+            missed: missed.iter().map(|limit| limit.to_string()).collect(),
+        }
+    }
+
+    #[test]
+    fn json_on_standard_output_is_one_document_and_nothing_else() {
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let exit = show(
+            &outcome(&[]),
+            Some(&Destination::Stdout),
+            &mut out,
+            &mut err,
+        );
+        assert_eq!(exit.unwrap(), Exit::Success);
+        let document: Value = serde_json::from_slice(&out).unwrap();
+        assert_eq!(document["schema"], "cft-ident/validate/1");
+        assert_eq!(err, b"warning: gap of 0.4 s at 3.1 s\n");
+    }
+
+    #[test]
+    fn json_in_a_file_leaves_the_tables_on_standard_output() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.json");
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let to_file = Destination::File(path.clone());
+        let exit = show(
+            &outcome(&["q4 1.4 % > 1 %"]),
+            Some(&to_file),
+            &mut out,
+            &mut err,
+        );
+        assert_eq!(exit.unwrap(), Exit::LimitMissed);
+        assert_eq!(out, b"joint  rmse\n");
+        let document: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        assert_eq!(document["joints"][0]["rmse"], Value::Null);
+        assert!(
+            String::from_utf8(err)
+                .unwrap()
+                .ends_with("limit missed: q4 1.4 % > 1 %\n")
+        );
+    }
+
+    /// A standard output that fails with the given kind.
+    struct Failing(io::ErrorKind);
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_closed_pipe_ends_the_tables_quietly_but_not_the_document() {
+        let result = outcome(&[]);
+        let mut pipe = Failing(io::ErrorKind::BrokenPipe);
+        let tables = show(&result, None, &mut pipe, &mut Vec::new());
+        assert_eq!(tables.unwrap(), Exit::Success);
+        let json = show(
+            &result,
+            Some(&Destination::Stdout),
+            &mut pipe,
+            &mut Vec::new(),
+        );
+        assert_eq!(json.unwrap_err().exit(), Exit::OutputFailed);
+        let mut full = Failing(io::ErrorKind::StorageFull);
+        let tables = show(&result, None, &mut full, &mut Vec::new());
+        assert_eq!(tables.unwrap_err().exit(), Exit::OutputFailed);
+    }
+}

@@ -1,0 +1,129 @@
+//! Outputs are looked at before the long run: an unwritable folder, or a name used twice, is told
+//! at once and not after the work.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::error::CliError;
+
+/// Checks the files that a command is going to write.
+///
+/// # Errors
+/// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output, when
+/// a folder is missing or cannot be written. (A file that a command renews in place is not given in
+/// `inputs`.)
+pub fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
+    let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
+    let mut seen: Vec<PathBuf> = Vec::with_capacity(outputs.len());
+    for output in outputs {
+        let full = resolved(output);
+        if seen.contains(&full) {
+            return Err(CliError::usage(format!(
+                "two outputs are the same file {}",
+                output.display()
+            ))
+            .hint("give each output a name of its own"));
+        }
+        if inputs.contains(&full) {
+            return Err(CliError::usage(format!(
+                "the output {} would overwrite an input",
+                output.display()
+            ))
+            .hint("give the output a name of its own"));
+        }
+        writable(output)?;
+        seen.push(full);
+    }
+    Ok(())
+}
+
+/// Writes a text file whole or not at all.
+pub(super) fn write_text(path: &Path, text: &str) -> Result<(), CliError> {
+    let written = tempfile::NamedTempFile::new_in(folder(path)).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|error| error.error)
+    });
+    written
+        .map(|_| ())
+        .map_err(|error| CliError::output(format!("cannot write {}: {error}", path.display())))
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// The path with its folder resolved, so that `a.csv` and `./a.csv` are one; a link that is there
+/// is followed.
+fn resolved(path: &Path) -> PathBuf {
+    if let Ok(full) = path.canonicalize() {
+        return full;
+    }
+    match (folder(path).canonicalize(), path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_path_buf(),
+    }
+}
+
+fn writable(path: &Path) -> Result<(), CliError> {
+    let failed =
+        |reason: &str| CliError::output(format!("cannot write {}: {reason}", path.display()));
+    if path.is_dir() {
+        return Err(failed("it is a folder").hint("name a file inside it"));
+    }
+    let folder = folder(path);
+    if !folder.is_dir() {
+        return Err(failed("its folder does not exist")
+            .hint(format!("make it first: mkdir -p {}", folder.display())));
+    }
+    // An unnamed file shows that one can be written here, and leaves nothing behind.
+    tempfile::tempfile_in(folder)
+        .map(|_| ())
+        .map_err(|error| failed(&error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::exit::Exit;
+
+    #[test]
+    fn outputs_that_collide_are_a_usage_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("a.csv");
+        std::fs::write(&log, "t\n").unwrap();
+        let model = folder.path().join("m.toml");
+        let same = folder.path().join(".").join("m.toml");
+        let error = check(&[&log], &[&model, &same]).unwrap_err();
+        assert_eq!(error.exit(), Exit::Usage);
+        let error = check(&[&log], &[&model, &log]).unwrap_err();
+        assert_eq!(error.exit(), Exit::Usage);
+        assert!(check(&[&log], &[&model]).is_ok());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_folder_as_file_are_output_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("no").join("m.toml");
+        let error = check(&[], &[&missing]).unwrap_err();
+        assert_eq!(error.exit(), Exit::OutputFailed);
+        assert!(error.to_string().contains("mkdir -p"));
+        let error = check(&[], &[folder.path()]).unwrap_err();
+        assert_eq!(error.exit(), Exit::OutputFailed);
+    }
+
+    #[test]
+    fn a_text_is_written_whole_and_nothing_is_left_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        write_text(&path, "{}\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "{}\n");
+        let error = write_text(&folder.path().join("no").join("a"), "x").unwrap_err();
+        assert_eq!(error.exit(), Exit::OutputFailed);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
