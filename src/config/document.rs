@@ -1,0 +1,179 @@
+//! One TOML text, read with errors that name file, line and the way out.
+
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use toml::de::{DeTable, DeValue};
+
+use super::ConfigError;
+use crate::log::escape;
+
+/// A TOML text and the name under which errors speak of it.
+pub(crate) struct Document<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+impl<'a> Document<'a> {
+    pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
+        Self { file, text }
+    }
+
+    /// Deserialises the text.
+    pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        toml::from_str(self.text).map_err(|error| self.explain(&error))
+    }
+
+    /// Turns an error of the TOML reader into ours.
+    fn explain(&self, error: &toml::de::Error) -> ConfigError {
+        let line = error.span().map_or(1, |span| self.line(span.start));
+        let message = one_line(error.message());
+        let listed = between_backticks(error.message());
+        // serde words an unknown name as: unknown field `x`, expected one of `a`, `b`
+        if let Some((name, known)) = listed.split_first() {
+            if message.starts_with("unknown field") {
+                return ConfigError::UnknownKey {
+                    file: self.file.to_owned(),
+                    line,
+                    key: escape(name),
+                    remedy: nearest_or_all(name, known, "known keys here"),
+                };
+            }
+            if message.starts_with("unknown variant") {
+                return ConfigError::Syntax {
+                    file: self.file.to_owned(),
+                    line,
+                    message: format!(
+                        "`{}` is no known value; {}",
+                        escape(name),
+                        nearest_or_all(name, known, "known values")
+                    ),
+                };
+            }
+        }
+        ConfigError::Syntax {
+            file: self.file.to_owned(),
+            line,
+            message: escape(&message),
+        }
+    }
+
+    /// Line of a byte offset, from 1.
+    fn line(&self, offset: usize) -> usize {
+        let end = offset.min(self.text.len());
+        1 + self.text.as_bytes()[..end]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count()
+    }
+
+    /// Line of the key at `path`, or of the innermost table on the way that exists.
+    /// A number stands for an element of an array.
+    pub(crate) fn line_of(&self, path: &[&str]) -> usize {
+        let Ok(root) = DeTable::parse(self.text) else {
+            return 1;
+        };
+        let mut best: Option<Range<usize>> = None;
+        let mut table = Some(root.get_ref());
+        let mut array: Option<&[toml::Spanned<DeValue<'_>>]> = None;
+        for name in path {
+            let value = if let Some(inside) = table {
+                let Some((key, value)) = inside.get_key_value(*name) else {
+                    break;
+                };
+                best = Some(key.span());
+                value
+            } else if let Some(inside) = array {
+                let found = name
+                    .parse::<usize>()
+                    .ok()
+                    .and_then(|index| inside.get(index));
+                let Some(value) = found else { break };
+                best = Some(value.span());
+                value
+            } else {
+                break;
+            };
+            table = value.get_ref().as_table();
+            array = value.get_ref().as_array().map(|elements| &**elements);
+        }
+        best.map_or(1, |span| self.line(span.start))
+    }
+
+    /// The error for a key that must be there; `remedy` reads on after "add".
+    pub(crate) fn missing(&self, path: &[&str], remedy: &str) -> ConfigError {
+        ConfigError::MissingKey {
+            file: self.file.to_owned(),
+            line: self.line_of(path),
+            key: dotted(path),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// The error for a value that cannot be.
+    pub(crate) fn value(&self, path: &[&str], problem: &str, remedy: &str) -> ConfigError {
+        ConfigError::Value {
+            file: self.file.to_owned(),
+            line: self.line_of(path),
+            key: dotted(path),
+            problem: problem.to_owned(),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// Refuses what is not a finite number above 0.
+    pub(crate) fn positive(&self, path: &[&str], value: f64) -> Result<(), ConfigError> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        Err(self.value(path, &format!("is {value}"), "give a number above 0"))
+    }
+
+    /// Refuses inf and nan.
+    pub(crate) fn finite(&self, path: &[&str], values: &[f64]) -> Result<(), ConfigError> {
+        match values.iter().find(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(value) => Err(self.value(path, &format!("holds {value}"), "give finite numbers")),
+        }
+    }
+}
+
+/// The path of a key as it is written in TOML.
+fn dotted(path: &[&str]) -> String {
+    let shown: Vec<String> = path.iter().map(|part| escape(part)).collect();
+    shown.join(".")
+}
+
+/// The parts of a message that stand between backticks.
+fn between_backticks(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+/// First line of a message: the TOML reader may append more.
+fn one_line(message: &str) -> String {
+    message.lines().collect::<Vec<_>>().join(" ")
+}
+
+/// "did you mean `x`?" where a known name is near, else the list of known names.
+pub(crate) fn nearest_or_all(name: &str, known: &[&str], what: &str) -> String {
+    match nearest(name, known) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("{what}: {}", known.join(", ")),
+    }
+}
+
+/// The known name nearest to `name`, where one is near enough to be meant.
+pub(crate) fn nearest<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
+    let lower = name.to_lowercase();
+    known
+        .iter()
+        .map(|candidate| {
+            (
+                strsim::jaro_winkler(&lower, &candidate.to_lowercase()),
+                *candidate,
+            )
+        })
+        .filter(|(similarity, _)| *similarity > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}

@@ -1,0 +1,252 @@
+//! Trajectory files: a Fourier series (43), a single-joint ladder of speeds, or a list of points.
+
+use serde::{Deserialize, Serialize};
+
+use super::ConfigError;
+use super::document::Document;
+
+/// In which coordinates a trajectory is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coordinates {
+    /// Actuator coordinates x_c1..x_c4 of the CFT robot [m, m, rad, m].
+    Cartesian,
+    /// Joint coordinates of the robot [m or rad].
+    Joint,
+}
+
+/// One coordinate of a Fourier series, eq. (43).
+///
+/// `x(t) = offset + sum_l a_l/(l w) sin(l w t) - b_l/(l w) cos(l w t)`, `w = 2 pi fundamental_hz`;
+/// so a and b are amplitudes of the velocity [m/s or rad/s].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FourierCoordinate {
+    /// Coordinate: `x_c1`..`x_c4`, or a joint name.
+    pub name: String,
+    /// q_i0 [m or rad].
+    pub offset: f64,
+    /// a_{i,1}.. [m/s or rad/s].
+    pub a: Vec<f64>,
+    /// b_{i,1}.. [m/s or rad/s], as many as `a`.
+    pub b: Vec<f64>,
+}
+
+/// A finite Fourier series in every coordinate, eq. (43).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fourier {
+    /// Which coordinates the series is in.
+    pub coordinates: Coordinates,
+    /// Fundamental frequency [Hz]; omega_f = 2 pi times it.
+    pub fundamental_hz: f64,
+    /// One series per coordinate, in the file's order.
+    pub series: Vec<FourierCoordinate>,
+}
+
+/// One joint (or actuator) runs back and forth over its range at a ladder of speeds, the others are held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SingleJointMove {
+    /// The joint that moves.
+    pub joint: String,
+    /// Speeds of the ladder, each run in both directions [m/s or rad/s].
+    pub speeds: Vec<f64>,
+    /// Range [m or rad]; the robot's own limits with a margin where absent.
+    pub range: Option<[f64; 2]>,
+    /// Acceleration at the reversals [m/s^2 or rad/s^2]; chosen from the range where absent.
+    pub acceleration: Option<f64>,
+}
+
+/// A pose at a time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Time [s], increasing along the list.
+    pub t: f64,
+    /// Position in each coordinate [m or rad].
+    pub position: Vec<f64>,
+}
+
+/// A list of poses at times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points {
+    /// Which coordinates the poses are in.
+    pub coordinates: Coordinates,
+    /// The poses, at least two.
+    pub points: Vec<Point>,
+}
+
+/// A checked trajectory file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Trajectory {
+    /// `kind = "fourier"`.
+    Fourier(Fourier),
+    /// `kind = "single-joint"`.
+    SingleJoint(SingleJointMove),
+    /// `kind = "points"`.
+    Points(Points),
+}
+
+/// Names of the actuator coordinates of the CFT robot.
+pub const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    Fourier,
+    SingleJoint,
+    Points,
+}
+
+/// The file as it is written: one flat table, so that errors keep their line.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TrajectoryToml {
+    kind: Kind,
+    coordinates: Option<Coordinates>,
+    fundamental_hz: Option<f64>,
+    #[serde(default)]
+    coordinate: Vec<FourierCoordinate>,
+    joint: Option<String>,
+    #[serde(default)]
+    speeds: Vec<f64>,
+    range: Option<[f64; 2]>,
+    acceleration: Option<f64>,
+    #[serde(default)]
+    point: Vec<Point>,
+}
+
+impl Trajectory {
+    /// Reads a trajectory from TOML text; `file` names it in errors.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let document = Document::new(file, text);
+        let raw: TrajectoryToml = document.read()?;
+        match raw.kind {
+            Kind::Fourier => fourier(&document, raw).map(Self::Fourier),
+            Kind::SingleJoint => single_joint(&document, raw).map(Self::SingleJoint),
+            Kind::Points => points(&document, raw).map(Self::Points),
+        }
+    }
+}
+
+fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates, ConfigError> {
+    raw.coordinates.ok_or_else(|| {
+        document.missing(
+            &["coordinates"],
+            "`coordinates = \"cartesian\"` or `\"joint\"`",
+        )
+    })
+}
+
+fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigError> {
+    let coordinates = coordinates(document, &raw)?;
+    let fundamental_hz = raw
+        .fundamental_hz
+        .ok_or_else(|| document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"))?;
+    document.positive(&["fundamental_hz"], fundamental_hz)?;
+    if raw.coordinate.is_empty() {
+        return Err(document.missing(
+            &["coordinate"],
+            "a `[[coordinate]]` table for each coordinate",
+        ));
+    }
+    for (index, coordinate) in raw.coordinate.iter().enumerate() {
+        let index = index.to_string();
+        let at = ["coordinate", index.as_str(), "name"];
+        if raw
+            .coordinate
+            .iter()
+            .filter(|c| c.name == coordinate.name)
+            .count()
+            > 1
+        {
+            return Err(document.value(&at, "is named twice", "give each coordinate one table"));
+        }
+        if coordinates == Coordinates::Cartesian && !CARTESIAN.contains(&coordinate.name.as_str()) {
+            return Err(document.value(
+                &at,
+                "is no actuator coordinate",
+                "name x_c1, x_c2, x_c3 or x_c4, or set `coordinates = \"joint\"`",
+            ));
+        }
+        if coordinate.a.len() != coordinate.b.len() || coordinate.a.is_empty() {
+            return Err(document.value(
+                &["coordinate", &index, "b"],
+                "does not have as many numbers as `a`",
+                "give a_l and b_l for the same l = 1..N, at least one",
+            ));
+        }
+        document.finite(&["coordinate", &index, "offset"], &[coordinate.offset])?;
+        document.finite(&["coordinate", &index, "a"], &coordinate.a)?;
+        document.finite(&["coordinate", &index, "b"], &coordinate.b)?;
+    }
+    Ok(Fourier {
+        coordinates,
+        fundamental_hz,
+        series: raw.coordinate,
+    })
+}
+
+fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointMove, ConfigError> {
+    let joint = raw
+        .joint
+        .ok_or_else(|| document.missing(&["joint"], "the joint that moves"))?;
+    if raw.speeds.is_empty() {
+        return Err(document.missing(
+            &["speeds"],
+            "the ladder of speeds, e.g. `speeds = [0.02, 0.1, 0.4]`",
+        ));
+    }
+    for &speed in &raw.speeds {
+        document.positive(&["speeds"], speed)?;
+    }
+    if let Some([low, high]) = raw.range {
+        document.finite(&["range"], &[low, high])?;
+        if low >= high {
+            return Err(document.value(&["range"], "is empty", "write the lower end first"));
+        }
+    }
+    if let Some(acceleration) = raw.acceleration {
+        document.positive(&["acceleration"], acceleration)?;
+    }
+    Ok(SingleJointMove {
+        joint,
+        speeds: raw.speeds,
+        range: raw.range,
+        acceleration: raw.acceleration,
+    })
+}
+
+fn points(document: &Document, raw: TrajectoryToml) -> Result<Points, ConfigError> {
+    let coordinates = coordinates(document, &raw)?;
+    if raw.point.len() < 2 {
+        return Err(document.missing(
+            &["point"],
+            "at least two `[[point]]` tables with `t` and `position`",
+        ));
+    }
+    for (index, pair) in raw.point.windows(2).enumerate() {
+        let index = (index + 1).to_string();
+        document.finite(&["point", &index, "t"], &[pair[0].t, pair[1].t])?;
+        if pair[1].t <= pair[0].t {
+            return Err(document.value(
+                &["point", &index, "t"],
+                "does not lie after the time before it",
+                "sort the points by increasing time",
+            ));
+        }
+        if pair[1].position.len() != pair[0].position.len() {
+            return Err(document.value(
+                &["point", &index, "position"],
+                "has another number of coordinates than the point before",
+                "give every coordinate in every point",
+            ));
+        }
+    }
+    for (index, point) in raw.point.iter().enumerate() {
+        document.finite(&["point", &index.to_string(), "position"], &point.position)?;
+    }
+    Ok(Points {
+        coordinates,
+        points: raw.point,
+    })
+}
