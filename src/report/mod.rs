@@ -3,4 +3,8 @@
 //! Everything here is a function of plain data and writes nowhere by itself; the same data give the
 //! same bytes.
 
+pub mod figure;
 pub mod json;
+pub mod number;
+pub mod summary;
+pub mod table;

@@ -1,0 +1,56 @@
+//! The legend: one line of samples and names, outside the data.
+
+use super::colour;
+use super::svg::{Anchor, Stroke, Svg, Type, width_of};
+
+/// What stands before a name.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Key {
+    Line(Stroke),
+    /// A line on a band of its colour.
+    Band(Stroke),
+    /// A dot with an error bar.
+    Dot(&'static str),
+    /// A tinted patch.
+    Patch(&'static str),
+}
+
+const SIZE: f64 = 11.0;
+const SAMPLE: f64 = 26.0;
+
+/// Draws the legend from `x` rightwards, its baseline at `y`. The names are the figures' own, few
+/// and short enough for one line.
+pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
+    let mut at = x;
+    for (key, name) in entries {
+        let width = SAMPLE + 6.0 + width_of(name, SIZE);
+        let middle = y - 0.36 * SIZE;
+        let sample = [at, middle];
+        match *key {
+            Key::Line(stroke) => svg.line(sample, [at + SAMPLE, middle], stroke),
+            Key::Band(stroke) => {
+                let outline = [
+                    [at, middle - 5.0],
+                    [at + SAMPLE, middle - 5.0],
+                    [at + SAMPLE, middle + 5.0],
+                    [at, middle + 5.0],
+                ];
+                svg.area(&outline, stroke.colour, 0.22);
+                svg.line(sample, [at + SAMPLE, middle], stroke);
+            }
+            Key::Dot(fill) => {
+                let centre = at + 0.5 * SAMPLE;
+                let bar = Stroke::solid(fill, 1.0);
+                svg.line([centre, middle - 6.0], [centre, middle + 6.0], bar);
+                svg.dot([centre, middle], 2.6, fill);
+            }
+            Key::Patch(fill) => svg.rect(
+                [at, middle - 5.0, SAMPLE, 10.0],
+                fill,
+                Some(Stroke::solid(colour::GRID, 0.6)),
+            ),
+        }
+        svg.text([at + SAMPLE + 6.0, y], name, Type::new(SIZE, Anchor::Start));
+        at += width + 14.0;
+    }
+}

@@ -1,0 +1,30 @@
+//! Static figures as SVG: measured and reconstructed torque, and friction curves.
+//!
+//! A small writer of our own instead of a plot library: panels of unequal height, dashes, bands and
+//! a legend outside the data are what these figures consist of, and the same data must give the same
+//! bytes.
+
+mod axis;
+mod decimate;
+mod friction;
+mod legend;
+mod panel;
+mod svg;
+mod torque;
+
+pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
+pub use torque::{JointTorque, TorqueFigure};
+
+/// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).
+mod colour {
+    pub const INK: &str = "#222222";
+    pub const MUTED: &str = "#666666";
+    pub const FRAME: &str = "#9a9a9a";
+    pub const GRID: &str = "#e7e7e7";
+    pub const ZERO: &str = "#bdbdbd";
+    pub const PAPER: &str = "#ffffff";
+    pub const BLUE: &str = "#0072b2";
+    pub const SKY: &str = "#56b4e9";
+    pub const VERMILLION: &str = "#d55e00";
+    pub const COVERED: &str = "#f0f4e8";
+}

@@ -1,0 +1,131 @@
+//! One frame with grid, ticks and axis titles; the figures put their data into it.
+
+use super::axis::{Scale, Ticks};
+use super::colour;
+use super::svg::{Anchor, Stroke, Svg, Type};
+
+const TICK: f64 = 10.0;
+const LABEL: f64 = 11.0;
+
+/// A frame and its two scales.
+#[derive(Debug)]
+pub(super) struct Panel {
+    /// x, y, width, height [px].
+    pub frame: [f64; 4],
+    pub x: Scale,
+    pub y: Scale,
+    x_ticks: Ticks,
+    y_ticks: Ticks,
+}
+
+impl Panel {
+    /// A frame for these intervals of data, with about so many numbers at each axis.
+    pub fn new(frame: [f64; 4], x: [f64; 2], y: [f64; 2], wanted: [usize; 2]) -> Self {
+        let [left, top, width, height] = frame;
+        Panel {
+            frame,
+            x: Scale::new(x, left, left + width),
+            y: Scale::new(y, top + height, top),
+            x_ticks: Ticks::new(x, wanted[0]),
+            y_ticks: Ticks::new(y, wanted[1]),
+        }
+    }
+
+    /// Data in px, run by run.
+    pub fn place(&self, runs: Vec<Vec<[f64; 2]>>) -> Vec<Vec<[f64; 2]>> {
+        let mut runs = runs;
+        for point in runs.iter_mut().flatten() {
+            *point = [self.x.px(point[0]), self.y.px(point[1])];
+        }
+        runs
+    }
+
+    /// Grid lines; the lines of 0 are darker.
+    pub fn grid(&self, svg: &mut Svg) {
+        let [left, top, width, height] = self.frame;
+        let shade = |value: f64| {
+            if value == 0.0 {
+                colour::ZERO
+            } else {
+                colour::GRID
+            }
+        };
+        for &value in &self.x_ticks.values {
+            let at = self.x.px(value);
+            svg.line(
+                [at, top],
+                [at, top + height],
+                Stroke::solid(shade(value), 0.8),
+            );
+        }
+        for &value in &self.y_ticks.values {
+            let at = self.y.px(value);
+            svg.line(
+                [left, at],
+                [left + width, at],
+                Stroke::solid(shade(value), 0.8),
+            );
+        }
+    }
+
+    /// The frame itself and the numbers at the left side.
+    pub fn outline(&self, svg: &mut Svg) {
+        let [left, ..] = self.frame;
+        svg.rect(self.frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
+        for (&value, text) in self.y_ticks.values.iter().zip(&self.y_ticks.texts) {
+            let at = self.y.px(value);
+            let mark = Stroke::solid(colour::FRAME, 0.9);
+            svg.line([left - 4.0, at], [left, at], mark);
+            svg.text(
+                [left - 7.0, at + 0.35 * TICK],
+                text,
+                Type::new(TICK, Anchor::End),
+            );
+        }
+    }
+
+    /// The numbers below.
+    pub fn x_numbers(&self, svg: &mut Svg) {
+        let [_, top, _, height] = self.frame;
+        for (&value, text) in self.x_ticks.values.iter().zip(&self.x_ticks.texts) {
+            let at = self.x.px(value);
+            let bottom = top + height;
+            let mark = Stroke::solid(colour::FRAME, 0.9);
+            svg.line([at, bottom], [at, bottom + 4.0], mark);
+            svg.text([at, bottom + 15.0], text, Type::new(TICK, Anchor::Middle));
+        }
+    }
+
+    /// The title of the lower axis, `name [unit]`.
+    pub fn x_title(&self, svg: &mut Svg, name: &str, unit: &str) {
+        let [left, top, width, height] = self.frame;
+        let title = format!("{name} [{}]", self.x_ticks.unit(unit));
+        svg.text(
+            [left + 0.5 * width, top + height + 31.0],
+            &title,
+            Type::new(LABEL, Anchor::Middle),
+        );
+    }
+
+    /// The title of the left axis, `name [unit]`, `offset` px left of the frame.
+    pub fn y_title(&self, svg: &mut Svg, offset: f64, name: &str, unit: &str) {
+        let [left, top, _, height] = self.frame;
+        let title = format!("{name} [{}]", self.y_ticks.unit(unit));
+        svg.upright(
+            [left - offset, top + 0.5 * height],
+            &title,
+            Type::new(LABEL, Anchor::Middle),
+        );
+    }
+
+    /// An empty frame that says why it is empty.
+    pub fn empty(svg: &mut Svg, frame: [f64; 4], reason: &str) {
+        let [left, top, width, height] = frame;
+        svg.rect(frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
+        svg.text(
+            [left + 0.5 * width, top + 0.5 * height + 4.0],
+            reason,
+            Type::new(LABEL, Anchor::Middle).muted(),
+        );
+    }
+}

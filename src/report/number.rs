@@ -1,0 +1,115 @@
+//! Numbers as a person reads them: as many digits as they deserve.
+
+/// What stands for a number that is not there.
+pub const ABSENT: &str = "-";
+
+/// `value` with `digits` significant digits, `1.23e-7` style where zeros would pile up.
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return ABSENT.into();
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let digits = digits.max(1) as i32;
+    let exponent = exponent_after_rounding(value, digits);
+    if (-4..6.max(digits)).contains(&exponent) {
+        let decimals = (digits - 1 - exponent).max(0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.*e}", (digits - 1) as usize)
+    }
+}
+
+/// Value and standard deviation as two texts: the deviation with two significant digits, the value
+/// down to the same place. Without a usable deviation the value has five digits.
+pub fn value_and_std(value: f64, std: f64) -> (String, String) {
+    if !std.is_finite() || std <= 0.0 {
+        let text = if std == 0.0 { "0" } else { ABSENT };
+        return (significant(value, 5), text.into());
+    }
+    if !value.is_finite() {
+        return (ABSENT.into(), significant(std, 2));
+    }
+    let last_place = exponent_after_rounding(std, 2) - 1;
+    let largest = exponent_after_rounding(value, 5).max(last_place + 1);
+    if last_place >= -7 && largest < 7 {
+        let decimals = (-last_place).max(0) as usize;
+        let value = format!("{value:.decimals$}");
+        let value = match value.strip_prefix('-') {
+            Some(rest) if rest.bytes().all(|c| c == b'0' || c == b'.') => rest.to_owned(),
+            _ => value,
+        };
+        (value, format!("{std:.decimals$}"))
+    } else {
+        let digits = (exponent_after_rounding(value, 5) - last_place).clamp(1, 9) as usize;
+        (format!("{value:.digits$e}"), format!("{std:.1e}"))
+    }
+}
+
+/// `value ± std` in one text.
+pub fn plus_minus(value: f64, std: f64) -> String {
+    let (value, std) = value_and_std(value, std);
+    format!("{value} ± {std}")
+}
+
+/// A fraction as percent with three significant digits: `0.0523` is `5.23 %`.
+pub fn percent(fraction: f64) -> String {
+    if fraction.is_finite() {
+        format!("{} %", significant(100.0 * fraction, 3))
+    } else {
+        ABSENT.into()
+    }
+}
+
+/// Power of ten of the leading digit, once `value` is rounded to `digits` digits.
+fn exponent_after_rounding(value: f64, digits: i32) -> i32 {
+    if value == 0.0 {
+        return 0;
+    }
+    // The formatter rounds as the output will: 9.996 with three digits leads with 1.00e1.
+    let text = format!("{value:.*e}", (digits - 1) as usize);
+    text.rsplit_once('e')
+        .and_then(|(_, exponent)| exponent.parse().ok())
+        .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_digits_survive_rounding_up_a_decade() {
+        assert_eq!(significant(9.996, 3), "10.0");
+        assert_eq!(significant(0.000123456, 3), "0.000123");
+        assert_eq!(significant(0.0000123456, 3), "1.23e-5");
+        assert_eq!(significant(-1234.56, 3), "-1235");
+        assert_eq!(significant(1.5e9, 3), "1.50e9");
+        assert_eq!(significant(0.0, 4), "0");
+        assert_eq!(significant(f64::NAN, 4), "-");
+    }
+
+    #[test]
+    fn the_deviation_decides_where_the_value_ends() {
+        let pair = |value, std| {
+            let (value, std) = value_and_std(value, std);
+            format!("{value} {std}")
+        };
+        assert_eq!(pair(95.10891, 0.0412), "95.109 0.041");
+        assert_eq!(pair(95.10891, 0.0996), "95.11 0.10");
+        assert_eq!(pair(-0.0004, 0.31), "0.00 0.31");
+        assert_eq!(pair(1234.6, 220.0), "1235 220");
+        assert_eq!(pair(1.23456e-6, 4.0e-9), "1.2346e-6 4.0e-9");
+        assert_eq!(pair(2.0, f64::NAN), "2.0000 -");
+        assert_eq!(pair(2.0, 0.0), "2.0000 0");
+        assert_eq!(pair(f64::NAN, 0.5), "- 0.50");
+    }
+
+    #[test]
+    fn fractions_are_shown_as_percent() {
+        assert_eq!(percent(0.00523), "0.523 %");
+        assert_eq!(percent(1.0), "100 %");
+        assert_eq!(percent(f64::INFINITY), "-");
+        assert_eq!(plus_minus(13.5, 0.25), "13.50 ± 0.25");
+    }
+}
