@@ -1,0 +1,228 @@
+//! What the user chooses about filtering, and the filters that follow for one sampling step.
+
+use serde::{Deserialize, Serialize};
+
+use super::MotionError;
+use crate::math::sos::Sos;
+use crate::math::zero_phase::ZeroPhase;
+
+/// Time constants of the position filter by which windows overlap. More than for the parallel
+/// filter, as differentiation makes up to 1 / step^2 of what is left.
+const POSITION_OVERLAP: f64 = 45.0;
+/// Time constants of the parallel filter by which windows overlap.
+const PARALLEL_OVERLAP: f64 = 28.0;
+/// Samples of a window besides its overlaps, at least.
+const WINDOW_CORE: usize = 8192;
+/// A position cut-off that is not asked for stays below this share of the sampling rate.
+const HIGHEST_SHARE: f64 = 0.4;
+
+/// How a log is filtered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Cut-off of the parallel filter [Hz]: the band of motion and torque that is kept.
+    pub cutoff_hz: f64,
+    /// Kind of the parallel filter.
+    pub filter: ParallelFilter,
+    /// Every how many samples a row is kept; left out, about ten rows per period of the cut-off.
+    pub decimation: Option<usize>,
+    /// Cut-off of the position filter [Hz]; left out, six times `cutoff_hz` but at most 0.4 of the
+    /// sampling rate.
+    pub q_cutoff_hz: Option<f64>,
+    /// Order of the (Butterworth) position filter; 0 differentiates raw positions.
+    pub q_order: usize,
+    /// How positions are differentiated.
+    pub differences: Differences,
+    /// At which time a logged torque acts.
+    pub torque: TorqueTiming,
+    /// A step longer than this many sampling steps splits the log.
+    pub gap_factor: f64,
+    /// Dropped at each end of a segment before the parallel filter [s], where the position filter
+    /// has nothing to look ahead to; left out, ten of that filter's time constants.
+    pub q_trim_s: Option<f64>,
+    /// Dropped at each end of a segment after the parallel filter [s]; left out, three of that
+    /// filter's time constants.
+    pub trim_s: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            cutoff_hz: 10.0,
+            filter: ParallelFilter::Butterworth { order: 4 },
+            decimation: None,
+            q_cutoff_hz: None,
+            q_order: 4,
+            differences: Differences::HighOrder,
+            torque: TorqueTiming::Sampled,
+            gap_factor: 2.5,
+            q_trim_s: None,
+            trim_s: None,
+        }
+    }
+}
+
+/// The filter that runs, forward and backward, over torque and computed columns alike.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ParallelFilter {
+    /// Flat in the pass band.
+    Butterworth {
+        /// Order of one pass.
+        order: usize,
+    },
+    /// Steep, with ripple: order 8, 0.05 dB at 0.8 of the new Nyquist frequency is the customary
+    /// decimating filter.
+    Chebyshev {
+        /// Order of one pass.
+        order: usize,
+        /// Ripple in the pass band [dB].
+        ripple_db: f64,
+    },
+}
+
+/// Difference formula for velocity and acceleration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Differences {
+    /// Three points, once for the velocity and once more for the acceleration.
+    Central,
+    /// Nine points, exact for polynomials of degree 8 (velocity) and 9 (acceleration).
+    HighOrder,
+}
+
+/// Time at which a logged torque acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TorqueTiming {
+    /// The value at the instant of the row.
+    Sampled,
+    /// The row's value acts from its instant to the next row (a held command): its mean about the
+    /// instant is formed from the values before and after.
+    HeldOverSample,
+}
+
+/// The filters and lengths for one sampling step.
+#[derive(Debug, Clone)]
+pub(super) struct Chain {
+    /// Sampling step [s].
+    pub dt: f64,
+    pub differences: Differences,
+    pub position: Option<ZeroPhase>,
+    pub q_cutoff_hz: Option<f64>,
+    pub parallel: ZeroPhase,
+    pub decimation: usize,
+    /// Samples dropped at a segment's end before the parallel filter.
+    pub edge: usize,
+    /// Samples dropped at a segment's end after the parallel filter.
+    pub trim: usize,
+    /// Samples at a window's artificial end that the position filter has not settled in.
+    pub position_overlap: usize,
+    /// Samples of overlap in all.
+    pub overlap: usize,
+    /// Samples of a window besides its overlaps.
+    pub core: usize,
+    /// Samples of the shortest segment that is used.
+    pub shortest: usize,
+}
+
+impl Chain {
+    pub(super) fn design(settings: &Settings, dt: f64) -> Result<Self, MotionError> {
+        let rate = 1.0 / dt;
+        let decimation = match settings.decimation {
+            Some(0) => {
+                return Err(MotionError::Setting {
+                    name: "decimation",
+                    value: 0.0,
+                    remedy: "1 keeps every row",
+                });
+            }
+            Some(every) => every,
+            None => ((rate / (10.0 * settings.cutoff_hz)) as usize).max(1),
+        };
+        let parallel = match settings.filter {
+            ParallelFilter::Butterworth { order } => {
+                Sos::butterworth(order, settings.cutoff_hz, rate)?
+            }
+            ParallelFilter::Chebyshev { order, ripple_db } => {
+                Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)?
+            }
+        };
+        let (position, q_cutoff_hz) = position_filter(settings, rate)?;
+        let edge = edge(settings, position.as_ref(), dt)?;
+        let trim = samples_of("trim_s", settings.trim_s, dt)?
+            .unwrap_or_else(|| parallel.settle_samples(3.0));
+        let pad = |sos: &Sos| sos.pad_samples() + 1;
+        let position_pad = position.as_ref().map_or(0, |f| pad(f.sos()));
+        // An artificial end must cost at least what a segment's end does, or a middle window
+        // would keep samples that the whole segment drops.
+        let position_overlap = settled(settings, position.as_ref(), POSITION_OVERLAP)
+            .max(edge)
+            .max(position_pad);
+        let parallel_overlap = parallel.settle_samples(PARALLEL_OVERLAP);
+        let overlap = position_overlap + parallel_overlap.max(trim).max(pad(&parallel));
+        let core = WINDOW_CORE.max(2 * overlap);
+        let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(&parallel));
+        Ok(Self {
+            dt,
+            differences: settings.differences,
+            position,
+            q_cutoff_hz,
+            parallel: ZeroPhase::new(parallel),
+            decimation,
+            edge,
+            trim,
+            position_overlap,
+            overlap,
+            core,
+            shortest,
+        })
+    }
+}
+
+/// The position filter and its cut-off [Hz].
+pub(super) fn position_filter(
+    settings: &Settings,
+    rate: f64,
+) -> Result<(Option<ZeroPhase>, Option<f64>), MotionError> {
+    if settings.q_order == 0 {
+        return Ok((None, None));
+    }
+    let cutoff = settings
+        .q_cutoff_hz
+        .unwrap_or_else(|| (6.0 * settings.cutoff_hz).min(HIGHEST_SHARE * rate));
+    let sos = Sos::butterworth(settings.q_order, cutoff, rate)?;
+    Ok((Some(ZeroPhase::new(sos)), Some(cutoff)))
+}
+
+/// Samples at a segment's end where the position filter lacks what it would look ahead to.
+pub(super) fn edge(
+    settings: &Settings,
+    position: Option<&ZeroPhase>,
+    dt: f64,
+) -> Result<usize, MotionError> {
+    let asked = samples_of("q_trim_s", settings.q_trim_s, dt)?;
+    Ok(asked.unwrap_or_else(|| settled(settings, position, 10.0)))
+}
+
+/// Samples after which `factor` time constants of the position filter have passed, and the
+/// differences reach no further back.
+fn settled(settings: &Settings, position: Option<&ZeroPhase>, factor: f64) -> usize {
+    position.map_or(0, |f| f.sos().settle_samples(factor)) + settings.differences.reach()
+}
+
+fn samples_of(
+    name: &'static str,
+    seconds: Option<f64>,
+    dt: f64,
+) -> Result<Option<usize>, MotionError> {
+    match seconds {
+        None => Ok(None),
+        Some(value) if (0.0..1e6).contains(&value) => Ok(Some((value / dt).round() as usize)),
+        Some(value) => Err(MotionError::Setting {
+            name,
+            value,
+            remedy: "a time in seconds, 0 or more",
+        }),
+    }
+}

@@ -1,0 +1,211 @@
+//! One window of a segment: smoothing, differentiation, the computed channels and their filter.
+
+use super::settings::Chain;
+use super::{MotionError, Row, Sample};
+
+/// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in
+/// a second-level cache.
+const GROUP: usize = 8;
+
+/// A stretch of one segment, with the overlaps that its filters need, and the rows that come of it.
+/// Its memory is reused from window to window.
+#[derive(Debug, Default)]
+pub(super) struct Window {
+    /// Number of the segment among those that are used.
+    pub segment: usize,
+    /// Index within the segment of the first sample held.
+    pub first: usize,
+    /// Samples of the segment whose rows this window gives, as indices within the segment.
+    pub core: std::ops::Range<usize>,
+    /// Whether the window reaches the segment's end.
+    pub ends: bool,
+    pub t: Vec<f64>,
+    pub q: Vec<f64>,
+    pub tau: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+    /// Computed channels, [group][sample][lane].
+    channels: Vec<f64>,
+    /// Samples of the rows, as indices within the window.
+    kept: Vec<usize>,
+    /// Channels of the rows before and after the filter, row-major.
+    raw: Vec<f64>,
+    filtered: Vec<f64>,
+}
+
+impl Window {
+    /// Computes the rows.
+    pub fn process(
+        &mut self,
+        chain: &Chain,
+        joints: usize,
+        channels: usize,
+        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+    ) -> Result<(), MotionError> {
+        let samples = self.t.len();
+        let dt = step_of(&self.t, chain.dt);
+        if let Some(filter) = &chain.position {
+            filter.run(&mut self.q, joints)?;
+        }
+        self.v.resize(samples * joints, 0.0);
+        self.a.resize(samples * joints, 0.0);
+        chain
+            .differences
+            .apply(&self.q, joints, dt, &mut self.v, &mut self.a);
+
+        // At a segment's end the parallel filter starts where the whole segment's would; at an
+        // artificial end, where the position filter has settled.
+        let lost = |at_end: bool| {
+            if at_end {
+                chain.edge
+            } else {
+                chain.position_overlap
+            }
+        };
+        let from = lost(self.first == 0);
+        let to = samples - lost(self.ends);
+        self.choose_rows(chain, samples);
+        self.compute(from..to, joints, channels, fill);
+        let span = to - from;
+        for group in self.channels.chunks_exact_mut(span * GROUP) {
+            chain.parallel.run(group, GROUP)?;
+        }
+        self.filtered.resize(self.kept.len() * channels, 0.0);
+        for (row, &k) in self.kept.iter().enumerate() {
+            let row = &mut self.filtered[row * channels..(row + 1) * channels];
+            for (lanes, group) in row
+                .chunks_mut(GROUP)
+                .zip(self.channels.chunks_exact(span * GROUP))
+            {
+                let at = (k - from) * GROUP;
+                lanes.copy_from_slice(&group[at..at + lanes.len()]);
+            }
+        }
+        match self.filtered.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(self.offending(from..to, joints, channels, fill)),
+        }
+    }
+
+    /// The rows, in order of time.
+    pub fn rows(&self, joints: usize, channels: usize) -> impl Iterator<Item = Row<'_>> {
+        self.kept.iter().enumerate().map(move |(row, &k)| {
+            let state = k * joints..(k + 1) * joints;
+            let values = row * channels..(row + 1) * channels;
+            Row {
+                t: self.t[k],
+                segment: self.segment,
+                q: &self.q[state.clone()],
+                v: &self.v[state.clone()],
+                a: &self.a[state],
+                raw: &self.raw[values.clone()],
+                filtered: &self.filtered[values],
+            }
+        })
+    }
+
+    /// Every m-th sample of the core, counted from where the segment's parallel filter starts, and
+    /// none within the trim.
+    fn choose_rows(&mut self, chain: &Chain, samples: usize) {
+        let lowest = chain.edge + chain.trim;
+        let highest = if self.ends {
+            (self.first + samples).saturating_sub(lowest)
+        } else {
+            usize::MAX
+        };
+        let start = self.core.start.max(lowest) - chain.edge;
+        let start = start.next_multiple_of(chain.decimation) + chain.edge;
+        self.kept.clear();
+        self.kept.extend(
+            (start..self.core.end.min(highest))
+                .step_by(chain.decimation)
+                .map(|index| index - self.first),
+        );
+    }
+
+    /// Fills the channels of the samples `span` and the raw values of the rows.
+    fn compute(
+        &mut self,
+        span: std::ops::Range<usize>,
+        joints: usize,
+        channels: usize,
+        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+    ) {
+        let size = span.len() * GROUP;
+        self.channels.clear();
+        self.channels.resize(channels.div_ceil(GROUP) * size, 0.0);
+        self.raw.clear();
+        let mut values = vec![0.0; channels];
+        let mut rows = self.kept.iter().peekable();
+        for k in span.clone() {
+            fill(&self.sample(k, joints), &mut values);
+            let at = (k - span.start) * GROUP;
+            for (lanes, group) in values
+                .chunks(GROUP)
+                .zip(self.channels.chunks_exact_mut(size))
+            {
+                group[at..at + lanes.len()].copy_from_slice(lanes);
+            }
+            if rows.next_if_eq(&&k).is_some() {
+                self.raw.extend_from_slice(&values);
+            }
+        }
+    }
+
+    /// The first sample at which a channel is not finite.
+    fn offending(
+        &self,
+        span: std::ops::Range<usize>,
+        joints: usize,
+        channels: usize,
+        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+    ) -> MotionError {
+        let mut values = vec![0.0; channels];
+        for k in span {
+            fill(&self.sample(k, joints), &mut values);
+            if let Some(channel) = values.iter().position(|x| !x.is_finite()) {
+                return MotionError::NotFinite {
+                    channel,
+                    value: values[channel],
+                    t: self.t[k],
+                };
+            }
+        }
+        // Every value is finite, but their weighted sum overflows.
+        let index = self.filtered.iter().position(|x| !x.is_finite());
+        let index = index.unwrap_or(0);
+        MotionError::NotFinite {
+            channel: index % channels.max(1),
+            value: self.filtered[index],
+            t: self.t[self.kept[index / channels.max(1)]],
+        }
+    }
+
+    fn sample(&self, k: usize, joints: usize) -> Sample<'_> {
+        let row = k * joints..(k + 1) * joints;
+        Sample {
+            t: self.t[k],
+            q: &self.q[row.clone()],
+            v: &self.v[row.clone()],
+            a: &self.a[row.clone()],
+            tau: &self.tau[row],
+        }
+    }
+}
+
+/// The sampling step of a window: the log's, unless the window's own times run away from it by a
+/// tenth of a step (a clock that drifts).
+pub(super) fn step_of(t: &[f64], dt: f64) -> f64 {
+    match t {
+        [first, .., last] => {
+            let steps = (t.len() - 1) as f64;
+            let span = last - first;
+            if (span - steps * dt).abs() > 0.1 * dt {
+                span / steps
+            } else {
+                dt
+            }
+        }
+        _ => dt,
+    }
+}
