@@ -132,11 +132,11 @@ fn whole(log: &Log, stretches: &[usize], settings: &Settings, dt: f64) -> Vec<Ke
         let (mut v, mut a) = (vec![0.0; q.len()], vec![0.0; q.len()]);
         settings.differences.apply(&q, JOINTS, dt, &mut v, &mut a);
         let mut raw = Vec::new();
-        for k in edge..length - edge {
+        for (k, &time) in t.iter().enumerate().take(length - edge).skip(edge) {
             let row = k * JOINTS..(k + 1) * JOINTS;
             let mut channels = [0.0; CHANNELS];
             let sample = Sample {
-                t: t[k],
+                t: time,
                 q: &q[row.clone()],
                 v: &v[row.clone()],
                 a: &a[row.clone()],
