@@ -8,6 +8,9 @@ use std::error::Error;
 use std::fmt;
 
 use super::exit::Exit;
+use crate::config::ConfigError;
+use crate::log::LogError;
+use crate::report::json::JsonError;
 
 /// An error ready to be shown: `error: ...`, then the places, then `hint: ...`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,6 +56,16 @@ impl CliError {
         Self::new(Exit::Interrupted, "interrupted, nothing was written")
     }
 
+    /// The error of a room, whose texts read `what is wrong; what to do`: the last part becomes the
+    /// hint.
+    pub fn from_room(exit: Exit, error: &(dyn Error + 'static)) -> Self {
+        let text = with_sources(error);
+        match text.rsplit_once("; ") {
+            Some((message, hint)) => Self::new(exit, message).hint(hint),
+            None => Self::new(exit, text),
+        }
+    }
+
     /// Adds a place: `file:line`, or the name of a setting.
     pub fn at(mut self, place: impl fmt::Display) -> Self {
         self.places.push(place.to_string());
@@ -85,6 +98,24 @@ impl fmt::Display for CliError {
 }
 
 impl Error for CliError {}
+
+impl From<LogError> for CliError {
+    fn from(error: LogError) -> Self {
+        Self::from_room(Exit::BadInput, &error)
+    }
+}
+
+impl From<ConfigError> for CliError {
+    fn from(error: ConfigError) -> Self {
+        Self::from_room(Exit::BadInput, &error)
+    }
+}
+
+impl From<JsonError> for CliError {
+    fn from(error: JsonError) -> Self {
+        Self::from_room(Exit::OutputFailed, &error)
+    }
+}
 
 /// The message of an error with those of its sources, `outer: inner`, each once.
 pub fn with_sources(error: &(dyn Error + 'static)) -> String {
@@ -138,6 +169,22 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "error: column \"\\u{1b}[31mq1\" is unknown\n  in the header"
+        );
+    }
+
+    #[test]
+    fn the_remedy_of_a_room_stands_on_a_line_of_its_own() {
+        let error = ConfigError::UnknownKey {
+            file: "cft.toml".into(),
+            line: 12,
+            key: "setpu".into(),
+            remedy: "did you mean `setup`?".into(),
+        };
+        let error = CliError::from(error);
+        assert_eq!(error.exit(), Exit::BadInput);
+        assert_eq!(
+            error.to_string(),
+            "error: cft.toml:12: unknown key `setpu`\nhint: did you mean `setup`?"
         );
     }
 

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use super::arguments;
+use crate::log::LogSpec;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident friction q1.csv q2.csv q4.csv q5.csv -r configs/cft.toml -o friction.toml
-  cft-ident friction again.csv -r configs/cft.toml --joint q4 -m friction.toml -o new.toml";
+  cft-ident friction q1.csv q2.csv q4.csv q5.csv -r configs/cft.toml -o f.toml
+  cft-ident friction q4b.csv -r configs/cft.toml --joint q4 -m f.toml -o new.toml";
 
 /// Estimate the friction of single joints by a continuous-discrete extended Kalman filter.
 ///
@@ -18,7 +19,7 @@ Example:
 pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
-    pub logs: Vec<String>,
+    pub logs: Vec<LogSpec>,
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: String,

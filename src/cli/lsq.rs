@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::log::LogSpec;
+
 const EXAMPLE: &str = "\
 Example:
   cft-ident lsq id.csv -r configs/cft.toml -m friction.toml -o model.toml
@@ -15,7 +17,7 @@ Example:
 pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
-    pub logs: Vec<String>,
+    pub logs: Vec<LogSpec>,
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: String,

@@ -145,11 +145,13 @@ mod tests {
     fn the_lines_of_the_contract_are_understood() {
         let args: super::friction::Args =
             parse("a.csv b.csv -r cft.toml --joint q4 -m old.toml -o new.toml").unwrap();
-        assert_eq!(args.logs, ["a.csv", "b.csv"]);
+        let names: Vec<String> = args.logs.iter().map(|log| log.name()).collect();
+        assert_eq!(names, ["a.csv", "b.csv"]);
         assert_eq!(args.joint.as_deref(), Some("q4"));
         let args: super::lsq::Args =
             parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
         assert_eq!(args.estimator, super::lsq::Estimator::Ols);
+        assert_eq!(args.logs[0].span.label().as_deref(), Some("0..70%"));
         let args: super::validate::Args =
             parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")
                 .unwrap();
@@ -166,6 +168,33 @@ mod tests {
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 
+    /// The help of one command's arguments, as the command will show it.
+    fn help<T: clap::Args>() -> String {
+        use clap::CommandFactory;
+        Alone::<T>::command()
+            .max_term_width(80)
+            .render_long_help()
+            .to_string()
+    }
+
+    #[test]
+    fn every_help_fits_80_columns_and_has_an_example() {
+        use super::{friction, identify, lsq, simulate, torque, validate};
+        let texts = [
+            help::<friction::Args>(),
+            help::<lsq::Args>(),
+            help::<validate::Args>(),
+            help::<torque::Args>(),
+            help::<simulate::Args>(),
+            help::<identify::Args>(),
+        ];
+        for text in texts {
+            assert!(text.contains("Example:\n  cft-ident "), "{text}");
+            let long = text.lines().find(|line| line.chars().count() > 80);
+            assert_eq!(long, None);
+        }
+    }
+
     #[test]
     fn lines_that_contradict_the_contract_are_refused() {
         use clap::error::ErrorKind::*;
@@ -176,6 +205,11 @@ mod tests {
         assert_eq!(kind, ValueValidation);
         let kind = parse::<super::friction::Args>("-r cft.toml -o m.toml").unwrap_err();
         assert_eq!(kind, MissingRequiredArgument);
+        let line = "a.csv@70..0% -r cft.toml -o m.toml";
+        assert_eq!(
+            parse::<super::lsq::Args>(line).unwrap_err(),
+            ValueValidation
+        );
         let line = "a.csv -r cft.toml -o m.toml --estimator magic";
         assert_eq!(parse::<super::lsq::Args>(line).unwrap_err(), InvalidValue);
         let line = "a.csv -m m.toml --max-relative-error nan";

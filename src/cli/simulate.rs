@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use super::arguments;
+use crate::log::LogSpec;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 --seed 7 -o q4.csv";
+  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o q4.csv";
 
 /// Simulate the robot under control and write its log.
 ///
@@ -29,7 +30,7 @@ pub struct Args {
     pub move_joint: Option<String>,
     /// Log whose volts u_1..u_4 drive the motors, without a controller
     #[arg(long, value_name = "LOG", group = "motion")]
-    pub volts: Option<String>,
+    pub volts: Option<LogSpec>,
     /// Duration [s]
     #[arg(long, value_name = "S", value_parser = arguments::positive)]
     pub seconds: Option<f64>,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::arguments;
+use crate::log::LogSpec;
 
 const EXAMPLE: &str = "\
 Example:
@@ -14,7 +15,7 @@ Example:
 pub struct Args {
     /// Log or trajectory of q; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(value_name = "LOG")]
-    pub log: String,
+    pub log: LogSpec,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::arguments;
+use crate::log::LogSpec;
 
 const EXAMPLE: &str = "\
 Example:
@@ -17,7 +18,7 @@ Example:
 pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
-    pub logs: Vec<String>,
+    pub logs: Vec<LogSpec>,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,

@@ -9,6 +9,8 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
+use crate::log::Provenance;
+
 /// What a document may not be made from.
 #[derive(Debug, Error)]
 pub enum JsonError {
@@ -29,21 +31,6 @@ pub enum JsonError {
     },
 }
 
-/// One input of a run, as the document names it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Input {
-    /// File name without its folder.
-    pub name: String,
-    /// The span that was used, as the user wrote it (`0..70%`, `15.2..23s`); null for the whole.
-    pub span: Option<String>,
-    /// SHA-256 of the whole file, hexadecimal.
-    pub sha256: String,
-    /// Samples inside the span; null for what is no log.
-    pub samples: Option<u64>,
-    /// Duration of the span [s]; null for what is no log.
-    pub duration_s: Option<f64>,
-}
-
 /// A complete document, ready to be printed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
@@ -57,7 +44,7 @@ impl Document {
     /// When `result` is no object, repeats a field of the envelope, or cannot be expressed in JSON.
     pub fn new<T: Serialize>(
         command: &str,
-        inputs: &[Input],
+        inputs: &[Provenance],
         warnings: &[String],
         result: &T,
     ) -> Result<Self, JsonError> {
@@ -122,13 +109,13 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    fn input() -> Input {
-        Input {
+    fn input() -> Provenance {
+        Provenance {
             name: "q4.csv".into(),
             span: Some("0..70%".into()),
             sha256: "00ff".into(),
-            samples: Some(14_000),
-            duration_s: Some(14.0),
+            samples: 14_000,
+            duration_s: 14.0,
         }
     }
 
