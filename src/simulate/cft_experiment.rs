@@ -1,0 +1,228 @@
+//! Experiments on the CFT robot with sound defaults: gains, one-joint ladders, the Table 3 run.
+//!
+//! The gains put each motor coordinate's own mode at about 60 rad/s (x_c1, x_c2) and 45 rad/s (x_c3,
+//! x_c4) with a damping of 0.6, for the inertia that its motor sees in the middle of the limits (229 kg
+//! on y_r, 270 kg on x_r, 1.3 kg m^2 on x_c3, 129 kg on x_c4).
+
+use super::SimulateError;
+use super::cft::{CftPlant, CftTruth};
+use super::chance::{Purpose, stream};
+use super::controller::Control;
+use super::effects::{EffectSpec, EffectValue, Effects, Site};
+use super::plant::Plant;
+use super::recording::Recording;
+use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, travel};
+use super::run::{Drive, Settings, Start, run};
+use crate::robot::JointKind;
+use crate::robot::cft::JOINTS;
+use crate::robot::cft::actuation::Setup;
+use crate::robot::cft::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, joints};
+
+/// Top speed of every motor: 4000 revolutions per minute \[rad/s\].
+const MOTOR_SPEED: f64 = 4000.0 * std::f64::consts::TAU / 60.0;
+
+/// Motor angle to y_r, x_r, x_c3, x_c4, gear and conversion ratio of Table 6 \[m/rad, rad/rad\].
+const CONVERSION: [f64; 4] = [
+    0.5 * 0.005 / std::f64::consts::TAU,
+    0.5 * 0.005 / std::f64::consts::TAU,
+    6.16 / (182.0 * std::f64::consts::TAU),
+    0.06 / (6.0 * std::f64::consts::TAU),
+];
+
+/// Share of the motors' top speed that a ladder uses.
+const SPEED_SHARE: f64 = 0.95;
+/// Distance to every limit, as a fraction of its span.
+const MARGIN: f64 = 0.05;
+/// Speeds of a ladder.
+const LEVELS: usize = 10;
+/// Time from zero speed to a slow plateau \[s\].
+const TURN: f64 = 0.3;
+/// Slowest plateau of q1 \[m/s\] and of q2, q4, q5 \[rad/s\]: a third of the speed at which friction
+/// with a slope of 200 s/m or 60 s/rad bends.
+const LOWEST: [f64; 4] = [0.0015, 0.005, 0.005, 0.005];
+
+/// Top speeds of the motor coordinates (x_c1, x_c2, x_c3, x_c4) at 4000 revolutions per minute:
+/// 0.167 m/s on y_r and x_r (seven and six times that on x_c1 and x_c2), 2.26 rad/s, 0.667 m/s.
+pub fn coordinate_speeds() -> [f64; 4] {
+    let ratio = [DOWNWARD_RATIO, OUTWARD_RATIO, 1.0, 1.0];
+    std::array::from_fn(|i| ratio[i] * CONVERSION[i] * MOTOR_SPEED)
+}
+
+impl Control<4> {
+    /// Gains that hold and track well on the set-up at 1 kHz.
+    pub fn cft(setup: Setup) -> Self {
+        // Volts per newton differ by a factor of four between the set-ups.
+        let scale = Setup::Tuedacs.gains()[0] / setup.gains()[0];
+        Self {
+            proportional: [270.0, 375.0, 80.0, 2400.0].map(|kp| scale * kp),
+            derivative: [5.4, 7.5, 2.1, 64.0].map(|kd| scale * kd),
+            filter_hz: 50.0,
+        }
+    }
+}
+
+/// One joint moves over its range at a ladder of speeds, the others are commanded to hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneJointMove {
+    /// Index of the joint in (q1, q2, q4, q5).
+    pub joint: usize,
+    /// Motor coordinates (x_c1..x_c4) around which it moves; the middle of the limits where absent.
+    pub pose: Option<[f64; 4]>,
+    /// Range of the joint, m or rad; what the limits leave, with a margin, where absent.
+    pub range: Option<(f64, f64)>,
+    /// Plateau speeds, m/s or rad/s; ten in equal ratios up to the motors' limit where absent.
+    pub speeds: Option<Vec<f64>>,
+    /// Largest acceleration, m/s^2 or rad/s^2; by joint and set-up where absent.
+    pub acceleration: Option<f64>,
+    /// Duration \[s\].
+    pub seconds: f64,
+    /// Shuffles the order of the speeds and the end at which the motion starts.
+    pub seed: Option<u64>,
+}
+
+impl OneJointMove {
+    /// The default ladder of a joint (0..3 for q1, q2, q4, q5).
+    pub fn new(joint: usize, seconds: f64, seed: Option<u64>) -> Self {
+        Self {
+            joint,
+            pose: None,
+            range: None,
+            speeds: None,
+            acceleration: None,
+            seconds,
+            seed,
+        }
+    }
+
+    /// The reference that the controller follows.
+    ///
+    /// # Errors
+    /// [`SimulateError`] when there is no such joint or the ladder does not fit.
+    pub fn reference(&self, setup: Setup) -> Result<Reference<4>, SimulateError> {
+        if self.joint >= 4 {
+            return Err(SimulateError::UnknownJoint {
+                name: format!("number {}", self.joint),
+                known: JOINTS.join(", "),
+            });
+        }
+        let plant = CftPlant::new(&CftTruth::synthetic(setup));
+        let mut pose = joints(&self.pose.unwrap_or(setup.limits().middles()))?;
+        let room = travel(&plant, &pose, self.joint, MARGIN, &coordinate_speeds())?;
+        let range = self.range.unwrap_or(room.range);
+        if range.0 < room.range.0 - 1e-9 || range.1 > room.range.1 + 1e-9 {
+            return Err(SimulateError::Reference {
+                what: format!(
+                    "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
+                    JOINTS[self.joint], range.0, range.1, room.range.0, room.range.1
+                ),
+            });
+        }
+        let acceleration = self.acceleration.unwrap_or(acceleration(setup)[self.joint]);
+        let top = SPEED_SHARE * room.top_speed;
+        let ladder = LadderPlan {
+            range,
+            speeds: self.speeds.clone().unwrap_or_else(|| {
+                LadderPlan::geometric(range, LOWEST[self.joint], top, LEVELS, acceleration)
+            }),
+            acceleration,
+            turn: TURN,
+            seconds: self.seconds,
+        };
+        let ladder = match self.seed {
+            Some(seed) => ladder.build(Some(&mut stream(seed, Purpose::Reference)))?,
+            None => ladder.build(None)?,
+        };
+        pose[self.joint] = ladder.at(0.0).0;
+        Ok(Reference {
+            frame: Frame::Joints,
+            path: Path::Ladder {
+                moving: self.joint,
+                pose,
+                ladder,
+            },
+        })
+    }
+}
+
+/// Accelerations that leave the amplifiers a reserve, for q1, q2, q4, q5 in m/s^2 and rad/s^2.
+const fn acceleration(setup: Setup) -> [f64; 4] {
+    match setup {
+        Setup::Tuedacs => [3.0, 8.0, 10.0, 10.0],
+        Setup::Dspace => [0.6, 6.0, 6.0, 6.0],
+    }
+}
+
+/// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
+pub fn excitation(setup: Setup) -> Reference<4> {
+    let mut series = Fourier::table_3();
+    if setup == Setup::Dspace {
+        series.offset[3] = setup.limits().middles()[3];
+    }
+    Reference {
+        frame: Frame::Motors,
+        path: Path::Fourier(series),
+    }
+}
+
+/// What the effects on a CFT robot are scaled with: the friction of each joint at a middling speed.
+pub fn effects(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    const SPEEDS: [f64; 4] = [0.2, 0.5, 0.5, 0.5];
+    let sites: [Site; 4] = std::array::from_fn(|joint| {
+        let kind = if joint == 0 {
+            JointKind::Prismatic
+        } else {
+            JointKind::Revolute
+        };
+        Site {
+            joint,
+            turns: kind == JointKind::Revolute,
+            scale: truth.friction[joint].torque(SPEEDS[joint]).abs(),
+            unit: kind.torque_unit(),
+        }
+    });
+    Effects::build(specs, &JOINTS.map(str::to_owned), &sites)
+}
+
+/// Runs a reference with the default gains, from the settled start.
+///
+/// # Errors
+/// As [`run`].
+pub fn follow(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+    reference: Reference<4>,
+    settings: &Settings<4>,
+) -> Result<Recording<4>, SimulateError> {
+    truth.check()?;
+    let (effects, _) = effects(truth, specs)?;
+    let drive = Drive::Follow {
+        reference,
+        control: Control::cft(truth.setup),
+    };
+    run(
+        &CftPlant::new(truth),
+        effects,
+        &Start::Settled,
+        &drive,
+        settings,
+    )
+}
+
+/// Largest distance between the wanted and the actual motor coordinates, and its root mean square.
+pub fn tracking_error<P: Plant<4>>(plant: &P, recording: &Recording<4>) -> ([f64; 4], [f64; 4]) {
+    let mut worst = [0.0; 4];
+    let mut squares = [0.0; 4];
+    for (q, target) in recording.actual.q.iter().zip(&recording.actual.target) {
+        let x = plant.coordinates(q);
+        for i in 0..4 {
+            let error = (x[i] - target[i]).abs();
+            worst[i] = f64::max(worst[i], error);
+            squares[i] += error * error;
+        }
+    }
+    let rows = recording.rows().max(1) as f64;
+    (worst, squares.map(|s| (s / rows).sqrt()))
+}

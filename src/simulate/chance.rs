@@ -1,0 +1,31 @@
+//! Random streams: one seed, and an own stream of ChaCha8 for each purpose.
+//!
+//! A stream that one purpose draws more or less from does not move the others: the noise of a log is
+//! the same whether effects are on or off, and whether samples are dropped or not.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// What chance is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// Parameters of a plant that vary from study to study.
+    Plant = 1,
+    /// Order and start phase of a reference.
+    Reference = 2,
+    /// Times of the samples.
+    Jitter = 3,
+    /// Rows that are lost.
+    Dropout = 4,
+    /// Noise of the logged volts.
+    Volts = 5,
+    /// Noise of the logged joint torques.
+    Torque = 6,
+}
+
+/// Generator of the given purpose.
+pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    generator.set_stream(purpose as u64);
+    generator
+}

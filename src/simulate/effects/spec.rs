@@ -1,0 +1,190 @@
+//! `NAME[:JOINT][:key=value,...]`: effects as they are asked for and as they came out.
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::{KINDS, Kind, Site};
+use crate::simulate::SimulateError;
+
+/// An effect as it is asked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectSpec {
+    pub name: String,
+    /// The joint; every joint where absent.
+    pub joint: Option<String>,
+    /// Keys that are given, in the order in which they are given.
+    pub values: Vec<(String, f64)>,
+}
+
+/// An effect as it acts: all its values, with units.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectValue {
+    pub effect: String,
+    pub family: String,
+    pub joint: String,
+    pub parameters: Vec<EffectParameter>,
+}
+
+/// One value of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectParameter {
+    pub key: String,
+    pub value: f64,
+    pub unit: String,
+}
+
+impl FromStr for EffectSpec {
+    type Err = SimulateError;
+
+    fn from_str(text: &str) -> Result<Self, SimulateError> {
+        let malformed = |part: &str| SimulateError::EffectSyntax {
+            text: text.to_owned(),
+            part: part.to_owned(),
+        };
+        let mut parts = text.split(':');
+        let name = parts.next().unwrap_or_default().trim();
+        if name.is_empty() {
+            return Err(malformed(text));
+        }
+        let mut spec = Self {
+            name: name.to_owned(),
+            joint: None,
+            values: Vec::new(),
+        };
+        for (place, part) in parts.enumerate() {
+            let part = part.trim();
+            if !part.contains('=') {
+                if place > 0 || part.is_empty() {
+                    return Err(malformed(part));
+                }
+                spec.joint = Some(part.to_owned());
+                continue;
+            }
+            if !spec.values.is_empty() {
+                return Err(malformed(part));
+            }
+            for pair in part.split(',') {
+                let (key, value) = pair.split_once('=').ok_or_else(|| malformed(pair))?;
+                let key = key.trim();
+                let value: f64 = value.trim().parse().map_err(|_| malformed(pair))?;
+                let twice = spec.values.iter().any(|(known, _)| known == key);
+                if !value.is_finite() || key.is_empty() || twice {
+                    return Err(malformed(pair));
+                }
+                spec.values.push((key.to_owned(), value));
+            }
+        }
+        Ok(spec)
+    }
+}
+
+impl EffectSpec {
+    /// The kind that the name stands for.
+    pub(super) fn kind(&self) -> Result<&'static Kind, SimulateError> {
+        let found = KINDS.iter().find(|kind| kind.name == self.name);
+        found.copied().ok_or_else(|| SimulateError::UnknownEffect {
+            name: self.name.clone(),
+            known: KINDS.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// The sites that the effect acts on: one joint, or all.
+    pub(super) fn sites<'a>(
+        &self,
+        joints: &[String],
+        sites: &'a [Site<'a>],
+    ) -> Result<&'a [Site<'a>], SimulateError> {
+        let Some(name) = &self.joint else {
+            return Ok(sites);
+        };
+        match joints.iter().position(|joint| joint == name) {
+            Some(i) => Ok(&sites[i..=i]),
+            None => Err(SimulateError::UnknownJoint {
+                name: name.clone(),
+                known: joints.join(", "),
+            }),
+        }
+    }
+
+    /// One number per key of the kind.
+    pub(super) fn numbers(&self, kind: &Kind, site: &Site) -> Result<Vec<f64>, SimulateError> {
+        for (key, _) in &self.values {
+            if !kind.keys.iter().any(|known| known.name == key) {
+                return Err(SimulateError::UnknownKey {
+                    effect: kind.name.to_owned(),
+                    key: key.clone(),
+                    known: kind
+                        .keys
+                        .iter()
+                        .map(|k| k.name)
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                });
+            }
+        }
+        let given = |key: &str| self.values.iter().find(|(k, _)| k == key).map(|(_, x)| *x);
+        let number = |key: &super::Key| given(key.name).unwrap_or_else(|| (key.default)(site));
+        Ok(kind.keys.iter().map(number).collect())
+    }
+}
+
+impl EffectValue {
+    pub(super) fn new(kind: &Kind, joint: &str, site: &Site, numbers: &[f64]) -> Self {
+        let parameter = |(key, &value): (&super::Key, &f64)| EffectParameter {
+            key: key.name.to_owned(),
+            value,
+            unit: match key.unit {
+                "torque" => site.unit.to_owned(),
+                "order" if site.turns => "1/rev".to_owned(),
+                "order" => "1/m".to_owned(),
+                other => other.to_owned(),
+            },
+        };
+        Self {
+            effect: kind.name.to_owned(),
+            family: kind.family.to_owned(),
+            joint: joint.to_owned(),
+            parameters: kind.keys.iter().zip(numbers).map(parameter).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_joints_and_values_are_read_in_every_permitted_form() {
+        let read = |text: &str| text.parse::<EffectSpec>().expect(text);
+        let bare = read("ripple");
+        assert_eq!((bare.joint, bare.values), (None, vec![]));
+        let joint = read("ripple:q4");
+        assert_eq!(joint.joint.as_deref(), Some("q4"));
+        let full = read("ripple:q4:order=12, sin=0.3,cos=-1e-2");
+        assert_eq!(full.values.len(), 3);
+        assert_eq!(full.values[2], ("cos".to_owned(), -0.01));
+        assert_eq!(
+            read("ripple:order=3").values,
+            vec![("order".to_owned(), 3.0)]
+        );
+    }
+
+    #[test]
+    fn malformed_effects_name_the_part_that_cannot_be_read() {
+        for (text, bad) in [
+            ("", ""),
+            ("ripple:q4:order", "order"),
+            ("ripple:q4:order=x", "order=x"),
+            ("ripple:q4:order=1,order=2", "order=2"),
+            ("ripple:q4:order=inf", "order=inf"),
+            ("ripple::order=1", ""),
+            ("ripple:order=1:q4", "q4"),
+        ] {
+            match text.parse::<EffectSpec>() {
+                Err(SimulateError::EffectSyntax { part, .. }) => assert_eq!(part, bad, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! What keeps a simulation from starting or ending.
+
+use crate::robot::RobotError;
+
+/// Errors of the room `simulate`.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// The state is no longer finite, or no step is short enough.
+    #[error(
+        "the simulated motion diverges at t = {t:.6} s; check gains, parameters and initial speeds, or lower \
+         the slopes of the friction law"
+    )]
+    Diverged { t: f64 },
+    /// A pose that the mechanism cannot take.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// A start outside the limits.
+    #[error(
+        "{coordinate} = {value:.5} at the start lies outside its limits [{lower}, {upper}]; begin inside them \
+         (the set-ups TUeDACS and dSPACE differ in x_c4)"
+    )]
+    LimitAtStart {
+        coordinate: String,
+        value: f64,
+        lower: f64,
+        upper: f64,
+    },
+    /// A reference that cannot be followed as it is written.
+    #[error("the reference cannot be used: {what}")]
+    Reference { what: String },
+    /// A number that a plant, controller or sensor cannot have.
+    #[error("{name} is {value}, but {rule}")]
+    Parameter {
+        name: &'static str,
+        value: f64,
+        rule: &'static str,
+    },
+    /// Parameters of no physical robot.
+    #[error(
+        "the inertia matrix is not positive definite at (x_c1, x_c2, x_c3, x_c4) = {x:.4?}; no physical robot \
+         has these theta_1..theta_12, so take others"
+    )]
+    NotPositiveDefinite { x: Vec<f64> },
+    /// Volts to play back that are no series.
+    #[error("the volts cannot be played back: {what}")]
+    Volts { what: String },
+    /// An effect that cannot be read.
+    #[error(
+        "effect `{text}`: cannot read `{part}`; write NAME, NAME:JOINT or NAME:JOINT:key=value,key=value"
+    )]
+    EffectSyntax { text: String, part: String },
+    /// An effect that is not known.
+    #[error("there is no effect `{name}` in the simulator; it has {known}")]
+    UnknownEffect { name: String, known: String },
+    /// A key that the effect does not have.
+    #[error("effect `{effect}` has no key `{key}`; its keys are {known}")]
+    UnknownKey {
+        effect: String,
+        key: String,
+        known: String,
+    },
+    /// A joint that the robot does not have.
+    #[error("the robot has no joint `{name}`; its joints are {known}")]
+    UnknownJoint { name: String, known: String },
+    /// More extra states than the integrator is compiled for.
+    #[error(
+        "the effects need {states} states of their own and at most {most} are possible; use fewer effects"
+    )]
+    TooManyStates { states: usize, most: usize },
+}

@@ -1,0 +1,181 @@
+//! What a simulation gives: the log as a laboratory would have it, and beside it what was true.
+
+use super::chance::Purpose;
+use super::integrate::Effort;
+use super::plant::Plant;
+use super::sensors::{Sensors, disturb};
+
+/// State of one motor channel at a sample (the status output of the report's Figure 9).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Status {
+    #[default]
+    Running,
+    /// The amplifier gives its largest voltage.
+    Saturated,
+    /// The coordinate is at or beyond a limit of Table 5.
+    LimitReached,
+}
+
+impl Status {
+    /// 0 running, 1 saturated, 2 limit reached.
+    pub fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+/// A limit that was reached.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitEvent {
+    pub coordinate: String,
+    /// Time of the first sample at which the coordinate was outside \[s\].
+    pub t: f64,
+    /// Where it was, m or rad.
+    pub value: f64,
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// How the run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// After the time that was asked for.
+    Completed,
+    /// At the first limit reached; the last row shows it.
+    StoppedAtLimit,
+}
+
+/// What was true at each row, and what the controller wanted.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Actual<const J: usize> {
+    /// Joint positions, m or rad.
+    pub q: Vec<[f64; J]>,
+    /// Joint speeds, m/s or rad/s.
+    pub v: Vec<[f64; J]>,
+    /// Joint torques that act from this sample on, N or N m.
+    pub torque: Vec<[f64; J]>,
+    /// Wanted motor coordinates, m or rad; the actual ones where nothing is followed.
+    pub target: Vec<[f64; J]>,
+}
+
+/// A simulated log, one entry per row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording<const J: usize> {
+    pub joints: [String; J],
+    pub coordinates: [String; J],
+    /// Time \[s\].
+    pub t: Vec<f64>,
+    /// Motor coordinates by the encoders, m or rad.
+    pub x: Vec<[f64; J]>,
+    /// Volts after saturation, held until the next sample, with the noise of their measurement \[V\].
+    pub volts: Vec<[f64; J]>,
+    /// Joint positions by the encoders, m or rad.
+    pub q: Vec<[f64; J]>,
+    /// Joint torques of the logged volts at the logged pose, eq. (66), with their own noise, N or N m.
+    pub torque: Vec<[f64; J]>,
+    pub status: Vec<[Status; J]>,
+    pub actual: Actual<J>,
+    /// The first time that each coordinate reached a limit.
+    pub limits: Vec<LimitEvent>,
+    pub ending: Ending,
+    /// Standard deviation of the noise on the volts \[V\].
+    pub volt_noise: [f64; J],
+    /// Standard deviation of the noise on the torques themselves, N or N m.
+    pub torque_noise: [f64; J],
+    /// What the integration cost.
+    pub effort: Effort,
+}
+
+impl<const J: usize> Recording<J> {
+    pub(super) fn empty<P: Plant<J>>(plant: &P, rows: usize) -> Self {
+        Self {
+            joints: plant.joint_names(),
+            coordinates: plant.coordinate_names(),
+            t: Vec::with_capacity(rows),
+            x: Vec::with_capacity(rows),
+            volts: Vec::with_capacity(rows),
+            q: Vec::with_capacity(rows),
+            torque: Vec::with_capacity(rows),
+            status: Vec::with_capacity(rows),
+            actual: Actual {
+                q: Vec::with_capacity(rows),
+                v: Vec::with_capacity(rows),
+                torque: Vec::with_capacity(rows),
+                target: Vec::with_capacity(rows),
+            },
+            limits: Vec::new(),
+            ending: Ending::Completed,
+            volt_noise: [0.0; J],
+            torque_noise: [0.0; J],
+            effort: Effort::default(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Turns the clean rows into what is logged: noise on volts, torques by (66), noise on torques, lost
+    /// rows.
+    pub(super) fn measure<P: Plant<J>>(&mut self, plant: &P, sensors: &Sensors<J>, seed: u64) {
+        self.volt_noise = sensors.volt_noise.deviation(&self.volts);
+        // The torque's own noise is sized by the torque without any.
+        self.torque_noise = sensors.torque_noise.deviation(&self.torque);
+        disturb(&mut self.volts, &self.volt_noise, seed, Purpose::Volts);
+        for ((torque, q), volts) in self.torque.iter_mut().zip(&self.q).zip(&self.volts) {
+            *torque = plant.torque(q, volts);
+        }
+        disturb(&mut self.torque, &self.torque_noise, seed, Purpose::Torque);
+        if sensors.dropouts > 0.0 {
+            let kept = sensors.kept(self.rows(), seed);
+            retain(&mut self.t, &kept);
+            retain(&mut self.status, &kept);
+            let columns = [
+                &mut self.x,
+                &mut self.volts,
+                &mut self.q,
+                &mut self.torque,
+                &mut self.actual.q,
+                &mut self.actual.v,
+                &mut self.actual.torque,
+                &mut self.actual.target,
+            ];
+            for column in columns {
+                retain(column, &kept);
+            }
+        }
+    }
+
+    /// Column names of the log: t, q_*, tau_*, and with `raw` also the motor coordinates, u_1.. and
+    /// status_1...
+    pub fn header(&self, raw: bool) -> Vec<String> {
+        let mut names = vec!["t".to_owned()];
+        names.extend(self.joints.iter().map(|joint| format!("q_{joint}")));
+        names.extend(self.joints.iter().map(|joint| format!("tau_{joint}")));
+        if raw {
+            names.extend(self.coordinates.iter().cloned());
+            names.extend((1..=J).map(|i| format!("u_{i}")));
+            names.extend((1..=J).map(|i| format!("status_{i}")));
+        }
+        names
+    }
+
+    /// Writes row k into `out`, in the order of [`Self::header`].
+    pub fn row(&self, k: usize, raw: bool, out: &mut Vec<f64>) {
+        out.clear();
+        out.push(self.t[k]);
+        out.extend(self.q[k]);
+        out.extend(self.torque[k]);
+        if raw {
+            out.extend(self.x[k]);
+            out.extend(self.volts[k]);
+            out.extend(self.status[k].map(|s| f64::from(s.code())));
+        }
+    }
+}
+
+/// Keeps the entries that are marked.
+fn retain<T>(column: &mut Vec<T>, kept: &[bool]) {
+    let mut marks = kept.iter();
+    column.retain(|_| marks.next().copied().unwrap_or(true));
+}

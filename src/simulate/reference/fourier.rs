@@ -1,0 +1,185 @@
+//! Finite Fourier series of eq. (43), entered smoothly from rest.
+
+use std::f64::consts::TAU;
+
+use super::Target;
+use crate::simulate::SimulateError;
+
+/// Positions x_i(t) = offset_i + sum_l a_il/(l w) sin(l w t) - b_il/(l w) cos(l w t), eq. (43).
+///
+/// The series is entered by running its own clock slowly at first: during the first
+/// [`Fourier::blend`] seconds the phase accelerates from standstill to one second per second, so that
+/// the path is that of the series from the start and never leaves its range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fourier<const J: usize> {
+    /// Offset per coordinate, m or rad.
+    pub offset: [f64; J],
+    /// a_l for l = 1, 2, ...: amplitudes of the velocity, m/s or rad/s.
+    pub a: Vec<[f64; J]>,
+    /// b_l, as many as a_l.
+    pub b: Vec<[f64; J]>,
+    /// Fundamental angular frequency w \[rad/s\].
+    pub fundamental: f64,
+    /// Phase at which the motion begins, in seconds of the series' own time.
+    pub start: f64,
+    /// Time within which the motion reaches full speed \[s\].
+    pub blend: f64,
+}
+
+impl Fourier<4> {
+    /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3, N = 4, at
+    /// 2 pi 0.4 rad/s, with the printed offsets. It lies inside Table 5 on TUeDACS; on dSPACE x_c4 needs
+    /// another offset.
+    pub fn table_3() -> Self {
+        Self {
+            offset: [-0.1343, 0.2766, 2.4, 0.0869],
+            a: vec![
+                [-0.1102, 0.1629, 1.9698, 0.0002],
+                [0.0042, -0.0118, 0.0014, -0.0302],
+                [-0.0014, 0.1438, -0.0267, 0.0021],
+                [-0.0173, -0.0043, 0.0021, -0.0800],
+            ],
+            b: vec![
+                [0.0037, 0.0188, 0.0011, -0.0347],
+                [0.0009, -0.0257, 0.0005, 0.0273],
+                [0.0005, 0.0033, -0.0060, 0.0294],
+                [-0.0168, -0.0277, 0.0024, 0.0447],
+            ],
+            fundamental: TAU * 0.4,
+            start: 0.0,
+            blend: 2.0,
+        }
+    }
+}
+
+impl<const J: usize> Fourier<J> {
+    /// Duration of one period \[s\].
+    pub fn period(&self) -> f64 {
+        TAU / self.fundamental
+    }
+
+    /// # Errors
+    /// [`SimulateError::Reference`] when a number is not finite, the frequency not positive, or a and
+    /// b differ in length.
+    pub fn check(&self) -> Result<(), SimulateError> {
+        let reject = |what: String| Err(SimulateError::Reference { what });
+        if !(self.fundamental > 0.0 && self.fundamental.is_finite()) {
+            return reject(format!(
+                "the fundamental frequency is {} rad/s; it must be positive",
+                self.fundamental
+            ));
+        }
+        if !(self.blend >= 0.0 && self.blend.is_finite() && self.start.is_finite()) {
+            return reject(format!(
+                "the blend time {} s or the start phase {} s is no usable time",
+                self.blend, self.start
+            ));
+        }
+        if self.a.len() != self.b.len() {
+            return reject(format!(
+                "the series has {} coefficients a and {} coefficients b; give as many of each",
+                self.a.len(),
+                self.b.len()
+            ));
+        }
+        let numbers = self.a.iter().chain(&self.b).flatten().chain(&self.offset);
+        for number in numbers {
+            if !number.is_finite() {
+                return reject(format!("a coefficient of the series is {number}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Position and velocity at time t >= 0 \[s\].
+    pub fn at(&self, t: f64) -> Target<J> {
+        let (phase, rate) = self.clock(t);
+        let mut target = Target {
+            position: self.offset,
+            velocity: [0.0; J],
+        };
+        for (l, (a, b)) in self.a.iter().zip(&self.b).enumerate() {
+            let omega = self.fundamental * (l + 1) as f64;
+            let (sin, cos) = (omega * phase).sin_cos();
+            for i in 0..J {
+                target.position[i] += (a[i] * sin - b[i] * cos) / omega;
+                target.velocity[i] += rate * (a[i] * cos + b[i] * sin);
+            }
+        }
+        target
+    }
+
+    /// The series' own time and its rate: the rate rises as x^3 (10 - 15 x + 6 x^2).
+    fn clock(&self, t: f64) -> (f64, f64) {
+        if t >= self.blend {
+            return (self.start + t - 0.5 * self.blend, 1.0);
+        }
+        let x = (t / self.blend).max(0.0);
+        let x3 = x * x * x;
+        (
+            self.start + self.blend * x3 * x * (2.5 - 3.0 * x + x * x),
+            x3 * (10.0 - 15.0 * x + 6.0 * x * x),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn velocity_is_the_derivative_of_position_through_the_blend() {
+        let series = Fourier::table_3();
+        let h = 1e-5;
+        for k in 1..200 {
+            let t = 0.05 * f64::from(k);
+            let (before, here, after) = (series.at(t - h), series.at(t), series.at(t + h));
+            for i in 0..4 {
+                let slope = (after.position[i] - before.position[i]) / (2.0 * h);
+                assert!(
+                    (slope - here.velocity[i]).abs() < 1e-8,
+                    "t {t}, coordinate {i}: {slope} against {}",
+                    here.velocity[i]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn motion_starts_at_rest_and_ends_periodic() {
+        let series = Fourier::table_3();
+        assert_eq!(series.at(0.0).velocity, [0.0; 4]);
+        let (one, next) = (series.at(5.0), series.at(5.0 + series.period()));
+        for i in 0..4 {
+            assert!((one.position[i] - next.position[i]).abs() < 1e-12);
+            assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn table_3_uses_the_shares_of_the_spans_that_are_known() {
+        // Shares of the spans of x_c1..x_c4 in use: 28, 21, 26 and 9 %.
+        let spans = [0.315, 0.607, 6.16, 0.595];
+        let series = Fourier::table_3();
+        for (i, (span, share)) in spans.iter().zip([28.0, 21.0, 26.0, 9.0]).enumerate() {
+            let values = (0..5000).map(|k| series.at(2.0 + f64::from(k) * 1e-3).position[i]);
+            let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+            let used = 100.0 * (high - low) / span;
+            assert!((used - share).abs() < 0.6, "coordinate {i}: {used} %");
+        }
+    }
+
+    #[test]
+    fn unusable_series_are_refused() {
+        let broken = |change: fn(&mut Fourier<4>)| {
+            let mut series = Fourier::table_3();
+            change(&mut series);
+            series.check().is_err()
+        };
+        assert!(Fourier::table_3().check().is_ok());
+        assert!(broken(|s| s.fundamental = 0.0));
+        assert!(broken(|s| s.b.truncate(2)));
+        assert!(broken(|s| s.a[1][2] = f64::NAN));
+        assert!(broken(|s| s.blend = -1.0));
+    }
+}

@@ -1,0 +1,464 @@
+//! One coordinate runs back and forth over its range at a ladder of speeds.
+//!
+//! What such a log must show is the friction curve: plateaus at speeds spread evenly in the logarithm,
+//! each in both directions, and reversals that pass zero speed without a dwell, slowly next to slow
+//! plateaus, so that even a slope of 200 s/m has many samples inside it. Fast strokes sweep the whole
+//! range (there gravity and inertia show their dependence on position); slow strokes are inserted in
+//! pairs behind them and take the time that is left.
+
+use rand::RngExt;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use crate::simulate::SimulateError;
+
+/// What the ladder has to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LadderPlan {
+    /// Lower and upper end of the motion, m or rad.
+    pub range: (f64, f64),
+    /// Speeds of the plateaus, m/s or rad/s; each occurs in both directions.
+    pub speeds: Vec<f64>,
+    /// Largest acceleration, m/s^2 or rad/s^2.
+    pub acceleration: f64,
+    /// Time from zero speed to the plateau where the acceleration does not need more \[s\].
+    pub turn: f64,
+    /// Duration of the whole motion \[s\].
+    pub seconds: f64,
+}
+
+/// The motion: strokes between turning points, in time order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ladder {
+    strokes: Vec<Stroke>,
+    end: f64,
+    seconds: f64,
+}
+
+/// How a stroke's speed meets zero: at rest, or on its way to the next stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Meeting {
+    /// v (10 x^3 - 15 x^4 + 6 x^5): no acceleration at zero speed.
+    Rest,
+    /// v (15 x - 10 x^3 + 3 x^5)/8: the acceleration is largest at zero speed and the next stroke
+    /// starts with the same.
+    Turn,
+}
+
+/// Peak slope of both ramps, in units of speed over ramp time.
+const PEAK: f64 = 1.875;
+/// A sweep must have at least this share of the range at its plateau speed.
+const PLATEAU_SHARE: f64 = 0.25;
+/// Duration of one pass through all speeds, the longest \[s\].
+const PASS: f64 = 20.0;
+
+impl Meeting {
+    /// Speed at the fraction x of the ramp, over the plateau speed.
+    fn speed(self, x: f64) -> f64 {
+        let x2 = x * x;
+        match self {
+            Self::Rest => x2 * x * (10.0 - 15.0 * x + 6.0 * x2),
+            Self::Turn => x * (15.0 - 10.0 * x2 + 3.0 * x2 * x2) / 8.0,
+        }
+    }
+
+    /// Distance at the fraction x of the ramp, over plateau speed times ramp time.
+    fn distance(self, x: f64) -> f64 {
+        let x2 = x * x;
+        match self {
+            Self::Rest => x2 * x2 * (2.5 - 3.0 * x + x2),
+            Self::Turn => x2 * (7.5 - 2.5 * x2 + 0.5 * x2 * x2) / 8.0,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Stroke {
+    start: f64,
+    from: f64,
+    direction: f64,
+    speed: f64,
+    /// Way in: how it begins and how long the ramp takes.
+    rise: (Meeting, f64),
+    plateau: f64,
+    /// Way out, as the way in.
+    fall: (Meeting, f64),
+}
+
+impl Stroke {
+    fn ramps(&self) -> f64 {
+        self.speed
+            * (self.rise.0.distance(1.0) * self.rise.1 + self.fall.0.distance(1.0) * self.fall.1)
+    }
+
+    fn duration(&self) -> f64 {
+        self.rise.1 + self.plateau + self.fall.1
+    }
+
+    fn length(&self) -> f64 {
+        self.ramps() + self.speed * self.plateau
+    }
+
+    /// Way covered and speed at a time after the start.
+    fn at(&self, elapsed: f64) -> (f64, f64) {
+        let (rise, rise_time) = self.rise;
+        let (fall, fall_time) = self.fall;
+        if elapsed < rise_time {
+            let x = elapsed / rise_time;
+            return (
+                self.speed * rise_time * rise.distance(x),
+                self.speed * rise.speed(x),
+            );
+        }
+        if elapsed < rise_time + self.plateau {
+            let way = rise_time * rise.distance(1.0) + elapsed - rise_time;
+            return (self.speed * way, self.speed);
+        }
+        let x = ((self.duration() - elapsed) / fall_time).clamp(0.0, 1.0);
+        (
+            self.length() - self.speed * fall_time * fall.distance(x),
+            self.speed * fall.speed(x),
+        )
+    }
+}
+
+/// A plateau in the order of the motion: its speed, and whether it goes to the end of the range.
+#[derive(Debug, Clone, Copy)]
+struct Rung {
+    speed: f64,
+    sweeps: bool,
+}
+
+impl LadderPlan {
+    /// Speeds in equal ratios from `top` down to `lowest`, where `top` is lowered as far as the range
+    /// demands at the given acceleration.
+    pub fn geometric(
+        range: (f64, f64),
+        lowest: f64,
+        top: f64,
+        count: usize,
+        acceleration: f64,
+    ) -> Vec<f64> {
+        let top = top.min(top_speed(range, acceleration)).max(lowest);
+        let steps = count.max(2) - 1;
+        (0..=steps)
+            .map(|k| top * (lowest / top).powf(k as f64 / steps as f64))
+            .collect()
+    }
+
+    /// The motion; `chance` shuffles the order of the strokes and the end at which it starts.
+    ///
+    /// # Errors
+    /// [`SimulateError::Reference`] when the range is empty, a speed does not fit into it, or the time
+    /// does not suffice for one pass.
+    pub fn build(&self, chance: Option<&mut ChaCha8Rng>) -> Result<Ladder, SimulateError> {
+        self.check()?;
+        let mut speeds = self.speeds.clone();
+        speeds.sort_by(|a, b| b.total_cmp(a));
+        let passes = (self.seconds / PASS).round().max(1.0) as usize;
+        let sweeping = self.sweeping(&speeds, self.seconds / passes as f64);
+        let mut mirrored = false;
+        let mut order = Vec::with_capacity(2 * speeds.len() * passes);
+        let mut chance = chance;
+        if let Some(chance) = chance.as_deref_mut() {
+            mirrored = chance.random_bool(0.5);
+        }
+        for _ in 0..passes {
+            let (mut fast, mut slow) = (speeds[..sweeping].to_vec(), speeds[sweeping..].to_vec());
+            if let Some(chance) = chance.as_deref_mut() {
+                fast.shuffle(chance);
+                slow.shuffle(chance);
+            }
+            interleave(&fast, &slow, &mut order);
+        }
+        // The plateau time of the slow strokes fills what the sweeps leave.
+        let shortest = self.lay_out(&order, 0.0, mirrored);
+        if shortest.end > self.seconds {
+            return Err(SimulateError::Reference {
+                what: format!(
+                    "the ladder of {} speeds needs at least {:.1} s in each pass and has {:.1} s; give more \
+                     seconds, fewer speeds or a smaller range",
+                    speeds.len(),
+                    shortest.end / passes as f64,
+                    self.seconds / passes as f64
+                ),
+            });
+        }
+        let (mut low, mut high) = (0.0, self.seconds);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.lay_out(&order, middle, mirrored).end > self.seconds {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        Ok(self.lay_out(&order, low, mirrored))
+    }
+
+    fn check(&self) -> Result<(), SimulateError> {
+        let reject = |what: String| Err(SimulateError::Reference { what });
+        let (low, high) = self.range;
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        if !(low.is_finite() && high.is_finite() && high > low) {
+            return reject(format!("the range [{low}, {high}] of the ladder is empty"));
+        }
+        if !(positive(self.acceleration) && positive(self.turn) && positive(self.seconds)) {
+            return reject(format!(
+                "acceleration {}, turn time {} s and duration {} s must be positive",
+                self.acceleration, self.turn, self.seconds
+            ));
+        }
+        if self.speeds.is_empty() {
+            return reject("the ladder has no speeds; give at least one".to_owned());
+        }
+        let fastest = top_speed(self.range, self.acceleration);
+        for &speed in &self.speeds {
+            if !positive(speed) || speed > fastest * (1.0 + 1e-9) {
+                return reject(format!(
+                    "the speed {speed} does not fit: over the range [{low}, {high}] at an acceleration of {} \
+                     the ladder reaches {fastest:.4}",
+                    self.acceleration
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// How many of the (descending) speeds sweep the whole range: as many as fit into half the time.
+    fn sweeping(&self, speeds: &[f64], seconds: f64) -> usize {
+        let range = self.range.1 - self.range.0;
+        let mut spent = 0.0;
+        let mut count = 0;
+        for &speed in speeds {
+            spent += 2.0 * (range / speed + speed / self.acceleration);
+            if count > 0 && spent > 0.5 * seconds {
+                break;
+            }
+            count += 1;
+        }
+        count
+    }
+
+    /// Acceleration where a stroke of one speed meets one of another.
+    fn meeting(&self, before: f64, after: f64) -> f64 {
+        (PEAK * before.max(after) / self.turn).min(self.acceleration)
+    }
+
+    fn lay_out(&self, order: &[Rung], plateau: f64, mirrored: bool) -> Ladder {
+        let (low, high) = self.range;
+        let mut strokes = Vec::with_capacity(order.len());
+        let (mut position, mut direction) = if mirrored { (high, -1.0) } else { (low, 1.0) };
+        let mut start = 0.0;
+        for (k, rung) in order.iter().enumerate() {
+            let before = k.checked_sub(1).map(|k| order[k].speed);
+            let after = order.get(k + 1).map(|r| r.speed);
+            let ramp = |neighbour: Option<f64>| {
+                let meeting = if neighbour.is_some() {
+                    Meeting::Turn
+                } else {
+                    Meeting::Rest
+                };
+                let acceleration = self.meeting(rung.speed, neighbour.unwrap_or(0.0));
+                (meeting, PEAK * rung.speed / acceleration)
+            };
+            let mut stroke = Stroke {
+                start,
+                from: position,
+                direction,
+                speed: rung.speed,
+                rise: ramp(before),
+                plateau,
+                fall: ramp(after),
+            };
+            let room = if direction > 0.0 {
+                high - position
+            } else {
+                position - low
+            };
+            let longest = ((room - stroke.ramps()) / rung.speed).max(0.0);
+            if rung.sweeps || plateau > longest {
+                stroke.plateau = longest;
+            }
+            position += direction * stroke.length();
+            start += stroke.duration();
+            direction = -direction;
+            strokes.push(stroke);
+        }
+        Ladder {
+            strokes,
+            end: start,
+            seconds: self.seconds,
+        }
+    }
+}
+
+/// Largest plateau speed whose ramps leave [`PLATEAU_SHARE`] of the range.
+fn top_speed((low, high): (f64, f64), acceleration: f64) -> f64 {
+    let ramps = 2.0 * PEAK * Meeting::Turn.distance(1.0);
+    ((1.0 - PLATEAU_SHARE) * (high - low) * acceleration / ramps).sqrt()
+}
+
+/// Each fast speed sweeps there and back; the slow ones follow in pairs, spread evenly behind the sweeps.
+fn interleave(fast: &[f64], slow: &[f64], order: &mut Vec<Rung>) {
+    let slots = 2 * fast.len();
+    for slot in 0..slots {
+        order.push(Rung {
+            speed: fast[slot / 2],
+            sweeps: true,
+        });
+        for &speed in &slow[slot * slow.len() / slots..(slot + 1) * slow.len() / slots] {
+            let rung = Rung {
+                speed,
+                sweeps: false,
+            };
+            order.extend([rung, rung]);
+        }
+    }
+}
+
+impl Ladder {
+    /// Duration that was asked for \[s\]; after the last stroke the coordinate rests.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Plateau speeds with their durations \[s\], in time order; negative in the downward direction.
+    pub fn plateaus(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.strokes
+            .iter()
+            .map(|s| (s.direction * s.speed, s.plateau))
+    }
+
+    /// Position and velocity at time t \[s\].
+    pub fn at(&self, t: f64) -> (f64, f64) {
+        let after = self.strokes.partition_point(|s| s.start <= t);
+        let Some(stroke) = self.strokes.get(after.saturating_sub(1)) else {
+            return (0.0, 0.0);
+        };
+        let elapsed = (t - stroke.start).clamp(0.0, stroke.duration());
+        let (way, speed) = stroke.at(elapsed);
+        (
+            stroke.from + stroke.direction * way,
+            stroke.direction * speed,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::chance::{Purpose, stream};
+
+    fn plan() -> LadderPlan {
+        let range = (0.2, 0.7);
+        LadderPlan {
+            range,
+            speeds: LadderPlan::geometric(range, 0.0015, 0.633, 10, 3.0),
+            acceleration: 3.0,
+            turn: 0.3,
+            seconds: 20.0,
+        }
+    }
+
+    #[test]
+    fn ladder_fills_its_time_and_stays_inside_its_range() {
+        for seed in 0..50 {
+            let ladder = plan()
+                .build(Some(&mut stream(seed, Purpose::Reference)))
+                .expect("feasible");
+            assert!(ladder.end > 19.0 && ladder.end <= 20.0, "{}", ladder.end);
+            for k in 0..=20_000 {
+                let (x, v) = ladder.at(1e-3 * f64::from(k));
+                assert!((0.2 - 1e-12..=0.7 + 1e-12).contains(&x), "{x}");
+                assert!(v.abs() <= 0.633 + 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn every_speed_has_a_plateau_in_both_directions() {
+        let ladder = plan().build(None).expect("feasible");
+        for speed in plan().speeds {
+            for sign in [1.0, -1.0] {
+                let longest = ladder
+                    .plateaus()
+                    .filter(|(v, _)| (v / (sign * speed) - 1.0).abs() < 1e-9)
+                    .map(|(_, seconds)| seconds)
+                    .fold(0.0, f64::max);
+                assert!(
+                    longest > 0.15,
+                    "{speed} m/s in direction {sign}: {longest} s"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn velocity_is_the_derivative_and_acceleration_is_bounded() {
+        let ladder = plan().build(None).expect("feasible");
+        let h = 1e-5;
+        for k in 1..19_999 {
+            let t = 1e-3 * f64::from(k);
+            let ((x0, v0), (_, v), (x1, v1)) = (ladder.at(t - h), ladder.at(t), ladder.at(t + h));
+            assert!(((x1 - x0) / (2.0 * h) - v).abs() < 1e-6, "at {t} s");
+            assert!((v1 - v0).abs() / (2.0 * h) < 3.0 + 1e-6, "at {t} s");
+        }
+    }
+
+    #[test]
+    fn reversals_dwell_nowhere_but_pass_zero_slowly_enough_for_the_steep_slope() {
+        let ladder = plan().build(None).expect("feasible");
+        let inside = (0..20_000).filter(|&k| {
+            let v = ladder.at(1e-3 * f64::from(k)).1.abs();
+            (0.5 / 200.0..2.0 / 200.0).contains(&v)
+        });
+        assert!(inside.count() > 2000);
+        let crossing = (1..19_000).filter(|&k| {
+            let (before, after) = (
+                ladder.at(1e-3 * f64::from(k)).1,
+                ladder.at(1e-3 * f64::from(k + 1)).1,
+            );
+            before == 0.0 && after == 0.0
+        });
+        assert_eq!(crossing.count(), 0);
+    }
+
+    #[test]
+    fn seeds_change_the_order_and_repeat_it() {
+        let build = |seed| {
+            plan()
+                .build(Some(&mut stream(seed, Purpose::Reference)))
+                .expect("feasible")
+        };
+        assert_eq!(build(3), build(3));
+        assert_ne!(build(3), build(4));
+    }
+
+    #[test]
+    fn long_ladders_repeat_their_passes() {
+        let long = LadderPlan {
+            seconds: 100.0,
+            ..plan()
+        };
+        let ladder = long.build(None).expect("feasible");
+        assert_eq!(ladder.strokes.len(), 100);
+        assert!(ladder.end > 95.0);
+    }
+
+    #[test]
+    fn impossible_ladders_are_refused_with_the_way_out() {
+        let refuse = |change: fn(&mut LadderPlan)| {
+            let mut plan = plan();
+            change(&mut plan);
+            match plan.build(None) {
+                Err(SimulateError::Reference { what }) => what,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert!(refuse(|p| p.seconds = 1.0).contains("more seconds"));
+        assert!(refuse(|p| p.speeds = vec![2.0]).contains("does not fit"));
+        assert!(refuse(|p| p.range = (0.7, 0.2)).contains("empty"));
+        assert!(refuse(|p| p.speeds.clear()).contains("at least one"));
+    }
+}

@@ -1,0 +1,189 @@
+//! A list of poses at times, joined smoothly.
+
+use super::Target;
+use crate::simulate::SimulateError;
+
+/// Cubic spline through poses at given times, twice continuously differentiable, at rest at both ends.
+///
+/// Two equal poses in a row are a dwell: the spline is at rest at both of them and the parts before
+/// and after are joined separately, so that a dwell never overshoots.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Points<const J: usize> {
+    times: Vec<f64>,
+    positions: Vec<[f64; J]>,
+    velocities: Vec<[f64; J]>,
+}
+
+impl<const J: usize> Points<J> {
+    /// Spline through `points`, each a time \[s\] and a pose \[m or rad\].
+    ///
+    /// # Errors
+    /// [`SimulateError::Reference`] for fewer than two points, times that do not increase, and numbers
+    /// that are not finite.
+    pub fn new(points: &[(f64, [f64; J])]) -> Result<Self, SimulateError> {
+        let reject = |what: String| Err(SimulateError::Reference { what });
+        if points.len() < 2 {
+            return reject(format!(
+                "the point list has {} points; it needs at least two",
+                points.len()
+            ));
+        }
+        for (k, (t, pose)) in points.iter().enumerate() {
+            if !t.is_finite() || pose.iter().any(|x| !x.is_finite()) {
+                return reject(format!("point {} of the list is not finite", k + 1));
+            }
+            if k > 0 && *t <= points[k - 1].0 {
+                return reject(format!(
+                    "point {} of the list is at {t} s, not after the point before it at {} s",
+                    k + 1,
+                    points[k - 1].0
+                ));
+            }
+        }
+        let times: Vec<f64> = points.iter().map(|p| p.0).collect();
+        let positions: Vec<[f64; J]> = points.iter().map(|p| p.1).collect();
+        let mut velocities = vec![[0.0; J]; points.len()];
+        let mut first = 0;
+        for k in 1..points.len() {
+            let dwell = positions[k] == positions[k - 1];
+            if dwell || k + 1 == points.len() {
+                let last = if dwell { k - 1 } else { k };
+                clamped_slopes(&times, &positions, first, last, &mut velocities);
+                first = k;
+            }
+        }
+        Ok(Self {
+            times,
+            positions,
+            velocities,
+        })
+    }
+
+    /// Time of the last point \[s\].
+    pub fn seconds(&self) -> f64 {
+        self.times.last().copied().unwrap_or(0.0)
+    }
+
+    /// Position and velocity at time t \[s\]; at rest before the first and after the last point.
+    pub fn at(&self, t: f64) -> Target<J> {
+        let n = self.times.len();
+        let after = self.times.partition_point(|&x| x <= t);
+        if after == 0 || after == n {
+            let end = if after == 0 { 0 } else { n - 1 };
+            return Target {
+                position: self.positions[end],
+                velocity: [0.0; J],
+            };
+        }
+        let k = after - 1;
+        let h = self.times[after] - self.times[k];
+        let x = (t - self.times[k]) / h;
+        // Hermite form on [0, 1].
+        let (x2, x3) = (x * x, x * x * x);
+        let mut target = Target {
+            position: [0.0; J],
+            velocity: [0.0; J],
+        };
+        for i in 0..J {
+            let (p0, p1) = (self.positions[k][i], self.positions[after][i]);
+            let (v0, v1) = (self.velocities[k][i], self.velocities[after][i]);
+            target.position[i] = p0
+                + (p1 - p0) * (3.0 * x2 - 2.0 * x3)
+                + h * (v0 * (x - 2.0 * x2 + x3) + v1 * (x3 - x2));
+            target.velocity[i] = (p1 - p0) / h * 6.0 * (x - x2)
+                + v0 * (1.0 - 4.0 * x + 3.0 * x2)
+                + v1 * (3.0 * x2 - 2.0 * x);
+        }
+        target
+    }
+}
+
+/// Slopes of the cubic spline through points `first..=last` with zero slope at both ends: continuity of
+/// the second derivative is a tridiagonal system, solved by elimination.
+fn clamped_slopes<const J: usize>(
+    times: &[f64],
+    positions: &[[f64; J]],
+    first: usize,
+    last: usize,
+    velocities: &mut [[f64; J]],
+) {
+    if last < first + 2 {
+        return;
+    }
+    let mut upper = vec![0.0; last - first];
+    for k in first + 1..last {
+        let (h0, h1) = (times[k] - times[k - 1], times[k + 1] - times[k]);
+        let (w0, w1) = (1.0 / h0, 1.0 / h1);
+        let pivot = 2.0 * (w0 + w1) - w0 * upper[k - first - 1];
+        upper[k - first] = w1 / pivot;
+        for i in 0..J {
+            let right = 3.0
+                * (w0 * w0 * (positions[k][i] - positions[k - 1][i])
+                    + w1 * w1 * (positions[k + 1][i] - positions[k][i]));
+            velocities[k][i] = (right - w0 * velocities[k - 1][i]) / pivot;
+        }
+    }
+    for k in (first + 1..last).rev() {
+        let next = velocities[k + 1];
+        for (slope, next) in velocities[k].iter_mut().zip(next) {
+            *slope -= upper[k - first] * next;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list() -> Points<2> {
+        Points::new(&[
+            (0.0, [0.0, 1.0]),
+            (1.0, [0.5, 1.2]),
+            (1.7, [0.1, 1.1]),
+            (2.5, [0.1, 1.1]),
+            (3.0, [0.3, 0.9]),
+            (4.0, [0.6, 0.7]),
+        ])
+        .expect("usable list")
+    }
+
+    #[test]
+    fn spline_passes_through_every_point() {
+        let points = list();
+        for (t, pose) in points.times.iter().zip(&points.positions) {
+            assert_eq!(points.at(*t).position, *pose);
+        }
+    }
+
+    #[test]
+    fn dwell_stays_at_rest() {
+        let points = list();
+        for k in 0..=80 {
+            let target = points.at(1.7 + 0.01 * f64::from(k));
+            assert!((target.position[0] - 0.1).abs() < 1e-15);
+            assert!(target.velocity[0].abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn velocity_and_acceleration_are_continuous_inside_a_stretch() {
+        let points = list();
+        let h = 1e-6;
+        for t in [1.0, 3.0] {
+            let acceleration = |t: f64| {
+                let (a, b) = (points.at(t), points.at(t + h));
+                (b.velocity[0] - a.velocity[0]) / h
+            };
+            let jump = acceleration(t) - acceleration(t - h);
+            assert!(jump.abs() < 1e-4, "jump {jump} at {t} s");
+        }
+    }
+
+    #[test]
+    fn times_that_stand_still_are_refused() {
+        let outcome = Points::new(&[(0.0, [0.0]), (0.0, [1.0])]);
+        assert!(matches!(outcome, Err(SimulateError::Reference { .. })));
+        assert!(Points::new(&[(0.0, [0.0])]).is_err());
+        assert!(Points::new(&[(0.0, [0.0]), (1.0, [f64::NAN])]).is_err());
+    }
+}

@@ -1,0 +1,93 @@
+//! How far and how fast one joint can move alone.
+
+use crate::simulate::SimulateError;
+use crate::simulate::plant::Plant;
+
+/// Room of one joint around a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Travel {
+    /// Lower and upper end, m or rad.
+    pub range: (f64, f64),
+    /// Speed at which the first motor reaches its own limit somewhere on the way, m/s or rad/s.
+    pub top_speed: f64,
+}
+
+/// Poses tried along the way.
+const POSES: usize = 400;
+/// Largest joint travel that is looked for, m or rad.
+const FARTHEST: f64 = 20.0;
+
+/// Finds how far joint `moving` can go from `pose` while the others stay, with a distance of `margin`
+/// (a fraction of each span) to the limits of every motor coordinate, and how fast, given the motors'
+/// top speeds.
+///
+/// # Errors
+/// [`SimulateError::LimitAtStart`] when the pose itself lies within the margin of a limit.
+pub fn travel<P: Plant<J>, const J: usize>(
+    plant: &P,
+    pose: &[f64; J],
+    moving: usize,
+    margin: f64,
+    motor_speeds: &[f64; J],
+) -> Result<Travel, SimulateError> {
+    let (lower, upper) = plant.limits();
+    let names = plant.coordinate_names();
+    let outside = |q: &[f64; J]| {
+        let x = plant.coordinates(q);
+        (0..J).find(|&i| {
+            let gap = margin * (upper[i] - lower[i]);
+            let gap = if gap.is_finite() { gap } else { 0.0 };
+            !(lower[i] + gap..=upper[i] - gap).contains(&x[i])
+        })
+    };
+    if let Some(i) = outside(pose) {
+        return Err(SimulateError::LimitAtStart {
+            coordinate: names[i].clone(),
+            value: plant.coordinates(pose)[i],
+            lower: lower[i],
+            upper: upper[i],
+        });
+    }
+    let at = |offset: f64| {
+        let mut q = *pose;
+        q[moving] += offset;
+        q
+    };
+    // The first exit on each side: walk in small steps, then halve the last one.
+    let reach = |direction: f64| {
+        let step = direction * FARTHEST / 4096.0;
+        let mut inside = 0.0;
+        for k in 1..=4096 {
+            let next = f64::from(k) * step;
+            if outside(&at(next)).is_some() {
+                let mut beyond = next;
+                for _ in 0..50 {
+                    let middle = 0.5 * (inside + beyond);
+                    if outside(&at(middle)).is_some() {
+                        beyond = middle;
+                    } else {
+                        inside = middle;
+                    }
+                }
+                break;
+            }
+            inside = next;
+        }
+        inside
+    };
+    let (low, high) = (reach(-1.0), reach(1.0));
+    let mut unit = [0.0; J];
+    unit[moving] = 1.0;
+    let mut top_speed = f64::INFINITY;
+    for k in 0..=POSES {
+        let q = at(low + (high - low) * k as f64 / POSES as f64);
+        let speeds = plant.coordinate_speeds(&q, &unit);
+        for (speed, motor) in speeds.iter().zip(motor_speeds) {
+            top_speed = top_speed.min(motor / speed.abs());
+        }
+    }
+    Ok(Travel {
+        range: (pose[moving] + low, pose[moving] + high),
+        top_speed,
+    })
+}
