@@ -8,7 +8,7 @@ use crate::log::LogSpec;
 const EXAMPLE: &str = "\
 Example:
   cft-ident friction q1.csv q2.csv q4.csv q5.csv -r configs/cft.toml -o f.toml
-  cft-ident friction q4b.csv -r configs/cft.toml --joint q4 -m f.toml -o new.toml";
+  cft-ident friction q4b.csv -r configs/cft.toml --joint q4 -m f.toml -o g.toml";
 
 /// Estimate the friction of single joints by a continuous-discrete extended Kalman filter.
 ///
