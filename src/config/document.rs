@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use super::ConfigError;
-use crate::log::escape;
+use crate::log::{escape, nearest};
 
 /// A TOML text and the name under which errors speak of it.
 pub(crate) struct Document<'a> {
@@ -129,6 +129,20 @@ impl<'a> Document<'a> {
         Err(self.value(path, &format!("is {value}"), "give a number above 0"))
     }
 
+    /// Refuses what is not a finite number of at least 0, where it is given.
+    pub(crate) fn not_negative(
+        &self,
+        path: &[&str],
+        value: Option<f64>,
+    ) -> Result<(), ConfigError> {
+        match value {
+            Some(value) if !(value.is_finite() && value >= 0.0) => {
+                Err(self.value(path, &format!("is {value}"), "give 0 or a number above it"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Refuses inf and nan.
     pub(crate) fn finite(&self, path: &[&str], values: &[f64]) -> Result<(), ConfigError> {
         match values.iter().find(|value| !value.is_finite()) {
@@ -156,24 +170,8 @@ fn one_line(message: &str) -> String {
 
 /// "did you mean `x`?" where a known name is near, else the list of known names.
 pub(crate) fn nearest_or_all(name: &str, known: &[&str], what: &str) -> String {
-    match nearest(name, known) {
+    match nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("{what}: {}", known.join(", ")),
     }
-}
-
-/// The known name nearest to `name`, where one is near enough to be meant.
-pub(crate) fn nearest<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
-    let lower = name.to_lowercase();
-    known
-        .iter()
-        .map(|candidate| {
-            (
-                strsim::jaro_winkler(&lower, &candidate.to_lowercase()),
-                *candidate,
-            )
-        })
-        .filter(|(similarity, _)| *similarity > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
 }

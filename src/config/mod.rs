@@ -1,13 +1,22 @@
 //! Files of the user: robot, model, trajectory and campaign (TOML).
+//!
+//! Every file is read strictly: a key that is not known is an error that names the line and the
+//! nearest known key. Files that come with the tool are found under `configs/` anywhere.
 
 pub mod campaign;
+mod channels;
+mod check;
 mod document;
+mod embedded;
 mod error;
+pub mod log_section;
 pub mod model_file;
+mod model_text;
 pub mod robot_file;
 pub mod trajectory;
 
 pub use campaign::Campaign;
+pub use embedded::{EMBEDDED, embedded, text};
 pub use error::ConfigError;
 pub use model_file::ModelFile;
 pub use robot_file::RobotFile;

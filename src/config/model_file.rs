@@ -1,11 +1,14 @@
 //! Model files: the robot, every parameter with its uncertainty, the effects added, where it came from.
+//! Reading and writing are in [`super::model_text`].
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::robot_file::RobotFile;
-use crate::log::Provenance;
+use super::ConfigError;
+use super::robot_file::{ModelKind, RobotFile};
+use crate::log::{Provenance, escape};
+use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 
 /// What the data say about a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -128,4 +131,130 @@ pub struct ModelFile {
     pub effects: Vec<Effect>,
     /// Where it came from.
     pub provenance: ModelProvenance,
+}
+
+impl ModelFile {
+    /// A parameter by name, of one joint or of none; `file` names the model in the error.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`].
+    pub fn parameter(
+        &self,
+        file: &str,
+        name: &str,
+        joint: Option<&str>,
+    ) -> Result<&Parameter, ConfigError> {
+        self.find(name, joint).ok_or_else(|| {
+            let key = match joint {
+                Some(joint) => format!("{name}:{joint}"),
+                None => name.to_owned(),
+            };
+            let command = if joint.is_some() { "friction" } else { "lsq" };
+            ConfigError::MissingParameter {
+                file: file.to_owned(),
+                name: key,
+                remedy: format!(
+                    "identify it with `cft-ident {command}`, or add a [[parameter]] table"
+                ),
+            }
+        })
+    }
+
+    /// A parameter by name, of one joint or of none, where the model has it.
+    pub fn find(&self, name: &str, joint: Option<&str>) -> Option<&Parameter> {
+        let mut all = self.parameters.iter();
+        all.find(|p| p.name == name && p.joint.as_deref() == joint)
+    }
+
+    /// Values of the inertial parameters, in the order of [`Robot::parameters`](crate::robot::Robot::parameters).
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] for the first that the model lacks.
+    pub fn inertial(&self, file: &str) -> Result<Vec<f64>, ConfigError> {
+        let robot = self.robot.robot();
+        let needed = robot.parameters().iter();
+        needed
+            .map(|info| Ok(self.parameter(file, info.name, None)?.value))
+            .collect()
+    }
+
+    /// Double-tanh friction of one joint, eq. (18).
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`].
+    pub fn double_tanh(&self, file: &str, joint: &str) -> Result<DoubleTanh, ConfigError> {
+        let mut values = [0.0; 5];
+        for (value, name) in values.iter_mut().zip(DoubleTanh::NAMES) {
+            *value = self.parameter(file, name, Some(joint))?.value;
+        }
+        Ok(DoubleTanh::from_parameters(values))
+    }
+
+    /// Viscous and Coulomb friction of one joint.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`].
+    pub fn viscous_coulomb(&self, file: &str, joint: &str) -> Result<ViscousCoulomb, ConfigError> {
+        let value = |name| Ok(self.parameter(file, name, Some(joint))?.value);
+        Ok(ViscousCoulomb {
+            viscous: value("viscous")?,
+            coulomb: value("coulomb")?,
+        })
+    }
+
+    /// Constant torque offset of one joint [N or Nm]; 0 where the model has none.
+    pub fn offset(&self, joint: &str) -> f64 {
+        self.find("offset", Some(joint)).map_or(0.0, |p| p.value)
+    }
+
+    /// Covariance of the parameters with these keys ([`Parameter::key`]), row-major; 0 where unknown.
+    pub fn covariance_of(&self, keys: &[String]) -> Vec<f64> {
+        let mut block = vec![0.0; keys.len() * keys.len()];
+        let Some(covariance) = &self.covariance else {
+            return block;
+        };
+        let place = |key: &String| covariance.names.iter().position(|name| name == key);
+        let places: Vec<Option<usize>> = keys.iter().map(place).collect();
+        for (i, row) in places.iter().enumerate() {
+            for (j, column) in places.iter().enumerate() {
+                if let (Some(row), Some(column)) = (*row, *column) {
+                    block[i * keys.len() + j] = covariance.matrix[row][column];
+                }
+            }
+        }
+        block
+    }
+
+    /// Refuses a model of another robot than `wanted`; `file` names the model.
+    ///
+    /// # Errors
+    /// [`ConfigError::OtherRobot`] with what differs.
+    pub fn belongs_to(&self, file: &str, wanted: &RobotFile) -> Result<(), ConfigError> {
+        let describe = |robot: &RobotFile| {
+            let section = &robot.robot;
+            match section.model {
+                ModelKind::Cft => format!(
+                    "cft, set-up {}, {} parameters",
+                    section.setup.unwrap_or_default().name(),
+                    section.parameters.unwrap_or(12)
+                ),
+                ModelKind::SingleJoint | ModelKind::Serial => {
+                    let kind = section.kind.map_or("m or rad", |kind| kind.position_unit());
+                    format!(
+                        "single-joint {} in {kind}",
+                        escape(section.joint.as_deref().unwrap_or_default())
+                    )
+                }
+            }
+        };
+        let (theirs, ours) = (describe(&self.robot), describe(wanted));
+        if theirs == ours {
+            return Ok(());
+        }
+        Err(ConfigError::OtherRobot {
+            file: file.to_owned(),
+            difference: format!("{theirs}; wanted: {ours}"),
+            remedy: "give the model that was identified on this robot, or the robot file that it belongs to".to_owned(),
+        })
+    }
 }

@@ -4,6 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::log_section::LogSection;
+use crate::robot::cft::{self, Setup, Structure};
+use crate::robot::{JointKind, Robot};
+
 /// `[robot] model`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -16,26 +20,6 @@ pub enum ModelKind {
     Serial,
 }
 
-/// `[robot] setup` of the CFT robot (Table 6 and Remark 5 of the report).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SetupKind {
-    /// TUeDACS.
-    Tuedacs,
-    /// dSPACE.
-    Dspace,
-}
-
-/// `[robot] kind` of a single joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum JointKind {
-    /// Position in m, torque channel in N.
-    Prismatic,
-    /// Position in rad, torque channel in Nm.
-    Revolute,
-}
-
 /// `[robot]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +28,7 @@ pub struct RobotSection {
     pub model: ModelKind,
     /// Set-up of the CFT robot.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub setup: Option<SetupKind>,
+    pub setup: Option<Setup>,
     /// Inertial parameters of the CFT robot: 12 (the report) or 22 (the full chain).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameters: Option<u32>,
@@ -108,198 +92,6 @@ pub struct FrictionSection {
     pub joint: BTreeMap<String, FrictionStart>,
 }
 
-/// Unit of a logged position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum PositionUnit {
-    /// Metre.
-    #[serde(rename = "m")]
-    Metre,
-    /// Millimetre.
-    #[serde(rename = "mm")]
-    Millimetre,
-    /// Radian.
-    #[serde(rename = "rad")]
-    Radian,
-    /// Degree.
-    #[serde(rename = "deg")]
-    Degree,
-    /// Encoder counts of the CFT robot (Table 5), actuator coordinates only.
-    #[serde(rename = "counts")]
-    Counts,
-}
-
-/// Unit of a logged torque or force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum TorqueUnit {
-    /// Newton.
-    #[serde(rename = "N")]
-    Newton,
-    /// Newton metre.
-    #[serde(rename = "Nm")]
-    NewtonMetre,
-    /// Ampere of motor current, kept as such: the model is then in A.
-    #[serde(rename = "A")]
-    Ampere,
-    /// Volt at the amplifier.
-    #[serde(rename = "V")]
-    Volt,
-}
-
-/// What the torque channel is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TorqueIs {
-    /// Torque at the joint.
-    Joint,
-    /// Torque at the motor.
-    Motor,
-    /// Motor current.
-    Current,
-    /// Commanded, not measured.
-    Commanded,
-}
-
-/// Unit of the time column.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum TimeUnit {
-    /// Second.
-    #[default]
-    #[serde(rename = "s")]
-    Second,
-    /// Millisecond.
-    #[serde(rename = "ms")]
-    Millisecond,
-    /// Microsecond.
-    #[serde(rename = "us")]
-    Microsecond,
-    /// Nanosecond.
-    #[serde(rename = "ns")]
-    Nanosecond,
-}
-
-/// What parts the columns of a text log.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DelimiterKind {
-    /// Found from the header line.
-    #[default]
-    Auto,
-    /// `,`
-    Comma,
-    /// `;`
-    Semicolon,
-    /// Tabulator.
-    Tab,
-    /// One or more spaces.
-    Space,
-}
-
-/// Which channels of a log are read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ChannelsKind {
-    /// Joint channels where the log has them, else actuator channels.
-    #[default]
-    Auto,
-    /// `q_<joint>`, `tau_<joint>`.
-    Joint,
-    /// `x_c1..x_c4`, `u_1..u_4` of the CFT robot.
-    Actuator,
-}
-
-/// `[log.joint.NAME]`: SI value = sign x scale x unit x logged value + offset.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JointChannels {
-    /// Column of the position; `q_NAME` where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position: Option<String>,
-    /// Unit of the position column.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_unit: Option<PositionUnit>,
-    /// 1 or -1; holds for the velocity too.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_sign: Option<f64>,
-    /// Factor, e.g. a gear ratio; holds for the velocity too.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_scale: Option<f64>,
-    /// Offset added after scaling [m or rad].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_offset: Option<f64>,
-    /// Column of the velocity; `dq_NAME` where absent, and then optional.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub velocity: Option<String>,
-    /// Column of the torque; `tau_NAME` where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque: Option<String>,
-    /// Unit of the torque column.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_unit: Option<TorqueUnit>,
-    /// 1 or -1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_sign: Option<f64>,
-    /// Factor, e.g. torque constant times gear ratio.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_scale: Option<f64>,
-    /// Offset added after scaling [N or Nm].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_offset: Option<f64>,
-}
-
-/// `[log.actuator.x_c1]`..: raw channels of the CFT robot.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ActuatorChannels {
-    /// Column of the position; `x_c1`.. where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position: Option<String>,
-    /// Unit of the position: SI where absent, or `counts` (Table 5).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_unit: Option<PositionUnit>,
-    /// 1 or -1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_sign: Option<f64>,
-    /// Homing offset: the coordinate where the encoder reads 0 [m or rad].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub home: Option<f64>,
-    /// Column of the volts; `u_1`.. where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub volts: Option<String>,
-    /// 1 or -1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub volts_sign: Option<f64>,
-}
-
-/// `[log]`: how the logs of this machine are written.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LogSection {
-    /// Column of the time; `t` where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time: Option<String>,
-    /// Unit of the time column.
-    #[serde(default)]
-    pub time_unit: TimeUnit,
-    /// What parts the columns.
-    #[serde(default)]
-    pub delimiter: DelimiterKind,
-    /// Joint or actuator channels.
-    #[serde(default)]
-    pub channels: ChannelsKind,
-    /// What the torque channel is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_is: Option<TorqueIs>,
-    /// The logged torque (or volt) was held from its own sample to the next.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_held: Option<bool>,
-    /// Columns by joint.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub joint: BTreeMap<String, JointChannels>,
-    /// Raw columns by actuator coordinate.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub actuator: BTreeMap<String, ActuatorChannels>,
-}
-
 /// `[filter] kind`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -348,9 +140,16 @@ pub struct FilterSection {
     /// How positions are differentiated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub differences: Option<DifferencesKind>,
-    /// What is cut off each end of a segment after filtering [s].
+    /// What is cut off each end of a segment before the parallel filter, where the position filter
+    /// has not settled [s].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_trim_s: Option<f64>,
+    /// What is cut off each end of a segment after the parallel filter [s].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trim_s: Option<f64>,
+    /// A step longer than this many sampling steps is a gap: nothing is differentiated across it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap_factor: Option<f64>,
 }
 
 /// Noise of one joint, where the user overrides what is estimated.
@@ -405,6 +204,9 @@ pub struct ControlSection {
     /// Derivative gain per coordinate [V s/m or V s/rad].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kd: Vec<f64>,
+    /// Corner frequency of the differenced position in the derivative part [Hz].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derivative_filter_hz: Option<f64>,
     /// Control and sampling rate [Hz].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
@@ -423,9 +225,9 @@ pub struct SensorsSection {
     /// Standard deviation of the noise on logged volts [V].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volt_noise: Option<f64>,
-    /// Standard deviation of the noise on logged torques [N or Nm].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_noise: Option<f64>,
+    /// Standard deviation of the noise on logged torques, by joint [N or Nm].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub torque_noise: Vec<f64>,
     /// The same as a fraction of the joint's torque rms; excludes `torque_noise`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_noise_relative: Option<f64>,
@@ -444,40 +246,63 @@ pub struct RobotFile {
     /// Which machine.
     pub robot: RobotSection,
     /// Friction law and starting values.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub friction: FrictionSection,
     /// How logs are written.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub log: LogSection,
     /// How logs are filtered.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub filter: FilterSection,
     /// Overrides of estimated noise.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub noise: NoiseSection,
     /// Limits by joint or actuator coordinate.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub limits: BTreeMap<String, CoordinateLimits>,
     /// Controller of the simulator.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub control: ControlSection,
     /// Sensors of the simulator.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub sensors: SensorsSection,
 }
 
-/// Joint names of the CFT robot, in the order of every vector.
-pub const CFT_JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
+/// Sections that say nothing are not written.
+pub(super) fn is_default<T: Default + PartialEq>(section: &T) -> bool {
+    *section == T::default()
+}
 
 impl RobotFile {
+    /// The physical model that the file describes.
+    pub fn robot(&self) -> Robot {
+        match self.robot.model {
+            ModelKind::Cft => Robot::cft(
+                self.robot.setup.unwrap_or_default(),
+                match self.robot.parameters {
+                    Some(22) => Structure::Full22,
+                    _ => Structure::Printed12,
+                },
+            ),
+            ModelKind::SingleJoint | ModelKind::Serial => Robot::single_joint(
+                self.robot.joint.as_deref().unwrap_or("q1"),
+                self.robot.kind.unwrap_or(JointKind::Revolute),
+            ),
+        }
+    }
+
     /// Joint names in the order of every vector.
     pub fn joint_names(&self) -> Vec<String> {
-        match self.robot.model {
-            ModelKind::Cft => CFT_JOINTS.map(str::to_owned).to_vec(),
-            ModelKind::SingleJoint | ModelKind::Serial => {
-                vec![self.robot.joint.clone().unwrap_or_else(|| "q1".to_owned())]
-            }
+        self.robot().joint_names().to_vec()
+    }
+
+    /// Joint names, and the actuator coordinates of the CFT robot.
+    pub fn coordinate_names(&self) -> Vec<String> {
+        let mut names = self.joint_names();
+        if self.robot.model == ModelKind::Cft {
+            names.extend(cft::COORDINATES.map(str::to_owned));
         }
+        names
     }
 
     /// The friction law: the declared one, or the model's own.

@@ -1,4 +1,4 @@
-//! What can be wrong with a log, and the way out.
+//! What can be wrong with a log, and the way out. Lines count from 1; names from files are escaped.
 
 use thiserror::Error;
 
@@ -14,5 +14,229 @@ pub enum LogError {
         spec: String,
         /// Why not.
         reason: &'static str,
+    },
+    /// The system cannot read the file.
+    #[error("{file}: cannot be read: {source}; {remedy}")]
+    Read {
+        /// File as the user named it.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The file is of a kind that is not read.
+    #[error("{file}: is {kind}; {remedy}")]
+    Format {
+        /// File as the user named it.
+        file: String,
+        /// What it is.
+        kind: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// No header line.
+    #[error("{file}: is empty; record again, or check that the recorder closed the file")]
+    Empty {
+        /// File as the user named it.
+        file: String,
+    },
+    /// The first line holds numbers.
+    #[error(
+        "{file}:{line}: there is no header: the first line holds only numbers; add a line that names the columns, e.g. `t,q_q1,tau_q1`"
+    )]
+    NoHeader {
+        /// File as the user named it.
+        file: String,
+        /// Its line.
+        line: u64,
+    },
+    /// A header and fewer than two rows.
+    #[error(
+        "{file}: holds {rows} row(s) after its header, which determine nothing; two at least, and some seconds of motion, are needed"
+    )]
+    TooFewRows {
+        /// File as the user named it.
+        file: String,
+        /// Rows found.
+        rows: u64,
+    },
+    /// A span with fewer than two rows in it.
+    #[error(
+        "{spec}: the span holds {rows} row(s); the log lasts {duration_s} s: choose a span inside it"
+    )]
+    EmptySpan {
+        /// File and span.
+        spec: String,
+        /// Rows found.
+        rows: u64,
+        /// Time from the first to the last row that was seen [s].
+        duration_s: f64,
+    },
+    /// A column that the robot needs.
+    #[error("{file}:{line}: column `{column}` ({purpose}) is missing; {remedy}")]
+    MissingColumn {
+        /// File as the user named it.
+        file: String,
+        /// Line of the header.
+        line: u64,
+        /// Name that was looked for.
+        column: String,
+        /// What it is needed for.
+        purpose: String,
+        /// The nearest name, the key to map it with, and what the header has.
+        remedy: String,
+    },
+    /// A column that is there more than once.
+    #[error(
+        "{file}:{line}: column `{column}` is named {count} times; rename or delete all but one"
+    )]
+    RepeatedColumn {
+        /// File as the user named it.
+        file: String,
+        /// Line of the header.
+        line: u64,
+        /// The name.
+        column: String,
+        /// How often.
+        count: usize,
+    },
+    /// A header that states another unit than the robot file.
+    #[error(
+        "{file}:{line}: column `{column}` is in {found}, but is to be read in {declared}; {remedy}"
+    )]
+    Unit {
+        /// File as the user named it.
+        file: String,
+        /// Line of the header.
+        line: u64,
+        /// The column.
+        column: String,
+        /// Unit in the header.
+        found: &'static str,
+        /// Unit that was declared or assumed.
+        declared: &'static str,
+        /// What to do.
+        remedy: String,
+    },
+    /// A row with more or fewer fields than the header.
+    #[error("{file}:{line}: the row has {found} fields, the header names {expected}; {remedy}")]
+    Fields {
+        /// File as the user named it.
+        file: String,
+        /// Line.
+        line: u64,
+        /// Fields in the row.
+        found: usize,
+        /// Names in the header.
+        expected: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Text where a number is needed.
+    #[error("{file}:{line}: column `{column}` holds `{text}`, which is no number; {remedy}")]
+    NotANumber {
+        /// File as the user named it.
+        file: String,
+        /// Line.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What it holds.
+        text: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// NaN or infinity.
+    #[error(
+        "{file}:{line}: column `{column}` holds {text}; delete the rows without a measurement: a gap in time is handled, a made-up number is not"
+    )]
+    NotFinite {
+        /// File as the user named it.
+        file: String,
+        /// Line.
+        line: u64,
+        /// The column.
+        column: String,
+        /// What it holds.
+        text: String,
+    },
+    /// Two rows at one time.
+    #[error(
+        "{file}:{line}: time stands still at {t} s, with other values than the row before; check the clock of the recorder or the time column `{column}`"
+    )]
+    TimeStandsStill {
+        /// File as the user named it.
+        file: String,
+        /// Line of the second row.
+        line: u64,
+        /// The time [s].
+        t: f64,
+        /// The time column.
+        column: String,
+    },
+    /// The same row twice.
+    #[error(
+        "{file}:{line}: the row repeats the row before it (t = {t} s); delete duplicate rows: each sample may stand there once"
+    )]
+    DuplicateRow {
+        /// File as the user named it.
+        file: String,
+        /// Line of the second row.
+        line: u64,
+        /// The time [s].
+        t: f64,
+    },
+    /// Time runs backwards.
+    #[error(
+        "{file}:{line}: time runs backwards, from {before} s to {t} s; sort the rows by time, or split the file where a second recording begins"
+    )]
+    TimeBackwards {
+        /// File as the user named it.
+        file: String,
+        /// Line.
+        line: u64,
+        /// Time of the row before [s].
+        before: f64,
+        /// Time of this row [s].
+        t: f64,
+    },
+    /// A joint that moves though its torque channel is dead.
+    #[error(
+        "{file}: torque column `{column}` is 0 in all {rows} rows although {joint} moves; check the channel, or name the right column in the [log] section of the robot file"
+    )]
+    ZeroTorque {
+        /// File as the user named it.
+        file: String,
+        /// The column.
+        column: String,
+        /// The joint.
+        joint: String,
+        /// Rows read.
+        rows: u64,
+    },
+    /// An actuator position that the robot cannot take.
+    #[error(
+        "{file}:{line}: the actuator positions {positions} belong to no pose of the robot; check units, homing offsets and column order in [log.actuator]"
+    )]
+    NoPose {
+        /// File as the user named it.
+        file: String,
+        /// Line.
+        line: u64,
+        /// x_c1..x_c4 [m, m, rad, m].
+        positions: String,
+    },
+    /// A line or a quoted field without an end.
+    #[error(
+        "{file}:{line}: a line or a quoted field is longer than {limit} bytes; this is no text log, or a quote is never closed"
+    )]
+    LongLine {
+        /// File as the user named it.
+        file: String,
+        /// Line where it begins.
+        line: u64,
+        /// Bytes allowed.
+        limit: usize,
     },
 }

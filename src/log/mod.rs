@@ -1,31 +1,28 @@
 //! The only readers of recordings: from a file to blocks of t, q, tau in SI units.
+//!
+//! A [`LogSpec`] says which part of which file, a [`Layout`] which columns are which channels;
+//! a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not grow
+//! with the log. What comes out is finite, in strictly increasing time, and in SI.
 
 mod block;
+mod columns;
+mod csv;
 mod error;
+mod head;
+mod layout;
+mod names;
+mod number;
+mod reader;
 mod source;
 mod spec;
 
 pub use block::Block;
 pub use error::LogError;
-pub use source::Provenance;
+pub use layout::{Channel, Channels, Conversion, Delimiter, Layout};
+pub use names::{escape, nearest};
+pub use reader::Reader;
+pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
 
-/// Text from a file made safe to print: control characters and backslashes as escapes, cut to 80 characters.
-pub fn escape(text: &str) -> String {
-    let mut shown = String::new();
-    for (index, character) in text.chars().enumerate() {
-        if index == 80 {
-            shown.push('…');
-            break;
-        }
-        // Direction overrides and other invisible format characters can forge a message as well.
-        if character.is_control()
-            || matches!(character, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-        {
-            shown.extend(character.escape_default());
-        } else {
-            shown.push(character);
-        }
-    }
-    shown
-}
+pub(crate) use names::list;
+pub(crate) use source::{remedy, shown};

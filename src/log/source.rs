@@ -1,6 +1,13 @@
-//! Which log was read: its name, the part of it, and its checksum.
+//! Files as they lie on the disk: opened with errors that help, and known again by their checksum.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::{LogError, escape};
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,4 +26,128 @@ pub struct Provenance {
     /// Time from the first to the last row used [s].
     #[serde(default)]
     pub duration_s: f64,
+}
+
+impl Provenance {
+    /// An input that is no log: a model, robot, campaign or trajectory file.
+    pub fn of_file(path: &Path) -> Result<Self, LogError> {
+        Ok(Self {
+            name: file_name(path),
+            span: None,
+            sha256: sha256(path)?,
+            samples: 0,
+            duration_s: 0.0,
+        })
+    }
+
+    /// An input that is no file of the user: a configuration that comes with the tool.
+    pub fn of_text(name: &str, text: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            span: None,
+            sha256: hexadecimal(&Sha256::digest(text.as_bytes())),
+            samples: 0,
+            duration_s: 0.0,
+        }
+    }
+}
+
+/// File name without folders: the only form in which a path enters an output.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// A path for a message.
+pub(crate) fn shown(path: &Path) -> String {
+    escape(&path.to_string_lossy())
+}
+
+/// What to do when the system refuses to read.
+pub(crate) fn remedy(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::NotFound => "check the path; it is looked for from the current folder",
+        io::ErrorKind::PermissionDenied => "allow reading it, or copy it to where you may read",
+        io::ErrorKind::IsADirectory => "name a file inside this folder",
+        io::ErrorKind::InvalidData => "it is no UTF-8 text; name the right file",
+        _ => "check the disk or the connection, and try again",
+    }
+}
+
+/// Opens a file for reading.
+pub(super) fn open(path: &Path) -> Result<File, LogError> {
+    let opened = File::open(path).and_then(|file| {
+        if file.metadata()?.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        Ok(file)
+    });
+    opened.map_err(|error| failed(path, error))
+}
+
+/// The error for a read that the system refused.
+pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
+    LogError::Read {
+        file: shown(path),
+        remedy: remedy(&error),
+        source: error,
+    }
+}
+
+/// SHA-256 of a whole file, hexadecimal.
+pub fn sha256(path: &Path) -> Result<String, LogError> {
+    let mut file = open(path)?;
+    let mut hasher = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer) {
+            Ok(0) => return Ok(hexadecimal(&hasher.finalize())),
+            Ok(count) => hasher.update(&buffer[..count]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(failed(path, error)),
+        }
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        // FIPS 180-2, appendix B.1.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(Provenance::of_text("abc", "abc").sha256, abc);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc.csv");
+        std::fs::write(&path, "abc").unwrap();
+        let provenance = Provenance::of_file(&path).unwrap();
+        assert_eq!(
+            (provenance.name.as_str(), provenance.sha256.as_str()),
+            ("abc.csv", abc)
+        );
+    }
+
+    #[test]
+    fn a_folder_and_a_missing_file_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder_error = sha256(folder.path()).unwrap_err().to_string();
+        assert!(
+            folder_error.contains("name a file inside"),
+            "{folder_error}"
+        );
+        let missing = sha256(&folder.path().join("none.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            missing.contains("none.csv") && missing.contains("check the path"),
+            "{missing}"
+        );
+    }
 }

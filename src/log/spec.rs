@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::LogError;
+use super::source::file_name;
 
 /// The part of a log that is used.
 ///
@@ -112,10 +113,7 @@ impl LogSpec {
 
     /// File name without folders: the only form in which a path enters an output.
     pub fn name(&self) -> String {
-        match self.path.file_name() {
-            Some(name) => name.to_string_lossy().into_owned(),
-            None => self.path.to_string_lossy().into_owned(),
-        }
+        file_name(&self.path)
     }
 }
 

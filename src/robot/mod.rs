@@ -7,6 +7,7 @@ pub mod friction;
 
 use cft::regressor::{regressor12, regressor22};
 use cft::{Setup, Structure};
+use serde::{Deserialize, Serialize};
 
 /// What the model cannot answer for.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -45,7 +46,8 @@ pub struct ParameterInfo {
 }
 
 /// Kind of a joint: it decides the units of position and torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum JointKind {
     /// Position in m, force in N.
     Prismatic,

@@ -1,0 +1,233 @@
+//! The `[log]` section: how the logs of a machine are written.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::robot_file::is_default;
+
+/// Unit of a logged position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PositionUnit {
+    /// Metre.
+    #[serde(rename = "m")]
+    Metre,
+    /// Millimetre.
+    #[serde(rename = "mm")]
+    Millimetre,
+    /// Radian.
+    #[serde(rename = "rad")]
+    Radian,
+    /// Degree.
+    #[serde(rename = "deg")]
+    Degree,
+    /// Encoder counts of the CFT robot (Table 5), actuator coordinates only.
+    #[serde(rename = "counts")]
+    Counts,
+}
+
+impl PositionUnit {
+    /// As it is written in files.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Millimetre => "mm",
+            Self::Radian => "rad",
+            Self::Degree => "deg",
+            Self::Counts => "counts",
+        }
+    }
+
+    /// SI units in one of it; 1 for counts, whose size depends on the coordinate.
+    pub const fn in_si(self) -> f64 {
+        match self {
+            Self::Metre | Self::Radian | Self::Counts => 1.0,
+            Self::Millimetre => 1e-3,
+            Self::Degree => std::f64::consts::PI / 180.0,
+        }
+    }
+}
+
+/// Unit of a logged torque or force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TorqueUnit {
+    /// Newton.
+    #[serde(rename = "N")]
+    Newton,
+    /// Newton metre.
+    #[serde(rename = "Nm")]
+    NewtonMetre,
+    /// Ampere of motor current, kept as such: the model is then in A.
+    #[serde(rename = "A")]
+    Ampere,
+    /// Volt at the amplifier.
+    #[serde(rename = "V")]
+    Volt,
+}
+
+impl TorqueUnit {
+    /// As it is written in files.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Newton => "N",
+            Self::NewtonMetre => "Nm",
+            Self::Ampere => "A",
+            Self::Volt => "V",
+        }
+    }
+}
+
+/// What the torque channel is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TorqueIs {
+    /// Torque at the joint.
+    Joint,
+    /// Torque at the motor.
+    Motor,
+    /// Motor current.
+    Current,
+    /// Commanded, not measured.
+    Commanded,
+}
+
+/// Unit of the time column.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TimeUnit {
+    /// Second.
+    #[default]
+    #[serde(rename = "s")]
+    Second,
+    /// Millisecond.
+    #[serde(rename = "ms")]
+    Millisecond,
+    /// Microsecond.
+    #[serde(rename = "us")]
+    Microsecond,
+    /// Nanosecond.
+    #[serde(rename = "ns")]
+    Nanosecond,
+}
+
+/// What parts the columns of a text log.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DelimiterKind {
+    /// Found from the header line.
+    #[default]
+    Auto,
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// Tabulator.
+    Tab,
+    /// One or more spaces.
+    Space,
+}
+
+/// Which channels of a log are read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChannelsKind {
+    /// Joint channels where the log has them, else actuator channels.
+    #[default]
+    Auto,
+    /// `q_<joint>`, `tau_<joint>`.
+    Joint,
+    /// `x_c1..x_c4`, `u_1..u_4` of the CFT robot.
+    Actuator,
+}
+
+/// `[log.joint.NAME]`: SI value = sign x scale x unit x logged value + offset.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointChannels {
+    /// Column of the position; `q_NAME` where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// Unit of the position column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_unit: Option<PositionUnit>,
+    /// 1 or -1; holds for the velocity too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_sign: Option<f64>,
+    /// Factor, e.g. a gear ratio; holds for the velocity too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_scale: Option<f64>,
+    /// Offset added after scaling [m or rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_offset: Option<f64>,
+    /// Column of the velocity; `dq_NAME` where absent, and then optional.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<String>,
+    /// Column of the torque; `tau_NAME` where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<String>,
+    /// Unit of the torque column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_unit: Option<TorqueUnit>,
+    /// 1 or -1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_sign: Option<f64>,
+    /// Factor, e.g. torque constant times gear ratio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_scale: Option<f64>,
+    /// Offset added after scaling [N or Nm].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_offset: Option<f64>,
+}
+
+/// `[log.actuator.x_c1]`..: raw channels of the CFT robot.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorChannels {
+    /// Column of the position; `x_c1`.. where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// Unit of the position: SI where absent, or `counts` (Table 5).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_unit: Option<PositionUnit>,
+    /// 1 or -1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_sign: Option<f64>,
+    /// Homing offset: the coordinate where the encoder reads 0 [m or rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub home: Option<f64>,
+    /// Column of the volts; `u_1`.. where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volts: Option<String>,
+    /// 1 or -1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volts_sign: Option<f64>,
+}
+
+/// `[log]`: how the logs of this machine are written.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogSection {
+    /// Column of the time; `t` where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// Unit of the time column.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub time_unit: TimeUnit,
+    /// What parts the columns.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub delimiter: DelimiterKind,
+    /// Joint or actuator channels.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub channels: ChannelsKind,
+    /// What the torque channel is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_is: Option<TorqueIs>,
+    /// The logged torque (or volt) was held from its own sample to the next.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_held: Option<bool>,
+    /// Columns by joint.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub joint: BTreeMap<String, JointChannels>,
+    /// Raw columns by actuator coordinate.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub actuator: BTreeMap<String, ActuatorChannels>,
+}

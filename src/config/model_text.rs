@@ -1,0 +1,254 @@
+//! Model files as text: read with checks, written to be read by people.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use serde::{Deserialize, Serialize};
+
+use super::document::Document;
+use super::log_section::LogSection;
+use super::model_file::{Covariance, Effect, ModelFile, ModelProvenance, Parameter};
+use super::robot_file::{
+    ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
+    RobotSection, SensorsSection,
+};
+use super::{ConfigError, check};
+
+/// The file as it is written: the sections of a robot file, and what was identified.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ModelToml {
+    robot: RobotSection,
+    #[serde(default)]
+    friction: FrictionSection,
+    #[serde(default)]
+    log: LogSection,
+    #[serde(default)]
+    filter: FilterSection,
+    #[serde(default)]
+    noise: NoiseSection,
+    #[serde(default)]
+    limits: BTreeMap<String, CoordinateLimits>,
+    #[serde(default)]
+    control: ControlSection,
+    #[serde(default)]
+    sensors: SensorsSection,
+    #[serde(default)]
+    parameter: Vec<Parameter>,
+    covariance: Option<Covariance>,
+    #[serde(default)]
+    residual_std: BTreeMap<String, f64>,
+    #[serde(default)]
+    effect: Vec<Effect>,
+    provenance: Option<ModelProvenance>,
+}
+
+#[derive(Serialize)]
+struct Effects<'a> {
+    effect: &'a [Effect],
+}
+
+#[derive(Serialize)]
+struct ProvenanceTable<'a> {
+    provenance: &'a ModelProvenance,
+}
+
+impl ModelFile {
+    /// Reads a model from TOML text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// Everything that a robot file can have wrong; a parameter twice, or not finite; a covariance
+    /// that is not square or names what is no parameter.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        let document = Document::new(file, text);
+        let raw: ModelToml = document.read()?;
+        let robot = RobotFile {
+            robot: raw.robot,
+            friction: raw.friction,
+            log: raw.log,
+            filter: raw.filter,
+            noise: raw.noise,
+            limits: raw.limits,
+            control: raw.control,
+            sensors: raw.sensors,
+        };
+        check::check(&robot, &document)?;
+        if raw.parameter.is_empty() {
+            return Err(document.missing(
+                &["parameter"],
+                "[[parameter]] tables (this looks like a robot file: give it as -r, not as -m)",
+            ));
+        }
+        let model = Self {
+            robot,
+            parameters: raw.parameter,
+            covariance: raw.covariance,
+            residual_std: raw.residual_std,
+            effects: raw.effect,
+            provenance: raw.provenance.unwrap_or_default(),
+        };
+        model.check_parameters(&document)?;
+        model.check_covariance(&document)?;
+        model.check_rest(&document)?;
+        Ok(model)
+    }
+
+    /// The model as TOML text. Numbers are written shortest, so that they are read back bit for bit.
+    ///
+    /// # Errors
+    /// A number that is not finite, or any other content that could not be read back.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        let mut text = String::from(
+            "# A dynamic model identified by cft-ident. SI units and radians. It may be edited by hand.\n\n",
+        );
+        let unwritable = |error: toml::ser::Error| ConfigError::Syntax {
+            file: "model".to_owned(),
+            line: 1,
+            message: format!("cannot be written: {error}"),
+        };
+        text.push_str(&toml::to_string(&self.robot).map_err(unwritable)?);
+        text.push_str("\n# Parameters: value and standard deviation in `unit`, theta as in the report's Table 4.\n");
+        for parameter in &self.parameters {
+            text.push_str("\n[[parameter]]\n");
+            text.push_str(&toml::to_string(parameter).map_err(unwritable)?);
+        }
+        if let Some(covariance) = &self.covariance {
+            text.push_str("\n# Covariance of the parameters: row and column i belong to names[i].\n[covariance]\nnames = [\n");
+            for name in &covariance.names {
+                let _ = writeln!(text, "  {},", toml::Value::from(name.as_str()));
+            }
+            text.push_str("]\nmatrix = [\n");
+            for row in &covariance.matrix {
+                let row: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
+                let _ = writeln!(text, "  [{}],", row.join(", "));
+            }
+            text.push_str("]\n");
+        }
+        if !self.residual_std.is_empty() {
+            text.push_str(
+                "\n# Standard deviation of the torque residual by joint.\n[residual_std]\n",
+            );
+            text.push_str(&toml::to_string(&self.residual_std).map_err(unwritable)?);
+        }
+        if !self.effects.is_empty() {
+            text.push_str("\n# Effects added to the declared model.\n");
+            text.push_str(
+                &toml::to_string(&Effects {
+                    effect: &self.effects,
+                })
+                .map_err(unwritable)?,
+            );
+        }
+        text.push('\n');
+        let provenance = ProvenanceTable {
+            provenance: &self.provenance,
+        };
+        text.push_str(&toml::to_string(&provenance).map_err(unwritable)?);
+        // What cannot be read back must not be written.
+        Self::parse("model", &text)?;
+        Ok(text)
+    }
+
+    fn check_parameters(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        let mut seen = BTreeMap::new();
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            let index_text = index.to_string();
+            let at = |key| ["parameter", index_text.as_str(), key];
+            document.finite(&at("value"), &[parameter.value])?;
+            document.not_negative(&at("std"), parameter.std)?;
+            if let Some(joint) = &parameter.joint
+                && !joints.contains(joint)
+            {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
+            }
+            if seen.insert(parameter.key(), index).is_some() {
+                return Err(document.value(
+                    &at("name"),
+                    "is there twice",
+                    "keep one table for each parameter",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_covariance(&self, document: &Document) -> Result<(), ConfigError> {
+        let Some(covariance) = &self.covariance else {
+            return Ok(());
+        };
+        let size = covariance.names.len();
+        let known: Vec<String> = self.parameters.iter().map(Parameter::key).collect();
+        let at_names = ["covariance", "names"];
+        for (index, name) in covariance.names.iter().enumerate() {
+            if !known.contains(name) || covariance.names[..index].contains(name) {
+                let problem = format!(
+                    "names `{}`, which is no parameter or there twice",
+                    crate::log::escape(name)
+                );
+                return Err(document.value(
+                    &at_names,
+                    &problem,
+                    "use each parameter once, as `name` or `name:joint`",
+                ));
+            }
+        }
+        let square = covariance.matrix.len() == size
+            && covariance.matrix.iter().all(|row| row.len() == size);
+        if !square {
+            let remedy = format!("give {size} rows of {size} numbers, or delete [covariance]");
+            return Err(document.value(
+                &["covariance", "matrix"],
+                "does not have the size of `names`",
+                &remedy,
+            ));
+        }
+        for row in &covariance.matrix {
+            document.finite(&["covariance", "matrix"], row)?;
+        }
+        Ok(())
+    }
+
+    fn check_rest(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        for (joint, std) in &self.residual_std {
+            if !joints.contains(joint) {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(
+                    &["residual_std", joint],
+                    "is no joint of this robot",
+                    &remedy,
+                ));
+            }
+            document.not_negative(&["residual_std", joint], Some(*std))?;
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            let index_text = index.to_string();
+            if let Some(joint) = &effect.joint
+                && !self.robot.coordinate_names().contains(joint)
+            {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(
+                    &["effect", &index_text, "joint"],
+                    "is no joint of this robot",
+                    &remedy,
+                ));
+            }
+            for (key, parameter) in &effect.parameters {
+                let at = |what| {
+                    [
+                        "effect",
+                        index_text.as_str(),
+                        "parameters",
+                        key.as_str(),
+                        what,
+                    ]
+                };
+                document.finite(&at("value"), &[parameter.value])?;
+                document.not_negative(&at("std"), parameter.std)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! Names that come from files: made safe to print, and compared with the names that are known.
+
+/// Characters of a name that are shown before it is cut.
+const SHOWN: usize = 80;
+
+/// Text from a file made safe to print: control and invisible format characters as escapes, cut to 80 characters.
+pub fn escape(text: &str) -> String {
+    let mut shown = String::new();
+    for (index, character) in text.chars().enumerate() {
+        if index == SHOWN {
+            shown.push('…');
+            break;
+        }
+        // Direction overrides and zero-width characters can forge a message as well.
+        let invisible = matches!(character,
+            '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}');
+        if character.is_control() || invisible {
+            shown.extend(character.escape_default());
+        } else {
+            shown.push(character);
+        }
+    }
+    shown
+}
+
+/// The known name nearest to `name`, where one is near enough to be meant.
+pub fn nearest<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
+    let name = name.to_lowercase();
+    let mut best: Option<(f64, &str)> = None;
+    for candidate in known {
+        let similarity = strsim::jaro_winkler(&name, &candidate.to_lowercase());
+        if similarity > best.map_or(0.75, |(score, _)| score) {
+            best = Some((similarity, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
+}
+
+/// A list of names for a message, escaped, cut to the first twenty.
+pub(crate) fn list<'k>(names: impl IntoIterator<Item = &'k str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    let mut text = names
+        .iter()
+        .take(20)
+        .map(|name| escape(name))
+        .collect::<Vec<_>>()
+        .join(", ");
+    if names.len() > 20 {
+        text.push_str(&format!(" and {} more", names.len() - 20));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_and_direction_overrides_are_shown_as_escapes() {
+        assert_eq!(escape("q\u{1b}[31m1"), "q\\u{1b}[31m1");
+        assert_eq!(escape("a\nb\u{202e}c"), "a\\nb\\u{202e}c");
+        assert_eq!(escape("Geschwindigkeit φ"), "Geschwindigkeit φ");
+        assert_eq!(escape(&"x".repeat(200)).chars().count(), 81);
+    }
+
+    #[test]
+    fn the_nearest_name_is_offered_only_where_it_is_near() {
+        assert_eq!(
+            nearest("cutof_hz", ["cutoff_hz", "order"]),
+            Some("cutoff_hz")
+        );
+        assert_eq!(nearest("Q_Q1", ["q_q1", "q_q2"]), Some("q_q1"));
+        assert_eq!(nearest("banana", ["cutoff_hz", "order"]), None);
+    }
+}

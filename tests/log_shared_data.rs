@@ -1,0 +1,112 @@
+//! Measured logs of other groups, read where the folder with them lies beside the repository.
+
+use std::path::{Path, PathBuf};
+
+use cft_ident::config::RobotFile;
+use cft_ident::log::{Block, Channel, Layout, LogSpec, Reader};
+
+fn shared(file: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: {} is absent", path.display());
+    None
+}
+
+/// Reads a whole log into one block.
+fn read(spec: &str, layout: &Layout) -> (Block, Reader) {
+    let mut reader = Reader::open(&spec.parse::<LogSpec>().unwrap(), layout).unwrap();
+    let (mut block, mut all) = (Block::default(), Block::default());
+    while reader.read(&mut block).unwrap() {
+        assert!(block.len() <= Block::ROWS);
+        if all.is_empty() {
+            all.line0 = block.line0;
+        }
+        all.t.extend(&block.t);
+        all.q.extend(&block.q);
+        all.tau.extend(&block.tau);
+        all.dq.extend(&block.dq);
+    }
+    (all, reader)
+}
+
+#[test]
+fn the_emps_logs_are_read_with_the_robot_file_that_comes_with_the_tool() {
+    let robot = RobotFile::load(Path::new("configs/emps.toml")).unwrap();
+    for (file, first_q, first_tau) in [
+        ("emps/emps_id.csv", 7.45e-06, 89.2344322112),
+        ("emps/emps_pulses_val.csv", 7.67021588343e-06, 89.7474943891),
+    ] {
+        let Some(path) = shared(file) else { return };
+        let (block, reader) = read(&path.to_string_lossy(), &robot.layout());
+        assert_eq!(block.len(), 24841, "{file}");
+        assert_eq!(
+            (block.q[0], block.tau[0], block.line0),
+            (first_q, first_tau, 2)
+        );
+        let provenance = reader.provenance().unwrap();
+        assert_eq!(provenance.samples, 24841);
+        assert!(
+            (provenance.duration_s - 24.84).abs() < 0.01,
+            "{provenance:?}"
+        );
+    }
+}
+
+#[test]
+fn the_bldc_log_is_read_in_spans_that_share_no_row_and_leave_none_out() {
+    let Some(path) = shared("bldc-cogging/speed_test1.txt") else {
+        return;
+    };
+    let path = path.to_string_lossy();
+    let robot = RobotFile::load(Path::new("configs/bldc.toml")).unwrap();
+    assert_eq!(robot.torque_unit(0), "A");
+    let layout = robot.layout();
+    let (whole, _) = read(&path, &layout);
+    assert_eq!(whole.len(), 30000 + 1);
+    assert_eq!(
+        (whole.t[2], whole.q[2], whole.tau[2]),
+        (0.003, 0.02859, 0.14551)
+    );
+    for (first, second) in [("0..70%", "70..100%"), ("0..15.2s", "15.2..s")] {
+        let (first, _) = read(&format!("{path}@{first}"), &layout);
+        let (second, _) = read(&format!("{path}@{second}"), &layout);
+        let joined: Vec<f64> = first.t.iter().chain(&second.t).copied().collect();
+        assert_eq!(joined, whole.t);
+        assert_eq!(second.q, whole.q[first.len()..]);
+    }
+    let (part, reader) = read(&format!("{path}@15.2..23s"), &layout);
+    assert!(part.t.iter().all(|t| (15.2..23.0).contains(t)));
+    assert_eq!(
+        reader.provenance().unwrap().span.as_deref(),
+        Some("15.2..23s")
+    );
+}
+
+#[test]
+fn logs_of_six_and_seven_joints_are_read_with_velocities_where_they_have_them() {
+    for (file, joints, rows, velocities) in [
+        ("tx40/tx40_joint.csv", 6, 45000, false),
+        ("panda/panda_exciting.csv", 7, 20544, true),
+        ("ur10/ur10_exciting.csv", 6, 3441, true),
+    ] {
+        let Some(path) = shared(file) else { return };
+        let names: Vec<String> = (1..=joints).map(|joint| joint.to_string()).collect();
+        let mut layout = Layout::joint_columns(&names);
+        for (index, name) in names.iter().enumerate() {
+            layout.positions[index] = Channel::si(format!("q{name}"), "rad");
+            layout.torques[index] = Channel::si(format!("tau{name}"), "Nm");
+            layout.velocities[index] = Channel::si(format!("dq{name}"), "rad");
+        }
+        let (block, reader) = read(&path.to_string_lossy(), &layout);
+        assert_eq!(
+            (block.len(), block.joints(), reader.has_velocities()),
+            (rows, joints, velocities),
+            "{file}"
+        );
+        assert_eq!(block.dq.is_empty(), !velocities);
+    }
+}
