@@ -2,6 +2,8 @@
 
 #![allow(dead_code)]
 
+use cft_ident::robot::cft::{Limits, Setup, pantograph};
+use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 
 pub struct State {
@@ -107,12 +109,12 @@ impl Oracle {
     }
 }
 
-/// Largest difference is within `tolerance` of the largest entry (of the vector, or 1e-3).
+/// Every entry within `tolerance` of its own size, but for rounding at the size of the largest.
 pub fn assert_close<const N: usize>(got: &[f64; N], want: &[f64; N], tolerance: f64, what: &str) {
-    let scale = want.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
+    let rounding = 1e-14 * want.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
     for i in 0..N {
         assert!(
-            (got[i] - want[i]).abs() <= tolerance * scale,
+            (got[i] - want[i]).abs() <= tolerance * want[i].abs() + rounding,
             "{what}[{i}]: {} and not {}",
             got[i],
             want[i]
@@ -129,4 +131,37 @@ pub fn assert_close_rows<const R: usize, const C: usize>(
     for i in 0..R {
         assert_close(&got[i], &want[i], tolerance, &format!("{what} row {i}"));
     }
+}
+
+/// Repeatable random numbers for the tests of the robot room.
+pub struct Draw(rand_chacha::ChaCha8Rng);
+
+impl Draw {
+    pub fn new(seed: u64) -> Self {
+        Self(rand_chacha::ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.random::<f64>()
+    }
+
+    pub fn vector<const N: usize>(&mut self, low: f64, high: f64) -> [f64; N] {
+        std::array::from_fn(|_| self.between(low, high))
+    }
+
+    /// A Cartesian position inside the limits of a set-up.
+    pub fn position(&mut self, limits: &Limits) -> [f64; 4] {
+        std::array::from_fn(|i| self.between(limits.lower[i], limits.upper[i]))
+    }
+
+    /// A state (q, v, a) inside Table 5.
+    pub fn state(&mut self) -> ([f64; 4], [f64; 4], [f64; 4]) {
+        let x = self.position(&Setup::Tuedacs.limits());
+        let q = pantograph::joints(&x).expect("inside Table 5");
+        (q, self.vector(-2.0, 2.0), self.vector(-8.0, 8.0))
+    }
+}
+
+pub fn apply<const R: usize, const C: usize>(matrix: &[[f64; C]; R], x: &[f64; C]) -> [f64; R] {
+    std::array::from_fn(|i| (0..C).map(|j| matrix[i][j] * x[j]).sum())
 }

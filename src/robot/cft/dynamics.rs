@@ -14,7 +14,6 @@
 //! order is (q1, q2, q4, q5), units are SI.
 
 use super::geometry::{D, D6, GRAVITY, L4, L6, U};
-use nalgebra::{Matrix4, Vector4};
 
 /// The coefficients of the closed form, linear in theta_1..theta_12 and in the ten base parameters
 /// that the printed structure leaves out. Computed once for many samples.
@@ -296,11 +295,33 @@ pub fn forward_dynamics(
     solve_positive(&m, &std::array::from_fn(|i| torque[i] - bias[i]))
 }
 
-/// x with M x = b for a symmetric positive definite M, by Cholesky; `None` when it is not.
+/// x with M x = b for a symmetric positive definite M, by L D L^T written out (no square roots,
+/// four divisions); `None` when M is not.
+#[inline]
 pub fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]> {
-    // nalgebra stores columns: of a symmetric matrix that is the same.
-    let factor = Matrix4::from(*m).cholesky()?;
-    Some(factor.solve(&Vector4::from(*b)).into())
+    let d0 = m[0][0];
+    let i0 = 1.0 / d0;
+    let (l1, l2, l3) = (m[0][1] * i0, m[0][2] * i0, m[0][3] * i0);
+    let d1 = m[1][1] - l1 * m[0][1];
+    let i1 = 1.0 / d1;
+    let (n12, n13) = (m[1][2] - l1 * m[0][2], m[1][3] - l1 * m[0][3]);
+    let (l12, l13) = (n12 * i1, n13 * i1);
+    let d2 = m[2][2] - l2 * m[0][2] - l12 * n12;
+    let i2 = 1.0 / d2;
+    let n23 = m[2][3] - l2 * m[0][3] - l12 * n13;
+    let l23 = n23 * i2;
+    let d3 = m[3][3] - l3 * m[0][3] - l13 * n13 - l23 * n23;
+    if !(d0 > 0.0 && d1 > 0.0 && d2 > 0.0 && d3 > 0.0) {
+        return None;
+    }
+    let y0 = b[0];
+    let y1 = b[1] - l1 * y0;
+    let y2 = b[2] - l2 * y0 - l12 * y1;
+    let y3 = b[3] - l3 * y0 - l13 * y1 - l23 * y2;
+    let x3 = y3 / d3;
+    let x2 = y2 * i2 - l23 * x3;
+    let x1 = y1 * i1 - l12 * x2 - l13 * x3;
+    Some([y0 * i0 - l1 * x1 - l2 * x2 - l3 * x3, x1, x2, x3])
 }
 
 /// [`inertia`] from theta_1..theta_12.

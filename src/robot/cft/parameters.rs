@@ -1,4 +1,4 @@
-//! Names, units and meanings of the inertial parameters (Table 4, corrected).
+//! Names, units and meanings of the parameters (Table 4, corrected).
 
 use crate::robot::ParameterInfo;
 
@@ -81,3 +81,110 @@ pub const PRINTED: [ParameterInfo; 12] = {
     }
     first
 };
+
+/// theta_13..theta_32, the friction of law (18): parameter p of [`DoubleTanh::NAMES`] of joint i is
+/// entry 4 p + i.
+///
+/// [`DoubleTanh::NAMES`]: crate::robot::friction::DoubleTanh::NAMES
+pub const FRICTION: [ParameterInfo; 20] = [
+    printed("theta_13", 13, "N s/m", "Bv of q1: viscous friction"),
+    printed("theta_14", 14, "N m s/rad", "Bv of q2: viscous friction"),
+    printed("theta_15", 15, "N m s/rad", "Bv of q4: viscous friction"),
+    printed("theta_16", 16, "N m s/rad", "Bv of q5: viscous friction"),
+    printed(
+        "theta_17",
+        17,
+        "N",
+        "Bf1 of q1: height of the first saturating part",
+    ),
+    printed(
+        "theta_18",
+        18,
+        "N m",
+        "Bf1 of q2: height of the first saturating part",
+    ),
+    printed(
+        "theta_19",
+        19,
+        "N m",
+        "Bf1 of q4: height of the first saturating part",
+    ),
+    printed(
+        "theta_20",
+        20,
+        "N m",
+        "Bf1 of q5: height of the first saturating part",
+    ),
+    printed(
+        "theta_21",
+        21,
+        "N",
+        "Bf2 of q1: height of the second saturating part",
+    ),
+    printed(
+        "theta_22",
+        22,
+        "N m",
+        "Bf2 of q2: height of the second saturating part",
+    ),
+    printed(
+        "theta_23",
+        23,
+        "N m",
+        "Bf2 of q4: height of the second saturating part",
+    ),
+    printed(
+        "theta_24",
+        24,
+        "N m",
+        "Bf2 of q5: height of the second saturating part",
+    ),
+    printed(
+        "theta_25",
+        25,
+        "s/m",
+        "w1 of q1: slope of the first saturating part",
+    ),
+    printed(
+        "theta_26",
+        26,
+        "s/rad",
+        "w1 of q2: slope of the first saturating part",
+    ),
+    printed(
+        "theta_27",
+        27,
+        "s/rad",
+        "w1 of q4: slope of the first saturating part",
+    ),
+    printed(
+        "theta_28",
+        28,
+        "s/rad",
+        "w1 of q5: slope of the first saturating part",
+    ),
+    printed(
+        "theta_29",
+        29,
+        "s/m",
+        "w2 of q1: slope of the second saturating part",
+    ),
+    printed(
+        "theta_30",
+        30,
+        "s/rad",
+        "w2 of q2: slope of the second saturating part",
+    ),
+    printed(
+        "theta_31",
+        31,
+        "s/rad",
+        "w2 of q4: slope of the second saturating part",
+    ),
+    printed(
+        "theta_32",
+        32,
+        "s/rad",
+        "w2 of q5: slope of the second saturating part",
+    ),
+];
