@@ -17,6 +17,9 @@ pub mod rfactor;
 pub mod sos;
 pub mod zero_phase;
 
+#[cfg(test)]
+mod properties;
+
 use thiserror::Error;
 
 /// What the room `math` cannot compute, with the numbers that offend.
