@@ -1,1 +1,420 @@
-//! Room `output`.
+//! Files that appear whole or not at all, and logs as CSV.
+//!
+//! A file is written under another name in its own folder, brought to the disk, and renamed. Until
+//! then whatever had its name stays as it was. What is no regular file (a terminal, a pipe,
+//! `/dev/null`) is written directly: there is nothing that could be half.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::NamedTempFile;
+use thiserror::Error;
+
+use crate::log::shown;
+
+/// An output that cannot be written.
+#[derive(Debug, Error)]
+#[error("{file}: cannot be written: {source}; {remedy}")]
+pub struct OutputError {
+    /// File as the user named it.
+    pub file: String,
+    /// What the system said.
+    pub source: io::Error,
+    /// What to do.
+    pub remedy: &'static str,
+}
+
+impl OutputError {
+    fn new(path: &Path, source: io::Error) -> Self {
+        let remedy = match source.kind() {
+            io::ErrorKind::NotFound => "make the folder first, or choose another",
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                "choose a folder that you may write to"
+            }
+            io::ErrorKind::IsADirectory => "name a file inside this folder",
+            io::ErrorKind::StorageFull
+            | io::ErrorKind::QuotaExceeded
+            | io::ErrorKind::FileTooLarge => {
+                "free some space or choose another disk; nothing was left behind"
+            }
+            io::ErrorKind::BrokenPipe => "the program that reads it has ended",
+            _ => "choose another place for it",
+        };
+        Self {
+            file: shown(path),
+            source,
+            remedy,
+        }
+    }
+}
+
+/// Temporary files that are not yet renamed: what an interruption must remove.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes every file that is not finished, right before an interrupted process ends.
+///
+/// From then on no file can be begun or finished: a thread that tries waits for the end.
+pub fn remove_unfinished() {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    while let Some(path) = unfinished.pop_first() {
+        // It may be gone already; then nothing is left to do.
+        let _ = std::fs::remove_file(path);
+    }
+    // Never unlocked: a file begun now would be left behind.
+    std::mem::forget(unfinished);
+}
+
+#[derive(Debug)]
+enum Target {
+    /// A file under a temporary name, and the name that it is to have.
+    Temporary(NamedTempFile, PathBuf),
+    /// Something that is no regular file.
+    Direct(File),
+}
+
+/// A file that appears when it is committed, and not at all when it is dropped before.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    /// `None` only while it is being committed.
+    target: Option<BufWriter<Target>>,
+}
+
+impl AtomicFile {
+    /// Begins a file. An unwritable place is told here, before the work.
+    ///
+    /// # Errors
+    /// A folder that is not there or may not be written to; a name that is a folder's.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let target = open(path).map_err(|error| OutputError::new(path, error))?;
+        Ok(Self {
+            path: path.to_owned(),
+            target: Some(BufWriter::with_capacity(1 << 16, target)),
+        })
+    }
+
+    /// Brings the file to the disk and gives it its name.
+    ///
+    /// # Errors
+    /// A full disk, a lost connection; then there is no file.
+    pub fn commit(mut self) -> Result<(), OutputError> {
+        let target = self.target.take();
+        let finished = match target.map(BufWriter::into_inner) {
+            None => Ok(()),
+            Some(Err(error)) => {
+                let (error, writer) = error.into_parts();
+                // Dropping the writer would try the same write once more.
+                let (target, _) = writer.into_parts();
+                forget(&target);
+                Err(error)
+            }
+            Some(Ok(target)) => finish(target),
+        };
+        finished.map_err(|error| OutputError::new(&self.path, error))
+    }
+}
+
+/// Opens the temporary file, or what is no regular file itself.
+fn open(path: &Path) -> io::Result<Target> {
+    let existing = std::fs::metadata(path).ok();
+    match &existing {
+        Some(existing) if existing.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
+        Some(existing) if !existing.is_file() => {
+            return File::options().write(true).open(path).map(Target::Direct);
+        }
+        // A file that may not be written is not replaced either, though its folder would let us.
+        Some(existing) if existing.permissions().readonly() => {
+            return Err(io::ErrorKind::PermissionDenied.into());
+        }
+        _ => {}
+    }
+    // A link stays a link: the file behind it is replaced.
+    let path = match existing {
+        Some(_) => path.canonicalize()?,
+        None => path.to_owned(),
+    };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".cft-ident-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any new file: the user's mask applies.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    // The lock comes first, so that no interruption finds the file before it is known.
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let file = builder.tempfile_in(folder)?;
+    unfinished.insert(file.path().to_owned());
+    Ok(Target::Temporary(file, path))
+}
+
+fn finish(target: Target) -> io::Result<()> {
+    let Target::Temporary(file, path) = target else {
+        return Ok(());
+    };
+    // Delayed writes may fail only here.
+    file.as_file().sync_all()?;
+    let temporary = file.path().to_owned();
+    // Under the lock, so that an interruption finds either the temporary file or the finished one.
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    unfinished.remove(&temporary);
+    file.persist(path).map(|_| ()).map_err(|error| error.error)
+}
+
+/// A temporary file that removes itself need not be removed by an interruption.
+fn forget(target: &Target) {
+    if let Target::Temporary(file, _) = target {
+        let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        unfinished.remove(file.path());
+    }
+}
+
+impl Write for Target {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Temporary(file, _) => file.write(buffer),
+            Self::Direct(file) => file.write(buffer),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Temporary(file, _) => file.flush(),
+            Self::Direct(file) => file.flush(),
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        match &mut self.target {
+            Some(target) => target.write(buffer),
+            None => Ok(buffer.len()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.target.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+impl Drop for AtomicFile {
+    fn drop(&mut self) {
+        if let Some(writer) = self.target.take() {
+            // What is still in the buffer must not be written any more.
+            let (target, _) = writer.into_parts();
+            forget(&target);
+        }
+    }
+}
+
+/// Writes a file whole or not at all.
+///
+/// # Errors
+/// Whatever `content` or the system gives; then there is no file.
+pub fn write_whole(
+    path: &Path,
+    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let mut file = AtomicFile::create(path)?;
+    content(&mut file).map_err(|error| OutputError::new(path, error))?;
+    file.commit()
+}
+
+/// Writes a log as CSV: a header line, then rows of the shortest numbers that are read back bit for bit.
+#[derive(Debug)]
+pub struct LogWriter {
+    file: AtomicFile,
+    columns: usize,
+}
+
+impl LogWriter {
+    /// Begins a log with these column names.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn create(path: &Path, columns: &[impl AsRef<str>]) -> Result<Self, OutputError> {
+        let mut writer = Self {
+            file: AtomicFile::create(path)?,
+            columns: columns.len(),
+        };
+        let names: Vec<String> = columns.iter().map(|name| quoted(name.as_ref())).collect();
+        let written = writeln!(writer.file, "{}", names.join(","));
+        writer.told(written)?;
+        Ok(writer)
+    }
+
+    /// Appends a row: as many numbers as there are columns; a number that is not finite is left empty.
+    ///
+    /// # Errors
+    /// A full disk, or another number of values than columns.
+    pub fn row(&mut self, values: impl IntoIterator<Item = f64>) -> Result<(), OutputError> {
+        let mut count = 0;
+        let mut written = Ok(());
+        for value in values {
+            let comma = if count == 0 { "" } else { "," };
+            written = if value.is_finite() {
+                write!(self.file, "{comma}{value:?}")
+            } else {
+                self.file.write_all(comma.as_bytes())
+            };
+            if written.is_err() {
+                break;
+            }
+            count += 1;
+        }
+        self.told(written)?;
+        if count != self.columns {
+            let problem = format!("a row of {count} numbers under {} names", self.columns);
+            return self.told(Err(io::Error::new(io::ErrorKind::InvalidInput, problem)));
+        }
+        let ended = self.file.write_all(b"\n");
+        self.told(ended)
+    }
+
+    /// Gives the log its name.
+    ///
+    /// # Errors
+    /// A full disk, a lost connection; then there is no file.
+    pub fn commit(self) -> Result<(), OutputError> {
+        self.file.commit()
+    }
+
+    fn told(&self, result: io::Result<()>) -> Result<(), OutputError> {
+        result.map_err(|error| OutputError::new(&self.file.path, error))
+    }
+}
+
+/// A name as a CSV field.
+fn quoted(name: &str) -> String {
+    let special = |c: char| c.is_control() || ",;\"#%".contains(c);
+    if name.is_empty() || name.starts_with(' ') || name.ends_with(' ') || name.chars().any(special)
+    {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder() -> tempfile::TempDir {
+        tempfile::tempdir().unwrap()
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_that_is_not_committed_leaves_nothing_and_keeps_the_old_one() {
+        let folder = folder();
+        let path = folder.path().join("model.toml");
+        std::fs::write(&path, "old").unwrap();
+        let mut file = AtomicFile::create(&path).unwrap();
+        file.write_all(&[b'x'; 200_000]).unwrap();
+        assert_eq!(names(folder.path()).len(), 2);
+        drop(file);
+        assert_eq!(names(folder.path()), ["model.toml"]);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    }
+
+    #[test]
+    fn a_committed_file_replaces_the_old_one_whole() {
+        let folder = folder();
+        let path = folder.path().join("model.toml");
+        std::fs::write(&path, "old").unwrap();
+        write_whole(&path, |file| file.write_all(b"new")).unwrap();
+        assert_eq!(names(folder.path()), ["model.toml"]);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
+    }
+
+    #[test]
+    fn an_error_in_the_content_leaves_no_file() {
+        let folder = folder();
+        let path = folder.path().join("a.csv");
+        let result = write_whole(&path, |file| {
+            file.write_all(b"half")?;
+            Err(io::ErrorKind::StorageFull.into())
+        });
+        assert!(result.unwrap_err().to_string().contains("free some space"));
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_has_the_permissions_of_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = folder();
+        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+        write_whole(&ours, |file| file.write_all(b"x")).unwrap();
+        std::fs::write(&plain, "x").unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_told_and_a_device_is_not_replaced() {
+        let full = Path::new("/dev/full");
+        let error = write_whole(full, |file| file.write_all(b"x")).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::StorageFull);
+        assert!(
+            error.to_string().contains("/dev/full")
+                && error.to_string().contains("free some space")
+        );
+        assert!(!std::fs::metadata(full).unwrap().is_file());
+        write_whole(Path::new("/dev/null"), |file| file.write_all(b"x")).unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_the_file_behind_it_is_replaced() {
+        let folder = folder();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_whole(&link, |content| content.write_all(b"new")).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_folder_as_name_are_told_before_the_work() {
+        let folder = folder();
+        let missing = AtomicFile::create(&folder.path().join("none/a.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(missing.contains("make the folder first"), "{missing}");
+        let named = AtomicFile::create(folder.path()).unwrap_err().to_string();
+        assert!(named.contains("name a file inside"), "{named}");
+    }
+
+    #[test]
+    fn a_row_of_the_wrong_width_is_refused() {
+        let folder = folder();
+        let mut log = LogWriter::create(&folder.path().join("a.csv"), &["t", "q_q1"]).unwrap();
+        log.row([0.0, 1.0]).unwrap();
+        assert!(
+            log.row([0.1])
+                .unwrap_err()
+                .to_string()
+                .contains("1 numbers under 2 names")
+        );
+    }
+}

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
+use crate::log::LogSpec;
 
 /// `[logs]`: log specifications by role, paths relative to the campaign file's folder.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -88,6 +89,25 @@ impl Campaign {
                 &["logs", "identification"],
                 "the logs that the inertial parameters are fitted to",
             ));
+        }
+        let logs = &campaign.logs;
+        for (role, specs) in [
+            ("friction", &logs.friction),
+            ("identification", &logs.identification),
+            ("validation", &logs.validation),
+            ("veto", &logs.veto),
+            ("holdout", &logs.holdout),
+        ] {
+            for spec in specs {
+                if let Err(error) = spec.parse::<LogSpec>() {
+                    let at = ["logs", role];
+                    return Err(document.value(
+                        &at,
+                        "holds a log that cannot be used",
+                        &error.to_string(),
+                    ));
+                }
+            }
         }
         if let Some(limit) = campaign.settings.max_relative_error {
             document.positive(&["settings", "max_relative_error"], limit)?;

@@ -2,19 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::ConfigError;
 use super::document::Document;
-use super::log_section::{ActuatorChannels, JointChannels, PositionUnit, TorqueIs, TorqueUnit};
 use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
+use super::{ConfigError, check_log};
 use crate::log::{list, nearest};
-use crate::robot::JointKind;
-use crate::robot::cft::COORDINATES;
 
 /// Checks a robot file that was read from `document`.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     robot(file, document)?;
     friction(file, document)?;
-    log(file, document)?;
+    check_log::check(file, document)?;
     filter(file, document)?;
     known_names(
         document,
@@ -159,171 +156,6 @@ fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     Ok(())
 }
 
-fn log(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
-    let log = &file.log;
-    known_names(document, &["log", "joint"], &log.joint, &file.joint_names())?;
-    // Which key reads which column: no column may be read twice.
-    let mut columns: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-    if let Some(time) = &log.time {
-        columns.insert(time.as_str(), vec!["log.time".to_owned()]);
-    }
-    let robot = file.robot();
-    for (joint, channels) in &log.joint {
-        let index = robot
-            .joint_names()
-            .iter()
-            .position(|name| name == joint)
-            .unwrap_or(0);
-        joint_channels(
-            document,
-            joint,
-            channels,
-            robot.joint_kind(index),
-            log.torque_is,
-        )?;
-        let named = [
-            ("position", &channels.position),
-            ("velocity", &channels.velocity),
-            ("torque", &channels.torque),
-        ];
-        for (key, column) in named {
-            if let Some(column) = column {
-                claim(
-                    document,
-                    &mut columns,
-                    column,
-                    &["log", "joint", joint, key],
-                )?;
-            }
-        }
-    }
-    if file.robot.model != ModelKind::Cft
-        && let Some(name) = log.actuator.keys().next()
-    {
-        return Err(document.value(
-            &["log", "actuator", name],
-            "does not belong to this model",
-            "map the channels of this joint in [log.joint]",
-        ));
-    }
-    let coordinates = COORDINATES.map(str::to_owned);
-    known_names(document, &["log", "actuator"], &log.actuator, &coordinates)?;
-    for (name, channels) in &log.actuator {
-        actuator_channels(document, name, channels)?;
-        for (key, column) in [("position", &channels.position), ("volts", &channels.volts)] {
-            if let Some(column) = column {
-                claim(
-                    document,
-                    &mut columns,
-                    column,
-                    &["log", "actuator", name, key],
-                )?;
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Refuses a column that is empty or already read as something else.
-fn claim<'c>(
-    document: &Document,
-    columns: &mut BTreeMap<&'c str, Vec<String>>,
-    column: &'c str,
-    at: &[&str],
-) -> Result<(), ConfigError> {
-    if column.trim().is_empty() {
-        return Err(document.value(at, "is empty", "name a column of the log"));
-    }
-    let readers = columns.entry(column).or_default();
-    if let Some(first) = readers.first() {
-        let problem = format!("reads the column that `{first}` reads already");
-        return Err(document.value(at, &problem, "give each channel its own column"));
-    }
-    readers.push(at.join("."));
-    Ok(())
-}
-
-fn joint_channels(
-    document: &Document,
-    joint: &str,
-    channels: &JointChannels,
-    kind: JointKind,
-    torque_is: Option<TorqueIs>,
-) -> Result<(), ConfigError> {
-    let at = |key| ["log", "joint", joint, key];
-    let position_fits = match channels.position_unit {
-        None => true,
-        Some(PositionUnit::Metre | PositionUnit::Millimetre) => kind == JointKind::Prismatic,
-        Some(PositionUnit::Radian | PositionUnit::Degree) => kind == JointKind::Revolute,
-        Some(PositionUnit::Counts) => false,
-    };
-    if !position_fits {
-        let remedy = match kind {
-            JointKind::Prismatic => "a prismatic joint is logged in \"m\" or \"mm\"",
-            JointKind::Revolute => "a revolute joint is logged in \"rad\" or \"deg\"",
-        };
-        return Err(document.value(&at("position_unit"), "does not fit the joint", remedy));
-    }
-    let scaled = channels.torque_scale.is_some();
-    let torque_fits = match channels.torque_unit {
-        None | Some(TorqueUnit::Ampere) => true,
-        Some(TorqueUnit::Newton) => kind == JointKind::Prismatic || scaled,
-        Some(TorqueUnit::NewtonMetre) => kind == JointKind::Revolute || scaled,
-        Some(TorqueUnit::Volt) => scaled,
-    };
-    if !torque_fits {
-        return Err(document.value(
-            &at("torque_unit"),
-            "does not fit the joint",
-            "a prismatic joint has N, a revolute one Nm; else give `torque_scale` to get there",
-        ));
-    }
-    sign(document, &at("position_sign"), channels.position_sign)?;
-    sign(document, &at("torque_sign"), channels.torque_sign)?;
-    scale(document, &at("position_scale"), channels.position_scale)?;
-    scale(document, &at("torque_scale"), channels.torque_scale)?;
-    document.finite(&at("position_offset"), channels.position_offset.as_slice())?;
-    document.finite(&at("torque_offset"), channels.torque_offset.as_slice())?;
-    match (torque_is, &channels.torque) {
-        (None, Some(_)) => Err(document.missing(
-            &["log", "torque_is"],
-            "what the torque column is: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
-        )),
-        (Some(TorqueIs::Motor), _) if !scaled => Err(document.missing(
-            &at("torque_scale"),
-            "the gear ratio that takes motor torque to the joint (1 where there is no gear)",
-        )),
-        (Some(TorqueIs::Current), _) if !scaled && channels.torque_unit != Some(TorqueUnit::Ampere) => {
-            Err(document.missing(
-                &at("torque_scale"),
-                "torque constant times gear ratio, or `torque_unit = \"A\"` to have the model in A",
-            ))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn actuator_channels(
-    document: &Document,
-    name: &str,
-    channels: &ActuatorChannels,
-) -> Result<(), ConfigError> {
-    let at = |key| ["log", "actuator", name, key];
-    let turns = name == COORDINATES[2];
-    let fits = match channels.position_unit {
-        None | Some(PositionUnit::Counts) => true,
-        Some(PositionUnit::Metre | PositionUnit::Millimetre) => !turns,
-        Some(PositionUnit::Radian | PositionUnit::Degree) => turns,
-    };
-    if !fits {
-        let remedy = "x_c3 is logged in \"rad\", \"deg\" or \"counts\", the others in \"m\", \"mm\" or \"counts\"";
-        return Err(document.value(&at("position_unit"), "does not fit the coordinate", remedy));
-    }
-    sign(document, &at("position_sign"), channels.position_sign)?;
-    sign(document, &at("volts_sign"), channels.volts_sign)?;
-    document.finite(&at("home"), channels.home.as_slice())
-}
-
 fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let filter = &file.filter;
     let at = |key| ["filter", key];
@@ -459,7 +291,7 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 }
 
 /// Refuses a table for a joint or coordinate that the robot does not have.
-fn known_names<T>(
+pub(super) fn known_names<T>(
     document: &Document,
     table: &[&str],
     entries: &BTreeMap<String, T>,
@@ -494,24 +326,4 @@ fn per_joint(
         ));
     }
     document.finite(at, values)
-}
-
-fn sign(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    match value {
-        Some(value) if value.abs() != 1.0 => {
-            Err(document.value(at, &format!("is {value}"), "give 1 or -1"))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn scale(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
-    match value {
-        Some(value) if value == 0.0 || !value.is_finite() => Err(document.value(
-            at,
-            &format!("is {value}"),
-            "give a finite factor other than 0",
-        )),
-        _ => Ok(()),
-    }
 }

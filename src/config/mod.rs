@@ -6,6 +6,7 @@
 pub mod campaign;
 mod channels;
 mod check;
+mod check_log;
 mod document;
 mod embedded;
 mod error;

@@ -89,7 +89,7 @@ pub enum Trajectory {
 /// Names of the actuator coordinates of the CFT robot.
 pub const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
     Fourier,
@@ -120,11 +120,38 @@ impl Trajectory {
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         let document = Document::new(file, text);
         let raw: TrajectoryToml = document.read()?;
+        foreign_keys(&document, &raw)?;
         match raw.kind {
             Kind::Fourier => fourier(&document, raw).map(Self::Fourier),
             Kind::SingleJoint => single_joint(&document, raw).map(Self::SingleJoint),
             Kind::Points => points(&document, raw).map(Self::Points),
         }
+    }
+}
+
+/// Refuses a key of another kind of trajectory, which would silently do nothing.
+fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigError> {
+    use Kind::{Fourier, Points, SingleJoint};
+    let keys: [(&str, bool, &[Kind]); 8] = [
+        ("coordinates", raw.coordinates.is_some(), &[Fourier, Points]),
+        ("fundamental_hz", raw.fundamental_hz.is_some(), &[Fourier]),
+        ("coordinate", !raw.coordinate.is_empty(), &[Fourier]),
+        ("joint", raw.joint.is_some(), &[SingleJoint]),
+        ("speeds", !raw.speeds.is_empty(), &[SingleJoint]),
+        ("range", raw.range.is_some(), &[SingleJoint]),
+        ("acceleration", raw.acceleration.is_some(), &[SingleJoint]),
+        ("point", !raw.point.is_empty(), &[Points]),
+    ];
+    match keys
+        .iter()
+        .find(|(_, given, kinds)| *given && !kinds.contains(&raw.kind))
+    {
+        None => Ok(()),
+        Some((key, ..)) => Err(document.value(
+            &[key],
+            "does not belong to this kind of trajectory",
+            "delete it, or choose the right `kind`",
+        )),
     }
 }
 

@@ -213,11 +213,11 @@ impl Rows {
         }
     }
 
-    /// The finite number in a column of the current row.
+    /// `factor` x the number in a column of the current row + `offset`, finite.
     #[inline]
-    pub(super) fn number(&self, column: usize) -> Result<f64, LogError> {
+    pub(super) fn scaled(&self, column: usize, factor: f64, offset: f64) -> Result<f64, LogError> {
         match self.field(column).and_then(number::parse) {
-            Some(value) if value.is_finite() => Ok(value),
+            Some(value) if (value * factor + offset).is_finite() => Ok(value * factor + offset),
             _ => Err(self.no_number(column)),
         }
     }

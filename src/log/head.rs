@@ -127,7 +127,14 @@ fn delimiter_of(line: &str, wanted: Delimiter) -> (u8, bool) {
         Delimiter::Byte(byte) => (byte, false),
         Delimiter::Spaces => (b' ', true),
         Delimiter::Auto => {
-            let count = |sign: u8| line.bytes().filter(|byte| *byte == sign).count();
+            let count = |sign: u8| {
+                let mut quoted = false;
+                let outside = line.bytes().filter(|byte| {
+                    quoted ^= *byte == b'"';
+                    !quoted && *byte == sign
+                });
+                outside.count()
+            };
             let mut best = (b',', count(b','));
             for sign in [b';', b'\t'] {
                 if count(sign) > best.1 {

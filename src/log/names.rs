@@ -28,12 +28,20 @@ pub fn nearest<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> Opti
     let name = name.to_lowercase();
     let mut best: Option<(f64, &str)> = None;
     for candidate in known {
-        let similarity = strsim::jaro_winkler(&name, &candidate.to_lowercase());
+        let similarity = similarity(&name, &candidate.to_lowercase());
         if similarity > best.map_or(0.75, |(score, _)| score) {
             best = Some((similarity, candidate));
         }
     }
     best.map(|(_, candidate)| candidate)
+}
+
+/// Nearness of two names in 0..1: by their common beginning, or by a few slips of the finger.
+fn similarity(a: &str, b: &str) -> f64 {
+    let slips = strsim::osa_distance(a, b);
+    let few = slips <= a.chars().count() / 3;
+    let by_slips = if few { 0.95 - 0.05 * slips as f64 } else { 0.0 };
+    strsim::jaro_winkler(a, b).max(by_slips)
 }
 
 /// A list of names for a message, escaped, cut to the first twenty.
@@ -70,6 +78,7 @@ mod tests {
             Some("cutoff_hz")
         );
         assert_eq!(nearest("Q_Q1", ["q_q1", "q_q2"]), Some("q_q1"));
+        assert_eq!(nearest("ctf", ["single-joint", "cft"]), Some("cft"));
         assert_eq!(nearest("banana", ["cutoff_hz", "order"]), None);
     }
 }

@@ -259,14 +259,14 @@ impl Reader {
 }
 
 fn time_of(rows: &Rows, column: Column) -> Result<f64, LogError> {
-    Ok(rows.number(column.index)? * column.factor + column.offset)
+    rows.scaled(column.index, column.factor, column.offset)
 }
 
 /// Appends the numbers of some columns of the current row.
 #[inline]
 fn append(rows: &Rows, columns: &[Column], to: &mut Vec<f64>) -> Result<(), LogError> {
     for column in columns {
-        to.push(rows.number(column.index)? * column.factor + column.offset);
+        to.push(rows.scaled(column.index, column.factor, column.offset)?);
     }
     Ok(())
 }
