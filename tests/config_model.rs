@@ -199,7 +199,7 @@ fn a_model_of_another_robot_is_refused_with_the_difference() {
     let dspace = RobotFile::load("configs/cft-dspace.toml".as_ref()).unwrap();
     refused(
         model.belongs_to("m.toml", &dspace),
-        &["another robot", "TUeDACS", "dSPACE"],
+        &["another robot", "set-up tuedacs", "set-up dspace"],
     );
 }
 
