@@ -136,7 +136,7 @@ impl<'a, const L: usize> Cascade<'a, L> {
             let [a1, a2] = section.a;
             for l in 0..L {
                 let y = b0 * x[l] + s1[l];
-                s1[l] = b1 * x[l] - a1 * y + s2[l];
+                s1[l] = (b1 * x[l] + s2[l]) - a1 * y;
                 s2[l] = b2 * x[l] - a2 * y;
                 x[l] = y;
             }

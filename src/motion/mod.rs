@@ -24,6 +24,7 @@
 //! | [`run`](mod@run) | the windows of a streamed log |
 //! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
 
+mod cutter;
 pub mod differences;
 pub mod full_rate;
 pub mod run;

@@ -132,8 +132,12 @@ impl Window {
         fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
     ) {
         let size = span.len() * GROUP;
-        self.channels.clear();
-        self.channels.resize(channels.div_ceil(GROUP) * size, 0.0);
+        let needed = channels.div_ceil(GROUP) * size;
+        if self.channels.len() != needed {
+            // Lanes without a channel stay zero: the filter of zeros is zeros.
+            self.channels.clear();
+            self.channels.resize(needed, 0.0);
+        }
         self.raw.clear();
         let mut values = vec![0.0; channels];
         let mut rows = self.kept.iter().peekable();
