@@ -5,7 +5,9 @@ use std::convert::Infallible;
 use cft_ident::log::Block;
 use cft_ident::math::sos::Sos;
 use cft_ident::math::zero_phase::ZeroPhase;
-use cft_ident::motion::{self, Differences, ParallelFilter, Row, Sample, Settings, Summary};
+use cft_ident::motion::{
+    self, Differences, ParallelFilter, Row, Sample, Settings, Summary, TorqueTiming,
+};
 use proptest::prelude::*;
 
 const JOINTS: usize = 2;
@@ -222,6 +224,7 @@ fn check(stretches: &[usize], settings: &Settings, block: usize) -> Result<(), T
         prop_assert_eq!((x.t, x.segment), (y.t, y.segment));
     }
     let off = largest_difference(&found, &expected);
+
     prop_assert!(off < 1e-9, "relative difference {off:e}");
     Ok(())
 }
@@ -293,4 +296,24 @@ fn the_number_of_threads_changes_no_bit() {
         assert!(rows == one, "{threads} threads");
     }
     assert_eq!(summary.segments, 3);
+}
+
+#[test]
+fn how_a_reader_cuts_its_blocks_changes_no_bit() {
+    // Uneven rows with gaps and a held torque: every stage that looks ahead is in use.
+    let mut log = log(&[30_000, 7, 2_000, 1, 1, 9_000], 1e-3);
+    for (k, t) in log.t.iter_mut().enumerate() {
+        *t += 2e-4 * ((k * k) as f64).sin();
+    }
+    let settings = Settings {
+        torque: TorqueTiming::HeldOverSample,
+        ..settings()
+    };
+    let (whole, summary) = run(&log, &settings, log.t.len());
+    assert!(summary.interpolated > 20_000 && summary.skipped.segments == 3);
+    for block in [1, 3, 1_000, 4_096, 8_192, 20_001] {
+        let (rows, other) = run(&log, &settings, block);
+        assert_eq!(other, summary, "blocks of {block}");
+        assert!(rows == whole, "blocks of {block}");
+    }
 }

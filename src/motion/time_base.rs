@@ -13,6 +13,8 @@ use crate::log::Block;
 const PREFIX: usize = 8192;
 /// Share of a step by which rows may be off and still count as even.
 const EVEN: f64 = 0.02;
+/// Rows that an interpolated value is formed from.
+const NODES: usize = 4;
 /// Rows kept behind the one in work: interpolation reaches that far back.
 const HISTORY: usize = 4;
 /// Rows buffered before the oldest are dropped.
@@ -275,7 +277,7 @@ impl TimeBase {
                 });
             } else if late < 0.0 {
                 self.cursor += 1;
-            } else if k + 1 < ready || closed {
+            } else if closed || ready >= NODES.max(k + 2) {
                 self.interpolate(due, ready);
                 self.next += 1.0;
                 self.interpolated += 1;
@@ -326,8 +328,11 @@ impl TimeBase {
     /// The value at time `due` of the cubic through the four rows nearest to it.
     fn interpolate(&mut self, due: f64, ready: usize) {
         let n = self.joints;
-        let first = self.cursor.saturating_sub(2).min(ready.saturating_sub(4));
-        let nodes = &self.t[first..ready.min(first + 4)];
+        let first = self
+            .cursor
+            .saturating_sub(2)
+            .min(ready.saturating_sub(NODES));
+        let nodes = &self.t[first..ready.min(first + NODES)];
         self.out_q.fill(0.0);
         self.out_tau.fill(0.0);
         for m in 0..nodes.len() {
