@@ -34,12 +34,12 @@ pub struct Tolerance {
 }
 
 impl Default for Tolerance {
-    /// Three orders below the encoders' resolution; halving it moves positions by less than 1e-9
+    /// Three orders below the encoders' resolution; halving it moves positions by less than 1e-10
     /// over 20 s (tests/simulate_integration.rs).
     fn default() -> Self {
         Self {
-            absolute: 1e-9,
-            relative: 1e-9,
+            absolute: 1e-8,
+            relative: 1e-8,
         }
     }
 }
