@@ -5,7 +5,7 @@ use rand::RngExt;
 use super::SimulateError;
 use super::chance::{Purpose, stream};
 use super::plant::Plant;
-use crate::robot::cft::actuation::{ENCODER_SCALE, Setup};
+use crate::robot::cft::actuation::{ENCODER_SCALE, Limits, Setup};
 use crate::robot::cft::dynamics::{Coefficients, inertia, inertia_and_bias, solve_positive};
 use crate::robot::cft::{COORDINATES, JOINTS, pantograph};
 use crate::robot::friction::DoubleTanh;
@@ -111,6 +111,7 @@ impl CftTruth {
 #[derive(Debug, Clone)]
 pub struct CftPlant {
     setup: Setup,
+    limits: Limits,
     coefficients: Coefficients,
     friction: [DoubleTanh; 4],
 }
@@ -120,9 +121,15 @@ impl CftPlant {
     pub fn new(truth: &CftTruth) -> Self {
         Self {
             setup: truth.setup,
+            limits: truth.setup.limits(),
             coefficients: Coefficients::from_theta22(&truth.theta),
             friction: truth.friction,
         }
+    }
+
+    /// The same plant with other limits of x_c1..x_c4 than its set-up has.
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
     }
 }
 
@@ -175,8 +182,7 @@ impl Plant<4> for CftPlant {
     }
 
     fn limits(&self) -> ([f64; 4], [f64; 4]) {
-        let limits = self.setup.limits();
-        (limits.lower, limits.upper)
+        (self.limits.lower, self.limits.upper)
     }
 
     fn resolution(&self) -> [f64; 4] {

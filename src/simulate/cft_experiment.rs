@@ -11,12 +11,12 @@ use super::controller::Control;
 use super::effects::{EffectSpec, EffectValue, Effects, Site};
 use super::plant::Plant;
 use super::recording::Recording;
-use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, travel};
+use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, Travel, travel};
 use super::run::{Drive, Settings, Start, run};
 use crate::robot::JointKind;
-use crate::robot::cft::JOINTS;
-use crate::robot::cft::actuation::Setup;
+use crate::robot::cft::actuation::{Limits, Setup};
 use crate::robot::cft::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, joints};
+use crate::robot::cft::{COORDINATES, JOINTS};
 
 /// Top speed of every motor: 4000 revolutions per minute \[rad/s\].
 const MOTOR_SPEED: f64 = 4000.0 * std::f64::consts::TAU / 60.0;
@@ -61,18 +61,59 @@ impl Control<4> {
     }
 }
 
+/// What moves in a one-joint experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mover {
+    /// A joint, by its index in (q1, q2, q4, q5).
+    Joint(usize),
+    /// A motor coordinate, by its index in (x_c1, x_c2, x_c3, x_c4); q4 and q5 then move together.
+    Motor(usize),
+}
+
+impl Mover {
+    /// The joint or motor coordinate of that name.
+    ///
+    /// # Errors
+    /// [`SimulateError::UnknownJoint`].
+    pub fn named(name: &str) -> Result<Self, SimulateError> {
+        let place = |names: [&str; 4]| names.iter().position(|known| *known == name);
+        let joint = place(JOINTS).map(Self::Joint);
+        let motor = || place(COORDINATES).map(Self::Motor);
+        joint
+            .or_else(motor)
+            .ok_or_else(|| SimulateError::UnknownJoint {
+                name: name.to_owned(),
+                known: [JOINTS, COORDINATES].concat().join(", "),
+            })
+    }
+
+    fn index(self) -> usize {
+        match self {
+            Self::Joint(index) | Self::Motor(index) => index,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Joint(_) => JOINTS[self.index()],
+            Self::Motor(_) => COORDINATES[self.index()],
+        }
+    }
+}
+
 /// One joint moves over its range at a ladder of speeds, the others are commanded to hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneJointMove {
-    /// Index of the joint in (q1, q2, q4, q5).
-    pub joint: usize,
+    pub mover: Mover,
+    /// Limits of the motor coordinates; those of the set-up where absent.
+    pub limits: Option<Limits>,
     /// Motor coordinates (x_c1..x_c4) around which it moves; the middle of the limits where absent.
     pub pose: Option<[f64; 4]>,
-    /// Range of the joint, m or rad; what the limits leave, with a margin, where absent.
+    /// Range of the mover, m or rad; what the limits leave, with a margin, where absent.
     pub range: Option<(f64, f64)>,
     /// Plateau speeds, m/s or rad/s; ten in equal ratios up to the motors' limit where absent.
     pub speeds: Option<Vec<f64>>,
-    /// Largest acceleration, m/s^2 or rad/s^2; by joint and set-up where absent.
+    /// Largest acceleration, m/s^2 or rad/s^2; by mover and set-up where absent.
     pub acceleration: Option<f64>,
     /// Duration \[s\].
     pub seconds: f64,
@@ -81,10 +122,11 @@ pub struct OneJointMove {
 }
 
 impl OneJointMove {
-    /// The default ladder of a joint (0..3 for q1, q2, q4, q5).
+    /// The default ladder of joint 0..3 (q1, q2, q4, q5).
     pub fn new(joint: usize, seconds: f64, seed: Option<u64>) -> Self {
         Self {
-            joint,
+            mover: Mover::Joint(joint),
+            limits: None,
             pose: None,
             range: None,
             speeds: None,
@@ -99,31 +141,61 @@ impl OneJointMove {
     /// # Errors
     /// [`SimulateError`] when there is no such joint or the ladder does not fit.
     pub fn reference(&self, setup: Setup) -> Result<Reference<4>, SimulateError> {
-        if self.joint >= 4 {
+        let place = self.mover.index();
+        if place >= 4 {
             return Err(SimulateError::UnknownJoint {
-                name: format!("number {}", self.joint),
+                name: format!("number {place}"),
                 known: JOINTS.join(", "),
             });
         }
-        let plant = CftPlant::new(&CftTruth::synthetic(setup));
-        let mut pose = joints(&self.pose.unwrap_or(setup.limits().middles()))?;
-        let room = travel(&plant, &pose, self.joint, MARGIN, &coordinate_speeds())?;
+        let limits = self.limits.unwrap_or(setup.limits());
+        let plant = CftPlant::new(&CftTruth::synthetic(setup)).with_limits(limits);
+        let middle = self.pose.unwrap_or(limits.middles());
+        let (frame, mut pose, room) = match self.mover {
+            Mover::Joint(_) => {
+                let pose = joints(&middle)?;
+                let room = travel(&plant, &pose, place, MARGIN, &coordinate_speeds())?;
+                (Frame::Joints, pose, room)
+            }
+            Mover::Motor(_) => {
+                let gap = MARGIN * limits.spans()[place];
+                let room = Travel {
+                    range: (limits.lower[place] + gap, limits.upper[place] - gap),
+                    top_speed: coordinate_speeds()[place],
+                };
+                (Frame::Motors, middle, room)
+            }
+        };
         let range = self.range.unwrap_or(room.range);
         if range.0 < room.range.0 - 1e-9 || range.1 > room.range.1 + 1e-9 {
             return Err(SimulateError::Reference {
                 what: format!(
                     "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
-                    JOINTS[self.joint], range.0, range.1, room.range.0, room.range.1
+                    self.mover.name(),
+                    range.0,
+                    range.1,
+                    room.range.0,
+                    room.range.1
                 ),
             });
         }
-        let acceleration = self.acceleration.unwrap_or(acceleration(setup)[self.joint]);
+        let (lowest, acceleration) = match self.mover {
+            Mover::Joint(_) => (LOWEST[place], acceleration(setup)[place]),
+            Mover::Motor(_) => {
+                // The motor's own share of the joint values: x_c4 is q1, x_c3 is q2.
+                let of =
+                    |joints: [f64; 4]| [0.3 * joints[2], 0.3 * joints[3], joints[1], joints[0]];
+                (of(LOWEST)[place], of(acceleration(setup))[place])
+            }
+        };
+        let acceleration = self.acceleration.unwrap_or(acceleration);
         let top = SPEED_SHARE * room.top_speed;
         let ladder = LadderPlan {
             range,
-            speeds: self.speeds.clone().unwrap_or_else(|| {
-                LadderPlan::geometric(range, LOWEST[self.joint], top, LEVELS, acceleration)
-            }),
+            speeds: self
+                .speeds
+                .clone()
+                .unwrap_or_else(|| LadderPlan::geometric(range, lowest, top, LEVELS, acceleration)),
             acceleration,
             turn: TURN,
             seconds: self.seconds,
@@ -132,11 +204,11 @@ impl OneJointMove {
             Some(seed) => ladder.build(Some(&mut stream(seed, Purpose::Reference)))?,
             None => ladder.build(None)?,
         };
-        pose[self.joint] = ladder.at(0.0).0;
+        pose[place] = ladder.at(0.0).0;
         Ok(Reference {
-            frame: Frame::Joints,
+            frame,
             path: Path::Ladder {
-                moving: self.joint,
+                moving: place,
                 pose,
                 ladder,
             },

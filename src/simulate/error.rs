@@ -1,9 +1,10 @@
 //! What keeps a simulation from starting or ending.
 
+use crate::config::ConfigError;
 use crate::robot::RobotError;
 
 /// Errors of the room `simulate`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
     /// The state is no longer finite, or no step is short enough.
     #[error(
@@ -14,6 +15,12 @@ pub enum SimulateError {
     /// A pose that the mechanism cannot take.
     #[error(transparent)]
     Robot(#[from] RobotError),
+    /// A model that does not hold what the plant needs.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A robot that the simulator cannot build.
+    #[error("this robot cannot be simulated: {what}")]
+    Unsupported { what: String },
     /// A start outside the limits.
     #[error(
         "{coordinate} = {value:.5} at the start lies outside its limits [{lower}, {upper}]; begin inside them \

@@ -115,6 +115,8 @@ const SHRINK_AT_MOST: f64 = 0.2;
 const GROW_AT_MOST: f64 = 5.0;
 /// A step shorter than this fraction of the interval means a discontinuity or divergence.
 const SHORTEST: f64 = 1e-9;
+/// More trial steps than this within one interval mean the same.
+const MOST_STEPS: u64 = 200_000;
 
 impl DormandPrince {
     /// Integrator with the given tolerances; the first step length is found by trial.
@@ -135,7 +137,7 @@ impl DormandPrince {
     /// Carries `y` from time `from` to time `to` \[s\].
     ///
     /// # Errors
-    /// [`SimulateError::Diverged`] when the state is no longer finite or no step is short enough.
+    /// [`SimulateError::Diverged`] when no step is short enough, or 200 000 do not reach the end.
     pub fn advance<const N: usize, S: System<N>>(
         &mut self,
         system: &mut S,
@@ -147,6 +149,7 @@ impl DormandPrince {
         let mut t = from;
         let span = to - from;
         let mut rates_known = false;
+        let mut trials = 0;
         while t < to {
             if !rates_known {
                 system.rates(t, y, &mut k[0]);
@@ -158,7 +161,8 @@ impl DormandPrince {
             let pieces = (remaining / self.step).ceil().max(1.0);
             let last = pieces <= 1.0;
             let h = if last { remaining } else { remaining / pieces };
-            if h < SHORTEST * span {
+            trials += 1;
+            if h < SHORTEST * span || trials > MOST_STEPS {
                 return Err(SimulateError::Diverged { t });
             }
             let (next, error) = self.attempt(system, t, h, y, &mut k);

@@ -10,6 +10,7 @@
 //! | [`sensors`] | encoders, sampling, noise, all from one seed |
 //! | [`run`](mod@run) | the experiment, with limits and saturation |
 //! | [`recording`] | the log, and beside it what was true |
+//! | [`order`], [`truth`] | the same from files, and to files |
 //!
 //! No estimator may see what is true: it goes to a file of its own.
 
@@ -19,20 +20,25 @@ pub mod chance;
 pub mod controller;
 pub mod effects;
 mod error;
+mod from_files;
 pub mod integrate;
+pub mod order;
 pub mod plant;
 pub mod recording;
 pub mod reference;
 pub mod run;
 pub mod sensors;
 pub mod single_joint;
+pub mod truth;
 
 pub use cft::{CftPlant, CftTruth};
 pub use controller::Control;
 pub use effects::{EffectSpec, Effects};
 pub use error::SimulateError;
+pub use order::{Motion, Order, SimulatedLog, simulate};
 pub use recording::{Ending, LimitEvent, Recording, Status};
 pub use reference::{Frame, Path, Reference};
 pub use run::{Drive, OnLimit, Settings, Start, VoltSeries, run};
 pub use sensors::{Noise, Sensors};
 pub use single_joint::SingleJointTruth;
+pub use truth::TruthFile;

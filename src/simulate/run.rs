@@ -21,7 +21,8 @@ pub enum Drive<const J: usize> {
     Volts(VoltSeries<J>),
 }
 
-/// Volts over time, each row held until the next; zero before the first and after the last.
+/// Volts over time, each row held until the next and the last for as long as the others on average;
+/// zero before and after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoltSeries<const J: usize> {
     times: Vec<f64>,
@@ -56,14 +57,17 @@ impl<const J: usize> VoltSeries<J> {
         Ok(Self { times, volts })
     }
 
-    /// Time of the last row \[s\].
+    /// Time at which the last row ends \[s\]; a single row lasts for ever.
     pub fn seconds(&self) -> f64 {
-        self.times.last().copied().unwrap_or(0.0)
+        match self.times.as_slice() {
+            [first, .., last] => last + (last - first) / (self.times.len() - 1) as f64,
+            _ => f64::INFINITY,
+        }
     }
 
     fn at(&self, t: f64) -> [f64; J] {
         let after = self.times.partition_point(|&x| x <= t);
-        if after == 0 || (after == self.times.len() && t > self.seconds()) {
+        if after == 0 || (after == self.times.len() && t >= self.seconds()) {
             return [0.0; J];
         }
         self.volts[after - 1]

@@ -1,6 +1,8 @@
 //! One joint with a constant inertia as a plant: tau = inertia a + F(v) + offset.
 
 use super::SimulateError;
+use super::controller::Control;
+use super::effects::{EffectSpec, EffectValue, Effects, Site};
 use super::plant::Plant;
 use crate::robot::JointKind;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -10,8 +12,8 @@ use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 pub enum SingleJointFriction {
     /// Law (18).
     DoubleTanh(DoubleTanh),
-    /// Fv v + Fc sgn(v). At zero speed the jump is replaced by tanh(w v), w = `steepness` in s/m or
-    /// s/rad: a differential equation with a jump has no solution at rest.
+    /// Fv v + Fc sgn(v), with tanh(w v) in the place of the sign, w = `steepness` in s/m or s/rad: a
+    /// differential equation with a jump has no solution at rest.
     ViscousCoulomb { law: ViscousCoulomb, steepness: f64 },
 }
 
@@ -33,7 +35,34 @@ pub struct SingleJointTruth {
     pub limits: (f64, f64),
 }
 
+/// The effects on a single joint, scaled with its friction at one m/s or rad/s.
+///
+/// # Errors
+/// As [`Effects::build`].
+pub fn effects(
+    truth: &SingleJointTruth,
+    specs: &[EffectSpec],
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    let site = Site {
+        joint: 0,
+        turns: truth.kind == JointKind::Revolute,
+        scale: truth.friction.torque(1.0).abs(),
+        unit: truth.kind.torque_unit(),
+    };
+    Effects::build(specs, std::slice::from_ref(&truth.name), &[site])
+}
+
 impl SingleJointTruth {
+    /// Gains that hold and track well at 1 kHz.
+    pub fn control(&self) -> Control<1> {
+        let stiffness = self.inertia * FREQUENCY * FREQUENCY / self.gain;
+        Control {
+            proportional: [stiffness],
+            derivative: [2.0 * DAMPING / FREQUENCY * stiffness],
+            filter_hz: 50.0,
+        }
+    }
+
     /// # Errors
     /// [`SimulateError::Parameter`] for the first number that no joint can have.
     pub fn check(&self) -> Result<(), SimulateError> {
@@ -82,7 +111,24 @@ impl SingleJointTruth {
     }
 }
 
+/// Rate at which a viscous-Coulomb joint comes to rest within its steep part: half a sample at 1 kHz
+/// \[1/s\].
+const REST_RATE: f64 = 2000.0;
+/// Own frequency \[rad/s\] and damping of the joint under [`SingleJointTruth::control`].
+const FREQUENCY: f64 = 45.0;
+const DAMPING: f64 = 0.6;
+
 impl SingleJointFriction {
+    /// Viscous and Coulomb friction, as steep at rest as a 1 kHz log can resolve.
+    pub fn viscous_coulomb(law: ViscousCoulomb, inertia: f64) -> Self {
+        let steepness = if law.coulomb > 0.0 {
+            REST_RATE * inertia / law.coulomb
+        } else {
+            1.0
+        };
+        Self::ViscousCoulomb { law, steepness }
+    }
+
     /// F(v) in N or N m.
     #[inline]
     pub fn torque(&self, v: f64) -> f64 {

@@ -1,5 +1,6 @@
 //! `NAME[:JOINT][:key=value,...]`: effects as they are asked for and as they came out.
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -23,13 +24,13 @@ pub struct EffectValue {
     pub effect: String,
     pub family: String,
     pub joint: String,
-    pub parameters: Vec<EffectParameter>,
+    /// By key, in alphabetical order.
+    pub parameters: BTreeMap<String, EffectParameter>,
 }
 
 /// One value of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectParameter {
-    pub key: String,
     pub value: f64,
     pub unit: String,
 }
@@ -131,15 +132,18 @@ impl EffectSpec {
 
 impl EffectValue {
     pub(super) fn new(kind: &Kind, joint: &str, site: &Site, numbers: &[f64]) -> Self {
-        let parameter = |(key, &value): (&super::Key, &f64)| EffectParameter {
-            key: key.name.to_owned(),
-            value,
-            unit: match key.unit {
-                "torque" => site.unit.to_owned(),
-                "order" if site.turns => "1/rev".to_owned(),
-                "order" => "1/m".to_owned(),
-                other => other.to_owned(),
-            },
+        let parameter = |(key, &value): (&super::Key, &f64)| {
+            let unit = match key.unit {
+                "torque" => site.unit,
+                "order" if site.turns => "1/rev",
+                "order" => "1/m",
+                other => other,
+            };
+            let parameter = EffectParameter {
+                value,
+                unit: unit.to_owned(),
+            };
+            (key.name.to_owned(), parameter)
         };
         Self {
             effect: kind.name.to_owned(),

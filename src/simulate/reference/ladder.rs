@@ -146,6 +146,11 @@ impl LadderPlan {
             .collect()
     }
 
+    /// Largest plateau speed that a range leaves room for at an acceleration.
+    pub fn fastest(range: (f64, f64), acceleration: f64) -> f64 {
+        top_speed(range, acceleration)
+    }
+
     /// The motion; `chance` shuffles the order of the strokes and the end at which it starts.
     ///
     /// # Errors

@@ -1,0 +1,332 @@
+//! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
+
+use super::cft::CftPlant;
+use super::cft_experiment;
+use super::controller::Control;
+use super::effects::{EffectSpec, EffectValue, Effects};
+use super::from_files;
+use super::plant::Plant;
+use super::recording::{Ending, LimitEvent, Recording, Status};
+use super::reference::{Path, Reference};
+use super::run::{Drive, Settings, Start, VoltSeries, run};
+use super::truth::TruthFile;
+use super::{SimulateError, single_joint};
+use crate::config::robot_file::{ModelKind, RobotFile};
+use crate::config::{ModelFile, Trajectory};
+use crate::log::{Channel, Channels};
+
+/// Duration of a motion that sets none \[s\].
+const SECONDS: f64 = 20.0;
+
+/// What the robot is to do.
+#[derive(Debug, Clone, Copy)]
+pub enum Motion<'a> {
+    /// Table 3 on the CFT robot, a ladder on a single joint.
+    Usual,
+    /// A trajectory file.
+    Trajectory(&'a Trajectory),
+    /// One joint (or motor coordinate) runs a ladder of speeds.
+    Move(&'a str),
+    /// Volts of a log: times \[s\], and volts row by row.
+    Volts { times: &'a [f64], volts: &'a [f64] },
+}
+
+/// What is asked of the simulator.
+#[derive(Debug, Clone)]
+pub struct Order<'a> {
+    pub robot: &'a RobotFile,
+    /// Model whose parameters are the truth, and its name in messages; the synthetic ones of the CFT
+    /// robot where absent.
+    pub model: Option<(&'a str, &'a ModelFile)>,
+    pub motion: Motion<'a>,
+    /// Duration \[s\]; the motion's own, or 20 s, where absent.
+    pub seconds: Option<f64>,
+    pub effects: Vec<EffectSpec>,
+    pub seed: u64,
+}
+
+/// A simulated log, ready to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedLog {
+    /// Column names.
+    pub header: Vec<String>,
+    /// Rows, one after the other.
+    pub values: Vec<f64>,
+    pub truth: TruthFile,
+    pub limits: Vec<LimitEvent>,
+    pub ending: Ending,
+    /// Share of the rows at which each motor channel is saturated, by coordinate.
+    pub saturated: Vec<(String, f64)>,
+}
+
+impl SimulatedLog {
+    /// The rows.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
+        self.values.chunks_exact(self.header.len())
+    }
+}
+
+/// Simulates what is ordered.
+///
+/// # Errors
+/// [`SimulateError`]; reaching a limit is none.
+pub fn simulate(order: &Order) -> Result<SimulatedLog, SimulateError> {
+    match order.robot.robot.model {
+        ModelKind::Cft => cft(order),
+        ModelKind::SingleJoint => single(order),
+        ModelKind::Serial => Err(SimulateError::Unsupported {
+            what: "a serial chain; the simulator has `cft` and `single-joint`".to_owned(),
+        }),
+    }
+}
+
+fn cft(order: &Order) -> Result<SimulatedLog, SimulateError> {
+    let truth = from_files::cft_truth(order.robot, order.model)?;
+    truth.check()?;
+    let setup = truth.setup;
+    let limits = from_files::cft_limits(order.robot, setup);
+    let plant = CftPlant::new(&truth).with_limits(limits);
+    let asked = asked_effects(order);
+    let (effects, values) = cft_experiment::effects(&truth, &asked)?;
+    let reference = match order.motion {
+        Motion::Usual => Some(cft_experiment::excitation(setup)),
+        Motion::Trajectory(trajectory) => Some(from_files::cft_reference(
+            order.robot,
+            trajectory,
+            setup,
+            order.seconds,
+            order.seed,
+        )?),
+        Motion::Move(name) => {
+            let mover = cft_experiment::Mover::named(name)?;
+            let seconds = order.seconds.unwrap_or(SECONDS);
+            let ladder = cft_experiment::OneJointMove {
+                mover,
+                limits: Some(limits),
+                ..cft_experiment::OneJointMove::new(0, seconds, Some(order.seed))
+            };
+            Some(ladder.reference(setup)?)
+        }
+        Motion::Volts { .. } => None,
+    };
+    let control = from_files::control(order.robot, Control::cft(setup))?;
+    let mut outcome = execute(order, &plant, effects, reference, control, None)?;
+    outcome.truth.model = "cft".to_owned();
+    outcome.truth.setup = Some(setup.name().to_owned());
+    outcome.truth.parameters = truth.parameters();
+    outcome.truth.effects = values;
+    Ok(outcome)
+}
+
+fn single(order: &Order) -> Result<SimulatedLog, SimulateError> {
+    let truth = from_files::single_joint_truth(order.robot, order.model)?;
+    truth.check()?;
+    let (effects, values) = single_joint::effects(&truth, &asked_effects(order))?;
+    let seconds = order.seconds.unwrap_or(SECONDS);
+    let reference = match order.motion {
+        Motion::Usual => Some(from_files::single_joint_ladder(
+            order.robot,
+            &truth,
+            None,
+            seconds,
+            order.seed,
+        )?),
+        Motion::Move(name) if name != truth.name => {
+            return Err(SimulateError::UnknownJoint {
+                name: name.to_owned(),
+                known: truth.name,
+            });
+        }
+        Motion::Move(_) => Some(from_files::single_joint_ladder(
+            order.robot,
+            &truth,
+            None,
+            seconds,
+            order.seed,
+        )?),
+        Motion::Trajectory(trajectory) => Some(from_files::single_joint_reference(
+            order.robot,
+            &truth,
+            trajectory,
+            order.seconds,
+            order.seed,
+        )?),
+        Motion::Volts { .. } => None,
+    };
+    let control = from_files::control(order.robot, truth.control())?;
+    let saturation = order.robot.control.saturation_v.or_else(|| {
+        let limits = order.robot.limits.get(&truth.name)?;
+        limits.torque.or(limits.volts)
+    });
+    let saturation = saturation.unwrap_or(f64::INFINITY);
+    let mut outcome = execute(order, &truth, effects, reference, control, Some(saturation))?;
+    outcome.truth.model = "single-joint".to_owned();
+    outcome.truth.parameters = truth.parameters();
+    outcome.truth.effects = values;
+    Ok(outcome)
+}
+
+/// Effects of the model, then those of the order.
+fn asked_effects(order: &Order) -> Vec<EffectSpec> {
+    let modelled = order.model.map(|(_, model)| model.effects.as_slice());
+    let mut asked: Vec<EffectSpec> = modelled
+        .unwrap_or_default()
+        .iter()
+        .map(|effect| EffectSpec {
+            name: effect.name.clone(),
+            joint: effect.joint.clone(),
+            values: effect
+                .parameters
+                .iter()
+                .map(|(key, p)| (key.clone(), p.value))
+                .collect(),
+        })
+        .collect();
+    asked.extend(order.effects.iter().cloned());
+    asked
+}
+
+/// Runs the plant and lays the log out as the robot file's `[log]` reads it.
+fn execute<P: Plant<J>, const J: usize>(
+    order: &Order,
+    plant: &P,
+    effects: Effects,
+    reference: Option<Reference<J>>,
+    control: Control<J>,
+    saturation: Option<f64>,
+) -> Result<SimulatedLog, SimulateError> {
+    let (drive, own_seconds) = match (reference, order.motion) {
+        (Some(reference), _) => {
+            let seconds = match &reference.path {
+                // A ladder lasts as long as it was built for; a list may end before the next sample.
+                Path::Points(points) => Some(points.seconds()),
+                _ => None,
+            };
+            (Drive::Follow { reference, control }, seconds)
+        }
+        (None, Motion::Volts { times, volts }) => {
+            let (rows, rest) = volts.as_chunks::<J>();
+            if !rest.is_empty() {
+                return Err(SimulateError::Volts {
+                    what: format!(
+                        "the robot has {J} motors, and the rows do not divide into {J} volts"
+                    ),
+                });
+            }
+            // A log's clock need not start at 0.
+            let first = times.first().copied().unwrap_or(0.0);
+            let times: Vec<f64> = times.iter().map(|t| t - first).collect();
+            let series = VoltSeries::new(times, rows.to_vec())?;
+            let seconds = Some(series.seconds()).filter(|s| s.is_finite());
+            (Drive::Volts(series), seconds)
+        }
+        (None, _) => {
+            return Err(SimulateError::Reference {
+                what: "there is neither a reference nor a series of volts".to_owned(),
+            });
+        }
+    };
+    let mut settings: Settings<J> = from_files::settings(order.robot)?;
+    settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
+    settings.seed = order.seed;
+    settings.saturation = saturation
+        .or(order.robot.control.saturation_v)
+        .unwrap_or(settings.saturation);
+    let recording = run(plant, effects, &Start::Settled, &drive, &settings)?;
+    let (header, values) = lay_out(order.robot, &recording);
+    let rows = recording.rows().max(1) as f64;
+    let saturated = (0..J).map(|i| {
+        let count = recording
+            .status
+            .iter()
+            .filter(|s| s[i] == Status::Saturated)
+            .count();
+        (recording.coordinates[i].clone(), count as f64 / rows)
+    });
+    Ok(SimulatedLog {
+        header,
+        values,
+        truth: truth_of(order, &recording, Vec::new()),
+        saturated: saturated.collect(),
+        ending: recording.ending,
+        limits: recording.limits,
+    })
+}
+
+fn truth_of<const J: usize>(
+    order: &Order,
+    recording: &Recording<J>,
+    effects: Vec<EffectValue>,
+) -> TruthFile {
+    let mut ending = match recording.ending {
+        Ending::Completed => "completed".to_owned(),
+        Ending::StoppedAtLimit => "stopped at a limit".to_owned(),
+    };
+    for event in &recording.limits {
+        ending += &format!(
+            "; {} = {:.5} at t = {:.4} s",
+            event.coordinate, event.value, event.t
+        );
+    }
+    TruthFile {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: order.seed,
+        model: String::new(),
+        setup: None,
+        ending,
+        volt_noise: recording.volt_noise.to_vec(),
+        torque_noise: recording.torque_noise.to_vec(),
+        parameters: Vec::new(),
+        effects,
+    }
+}
+
+/// Header and rows under the names, signs, scales and offsets with which the robot file reads logs: joint
+/// channels where it reads those, and for the CFT robot the raw channels and status behind them.
+fn lay_out<const J: usize>(robot: &RobotFile, recording: &Recording<J>) -> (Vec<String>, Vec<f64>) {
+    let layout = robot.layout();
+    let (joint, actuator) = match (layout.channels, layout.otherwise.as_deref()) {
+        (Channels::Joint, otherwise) => (Some(&layout), otherwise),
+        (Channels::Actuator, _) => (None, Some(&layout)),
+    };
+    let mut header = vec![layout.time.column.clone()];
+    for part in [joint, actuator].into_iter().flatten() {
+        header.extend(
+            part.positions
+                .iter()
+                .chain(&part.torques)
+                .map(|c| c.column.clone()),
+        );
+    }
+    if actuator.is_some() {
+        header.extend((1..=J).map(|i| format!("status_{i}")));
+    }
+    let mut values = Vec::with_capacity(header.len() * recording.rows());
+    for k in 0..recording.rows() {
+        values.push(logged(&layout.time, recording.t[k]));
+        if let Some(part) = joint {
+            extend(&mut values, &part.positions, &recording.q[k]);
+            extend(&mut values, &part.torques, &recording.torque[k]);
+        }
+        if let Some(part) = actuator {
+            extend(&mut values, &part.positions, &recording.x[k]);
+            extend(&mut values, &part.torques, &recording.volts[k]);
+            values.extend(recording.status[k].map(|s| f64::from(s.code())));
+        }
+    }
+    (header, values)
+}
+
+fn extend(values: &mut Vec<f64>, channels: &[Channel], numbers: &[f64]) {
+    values.extend(
+        channels
+            .iter()
+            .zip(numbers)
+            .map(|(channel, x)| logged(channel, *x)),
+    );
+}
+
+/// The number that the channel shows for an SI value.
+fn logged(channel: &Channel, value: f64) -> f64 {
+    (value - channel.offset) / channel.factor
+}
