@@ -17,6 +17,7 @@
 
 pub mod math;
 pub mod robot;
+pub mod verdict;
 
 pub mod log;
 

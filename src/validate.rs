@@ -1,1 +1,279 @@
-//! Room `validate`.
+//! Torque reconstruction on a log that was not used (Figures 7 and 8 of the report).
+//!
+//! Measured and reconstructed torque run through the model's declared parallel filter alike; the
+//! errors of every filtered, decimated row and of every raw sample are summed as they pass.
+
+use serde::Serialize;
+
+use crate::log::Block;
+use crate::motion::{self, Settings, Summary};
+use crate::robot::model::Model;
+
+/// Errors of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointError {
+    pub joint: String,
+    /// "N" or "Nm".
+    pub unit: &'static str,
+    /// Root mean square of measured less reconstructed torque, filtered.
+    pub rmse: f64,
+    /// norm(tau - tau_hat) / norm(tau), filtered and decimated.
+    pub relative_error: f64,
+    /// The same of every raw sample.
+    pub relative_error_raw: f64,
+    /// Largest filtered error.
+    pub max_abs: f64,
+    /// 1 - residual variance / variance of the measured torque, filtered.
+    pub r2: f64,
+    /// Filtered, decimated rows.
+    pub samples: u64,
+}
+
+/// Errors over all joints.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Overall {
+    /// Stacked norms over all joints; none where their units differ.
+    pub relative_error: Option<f64>,
+    /// Root mean square over joints of their relative errors.
+    pub mean_relative_error: f64,
+}
+
+/// One reconstructed log.
+#[derive(Debug, Clone)]
+pub struct Validation {
+    pub joints: Vec<JointError>,
+    pub overall: Overall,
+    pub summary: Summary,
+    pub traces: Traces,
+}
+
+/// Filtered torques over time for the figure, thinned to a bounded number of points so that every
+/// extreme survives.
+#[derive(Debug, Clone, Default)]
+pub struct Traces {
+    /// Time of each point [s].
+    pub t: Vec<f64>,
+    /// First point of each uninterrupted stretch.
+    pub breaks: Vec<usize>,
+    /// Measured and reconstructed torque, points x joints, row-major.
+    pub measured: Vec<f64>,
+    pub reconstructed: Vec<f64>,
+}
+
+/// Sums of one joint.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    error: f64,
+    torque: f64,
+    mean: f64,
+    scatter: f64,
+    largest: f64,
+    rows: u64,
+    raw_error: f64,
+    raw_torque: f64,
+}
+
+impl Sums {
+    fn add(&mut self, measured: f64, reconstructed: f64) {
+        let e = measured - reconstructed;
+        self.error += e * e;
+        self.torque += measured * measured;
+        self.largest = self.largest.max(e.abs());
+        self.rows += 1;
+        // Welford 1962: the scatter about the running mean
+        let d = measured - self.mean;
+        self.mean += d / self.rows as f64;
+        self.scatter += d * (measured - self.mean);
+    }
+
+    fn add_raw(&mut self, measured: f64, reconstructed: f64) {
+        let e = measured - reconstructed;
+        self.raw_error += e * e;
+        self.raw_torque += measured * measured;
+    }
+}
+
+/// One row of raw torques, handed to the caller for a residual file.
+#[derive(Debug, Clone, Copy)]
+pub struct Reconstructed<'a> {
+    pub t: f64,
+    /// Unfiltered torque as logged and as reconstructed, n numbers each.
+    pub measured: &'a [f64],
+    pub reconstructed: &'a [f64],
+}
+
+/// Errors of several logs and joints, summed log after log.
+pub struct Reconstruction<'a> {
+    model: &'a Model,
+    sums: Vec<Sums>,
+    traces: Traces,
+}
+
+impl<'a> Reconstruction<'a> {
+    /// Nothing yet.
+    pub fn new(model: &'a Model) -> Self {
+        Reconstruction {
+            model,
+            sums: vec![Sums::default(); model.robot.joints()],
+            traces: Traces::default(),
+        }
+    }
+
+    /// Runs one log through with the processing that the model declares. `row` gets every raw
+    /// sample.
+    ///
+    /// # Errors
+    /// Those of the source and of [`motion::run`].
+    pub fn add<E>(
+        &mut self,
+        settings: &Settings,
+        source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+        row: &mut dyn FnMut(&Reconstructed),
+    ) -> Result<Summary, motion::RunError<E>> {
+        let n = self.model.robot.joints();
+        let model = self.model;
+        let mut full = settings.clone();
+        let declared = full.decimation;
+        // every raw sample counts, so rows are thinned here and not by the pipeline
+        full.decimation = Some(1);
+        let mut stretch = None;
+        let mut count = 0usize;
+        let (sums, traces) = (&mut self.sums, &mut self.traces);
+        let cutoff = settings.cutoff_hz;
+        let mut last_t = None::<f64>;
+        let summary = motion::run(
+            source,
+            n,
+            &full,
+            None,
+            2 * n,
+            &|sample, out| {
+                out[..n].copy_from_slice(sample.tau);
+                model.torque(sample.q, sample.v, sample.a, &mut out[n..]);
+            },
+            &mut |r| {
+                if stretch != Some(r.segment) {
+                    stretch = Some(r.segment);
+                    count = 0;
+                    traces.breaks.push(traces.t.len());
+                    last_t = None;
+                }
+                for (j, s) in sums.iter_mut().enumerate() {
+                    s.add_raw(r.raw[j], r.raw[n + j]);
+                }
+                row(&Reconstructed {
+                    t: r.t,
+                    measured: &r.raw[..n],
+                    reconstructed: &r.raw[n..],
+                });
+                // without a declared decimation: ten rows a period of the cut-off
+                let keep = match declared {
+                    Some(every) => count.is_multiple_of(every.max(1)),
+                    None => last_t.is_none_or(|l| r.t - l >= 0.0999 / cutoff),
+                };
+                count += 1;
+                if keep {
+                    last_t = Some(r.t);
+                    for (j, s) in sums.iter_mut().enumerate() {
+                        s.add(r.filtered[j], r.filtered[n + j]);
+                    }
+                    append(traces, r.t, r.filtered, n);
+                }
+            },
+        )?;
+        Ok(summary)
+    }
+
+    /// Errors over all logs that were added, with the last log's summary.
+    pub fn finish(self, summary: Summary) -> Validation {
+        let robot = &self.model.robot;
+        let n = robot.joints();
+        let joints: Vec<JointError> = (0..n)
+            .map(|j| {
+                let s = &self.sums[j];
+                let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
+                JointError {
+                    joint: robot.joint_names()[j].clone(),
+                    unit: robot.joint_unit(j),
+                    rmse: (s.error / s.rows.max(1) as f64).sqrt(),
+                    relative_error: ratio(s.error, s.torque),
+                    relative_error_raw: ratio(s.raw_error, s.raw_torque),
+                    max_abs: s.largest,
+                    r2: if s.scatter > 0.0 {
+                        1.0 - s.error / s.scatter
+                    } else {
+                        f64::NAN
+                    },
+                    samples: s.rows,
+                }
+            })
+            .collect();
+        let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
+        let (error, torque) = self
+            .sums
+            .iter()
+            .fold((0.0, 0.0), |(e, t), s| (e + s.error, t + s.torque));
+        let mean = joints
+            .iter()
+            .map(|e| e.relative_error * e.relative_error)
+            .sum::<f64>();
+        Validation {
+            overall: Overall {
+                relative_error: one_unit.then(|| (error / torque).sqrt()),
+                mean_relative_error: (mean / n as f64).sqrt(),
+            },
+            joints,
+            summary,
+            traces: self.traces,
+        }
+    }
+}
+
+/// Most points of a trace; beyond it neighbouring pairs of extremes merge.
+const MOST_POINTS: usize = 16_384;
+
+/// Appends a row to the traces; thins them by two where they are too many.
+fn append(traces: &mut Traces, t: f64, filtered: &[f64], n: usize) {
+    traces.t.push(t);
+    traces.measured.extend_from_slice(&filtered[..n]);
+    traces.reconstructed.extend_from_slice(&filtered[n..]);
+    if traces.t.len() >= MOST_POINTS {
+        halve(traces, n);
+    }
+}
+
+/// Of every four points keeps the two whose first-joint error is smallest and largest, in order
+/// of time; stretches keep their borders.
+fn halve(traces: &mut Traces, n: usize) {
+    let mut out = Traces::default();
+    let mut bounds = traces.breaks.clone();
+    bounds.push(traces.t.len());
+    for pair in bounds.windows(2) {
+        out.breaks.push(out.t.len());
+        let mut k = pair[0];
+        while k < pair[1] {
+            let end = (k + 4).min(pair[1]);
+            let size = |i: &usize| -> f64 {
+                (0..n)
+                    .map(|j| traces.measured[i * n + j] - traces.reconstructed[i * n + j])
+                    .sum()
+            };
+            let lo = (k..end).min_by(|a, b| size(a).total_cmp(&size(b)));
+            let hi = (k..end).max_by(|a, b| size(a).total_cmp(&size(b)));
+            let (Some(lo), Some(hi)) = (lo, hi) else {
+                break;
+            };
+            let mut kept = [lo.min(hi), lo.max(hi)].to_vec();
+            kept.dedup();
+            for i in kept {
+                out.t.push(traces.t[i]);
+                out.measured
+                    .extend_from_slice(&traces.measured[i * n..(i + 1) * n]);
+                out.reconstructed
+                    .extend_from_slice(&traces.reconstructed[i * n..(i + 1) * n]);
+            }
+            k = end;
+        }
+    }
+    *traces = out;
+}

@@ -1,8 +1,27 @@
 //! `cft-ident lsq`: the inertial parameters by linear least squares.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::log::LogSpec;
+use serde_json::{Value, json};
+
+use super::friction::new_model;
+use super::machine::{Machine, run_error, summary_warnings};
+use super::{CliError, Context, Outcome};
+use crate::config::ModelFile;
+use crate::config::identified::{friction_meaning, friction_unit};
+use crate::config::model_file::Parameter;
+use crate::config::robot_file::FrictionLawKind;
+use crate::inertia::accumulate::Sums;
+use crate::inertia::columns::{Columns, KnownFriction, Own};
+use crate::inertia::solve::{Fit, FitError, fit};
+use crate::inertia::verdict::verdict;
+use crate::inertia::{accumulate, solve};
+use crate::log::{LogSpec, Provenance};
+use crate::motion::Summary;
+use crate::report::json::Document;
+use crate::report::{number, summary};
+use crate::robot::friction::DoubleTanh;
+use crate::verdict::{IDENTIFIED, Verdict};
 
 const EXAMPLE: &str = "\
 Example:
@@ -39,4 +58,412 @@ pub enum Estimator {
     Wls,
     /// All rows alike
     Ols,
+}
+
+impl From<Estimator> for solve::Estimator {
+    fn from(estimator: Estimator) -> Self {
+        match estimator {
+            Estimator::Wls => solve::Estimator::Wls,
+            Estimator::Ols => solve::Estimator::Ols,
+        }
+    }
+}
+
+/// One unknown of the fit with what the data say about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unknown {
+    pub name: String,
+    pub theta: Option<u32>,
+    pub joint: Option<String>,
+    pub unit: String,
+    pub meaning: String,
+    pub value: f64,
+    pub std: f64,
+    pub verdict: Verdict,
+    pub negligible: bool,
+}
+
+/// Result of the stage.
+pub struct Identified {
+    pub columns: Columns,
+    pub fit: Fit,
+    pub unknowns: Vec<Unknown>,
+    pub summary: Summary,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Fits the inertial parameters; friction from `friction`, or fitted with them where there is none.
+pub fn identify(
+    machine: &Machine,
+    logs: &[LogSpec],
+    friction: Option<(&str, &ModelFile)>,
+    estimator: solve::Estimator,
+    context: &Context,
+) -> Result<Identified, CliError> {
+    let columns = columns(machine, friction)?;
+    let mut warnings = Vec::new();
+    if friction.is_none() {
+        warnings.push(
+            "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it".to_owned(),
+        );
+    }
+    let bar = context.progress("least squares", Some(logs.len() as u64));
+    let mut total: Option<(Sums, Summary)> = None;
+    let mut inputs = Vec::new();
+    for spec in logs {
+        let (mut log, held) = machine.open(spec, context)?;
+        let settings = machine.settings(held);
+        let (sums, summary) = accumulate(&machine.robot, &columns, &settings, &mut |block| {
+            log.read(block)
+        })
+        .map_err(|e| run_error(spec, e))?;
+        warnings.extend(summary_warnings(spec, &summary));
+        inputs.push(log.provenance()?);
+        total = Some(match total {
+            None => (sums, summary),
+            Some((mut all, first)) => {
+                all.merge(sums);
+                (all, first)
+            }
+        });
+        bar.advance(1);
+    }
+    let Some((sums, summary)) = total else {
+        return Err(CliError::usage("no log is given"));
+    };
+    let fit = fit(&sums, estimator).map_err(|e| match e {
+        FitError::Math(_) => CliError::input(e),
+        FitError::TooFewRows { .. } | FitError::NothingExcited => CliError::undetermined(e),
+    })?;
+    let unknowns = unknowns(machine, &columns, &fit);
+    for c in &fit.confounded {
+        let words: Vec<String> = c
+            .terms
+            .iter()
+            .take(6)
+            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].name))
+            .collect();
+        warnings.push(format!(
+            "these data cannot tell apart what {} share: their combination {} (columns scaled to norm 1) changes nothing",
+            c.terms.iter().take(6).map(|(i, _)| unknowns[*i].name.as_str()).collect::<Vec<_>>().join(", "),
+            words.join(" ")
+        ));
+    }
+    if unknowns
+        .iter()
+        .all(|u| u.verdict == Verdict::NotIdentifiable)
+    {
+        return Err(CliError::undetermined(
+            "these data determine none of the parameters; excite every joint with more speed and acceleration",
+        ));
+    }
+    Ok(Identified {
+        columns,
+        fit,
+        unknowns,
+        summary,
+        inputs,
+        warnings,
+    })
+}
+
+/// Which columns this robot's rows have.
+fn columns(machine: &Machine, friction: Option<(&str, &ModelFile)>) -> Result<Columns, CliError> {
+    let robot = &machine.robot;
+    let n = robot.joints();
+    let section = &machine.file.friction;
+    let mut own = vec![Vec::new(); n];
+    let mut known = vec![None; n];
+    for (j, joint) in robot.joint_names().iter().enumerate() {
+        match friction {
+            Some((file, model)) => {
+                let law = model.double_tanh(file, joint)?;
+                let keys: Vec<String> = DoubleTanh::NAMES
+                    .iter()
+                    .map(|n| format!("{n}:{joint}"))
+                    .collect();
+                let flat = model.covariance_of(&keys);
+                let covariance = std::array::from_fn(|a| std::array::from_fn(|b| flat[a * 5 + b]));
+                known[j] = Some(KnownFriction { law, covariance });
+            }
+            None => own[j].extend([Own::Viscous, Own::Coulomb]),
+        }
+        if section.offset {
+            own[j].push(Own::Offset);
+        }
+    }
+    Ok(Columns {
+        joints: n,
+        shared: robot.parameters().len(),
+        own,
+        known,
+    })
+}
+
+fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
+    let robot = &machine.robot;
+    let rate = |i: usize, value: f64| {
+        let std = fit.covariance[(i, i)].max(0.0).sqrt();
+        let share = (0..columns.joints)
+            .filter(|j| fit.torque_rms[*j] > 0.0)
+            .map(|j| 2.0 * std * fit.column_rms[(j, i)] / fit.torque_rms[j])
+            .fold(0.0, f64::max);
+        let (verdict, negligible) = verdict(value, std, fit.determined[i], share);
+        (std, verdict, negligible)
+    };
+    let mut out = Vec::with_capacity(columns.unknowns());
+    for (i, info) in robot.parameters().iter().enumerate() {
+        let value = fit.theta[i];
+        let (std, verdict, negligible) = rate(i, value);
+        out.push(Unknown {
+            name: info.name.to_owned(),
+            theta: info.theta,
+            joint: None,
+            unit: info.unit.to_owned(),
+            meaning: info.meaning.to_owned(),
+            value,
+            std,
+            verdict,
+            negligible,
+        });
+    }
+    for (j, joint) in robot.joint_names().iter().enumerate() {
+        for own in &columns.own[j] {
+            let i = out.len();
+            let value = fit.theta[i];
+            let (std, verdict, negligible) = rate(i, value);
+            out.push(Unknown {
+                name: own.name().to_owned(),
+                theta: None,
+                joint: Some(joint.clone()),
+                unit: friction_unit(robot, j, own.name(), machine.file.torque_unit(j)),
+                meaning: friction_meaning(own.name()).to_owned(),
+                value,
+                std,
+                verdict,
+                negligible,
+            });
+        }
+    }
+    out
+}
+
+impl Unknown {
+    fn relative_std(&self) -> f64 {
+        self.std / self.value.abs()
+    }
+
+    /// The parameter as a model file holds it: the value is kept even where the data do not
+    /// determine it, for the torque is computed with all of them together.
+    fn parameter(&self) -> Parameter {
+        Parameter {
+            name: self.name.clone(),
+            theta: self.theta,
+            joint: self.joint.clone(),
+            value: self.value,
+            std: self.std.is_finite().then_some(self.std),
+            unit: self.unit.clone(),
+            meaning: self.meaning.clone(),
+            verdict: Some(self.verdict),
+        }
+    }
+}
+
+/// The model: friction as it was known, and what was fitted, with their joint covariance.
+pub fn into_model(
+    machine: &Machine,
+    found: &Identified,
+    friction: Option<&ModelFile>,
+) -> ModelFile {
+    let mut model = new_model(machine, "lsq", &found.inputs);
+    model.parameters = found.unknowns.iter().map(Unknown::parameter).collect();
+    let robot = &machine.robot;
+    let u = found.unknowns.len();
+    let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
+    let mut joint_of = Vec::new();
+    if let Some(friction) = friction {
+        for (j, joint) in robot.joint_names().iter().enumerate() {
+            for (k, name) in DoubleTanh::NAMES.iter().enumerate() {
+                if let Some(p) = friction.find(name, Some(joint)) {
+                    keys.push(p.key());
+                    joint_of.push((j, k));
+                    model.parameters.push(p.clone());
+                }
+            }
+        }
+        model.effects = friction.effects.clone();
+    }
+    let fit = &found.fit;
+    let known = |j: usize, a: usize, b: usize| {
+        found.columns.known[j]
+            .as_ref()
+            .map_or(0.0, |k| k.covariance[a][b])
+    };
+    // cov(theta, theta_f) = S Sigma_f, with S = d theta / d theta_f
+    let cross = |i: usize, (j, k): (usize, usize)| -> f64 {
+        fit.friction_sensitivity[j]
+            .as_ref()
+            .map_or(0.0, |s| (0..5).map(|m| s[(i, m)] * known(j, m, k)).sum())
+    };
+    model.replace_covariance(&keys, &|a, b| match (a < u, b < u) {
+        (true, true) => fit.covariance[(a, b)],
+        (true, false) => cross(a, joint_of[b - u]),
+        (false, true) => cross(b, joint_of[a - u]),
+        (false, false) => {
+            let ((ja, ka), (jb, kb)) = (joint_of[a - u], joint_of[b - u]);
+            if ja == jb { known(ja, ka, kb) } else { 0.0 }
+        }
+    });
+    for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
+        model.residual_std.insert(joint.clone(), *std);
+    }
+    model
+}
+
+/// The JSON fields of the command.
+pub fn json(machine: &Machine, found: &Identified) -> Value {
+    let fit = &found.fit;
+    let parameters: Vec<Value> = found
+        .unknowns
+        .iter()
+        .map(|u| {
+            let known = u.verdict != Verdict::NotIdentifiable;
+            json!({
+                "name": u.name,
+                "theta": u.theta,
+                "joint": u.joint,
+                "value": known.then_some(u.value),
+                "std": known.then_some(u.std),
+                "relative_std": known.then(|| u.relative_std()),
+                "unit": u.unit,
+                "verdict": u.verdict,
+                "negligible": u.negligible,
+            })
+        })
+        .collect();
+    let joints: Vec<Value> = (0..machine.robot.joints())
+        .map(|j| {
+            json!({
+                "joint": machine.robot.joint_names()[j],
+                "unit": machine.file.torque_unit(j),
+                "rmse": fit.residual_std[j],
+                "relative_error": fit.relative_error[j],
+            })
+        })
+        .collect();
+    json!({
+        "parameters": parameters,
+        "condition": fit.condition,
+        "rank": fit.rank,
+        "samples": fit.rows * machine.robot.joints() as u64,
+        "effective_samples": fit.effective_rows * machine.robot.joints() as f64,
+        "joints": joints,
+        "processing": processing(&found.summary),
+    })
+}
+
+/// What was done to the logs before the fit.
+pub fn processing(summary: &Summary) -> Value {
+    json!({
+        "cutoff_hz": summary.cutoff_hz,
+        "decimation": summary.decimation,
+        "position_cutoff_hz": summary.q_cutoff_hz,
+    })
+}
+
+/// The tables for a person.
+pub fn text(machine: &Machine, found: &Identified) -> String {
+    let fit = &found.fit;
+    let rows: Vec<summary::Parameter> = found
+        .unknowns
+        .iter()
+        .map(|u| {
+            let known = u.verdict != Verdict::NotIdentifiable;
+            summary::Parameter {
+                joint: u.joint.as_deref().unwrap_or(""),
+                name: &u.name,
+                theta: None,
+                value: if known { u.value } else { f64::NAN },
+                std: if known { u.std } else { f64::NAN },
+                unit: &u.unit,
+                verdict: if u.negligible && u.relative_std() > IDENTIFIED {
+                    "negligible"
+                } else {
+                    u.verdict.word()
+                },
+                truth: None,
+            }
+        })
+        .collect();
+    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
+    let mut out = format!(
+        "{}\ncondition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
+        summary::parameters("parameters", &rows),
+        condition(fit.condition.raw),
+        condition(fit.condition.normalised),
+        fit.rank,
+        found.unknowns.len(),
+        fit.rows,
+        fit.effective_rows,
+    );
+    let errors: Vec<String> = (0..machine.robot.joints())
+        .map(|j| {
+            format!(
+                "{} {} ({} {})",
+                machine.robot.joint_names()[j],
+                number::percent(fit.relative_error[j]),
+                number::significant(fit.residual_std[j], 3),
+                machine.file.torque_unit(j)
+            )
+        })
+        .collect();
+    out += &format!("residual of the fit: {}\n", errors.join(", "));
+    out
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
+    super::outputs::check(&inputs, &[args.output.as_path()])?;
+    let machine = Machine::load(&args.robot)?;
+    let friction = match &args.model {
+        None => None,
+        Some(path) => {
+            let model = ModelFile::load(path)?;
+            model.belongs_to(&path.display().to_string(), &machine.file)?;
+            Some((path.display().to_string(), model))
+        }
+    };
+    if friction.is_none()
+        && !machine.file.friction.fitted_with_inertias
+        && machine.file.friction_law() == FrictionLawKind::DoubleTanh
+    {
+        return Err(CliError::usage("lsq needs the friction of every joint")
+            .hint("identify it first with `cft-ident friction`, and give its model with -m")
+            .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));
+    }
+    let known = friction
+        .as_ref()
+        .map(|(name, model)| (name.as_str(), model));
+    let found = identify(&machine, &args.logs, known, args.estimator.into(), context)?;
+    let model = into_model(&machine, &found, known.map(|k| k.1));
+    let document = Document::new(
+        "lsq",
+        &found.inputs,
+        &found.warnings,
+        &json(&machine, &found),
+    )?;
+    let mut text = text(&machine, &found);
+    context.check()?;
+    super::outputs::write_text(&args.output, &model.to_toml()?)?;
+    text += &format!("written: {}\n", args.output.display());
+    Ok(Outcome {
+        text,
+        document,
+        missed: Vec::new(),
+    })
 }

@@ -14,8 +14,10 @@ mod arguments;
 mod context;
 mod error;
 mod exit;
+pub mod machine;
 mod outcome;
 mod outputs;
+mod residual_file;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -60,11 +62,19 @@ struct Common {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    Friction(friction::Args),
+    Lsq(lsq::Args),
+    Validate(validate::Args),
+}
 
 impl Command {
-    fn run(&self, _context: &Context) -> Result<Outcome, CliError> {
-        match *self {}
+    fn run(&self, context: &Context) -> Result<Outcome, CliError> {
+        match self {
+            Command::Friction(args) => friction::run(args, context),
+            Command::Lsq(args) => lsq::run(args, context),
+            Command::Validate(args) => validate::run(args, context),
+        }
     }
 }
 

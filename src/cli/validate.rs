@@ -1,9 +1,19 @@
 //! `cft-ident validate`: the torque of a log that was not used, reconstructed by a model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::arguments;
-use crate::log::LogSpec;
+use serde_json::{Value, json};
+
+use super::lsq::processing;
+use super::machine::{Machine, run_error, summary_warnings};
+use super::{CliError, Context, Outcome, arguments};
+use crate::config::ModelFile;
+use crate::log::{LogSpec, Provenance};
+use crate::report::figure::{JointTorque, TorqueFigure};
+use crate::report::json::Document;
+use crate::report::{number, summary};
+use crate::robot::model::Model;
+use crate::validate::{Reconstruction, Validation};
 
 const EXAMPLE: &str = "\
 Example:
@@ -31,4 +41,224 @@ pub struct Args {
     /// Draw measured and reconstructed torque; may be given more than once
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
     pub plot: Vec<PathBuf>,
+}
+
+/// Result of the stage.
+pub struct Validated {
+    pub validation: Validation,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Reconstructs the torque of logs; `row` gets every raw sample as (t, measured, reconstructed).
+pub fn reconstruct(
+    machine: &Machine,
+    model: &Model,
+    logs: &[LogSpec],
+    context: &Context,
+    row: &mut dyn FnMut(&crate::validate::Reconstructed),
+) -> Result<Validated, CliError> {
+    let bar = context.progress("reconstruction", Some(logs.len() as u64));
+    let mut all: Option<Reconstruction> = None;
+    let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
+    for spec in logs {
+        let (mut log, held) = machine.open(spec, context)?;
+        let settings = machine.settings(held);
+        let all = all.get_or_insert_with(|| Reconstruction::new(model));
+        let summary = all
+            .add(&settings, &mut |block| log.read(block), row)
+            .map_err(|e| run_error(spec, e))?;
+        warnings.extend(summary_warnings(spec, &summary));
+        inputs.push(log.provenance()?);
+        last = Some(summary);
+        bar.advance(1);
+    }
+    let (Some(all), Some(summary)) = (all, last) else {
+        return Err(CliError::usage("no log is given"));
+    };
+    Ok(Validated {
+        validation: all.finish(summary),
+        inputs,
+        warnings,
+    })
+}
+
+/// The JSON fields of the command.
+pub fn json(machine: &Machine, validation: &Validation) -> Value {
+    let joints: Vec<Value> = validation
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, e)| {
+            let mut joint = json!(e);
+            joint["unit"] = machine.file.torque_unit(j).into();
+            joint
+        })
+        .collect();
+    json!({
+        "joints": joints,
+        "overall": validation.overall,
+        "processing": processing(&validation.summary),
+    })
+}
+
+/// The table for a person.
+pub fn text(machine: &Machine, validation: &Validation, caption: &str) -> String {
+    let rows: Vec<summary::TorqueError> = validation
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, e)| summary::TorqueError {
+            joint: &e.joint,
+            unit: machine.file.torque_unit(j),
+            relative_error: e.relative_error,
+            rmse: e.rmse,
+            max_abs: e.max_abs,
+            r2: e.r2,
+            samples: e.samples,
+        })
+        .collect();
+    let raw: Vec<String> = validation
+        .joints
+        .iter()
+        .map(|e| format!("{} {}", e.joint, number::percent(e.relative_error_raw)))
+        .collect();
+    format!(
+        "{}\nover joints {}; before the parallel filter: {}\n",
+        summary::torque_errors(caption, &rows),
+        number::percent(validation.overall.mean_relative_error),
+        raw.join(", ")
+    )
+}
+
+/// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
+pub fn figure(machine: &Machine, validation: &Validation, title: &str) -> TorqueFigure {
+    let traces = &validation.traces;
+    let n = validation.joints.len();
+    let joints = validation
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, e)| {
+            let mut joint = JointTorque {
+                joint: e.joint.clone(),
+                unit: machine.file.torque_unit(j).to_owned(),
+                t: Vec::with_capacity(traces.t.len()),
+                measured: Vec::with_capacity(traces.t.len()),
+                reconstructed: Vec::with_capacity(traces.t.len()),
+                relative_error: e.relative_error,
+                rmse: e.rmse,
+            };
+            for (k, t) in traces.t.iter().enumerate() {
+                if k > 0 && traces.breaks.contains(&k) {
+                    // a row that is not finite parts the lines at a gap
+                    joint.t.push(*t);
+                    joint.measured.push(f64::NAN);
+                    joint.reconstructed.push(f64::NAN);
+                }
+                joint.t.push(*t);
+                joint.measured.push(traces.measured[k * n + j]);
+                joint.reconstructed.push(traces.reconstructed[k * n + j]);
+            }
+            joint
+        })
+        .collect();
+    TorqueFigure {
+        title: title.to_owned(),
+        joints,
+    }
+}
+
+/// Joints that miss a limit on the relative error.
+pub fn missed(validation: &Validation, limit: Option<f64>) -> Vec<String> {
+    let Some(limit) = limit else {
+        return Vec::new();
+    };
+    validation
+        .joints
+        .iter()
+        // an error that is not a number is no error within the limit
+        .filter(|e| e.relative_error.is_nan() || e.relative_error > limit)
+        .map(|e| {
+            format!(
+                "{}: relative error {} is above {}",
+                e.joint,
+                number::percent(e.relative_error),
+                number::percent(limit)
+            )
+        })
+        .collect()
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: Vec<&Path> = args
+        .logs
+        .iter()
+        .map(|l| l.path.as_path())
+        .chain([args.model.as_path()])
+        .collect();
+    let outputs: Vec<&Path> = args
+        .output
+        .iter()
+        .chain(&args.plot)
+        .map(PathBuf::as_path)
+        .collect();
+    super::outputs::check(&inputs, &outputs)?;
+    let name = args.model.display().to_string();
+    let file = ModelFile::load(&args.model)?;
+    let model = file.model(&name)?;
+    let machine = Machine::new(&name, file.robot.clone());
+    let mut residual = match &args.output {
+        None => None,
+        Some(path) => Some(super::residual_file::ResidualFile::create(
+            path,
+            machine.robot.joint_names(),
+        )?),
+    };
+    let mut failed = None;
+    let found = reconstruct(&machine, &model, &args.logs, context, &mut |r| {
+        if let Some(file) = &mut residual
+            && failed.is_none()
+            && let Err(error) = file.row(r)
+        {
+            failed = Some(error);
+        }
+    })?;
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    let validation = &found.validation;
+    let title = args
+        .logs
+        .iter()
+        .map(LogSpec::name)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let document = Document::new(
+        "validate",
+        &found.inputs,
+        &found.warnings,
+        &json(&machine, validation),
+    )?;
+    let text = text(
+        &machine,
+        validation,
+        &format!("torque of {title} by {name}"),
+    );
+    context.check()?;
+    for path in &args.plot {
+        super::outputs::write_text(path, &figure(&machine, validation, &title).svg())?;
+    }
+    if let Some(file) = residual {
+        file.finish()?;
+    }
+    Ok(Outcome {
+        text,
+        document,
+        missed: missed(validation, args.max_relative_error),
+    })
 }

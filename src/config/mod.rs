@@ -10,6 +10,7 @@ mod check_log;
 mod document;
 mod embedded;
 mod error;
+pub mod identified;
 pub mod log_section;
 pub mod model_file;
 mod model_text;

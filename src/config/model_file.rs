@@ -9,20 +9,7 @@ use super::ConfigError;
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{Provenance, escape};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
-
-/// What the data say about a parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Relative standard deviation of at most 10 %, or a negligible parameter.
-    Identified,
-    /// Relative standard deviation of at most 50 %.
-    Weak,
-    /// The data do not determine it.
-    NotIdentifiable,
-    /// Only a lower bound is known: `value` is that bound.
-    LowerBound,
-}
+pub use crate::verdict::Verdict;
 
 /// One parameter of a model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

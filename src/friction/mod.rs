@@ -1,1 +1,18 @@
-//! Room `friction`.
+//! Friction parameters theta 13..32, joint by joint, by a continuous-discrete extended Kalman
+//! filter (eq. (29)-(38)).
+//!
+//! `prepare` turns the motion of all joints into the one-joint problem, `start` guesses from the
+//! log, `filter` is the filter, `score` the same filter at fixed parameters, `passes` the search,
+//! `propagate` the integrals that both share.
+
+pub mod estimate;
+pub mod excitation;
+pub mod filter;
+pub mod motions;
+pub mod passes;
+pub mod plateau;
+pub mod prepare;
+pub mod problem;
+pub mod propagate;
+pub mod score;
+pub mod start;

@@ -1,1 +1,43 @@
-//! Room `inertia`.
+//! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
+//!
+//! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
+//! `accumulate` folds them into R factors, `solve` fits, `covariance` says how sure it is.
+
+pub mod accumulate;
+pub mod columns;
+mod covariance;
+pub mod solve;
+pub mod verdict;
+
+use crate::log::Block;
+use crate::motion::{self, RunError, Settings, Summary};
+use crate::robot::Robot;
+
+use accumulate::{Accumulator, Sums};
+use columns::Columns;
+
+/// Length of the blocks whose scores make the covariance, to begin with [s].
+const BLOCK_SECONDS: f64 = 0.25;
+
+/// Reads one log and reduces its filtered, decimated rows to sums. Sums of several logs merge.
+///
+/// # Errors
+/// Those of the source and of [`motion::run`].
+pub fn accumulate<E>(
+    robot: &Robot,
+    columns: &Columns,
+    settings: &Settings,
+    source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+) -> Result<(Sums, Summary), RunError<E>> {
+    let mut sums = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+    let summary = motion::run(
+        source,
+        columns.joints,
+        settings,
+        None,
+        columns.channels(),
+        &|s, out| columns.fill(robot, s.q, s.v, s.a, s.tau, out),
+        &mut |row| sums.add(row.segment, row.t, row.filtered),
+    )?;
+    Ok((sums.finish(), summary))
+}

@@ -4,6 +4,7 @@
 
 pub mod cft;
 pub mod friction;
+pub mod model;
 
 use cft::regressor::{regressor12, regressor22};
 use cft::{Setup, Structure};
@@ -169,6 +170,34 @@ impl Robot {
                 JointKind::Prismatic => &INERTIA_KG,
                 JointKind::Revolute => &INERTIA_KG_M2,
             },
+        }
+    }
+
+    /// Torques at pose `there` of the motor forces that give `tau` at pose `here`: held motor
+    /// forces turn into other joint torques as the arm moves (eq. (63)-(66)). Where motors act on
+    /// the joints directly, and at a singular pose, `tau` itself.
+    #[inline]
+    pub fn carry_torque(&self, here: &[f64], there: &[f64], tau: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(tau);
+        if let Self::Cft(_) = self
+            && let Ok(forces) = cft::actuation::torques_to_forces(four(here), four(tau))
+        {
+            out.copy_from_slice(&cft::actuation::forces_to_torques(four(there), &forces));
+        }
+    }
+
+    /// Variance of a position measured at the motors, seen at joint i, from the encoders' steps
+    /// (resolution^2 / 12 each); pose-dependent on the CFT robot. `None` where the robot's
+    /// encoders are not known.
+    pub fn encoder_variance(&self, i: usize, q: &[f64]) -> Option<f64> {
+        match self {
+            Self::Cft(_) => {
+                let steps = cft::actuation::quantisation_variance();
+                cft::actuation::joint_covariance(four(q), &steps)
+                    .ok()
+                    .map(|c| c[i][i])
+            }
+            Self::SingleJoint(_) => None,
         }
     }
 

@@ -1,0 +1,227 @@
+//! What the commands that work on logs share: the robot with its processing, and its logs opened.
+
+use std::path::Path;
+
+use super::context::Context;
+use super::error::CliError;
+use crate::config::RobotFile;
+use crate::config::robot_file::{DifferencesKind, FilterKind};
+use crate::friction::motions::motions;
+use crate::friction::prepare::Motion;
+use crate::log::{Block, LogError, LogSpec, Provenance, Reader};
+use crate::motion::{Differences, ParallelFilter, RunError, Settings, Summary, TorqueTiming};
+use crate::robot::Robot;
+
+/// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
+/// file names none and the sampling rate allows it. Wide, because the acceleration of held joints
+/// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
+const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
+
+/// A robot as its file describes it.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// Name of the file, for messages.
+    pub name: String,
+    pub file: RobotFile,
+    pub robot: Robot,
+}
+
+/// Why a log could not be run through, decorated.
+pub fn run_error(spec: &LogSpec, error: RunError<ReadError>) -> CliError {
+    match error {
+        RunError::Source(ReadError::Log(error)) => error.into(),
+        RunError::Source(ReadError::Interrupted) => CliError::interrupted(),
+        RunError::Motion(error) => CliError::input(format!("{}: {error}", spec.name())),
+    }
+}
+
+/// What stops the reading of a log.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// A log that is being read.
+pub struct Open<'a> {
+    reader: Reader,
+    context: &'a Context,
+}
+
+impl Open<'_> {
+    /// The next block; false at the end.
+    pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
+        if self.context.interrupted() {
+            return Err(ReadError::Interrupted);
+        }
+        Ok(self.reader.read(block)?)
+    }
+
+    /// Name, span, checksum and size of what was read.
+    pub fn provenance(&self) -> Result<Provenance, CliError> {
+        Ok(self.reader.provenance()?)
+    }
+}
+
+impl Machine {
+    /// Reads a robot file, or one that comes with the tool.
+    pub fn load(path: &str) -> Result<Self, CliError> {
+        Ok(Self::new(path, RobotFile::load(Path::new(path))?))
+    }
+
+    /// The robot of a file that is read already.
+    pub fn new(name: &str, file: RobotFile) -> Self {
+        let robot = file.robot();
+        Machine {
+            name: name.to_owned(),
+            file,
+            robot,
+        }
+    }
+
+    /// Opens a log, and says whether its torque is held from row to row.
+    pub fn open<'a>(
+        &self,
+        spec: &LogSpec,
+        context: &'a Context,
+    ) -> Result<(Open<'a>, bool), CliError> {
+        let reader = Reader::open(spec, &self.file.layout())?;
+        let held = self.file.torque_held(reader.layout().channels);
+        Ok((Open { reader, context }, held))
+    }
+
+    /// Processing of logs for least squares and validation.
+    pub fn settings(&self, held: bool) -> Settings {
+        let f = &self.file.filter;
+        let plain = Settings::default();
+        let order = f.order.map(|o| o as usize);
+        Settings {
+            cutoff_hz: f.cutoff_hz.unwrap_or(plain.cutoff_hz),
+            filter: match f.kind {
+                Some(FilterKind::ChebyshevDecimate) => ParallelFilter::Chebyshev {
+                    order: order.unwrap_or(8),
+                    ripple_db: f.ripple_db.unwrap_or(0.05),
+                },
+                Some(FilterKind::Butterworth) | None => ParallelFilter::Butterworth {
+                    order: order.unwrap_or(4),
+                },
+            },
+            decimation: f.decimation.map(|d| d as usize),
+            q_cutoff_hz: f.position_cutoff_hz,
+            q_order: f.position_order.map_or(plain.q_order, |o| o as usize),
+            differences: match f.differences {
+                Some(DifferencesKind::Central) => Differences::Central,
+                Some(DifferencesKind::HighOrder) | None => Differences::HighOrder,
+            },
+            torque: if held {
+                TorqueTiming::HeldOverSample
+            } else {
+                TorqueTiming::Sampled
+            },
+            gap_factor: f.gap_factor.unwrap_or(plain.gap_factor),
+            q_trim_s: f.position_trim_s,
+            trim_s: f.trim_s,
+        }
+    }
+
+    /// Smoothing of the motion that the friction filter takes as known.
+    fn friction_settings(&self, rate_hz: f64) -> Settings {
+        Settings {
+            q_cutoff_hz: Some(
+                self.file
+                    .filter
+                    .position_cutoff_hz
+                    .unwrap_or(FRICTION_POSITION_CUTOFF_HZ)
+                    .min(0.2 * rate_hz),
+            ),
+            differences: Differences::HighOrder,
+            q_trim_s: None,
+            ..self.settings(false)
+        }
+    }
+
+    /// Reads a one-joint log into memory and smooths its motion.
+    pub fn motions(
+        &self,
+        spec: &LogSpec,
+        context: &Context,
+    ) -> Result<(Vec<Motion>, bool, Provenance), CliError> {
+        let (mut log, held) = self.open(spec, context)?;
+        let mut whole = Block::default();
+        let mut block = Block::default();
+        loop {
+            let more = log
+                .read(&mut block)
+                .map_err(|e| run_error(spec, RunError::Source(e)))?;
+            if !more {
+                break;
+            }
+            whole.t.extend_from_slice(&block.t);
+            whole.q.extend_from_slice(&block.q);
+            whole.tau.extend_from_slice(&block.tau);
+        }
+        let rate = match (whole.t.first(), whole.t.last()) {
+            (Some(first), Some(last)) if last > first => {
+                (whole.t.len() - 1) as f64 / (last - first)
+            }
+            _ => 1.0,
+        };
+        let found = motions(
+            &whole.t,
+            &whole.q,
+            &whole.tau,
+            self.robot.joints(),
+            &self.friction_settings(rate),
+        )
+        .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))?;
+        Ok((found, held, log.provenance()?))
+    }
+
+    /// Full travel of each joint, by which motions of metres and radians are compared.
+    pub fn ranges(&self) -> Vec<f64> {
+        match &self.robot {
+            // spans of x_c4 and x_c3 (Table 5), and what x_c1, x_c2 leave to q4 and q5
+            Robot::Cft(robot) => {
+                let spans = robot.setup.limits().spans();
+                vec![spans[3], spans[2], 2.2, 1.7]
+            }
+            Robot::SingleJoint(_) => vec![f64::MIN_POSITIVE; 1],
+        }
+    }
+}
+
+/// Warnings about what the processing left out of a log.
+pub fn summary_warnings(spec: &LogSpec, summary: &Summary) -> Vec<String> {
+    let mut out = Vec::new();
+    let name = spec.name();
+    if summary.skipped.segments > 0 {
+        let spans: Vec<String> = summary
+            .skipped
+            .spans_s
+            .iter()
+            .take(3)
+            .map(|[a, b]| format!("{a:.3}..{b:.3} s"))
+            .collect();
+        out.push(format!(
+            "{name}: {} stretch(es) between gaps are too short to filter and are left out ({} samples; {})",
+            summary.skipped.segments,
+            summary.skipped.samples,
+            spans.join(", ")
+        ));
+    }
+    if summary.segments > 1 {
+        out.push(format!(
+            "{name}: gaps part it into {} stretches; nothing is differentiated across them",
+            summary.segments
+        ));
+    }
+    if summary.interpolated > 0 {
+        out.push(format!(
+            "{name}: the clock is uneven, {} of {} samples were interpolated onto an even one",
+            summary.interpolated, summary.samples
+        ));
+    }
+    out
+}

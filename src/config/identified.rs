@@ -1,0 +1,135 @@
+//! Between a model file and the numbers that formulas work with.
+
+use super::ConfigError;
+use super::model_file::{Covariance, ModelFile, Parameter};
+use crate::robot::Robot;
+use crate::robot::cft::FRICTION;
+use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
+use crate::robot::model::{JointFriction, Model};
+
+/// Unit of a friction parameter of joint `j` by its name.
+pub fn friction_unit(robot: &Robot, j: usize, name: &str, torque_unit: &str) -> String {
+    let position = robot.joint_kind(j).position_unit();
+    match name {
+        "viscous" => format!("{torque_unit} s/{position}"),
+        "slope_1" | "slope_2" => format!("s/{position}"),
+        _ => torque_unit.to_owned(),
+    }
+}
+
+/// Number in the report's Table 4 of friction parameter `k` (order of [`DoubleTanh::NAMES`]) of
+/// joint `j`: 13 + 4 k + j on the CFT robot.
+pub fn friction_theta(robot: &Robot, j: usize, k: usize) -> Option<u32> {
+    match robot {
+        Robot::Cft(_) => FRICTION[4 * k + j].theta,
+        Robot::SingleJoint(_) => None,
+    }
+}
+
+/// Meaning of a friction parameter.
+pub fn friction_meaning(name: &str) -> &'static str {
+    match name {
+        "viscous" => "Bv: viscous friction",
+        "coulomb_1" => "Bf1: height of the steeper saturating part",
+        "coulomb_2" => "Bf2: height of the other saturating part; negative for a Stribeck dip",
+        "slope_1" => "w1: slope of the steeper saturating part",
+        "slope_2" => "w2: slope of the other saturating part",
+        "coulomb" => "Fc: Coulomb friction",
+        "offset" => "constant torque",
+        _ => "",
+    }
+}
+
+impl ModelFile {
+    /// The model that the file describes; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] for the first inertial or friction parameter it lacks.
+    pub fn model(&self, file: &str) -> Result<Model, ConfigError> {
+        let robot = self.robot.robot();
+        let theta = self.inertial(file)?;
+        let mut friction = Vec::with_capacity(robot.joints());
+        let mut offset = Vec::with_capacity(robot.joints());
+        for joint in robot.joint_names() {
+            friction.push(self.joint_friction(file, joint)?);
+            offset.push(self.offset(joint));
+        }
+        Ok(Model {
+            robot,
+            theta,
+            friction,
+            offset,
+        })
+    }
+
+    /// Friction of one joint by the law whose parameters the file holds.
+    fn joint_friction(&self, file: &str, joint: &str) -> Result<JointFriction, ConfigError> {
+        Ok(if self.find("slope_1", Some(joint)).is_some() {
+            JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
+        } else if self.find("coulomb", Some(joint)).is_some() {
+            JointFriction::ViscousCoulomb(self.viscous_coulomb(file, joint)?)
+        } else if self.find("viscous", Some(joint)).is_some() {
+            // a viscous term alone is half a law: say what is missing
+            JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
+        } else {
+            JointFriction::None
+        })
+    }
+
+    /// Covariance in the order of [`Model::gradient`], row-major; 0 where unknown.
+    pub fn model_covariance(&self, model: &Model) -> Vec<f64> {
+        let mut keys: Vec<String> = model
+            .robot
+            .parameters()
+            .iter()
+            .map(|p| p.name.to_owned())
+            .collect();
+        for (joint, friction) in model.robot.joint_names().iter().zip(&model.friction) {
+            let names: &[&str] = match friction {
+                JointFriction::None => &[],
+                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
+                JointFriction::ViscousCoulomb(_) => &ViscousCoulomb::NAMES,
+            };
+            keys.extend(names.iter().map(|n| format!("{n}:{joint}")));
+        }
+        keys.extend(
+            model
+                .robot
+                .joint_names()
+                .iter()
+                .map(|j| format!("offset:{j}")),
+        );
+        self.covariance_of(&keys)
+    }
+
+    /// Puts a joint's friction parameters in place of those that the file has of it.
+    pub fn replace_joint(&mut self, joint: &str, parameters: Vec<Parameter>) {
+        self.parameters
+            .retain(|p| p.joint.as_deref() != Some(joint) || p.name == "offset");
+        self.parameters.extend(parameters);
+    }
+
+    /// Puts a block of covariance in place of what the file has between these keys; entries between
+    /// them and other keys are dropped.
+    pub fn replace_covariance(&mut self, keys: &[String], block: &dyn Fn(usize, usize) -> f64) {
+        let old = self.covariance.take().unwrap_or_default();
+        let kept: Vec<usize> = (0..old.names.len())
+            .filter(|i| !keys.contains(&old.names[*i]))
+            .collect();
+        let mut names: Vec<String> = kept.iter().map(|i| old.names[*i].clone()).collect();
+        names.extend_from_slice(keys);
+        let first = kept.len();
+        let matrix = (0..names.len())
+            .map(|i| {
+                (0..names.len())
+                    .map(|j| match (i < first, j < first) {
+                        (true, true) => old.matrix[kept[i]][kept[j]],
+                        (false, false) => block(i - first, j - first),
+                        _ => 0.0,
+                    })
+                    .collect()
+            })
+            .collect();
+        self.covariance = Some(Covariance { names, matrix });
+    }
+}

@@ -1,0 +1,356 @@
+//! The estimate of one joint: parameters with verdicts, curve, consistency.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::excitation::{FrictionError, Speeds, speeds};
+use super::passes::{Ending, Given, Maximum, maximise, profile_slope};
+use super::plateau::{Plateau, plateaus};
+use super::prepare::Prepared;
+use super::problem::FRICTION;
+use super::start::{Start, constant_inertia, from_log};
+use crate::robot::friction::DoubleTanh;
+use crate::verdict::{Verdict, verdict_of};
+
+/// What the user may give beside the logs.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Friction law to start from, beside the starts that the log gives.
+    pub start: Option<DoubleTanh>,
+    /// Inertia to start from [kg or kg m^2]; only with `start`.
+    pub start_inertia: Option<f64>,
+    /// Only the user's start, none from the log.
+    pub only_start: bool,
+    /// Noise levels that the user overrides.
+    pub noise: Given,
+}
+
+/// One friction parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Value {
+    pub value: f64,
+    pub std: f64,
+    pub verdict: Verdict,
+}
+
+/// One point of the friction curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// Velocity [m/s or rad/s].
+    pub v: f64,
+    /// Friction torque [N or Nm].
+    pub torque: f64,
+    /// Its standard deviation [N or Nm].
+    pub std: f64,
+}
+
+/// A nuisance quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nuisance {
+    pub name: String,
+    pub value: f64,
+    pub std: f64,
+    pub unit: String,
+}
+
+/// Normalised innovations squared with their 95 % bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Nis {
+    /// Mean; 1 where the filter's covariance is true.
+    pub mean: f64,
+    /// 95 % bounds of the mean for white innovations.
+    pub lower_95: f64,
+    pub upper_95: f64,
+    /// Share of single innovations inside their own 95 % bound.
+    pub share_inside: f64,
+}
+
+impl Nis {
+    /// Whether the mean is inside its bounds.
+    pub fn consistent(&self) -> bool {
+        (self.lower_95..=self.upper_95).contains(&self.mean)
+    }
+}
+
+/// Friction of one joint with all that belongs to it.
+#[derive(Debug, Clone)]
+pub struct JointEstimate {
+    /// The law at the maximum of the likelihood.
+    pub law: DoubleTanh,
+    /// Bv, Bf1, Bf2, w1, w2 with verdicts; a slope with a bound holds the bound.
+    pub values: [Value; FRICTION],
+    /// Covariance of the five parameters in SI units.
+    pub covariance: [[f64; FRICTION]; FRICTION],
+    pub nuisance: Vec<Nuisance>,
+    pub speeds: Speeds,
+    pub curve: Vec<CurvePoint>,
+    pub plateaus: Vec<Plateau>,
+    pub nis: Nis,
+    /// Torque residual along the measured motion [N or Nm], and relative to the torque.
+    pub rmse: f64,
+    pub relative_error: f64,
+    pub samples: usize,
+    pub starts: usize,
+    pub ending: Ending,
+    /// Factor by which coloured innovations widened the covariance.
+    pub widening: f64,
+    /// Standard deviation of the torque noise that the filter settled on [N or Nm].
+    pub torque_noise: f64,
+    /// Factor on the encoder's variance that it settled on.
+    pub position_factor: f64,
+}
+
+/// Points of the curve in each direction.
+const CURVE_STEPS: usize = 50;
+/// Starts taken from the log.
+const LOG_STARTS: usize = 4;
+
+/// Estimates the friction of one joint.
+///
+/// # Errors
+/// [`FrictionError`] where the motion cannot show friction, or no start ends at a finite estimate.
+pub fn estimate(
+    joint: &str,
+    names: &[String],
+    prepared: &Prepared,
+    options: &Options,
+) -> Result<JointEstimate, FrictionError> {
+    let problem = &prepared.problem;
+    let speeds = speeds(joint, &prepared.velocity, problem.parameters())?;
+    let mut starts = Vec::new();
+    if !options.only_start || options.start.is_none() {
+        starts.extend(from_log(prepared, LOG_STARTS));
+    }
+    if let Some(law) = &options.start {
+        let mut p = vec![0.0; problem.parameters()];
+        problem.coordinates(law, &mut p);
+        match (options.start_inertia, starts.first()) {
+            (Some(inertia), _) => {
+                p[FRICTION..].copy_from_slice(&constant_inertia(prepared, inertia))
+            }
+            (None, Some(log)) => p[FRICTION..].copy_from_slice(&log.parameters[FRICTION..]),
+            (None, None) => {}
+        }
+        starts.insert(
+            0,
+            Start {
+                parameters: p,
+                residual: f64::INFINITY,
+            },
+        );
+    }
+    let no_estimate = || FrictionError::NoEstimate {
+        joint: joint.to_owned(),
+    };
+    let maximum = maximise(prepared, &starts, &options.noise).ok_or_else(no_estimate)?;
+    Ok(assemble(names, prepared, maximum, speeds))
+}
+
+fn assemble(
+    names: &[String],
+    prepared: &Prepared,
+    mut maximum: Maximum,
+    speeds: Speeds,
+) -> JointEstimate {
+    let problem = &prepared.problem;
+    let np = problem.parameters();
+    // slope_1 is the steeper one: a swap of the two tanh terms is the same law
+    if maximum.parameters[3] < maximum.parameters[4] {
+        let mut order: Vec<usize> = (0..np).collect();
+        order.swap(1, 2);
+        order.swap(3, 4);
+        let p = maximum.parameters.clone();
+        let c = maximum.covariance.clone();
+        for i in 0..np {
+            maximum.parameters[i] = p[order[i]];
+            for j in 0..np {
+                maximum.covariance[(i, j)] = c[(order[i], order[j])];
+            }
+        }
+        maximum.at_limit.swap(0, 1);
+    }
+    let p = &maximum.parameters;
+    let law = problem.friction(p);
+    let jacobian = problem.jacobian(p);
+    let mut covariance = [[0.0; FRICTION]; FRICTION];
+    for (i, row) in covariance.iter_mut().enumerate() {
+        for (j, c) in row.iter_mut().enumerate() {
+            *c = jacobian[i] * jacobian[j] * maximum.covariance[(i, j)];
+        }
+    }
+    let si = law.parameters();
+    let values = std::array::from_fn(|i| {
+        let std = covariance[i][i].max(0.0).sqrt();
+        let verdict = verdict_of(si[i], std);
+        if i >= 3 && (maximum.at_limit[i - 3] || verdict == Verdict::NotIdentifiable) {
+            // only a slope whose term is there at all has a bound
+            let term = values_of_term(&si, &covariance, i - 2);
+            return match profile_slope(problem, &maximum, i).filter(|_| term) {
+                Some(bound) => Value {
+                    value: bound,
+                    std: f64::NAN,
+                    verdict: Verdict::LowerBound,
+                },
+                None => Value {
+                    value: si[i],
+                    std,
+                    verdict: Verdict::NotIdentifiable,
+                },
+            };
+        }
+        Value {
+            value: si[i],
+            std,
+            verdict,
+        }
+    });
+
+    let curve = curve(&law, &covariance, speeds.covered);
+    let (rmse, relative_error) = residual(prepared, p, &law);
+    let samples = problem.samples();
+    let s = &maximum.score;
+    let half = 1.96 * (2.0 / s.innovations.max(1) as f64).sqrt();
+    JointEstimate {
+        law,
+        values,
+        covariance,
+        nuisance: nuisance(names, prepared, &maximum),
+        speeds,
+        curve,
+        plateaus: plateaus(prepared, p),
+        nis: Nis {
+            mean: s.mean_nis,
+            lower_95: 1.0 - half,
+            upper_95: 1.0 + half,
+            share_inside: s.share_inside,
+        },
+        rmse,
+        relative_error,
+        samples,
+        starts: maximum.starts,
+        ending: maximum.ending,
+        widening: maximum.widening,
+        torque_noise: maximum.noise.torque,
+        position_factor: maximum.noise.position_factor,
+    }
+}
+
+/// Whether the tanh term `i` (1 or 2) differs from zero by more than its uncertainty.
+fn values_of_term(si: &[f64; 5], covariance: &[[f64; 5]; 5], i: usize) -> bool {
+    si[i].abs() > 2.0 * covariance[i][i].max(0.0).sqrt()
+}
+
+fn curve(
+    law: &DoubleTanh,
+    covariance: &[[f64; FRICTION]; FRICTION],
+    covered: [f64; 2],
+) -> Vec<CurvePoint> {
+    let [lo, hi] = covered;
+    let step = |i: usize| lo + (hi - lo) * i as f64 / (CURVE_STEPS - 1) as f64;
+    (0..CURVE_STEPS)
+        .rev()
+        .map(|i| -step(i))
+        .chain((0..CURVE_STEPS).map(step))
+        .map(|v| CurvePoint {
+            v,
+            torque: law.torque(v),
+            std: curve_std(law, covariance, v),
+        })
+        .collect()
+}
+
+/// Standard deviation of F(v).
+pub fn curve_std(law: &DoubleTanh, covariance: &[[f64; FRICTION]; FRICTION], v: f64) -> f64 {
+    let g = law.gradient(v);
+    let mut variance = 0.0;
+    for i in 0..FRICTION {
+        for j in 0..FRICTION {
+            variance += g[i] * covariance[i][j] * g[j];
+        }
+    }
+    variance.max(0.0).sqrt()
+}
+
+/// Residual torque along the smoothed motion.
+fn residual(prepared: &Prepared, p: &[f64], law: &DoubleTanh) -> (f64, f64) {
+    let problem = &prepared.problem;
+    let (eta, e) = (&p[FRICTION..], problem.nuisance);
+    let (mut square, mut torque, mut n) = (0.0, 0.0, 0usize);
+    let mut first = 0;
+    for record in &problem.records {
+        for k in 0..record.tau.len() {
+            let mean = |x: &[f64]| 0.5 * (x[first + k] + x[first + k + 1]);
+            let (v, a) = (mean(&prepared.velocity), mean(&prepared.acceleration));
+            let row = k * e..(k + 1) * e;
+            let known: f64 = record.m[row.clone()]
+                .iter()
+                .zip(&record.h[row])
+                .zip(eta)
+                .map(|((m, h), x)| (m * a + h) * x)
+                .sum();
+            let d = record.tau[k] - known - law.torque(v);
+            square += d * d;
+            torque += record.tau[k] * record.tau[k];
+            n += 1;
+        }
+        first += record.t.len();
+    }
+    ((square / n.max(1) as f64).sqrt(), (square / torque).sqrt())
+}
+
+/// Mean inertia, offset, and every direction that the log determined.
+fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nuisance> {
+    let problem = &prepared.problem;
+    let e = problem.nuisance;
+    let eta = DVector::from_column_slice(&maximum.parameters[FRICTION..]);
+    let cov: DMatrix<f64> = maximum
+        .covariance
+        .view((FRICTION, FRICTION), (e, e))
+        .into_owned();
+    let of = |g: &DVector<f64>| (g.dot(&eta), (g.dot(&(&cov * g))).max(0.0).sqrt());
+    let mut mean = DVector::zeros(e);
+    let mut count = 0.0;
+    for m in problem.records.iter().flat_map(|r| r.m.chunks_exact(e)) {
+        mean += DVector::from_column_slice(m);
+        count += 1.0;
+    }
+    mean /= count;
+    let (inertia, inertia_std) = of(&mean);
+    let offset_row = prepared.back.row(prepared.back.nrows() - 1).transpose();
+    let (offset, offset_std) = of(&offset_row.into_owned());
+    let mut out = vec![
+        Nuisance {
+            name: "mean inertia".into(),
+            value: inertia,
+            std: inertia_std,
+            unit: "torque/acceleration".into(),
+        },
+        Nuisance {
+            name: "offset".into(),
+            value: offset,
+            std: offset_std,
+            unit: "torque".into(),
+        },
+    ];
+    for k in 0..e {
+        let column = prepared.back.column(k);
+        let mut terms: Vec<usize> = (0..column.len()).collect();
+        terms.sort_by(|a, b| column[*b].abs().total_cmp(&column[*a].abs()));
+        let words: Vec<String> = terms
+            .iter()
+            .take(3)
+            .filter(|i| column[**i] != 0.0)
+            .map(|i| {
+                let name = names.get(*i).map_or("offset", String::as_str);
+                format!("{:+.2e} {name}", column[*i])
+            })
+            .collect();
+        out.push(Nuisance {
+            name: format!("direction {} ({} ...)", k + 1, words.join(" ")),
+            value: eta[k],
+            std: cov[(k, k)].max(0.0).sqrt(),
+            unit: "1".into(),
+        });
+    }
+    out
+}

@@ -1,0 +1,139 @@
+//! Which joint a log moves, and whether its motion can show friction at all.
+
+use super::prepare::{Motion, rms};
+
+/// Why a log cannot give a joint's friction. Each message says what motion is missing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FrictionError {
+    #[error(
+        "no joint moves in this log: the largest travel is {travel:.3e} of a joint's range; \
+         log an experiment in which one joint runs back and forth"
+    )]
+    NothingMoves { travel: f64 },
+    #[error(
+        "joints {first} and {second} both move ({first_share:.0} % and {second_share:.0} % of their ranges), so \
+         the joint that this log is about cannot be told; name it with --joint, or log one joint at a time"
+    )]
+    SeveralMove {
+        first: String,
+        second: String,
+        first_share: f64,
+        second_share: f64,
+    },
+    #[error(
+        "joint {joint} does not move in this log, or its torque is zero throughout; log it moving back and forth"
+    )]
+    StandsStill { joint: String },
+    #[error(
+        "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be told \
+         from a constant torque; log it in both directions"
+    )]
+    NeverReverses {
+        joint: String,
+        least: f64,
+        most: f64,
+    },
+    #[error(
+        "the log of joint {joint} holds {samples} samples in which it moves, too few for {unknowns} unknowns; log longer"
+    )]
+    TooShort {
+        joint: String,
+        samples: usize,
+        unknowns: usize,
+    },
+    #[error(
+        "the filter found no finite estimate for joint {joint} from any start; inspect the log's torque and position channels"
+    )]
+    NoEstimate { joint: String },
+}
+
+/// Share of its range that a joint must travel to count as moving.
+const MOVES: f64 = 0.02;
+/// A second joint that travels more than this share of what the first does makes the log ambiguous.
+const AMBIGUOUS: f64 = 0.3;
+
+/// The joint that moves. `range` is each joint's full travel [m or rad]; ones where unknown.
+pub fn moving_joint(
+    names: &[String],
+    motions: &[Motion],
+    range: &[f64],
+) -> Result<usize, FrictionError> {
+    let n = names.len();
+    let share: Vec<f64> = (0..n)
+        .map(|j| {
+            let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
+            for q in motions.iter().flat_map(|m| m.q.iter().skip(j).step_by(n)) {
+                lo = lo.min(*q);
+                hi = hi.max(*q);
+            }
+            if hi > lo { (hi - lo) / range[j] } else { 0.0 }
+        })
+        .collect();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| share[*b].total_cmp(&share[*a]));
+    let first = order[0];
+    if share[first] < MOVES {
+        return Err(FrictionError::NothingMoves {
+            travel: share[first],
+        });
+    }
+    if let Some(&second) = order.get(1)
+        && share[second] > AMBIGUOUS * share[first]
+    {
+        return Err(FrictionError::SeveralMove {
+            first: names[first].clone(),
+            second: names[second].clone(),
+            first_share: 100.0 * share[first],
+            second_share: 100.0 * share[second],
+        });
+    }
+    Ok(first)
+}
+
+/// Speeds that the moving joint reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speeds {
+    /// Smallest and largest speed with data in either direction [1/s].
+    pub covered: [f64; 2],
+}
+
+/// Checks that a joint's velocity shows friction: both directions, enough samples.
+pub fn speeds(joint: &str, velocity: &[f64], unknowns: usize) -> Result<Speeds, FrictionError> {
+    let size = rms(velocity.iter().copied());
+    let moving = |v: &&f64| v.abs() > 1e-3 * size;
+    let samples = velocity.iter().filter(moving).count();
+    if samples < 20 * unknowns {
+        return Err(FrictionError::TooShort {
+            joint: joint.to_owned(),
+            samples,
+            unknowns,
+        });
+    }
+    let direction = |positive: bool| {
+        let mut v: Vec<f64> = velocity
+            .iter()
+            .filter(moving)
+            .filter(|v| (**v > 0.0) == positive)
+            .map(|v| v.abs())
+            .collect();
+        v.sort_by(f64::total_cmp);
+        v
+    };
+    let (forward, backward) = (direction(true), direction(false));
+    let least = samples / 20;
+    if forward.len() < least || backward.len() < least {
+        let signed = |v: &Vec<f64>, s: f64| v.last().map_or(0.0, |x| s * x);
+        return Err(FrictionError::NeverReverses {
+            joint: joint.to_owned(),
+            least: signed(&backward, -1.0),
+            most: signed(&forward, 1.0),
+        });
+    }
+    let at = |v: &[f64], share: f64| v[((v.len() - 1) as f64 * share) as usize];
+    Ok(Speeds {
+        covered: [
+            at(&forward, 0.02).max(at(&backward, 0.02)),
+            at(&forward, 0.995).min(at(&backward, 0.995)),
+        ],
+    })
+}

@@ -1,0 +1,386 @@
+//! Several starts, annealed passes, and the end at the maximum of the innovation likelihood.
+//!
+//! A pass of the filter far from the truth linearises wrongly and grows sure of it. So the first
+//! passes run with both noises raised (the gains stay, the parameters learn slower), each next
+//! one from the last estimate with the prior widened again. The best ends are then taken to the
+//! maximum of the likelihood at fixed parameters, the noise levels with them, and the covariance
+//! is linearised there.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::filter::Filter;
+use super::prepare::Prepared;
+use super::problem::{FRICTION, Noise, Parameters, Problem};
+use super::score::{Score, log_likelihood, score};
+use super::start::Start;
+
+/// Factors on both noises in the annealed passes.
+const ANNEALING: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
+/// Prior standard deviations in the filter's coordinates: friction terms and nuisance of the size
+/// of the whole torque, slopes within a factor of five.
+const SPREAD_LINEAR: f64 = 2.0;
+const SPREAD_SLOPE: f64 = 1.6;
+/// Samples per block of the score's outer product, in seconds.
+const BLOCK_SECONDS: f64 = 0.25;
+/// Most Gauss-Newton steps of one refinement.
+const MOST_STEPS: usize = 40;
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    Converged,
+    IterationLimit,
+    Diverged,
+}
+
+/// Levels that the user gives; what is not given comes from the log.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Given {
+    /// Standard deviation of the torque noise [N or Nm].
+    pub torque: Option<f64>,
+    /// Factor on the position variance.
+    pub position_factor: Option<f64>,
+}
+
+/// Maximum of the innovation likelihood of one joint.
+#[derive(Debug, Clone)]
+pub struct Maximum {
+    pub parameters: Parameters,
+    /// Covariance in the filter's coordinates, widened where the score is coloured.
+    pub covariance: DMatrix<f64>,
+    pub noise: Noise,
+    pub score: Score,
+    pub ending: Ending,
+    /// Factor by which coloured innovations widened the covariance.
+    pub widening: f64,
+    /// A slope stands at an end of its range.
+    pub at_limit: [bool; 2],
+    pub starts: usize,
+    /// Index of the start that won.
+    pub best_start: usize,
+}
+
+/// Prior standard deviations of all parameters.
+pub fn spread(problem: &Problem) -> Vec<f64> {
+    let mut s = vec![SPREAD_LINEAR; problem.parameters()];
+    s[3] = SPREAD_SLOPE;
+    s[4] = SPREAD_SLOPE;
+    s
+}
+
+/// Noise levels to begin with, from the log alone: a tenth of the torque's second differences
+/// (a controller's own reaction is in them) and the encoder's resolution.
+pub fn first_noise(problem: &Problem, given: &Given) -> Noise {
+    let mut d: Vec<f64> = problem
+        .records
+        .iter()
+        .flat_map(|r| r.tau.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()))
+        .collect();
+    d.sort_by(f64::total_cmp);
+    let median = d.get(d.len() / 2).copied().unwrap_or(0.0);
+    // median of |N(0, 6 s^2)| is 0.6745 sqrt(6) s
+    let torque = (median / 1.652).max(1e-3 * problem.torque_scale);
+    Noise {
+        torque: given.torque.unwrap_or(torque),
+        position_factor: given.position_factor.unwrap_or(1.0).max(1.0),
+    }
+}
+
+/// Runs every start through the annealed passes, then refines the best.
+pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<Maximum> {
+    let problem = &prepared.problem;
+    let noise = first_noise(problem, given);
+    let spread = spread(problem);
+    let mut filter = Filter::new(problem);
+    let mut ends: Vec<(usize, Parameters, f64)> = Vec::new();
+    for (i, start) in starts.iter().enumerate() {
+        let mut p = start.parameters.clone();
+        problem.clamp(&mut p);
+        for factor in ANNEALING {
+            let raised = Noise {
+                torque: noise.torque * factor,
+                position_factor: noise.position_factor * factor * factor,
+            };
+            let pass = filter.pass(problem, &p, &spread, raised);
+            if !pass.log_likelihood.is_finite() || pass.parameters.iter().any(|x| !x.is_finite()) {
+                break;
+            }
+            p = pass.parameters;
+        }
+        problem.clamp(&mut p);
+        // the start itself stands where the passes lost the way
+        for candidate in [p, start.parameters.clone()] {
+            let l = log_likelihood(problem, &candidate, noise);
+            if l.is_finite() {
+                ends.push((i, candidate, l));
+            }
+        }
+    }
+    ends.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let mut best: Option<(usize, Refined)> = None;
+    for (i, p, _) in ends.into_iter().take(3) {
+        let refined = refine(problem, p, noise, &spread, 12);
+        if best
+            .as_ref()
+            .is_none_or(|b| refined.score.log_likelihood > b.1.score.log_likelihood)
+        {
+            best = Some((i, refined));
+        }
+    }
+    let (best_start, mut refined) = best?;
+    // noise levels and parameters in turn: each is little moved by the other
+    let mut noise = noise;
+    for _ in 0..2 {
+        noise = tune(problem, &refined.parameters, noise, given);
+        refined = refine(problem, refined.parameters, noise, &spread, MOST_STEPS);
+    }
+    finish(problem, refined, noise, &spread, starts.len(), best_start)
+}
+
+/// Parameters at which a refinement ended.
+struct Refined {
+    parameters: Parameters,
+    score: Score,
+    ending: Ending,
+}
+
+fn block(problem: &Problem) -> usize {
+    let record = &problem.records[0];
+    let n = record.t.len();
+    let step = (record.t[n - 1] - record.t[0]) / (n - 1) as f64;
+    ((BLOCK_SECONDS / step).round() as usize).max(1)
+}
+
+/// Penalised information and its right side: prior around zero for the linear part would bias, so
+/// the prior only limits the step.
+fn damped(
+    score: &Score,
+    spread: &[f64],
+    damping: f64,
+    held: Option<usize>,
+) -> Option<DVector<f64>> {
+    let mut h = score.information.clone();
+    let mut gradient = score.gradient.clone();
+    if let Some(j) = held {
+        h.row_mut(j).fill(0.0);
+        h.column_mut(j).fill(0.0);
+        h[(j, j)] = 1.0;
+        gradient[j] = 0.0;
+    }
+    for (j, s) in spread.iter().enumerate() {
+        h[(j, j)] = h[(j, j)] * (1.0 + damping) + 1e-6 / (s * s);
+    }
+    Some(h.cholesky()?.solve(&gradient))
+}
+
+/// Gauss-Newton with step control on the innovation likelihood.
+fn refine(
+    problem: &Problem,
+    start: Parameters,
+    noise: Noise,
+    spread: &[f64],
+    most: usize,
+) -> Refined {
+    refine_others(problem, start, noise, spread, most, None)
+}
+
+/// The same with one parameter held where it is.
+fn refine_others(
+    problem: &Problem,
+    start: Parameters,
+    noise: Noise,
+    spread: &[f64],
+    most: usize,
+    held: Option<usize>,
+) -> Refined {
+    let block = block(problem);
+    let mut p = start;
+    let mut at = score(problem, &p, noise, block);
+    let mut damping = 1e-3;
+    for _ in 0..most {
+        let Some(step) = damped(&at, spread, damping, held) else {
+            return Refined {
+                parameters: p,
+                score: at,
+                ending: Ending::Diverged,
+            };
+        };
+        // no step longer than the prior: the Gauss-Newton model is local
+        let longest = step
+            .iter()
+            .zip(spread)
+            .fold(0.0f64, |m, (d, s)| m.max(d.abs() / s));
+        let shorten = if longest > 0.5 { 0.5 / longest } else { 1.0 };
+        let mut trial: Parameters = p
+            .iter()
+            .zip(step.iter())
+            .map(|(x, d)| x + shorten * d)
+            .collect();
+        problem.clamp(&mut trial);
+        let next = score(problem, &trial, noise, block);
+        let gain = next.log_likelihood - at.log_likelihood;
+        if gain.is_finite() && gain >= 0.0 {
+            p = trial;
+            at = next;
+            damping = (damping * 0.1).max(1e-9);
+            if gain < 1e-4 {
+                return Refined {
+                    parameters: p,
+                    score: at,
+                    ending: Ending::Converged,
+                };
+            }
+        } else if gain.is_finite() && gain > -1e-4 * (1.0 + 1e-9 * at.log_likelihood.abs()) {
+            return Refined {
+                parameters: p,
+                score: at,
+                ending: Ending::Converged,
+            };
+        } else {
+            damping = damping.max(1e-4) * 10.0;
+            if damping > 1e8 {
+                return Refined {
+                    parameters: p,
+                    score: at,
+                    ending: Ending::Converged,
+                };
+            }
+        }
+    }
+    Refined {
+        parameters: p,
+        score: at,
+        ending: Ending::IterationLimit,
+    }
+}
+
+/// Noise levels of highest likelihood at fixed parameters; the position's never below the
+/// resolution's own.
+fn tune(problem: &Problem, p: &[f64], noise: Noise, given: &Given) -> Noise {
+    let free = (given.torque.is_none(), given.position_factor.is_none());
+    if !free.0 && !free.1 {
+        return noise;
+    }
+    let at = |x: &[f64]| Noise {
+        torque: if free.0 {
+            x[0].clamp(-30.0, 30.0).exp()
+        } else {
+            noise.torque
+        },
+        // 1 + exp keeps the floor without a kink that a simplex could hang on
+        position_factor: if free.1 {
+            1.0 + x[1].clamp(-30.0, 30.0).exp()
+        } else {
+            noise.position_factor
+        },
+    };
+    let start: [f64; 2] = [
+        noise.torque.ln(),
+        (noise.position_factor - 1.0).max(0.1).ln(),
+    ];
+    let mut x = start;
+    let mut best = log_likelihood(problem, p, at(&x));
+    let mut step = [0.7, 1.5];
+    for _ in 0..12 {
+        let mut moved = false;
+        for i in 0..2 {
+            if (i == 0 && !free.0) || (i == 1 && !free.1) {
+                continue;
+            }
+            for sign in [1.0, -1.0] {
+                let mut y = x;
+                y[i] += sign * step[i];
+                let l = log_likelihood(problem, p, at(&y));
+                if l > best {
+                    best = l;
+                    x = y;
+                    moved = true;
+                    break;
+                }
+            }
+        }
+        if !moved {
+            step = [step[0] * 0.4, step[1] * 0.4];
+        }
+    }
+    let best = at(&x);
+    if log_likelihood(problem, p, best) > log_likelihood(problem, p, noise) {
+        best
+    } else {
+        noise
+    }
+}
+
+/// Covariance at the maximum.
+fn finish(
+    problem: &Problem,
+    refined: Refined,
+    noise: Noise,
+    spread: &[f64],
+    starts: usize,
+    best_start: usize,
+) -> Option<Maximum> {
+    let np = problem.parameters();
+    let mut h = refined.score.information.clone();
+    for (j, s) in spread.iter().enumerate() {
+        h[(j, j)] += 1.0 / (s * s);
+    }
+    let covariance = h.cholesky()?.inverse();
+    // white innovations give outer = information; the mean ratio over the friction directions says
+    // by how much colour widens
+    let spread_of_score = &covariance * &refined.score.outer * &covariance;
+    let ratio: f64 = (0..FRICTION)
+        .map(|j| spread_of_score[(j, j)] / covariance[(j, j)])
+        .sum::<f64>()
+        / FRICTION as f64;
+    let widening = if refined.score.blocks > 2 * np {
+        ratio.max(1.0)
+    } else {
+        1.0
+    };
+    let (lo, hi) = problem.slope_range;
+    let at_limit = [3, 4].map(|j| {
+        let w = refined.parameters[j].exp() / problem.velocity_scale;
+        w > 0.99 * hi || w < 1.01 * lo
+    });
+    Some(Maximum {
+        parameters: refined.parameters,
+        covariance: covariance * widening,
+        noise,
+        score: refined.score,
+        ending: refined.ending,
+        widening,
+        at_limit,
+        starts,
+        best_start,
+    })
+}
+
+/// Drop of the log-likelihood at a one-sided 95 % bound: half of 1.645 squared.
+const BOUND_DROP: f64 = 1.353;
+
+/// One-sided 95 % lower bound of the slope with index `i` (3 or 4) by its profile likelihood: the
+/// slope steps down while everything else is fitted anew. `None` where the whole range is as
+/// likely.
+pub fn profile_slope(problem: &Problem, maximum: &Maximum, i: usize) -> Option<f64> {
+    let spread = spread(problem);
+    let lowest = (problem.slope_range.0 * problem.velocity_scale).ln();
+    let top = maximum.score.log_likelihood / maximum.widening;
+    let mut p = maximum.parameters.clone();
+    let mut before = (p[i], 0.0);
+    while p[i] > lowest {
+        p[i] = (p[i] - 0.25).max(lowest);
+        let refined = refine_others(problem, p, maximum.noise, &spread, 8, Some(i));
+        p = refined.parameters;
+        // coloured innovations count for less, as in the covariance
+        let drop = top - refined.score.log_likelihood / maximum.widening;
+        if drop > BOUND_DROP {
+            let share = (BOUND_DROP - before.1) / (drop - before.1);
+            let at = before.0 + share.clamp(0.0, 1.0) * (p[i] - before.0);
+            return Some(at.exp() / problem.velocity_scale);
+        }
+        before = (p[i], drop);
+    }
+    None
+}

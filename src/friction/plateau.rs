@@ -1,0 +1,88 @@
+//! Plateau map: mean torque at constant speed, per direction, the report's own idea at (29).
+//!
+//! At constant speed inertia takes no torque; what the nuisance says of gravity and of the other
+//! joints is subtracted. It is drawn over the filter's curve as a check that uses neither the
+//! filter nor the friction law.
+
+use serde::Serialize;
+
+use super::prepare::Prepared;
+use super::problem::FRICTION;
+
+/// Mean torque over one plateau, less the nuisance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Plateau {
+    /// Mean velocity [m/s or rad/s].
+    pub v: f64,
+    /// Mean torque [N or Nm].
+    pub torque: f64,
+    /// Standard error of the mean torque, from tenths of the plateau [N or Nm].
+    pub std: f64,
+    /// Length [s].
+    pub seconds: f64,
+}
+
+/// Shortest plateau [s]; largest departure from its own speed, relative.
+const SHORTEST: f64 = 0.15;
+const DEPARTURE: f64 = 0.02;
+
+/// Plateaus of all records at the estimate `p`.
+pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
+    let problem = &prepared.problem;
+    let eta = &p[FRICTION..];
+    let e = problem.nuisance;
+    let mut out = Vec::new();
+    let mut first = 0;
+    for record in &problem.records {
+        let n = record.tau.len();
+        let v = &prepared.velocity[first..first + record.t.len()];
+        let a = &prepared.acceleration[first..first + record.t.len()];
+        let net = |k: usize| {
+            let m: f64 = record.m[k * e..(k + 1) * e]
+                .iter()
+                .zip(eta)
+                .map(|(x, y)| x * y)
+                .sum();
+            let h: f64 = record.h[k * e..(k + 1) * e]
+                .iter()
+                .zip(eta)
+                .map(|(x, y)| x * y)
+                .sum();
+            record.tau[k] - m * 0.5 * (a[k] + a[k + 1]) - h
+        };
+        let mut k = 0;
+        while k < n {
+            let speed = v[k].abs();
+            let near = |i: usize| (v[i] - v[k]).abs() <= DEPARTURE * speed;
+            let mut end = k;
+            while end < n && near(end) {
+                end += 1;
+            }
+            let seconds = record.t[end.min(n)] - record.t[k];
+            if speed > 0.02 * problem.velocity_scale && seconds >= SHORTEST {
+                let count = (end - k) as f64;
+                let mean = (k..end).map(net).sum::<f64>() / count;
+                let parts = 10usize.min(end - k);
+                let part = (end - k) / parts;
+                let spread = (0..parts)
+                    .map(|i| {
+                        let from = k + i * part;
+                        let m = (from..from + part).map(net).sum::<f64>() / part as f64;
+                        (m - mean) * (m - mean)
+                    })
+                    .sum::<f64>();
+                out.push(Plateau {
+                    v: v[k..end].iter().sum::<f64>() / count,
+                    torque: mean,
+                    std: (spread / (parts * (parts - 1)).max(1) as f64).sqrt(),
+                    seconds,
+                });
+                k = end;
+            } else {
+                k += ((end - k) / 4).max(1);
+            }
+        }
+        first += record.t.len();
+    }
+    out
+}

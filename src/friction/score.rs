@@ -1,0 +1,228 @@
+//! The same filter at fixed parameters: likelihood, score and information.
+//!
+//! An extended filter that learns its parameters on the way linearises early samples at wrong
+//! ones, and is surer than it may be. Here the parameters stand still; the states are filtered,
+//! their sensitivities to the parameters are carried along (the prediction-error method: Ljung
+//! 1979, IEEE TAC 24, "Asymptotic behavior of the extended Kalman filter"), and score and Gauss-
+//! Newton information are summed over innovations. At the maximum the inverse information is the
+//! covariance of the augmented filter linearised there; sums over blocks of the score give what a
+//! coloured residual adds to it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::{FRICTION, Noise, Problem};
+use super::propagate::{Interval, Law, Transition, state, with_sensitivities};
+
+/// Result of a pass at fixed parameters.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Gaussian log-likelihood of the innovations (less the constant).
+    pub log_likelihood: f64,
+    /// Gradient of the log-likelihood.
+    pub gradient: DVector<f64>,
+    /// Gauss-Newton information matrix.
+    pub information: DMatrix<f64>,
+    /// Sum over blocks of the outer product of the block's gradient.
+    pub outer: DMatrix<f64>,
+    /// Number of blocks in `outer`.
+    pub blocks: usize,
+    pub innovations: usize,
+    pub mean_nis: f64,
+    /// Share of innovations inside their 95 % bound.
+    pub share_inside: f64,
+    /// Square root of the mean squared innovation.
+    pub innovation_rms: f64,
+}
+
+/// Two-state covariance (qq, qv, vv), predicted over one interval.
+#[inline(always)]
+fn predict(p: [f64; 3], t: &Transition, s2: f64) -> [f64; 3] {
+    [
+        p[0] + 2.0 * t.q_v * p[1] + t.q_v * t.q_v * p[2] + s2 * t.n_q * t.n_q,
+        t.v_v * (p[1] + t.q_v * p[2]) + s2 * t.n_q * t.n_v,
+        t.v_v * t.v_v * p[2] + s2 * t.n_v * t.n_v,
+    ]
+}
+
+/// Innovation update of the two-state covariance; returns the gains.
+#[inline(always)]
+fn update(p: &mut [f64; 3], s: f64) -> (f64, f64) {
+    let (kq, kv) = (p[0] / s, p[1] / s);
+    // Joseph's form for H = (1, 0)
+    let r = s - p[0];
+    let c = r / s;
+    *p = [
+        c * c * p[0] + kq * kq * r,
+        c * p[1] - kv * p[0] * c + kq * kv * r,
+        p[2] - 2.0 * kv * p[1] + kv * kv * s,
+    ];
+    (kq, kv)
+}
+
+/// Likelihood, score and information of `parameters`. `block` is the number of samples over which
+/// the score is summed before its outer product is taken.
+pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) -> Score {
+    let np = problem.parameters();
+    let law = Law::new(problem, parameters);
+    let e = problem.nuisance;
+    let mut t = Transition::new(np);
+    let mut out = Score {
+        log_likelihood: 0.0,
+        gradient: DVector::zeros(np),
+        information: DMatrix::zeros(np, np),
+        outer: DMatrix::zeros(np, np),
+        blocks: 0,
+        innovations: 0,
+        mean_nis: 0.0,
+        share_inside: 0.0,
+        innovation_rms: 0.0,
+    };
+    let s2 = noise.torque * noise.torque;
+    let mut info = vec![0.0; np * np];
+    let (mut nis, mut inside, mut square) = (0.0, 0usize, 0.0);
+    let mut w_q = vec![0.0; np];
+    let mut w_v = vec![0.0; np];
+    for record in &problem.records {
+        let mut part = DVector::zeros(np);
+        let (mut q, mut v) = (record.y[0], record.v0);
+        let mut p = [
+            record.r[0] * noise.position_factor,
+            0.0,
+            (0.1 * problem.velocity_scale).powi(2),
+        ];
+        w_q.fill(0.0);
+        w_v.fill(0.0);
+        for k in 0..record.tau.len() {
+            let interval = Interval {
+                dt: record.t[k + 1] - record.t[k],
+                tau: record.tau[k],
+                m: &record.m[k * e..(k + 1) * e],
+                h: &record.h[k * e..(k + 1) * e],
+            };
+            let next = with_sensitivities(
+                &law,
+                parameters,
+                &interval,
+                problem.least_inertia,
+                q,
+                v,
+                &mut t,
+            );
+            (q, v) = next;
+            p = predict(p, &t, s2);
+            for j in 0..np {
+                w_q[j] += t.q_v * w_v[j] + t.b_q[j];
+                w_v[j] = t.v_v * w_v[j] + t.b_v[j];
+            }
+            let s = p[0] + record.r[k + 1] * noise.position_factor;
+            let innovation = record.y[k + 1] - q;
+            let (kq, kv) = update(&mut p, s);
+            q += kq * innovation;
+            v += kv * innovation;
+            let z = innovation * innovation / s;
+            out.log_likelihood -= 0.5 * (z + s.ln());
+            nis += z;
+            inside += usize::from(z < CHI2_95);
+            square += innovation * innovation;
+            out.innovations += 1;
+            // d(innovation)/dp = -w_q; score = w_q nu / s, information = w_q w_q' / s
+            let g = innovation / s;
+            for i in 0..np {
+                part[i] += w_q[i] * g;
+                let wi = w_q[i] / s;
+                for (a, w) in info[i * np..i * np + i + 1].iter_mut().zip(&w_q[..=i]) {
+                    *a += wi * w;
+                }
+            }
+            for j in 0..np {
+                let w = w_q[j];
+                w_q[j] -= kq * w;
+                w_v[j] -= kv * w;
+            }
+            if (k + 1) % block.max(1) == 0 {
+                out.outer.ger(1.0, &part, &part, 1.0);
+                out.gradient += &part;
+                out.blocks += 1;
+                part.fill(0.0);
+            }
+        }
+        // the last, shorter block
+        out.outer.ger(1.0, &part, &part, 1.0);
+        out.gradient += &part;
+        out.blocks += 1;
+    }
+    for i in 0..np {
+        for j in 0..=i {
+            out.information[(i, j)] = info[i * np + j];
+            out.information[(j, i)] = info[i * np + j];
+        }
+    }
+    let n = out.innovations.max(1) as f64;
+    out.mean_nis = nis / n;
+    out.share_inside = inside as f64 / n;
+    out.innovation_rms = (square / n).sqrt();
+    out
+}
+
+/// 95 % point of chi-squared with one degree of freedom.
+const CHI2_95: f64 = 3.841_458_820_694_124;
+
+/// Log-likelihood alone, at a quarter of the cost.
+pub fn log_likelihood(problem: &Problem, parameters: &[f64], noise: Noise) -> f64 {
+    let law = Law::new(problem, parameters);
+    let eta = &parameters[FRICTION..];
+    let e = problem.nuisance;
+    let s2 = noise.torque * noise.torque;
+    let mut sum = 0.0;
+    for record in &problem.records {
+        let (mut q, mut v) = (record.y[0], record.v0);
+        let mut p = [
+            record.r[0] * noise.position_factor,
+            0.0,
+            (0.1 * problem.velocity_scale).powi(2),
+        ];
+        for k in 0..record.tau.len() {
+            let interval = Interval {
+                dt: record.t[k + 1] - record.t[k],
+                tau: record.tau[k],
+                m: &record.m[k * e..(k + 1) * e],
+                h: &record.h[k * e..(k + 1) * e],
+            };
+            let (start_v, dt) = (v, interval.dt);
+            let minv = inverse_inertia(&interval, eta, problem.least_inertia);
+            (q, v) = state(&law, eta, &interval, problem.least_inertia, q, v);
+            // one mean decay over the interval serves the covariance
+            let decay = 0.5 * (law.slope_at(start_v) + law.slope_at(v)) * minv * dt;
+            let t = decayed(decay, dt, minv);
+            p = [
+                p[0] + 2.0 * t[0] * p[1] + t[0] * t[0] * p[2] + s2 * t[2] * t[2],
+                t[1] * (p[1] + t[0] * p[2]) + s2 * t[2] * t[3],
+                t[1] * t[1] * p[2] + s2 * t[3] * t[3],
+            ];
+            let s = p[0] + record.r[k + 1] * noise.position_factor;
+            let innovation = record.y[k + 1] - q;
+            let (kq, kv) = update(&mut p, s);
+            q += kq * innovation;
+            v += kv * innovation;
+            sum -= 0.5 * (innovation * innovation / s + s.ln());
+        }
+    }
+    sum
+}
+
+fn inverse_inertia(interval: &Interval, eta: &[f64], least: f64) -> f64 {
+    let inertia: f64 = interval.m.iter().zip(eta).map(|(m, e)| m * e).sum();
+    1.0 / inertia.max(least)
+}
+
+/// (dq/dv, dv/dv, dq/dtau, dv/dtau) of an interval with total decay `x`.
+#[inline(always)]
+fn decayed(x: f64, dt: f64, minv: f64) -> [f64; 4] {
+    let whole = (-x).exp();
+    let (a, b) = if x.abs() < 1e-3 {
+        (1.0 - x / 2.0 + x * x / 6.0, 0.5 - x / 6.0 + x * x / 24.0)
+    } else {
+        ((1.0 - whole) / x, (x - 1.0 + whole) / (x * x))
+    };
+    [dt * a, whole, minv * dt * dt * b, minv * dt * a]
+}

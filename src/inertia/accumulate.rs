@@ -1,0 +1,208 @@
+//! Sums that replace the stacked matrix (42): one R factor per joint and block of time.
+//!
+//! Blocks keep what a covariance under correlated residuals needs, the score of any parameter
+//! vector over a stretch of time, without a second reading. Their number is bounded: when there
+//! are too many, neighbours merge and the block length doubles.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::columns::Columns;
+use crate::math::rfactor::RFactor;
+
+/// Most blocks that are kept per joint.
+const MOST_BLOCKS: usize = 512;
+
+/// One block of time: the R factor of each joint's rows.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Uninterrupted stretch that the block belongs to; correlation ends at its borders.
+    pub stretch: usize,
+    /// Rows per joint.
+    pub rows: u64,
+    /// Upper triangle per joint, columns as in [`Columns::of_joint`].
+    pub r: Vec<DMatrix<f64>>,
+}
+
+/// Accumulates filtered, decimated rows.
+#[derive(Debug, Clone)]
+pub struct Accumulator {
+    columns: Columns,
+    open: Vec<RFactor>,
+    open_rows: u64,
+    stretch: usize,
+    began: f64,
+    block_seconds: f64,
+    blocks: Vec<Block>,
+    /// Squared norm of the filtered torque per joint.
+    torque_square: Vec<f64>,
+    rows: u64,
+}
+
+impl Accumulator {
+    /// `block_seconds` is the length of a block to begin with [s].
+    pub fn new(columns: Columns, block_seconds: f64) -> Self {
+        let open = (0..columns.joints)
+            .map(|j| RFactor::new(columns.of_joint(j)))
+            .collect();
+        let torque_square = vec![0.0; columns.joints];
+        Accumulator {
+            columns,
+            open,
+            open_rows: 0,
+            stretch: 0,
+            began: 0.0,
+            block_seconds,
+            blocks: Vec::new(),
+            torque_square,
+            rows: 0,
+        }
+    }
+
+    /// Adds one row of every joint; `channels` as [`Columns::fill`] writes them. A new `stretch`
+    /// closes the open block.
+    pub fn add(&mut self, stretch: usize, t: f64, channels: &[f64]) {
+        if stretch != self.stretch {
+            self.close();
+            self.stretch = stretch;
+        }
+        if self.open_rows > 0 && t - self.began >= self.block_seconds {
+            self.close();
+        }
+        if self.open_rows == 0 {
+            self.began = t;
+        }
+        let mut at = 0;
+        for (j, open) in self.open.iter_mut().enumerate() {
+            let c = self.columns.of_joint(j);
+            open.fold(&channels[at..at + c]);
+            at += c;
+        }
+        for (s, tau) in self.torque_square.iter_mut().zip(&channels[at..]) {
+            *s += tau * tau;
+        }
+        self.open_rows += 1;
+        self.rows += 1;
+    }
+
+    fn close(&mut self) {
+        if self.open_rows == 0 {
+            return;
+        }
+        let r = self.open.iter().map(RFactor::r).collect();
+        for (j, open) in self.open.iter_mut().enumerate() {
+            *open = RFactor::new(self.columns.of_joint(j));
+        }
+        self.blocks.push(Block {
+            stretch: self.stretch,
+            rows: self.open_rows,
+            r,
+        });
+        self.open_rows = 0;
+        if self.blocks.len() > MOST_BLOCKS {
+            self.halve();
+        }
+    }
+
+    fn halve(&mut self) {
+        self.block_seconds *= 2.0;
+        let old = std::mem::take(&mut self.blocks);
+        let mut old = old.into_iter().peekable();
+        while let Some(mut first) = old.next() {
+            if let Some(second) = old.next_if(|b| b.stretch == first.stretch) {
+                for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
+                    *a = merged([&*a, b], self.columns.of_joint(j));
+                }
+                first.rows += second.rows;
+            }
+            self.blocks.push(first);
+        }
+    }
+
+    /// Closes the last block and hands everything over.
+    pub fn finish(mut self) -> Sums {
+        self.close();
+        Sums {
+            columns: self.columns,
+            blocks: self.blocks,
+            torque_square: self.torque_square,
+            rows: self.rows,
+        }
+    }
+}
+
+/// R factor of several stacked triangles.
+fn merged<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> DMatrix<f64> {
+    let mut factor = RFactor::new(columns);
+    let mut row = vec![0.0; columns];
+    for part in parts {
+        for i in 0..part.nrows() {
+            for (c, x) in row.iter_mut().enumerate() {
+                *x = part[(i, c)];
+            }
+            factor.fold(&row);
+        }
+    }
+    factor.r()
+}
+
+/// All rows of all logs, reduced.
+#[derive(Debug, Clone)]
+pub struct Sums {
+    pub columns: Columns,
+    pub blocks: Vec<Block>,
+    pub torque_square: Vec<f64>,
+    /// Rows per joint.
+    pub rows: u64,
+}
+
+impl Sums {
+    /// Joins the sums of another set of logs with the same columns; stretches stay apart.
+    pub fn merge(&mut self, other: Sums) {
+        let shift = self.blocks.last().map_or(0, |b| b.stretch + 1);
+        self.blocks.extend(other.blocks.into_iter().map(|mut b| {
+            b.stretch += shift;
+            b
+        }));
+        for (a, b) in self.torque_square.iter_mut().zip(&other.torque_square) {
+            *a += b;
+        }
+        self.rows += other.rows;
+    }
+
+    /// R factor of all rows of joint j.
+    pub fn joint(&self, j: usize) -> DMatrix<f64> {
+        merged(
+            self.blocks.iter().map(|b| &b.r[j]),
+            self.columns.of_joint(j),
+        )
+    }
+}
+
+/// Normal quantities of one joint's triangle: X'X, X'G, X't, and |t - X theta|^2 by parts.
+pub struct Parts<'a> {
+    pub r: &'a DMatrix<f64>,
+    pub unknowns: usize,
+    pub gradient: usize,
+}
+
+impl Parts<'_> {
+    /// X' (t - X theta) for the joint's own unknowns.
+    pub fn score(&self, theta: &DVector<f64>) -> DVector<f64> {
+        let c = self.unknowns;
+        let x = self.r.columns(0, c);
+        let t = self.r.column(self.r.ncols() - 1);
+        x.tr_mul(&(t - x * theta))
+    }
+
+    /// |t - X theta|^2.
+    pub fn residual_square(&self, theta: &DVector<f64>) -> f64 {
+        let x = self.r.columns(0, self.unknowns);
+        (self.r.column(self.r.ncols() - 1) - x * theta).norm_squared()
+    }
+
+    /// X' G.
+    pub fn with_gradient(&self) -> DMatrix<f64> {
+        let x = self.r.columns(0, self.unknowns);
+        x.tr_mul(&self.r.columns(self.unknowns, self.gradient))
+    }
+}

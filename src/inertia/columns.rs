@@ -1,0 +1,142 @@
+//! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
+//! gradient of its known friction, and the target.
+
+use crate::robot::Robot;
+use crate::robot::friction::DoubleTanh;
+
+/// A linear term that belongs to one joint and is fitted with the inertias.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Own {
+    /// Fv v.
+    Viscous,
+    /// Fc sgn(v).
+    Coulomb,
+    /// A constant torque.
+    Offset,
+}
+
+impl Own {
+    /// Name in results and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Own::Viscous => "viscous",
+            Own::Coulomb => "coulomb",
+            Own::Offset => "offset",
+        }
+    }
+
+    /// Its column at velocity v.
+    #[inline]
+    pub fn column(self, v: f64) -> f64 {
+        match self {
+            Own::Viscous => v,
+            // sgn with sgn(0) = 0
+            Own::Coulomb => f64::from(i8::from(v > 0.0) - i8::from(v < 0.0)),
+            Own::Offset => 1.0,
+        }
+    }
+}
+
+/// What is known of a joint's friction before the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownFriction {
+    pub law: DoubleTanh,
+    /// Covariance of (Bv, Bf1, Bf2, w1, w2), row-major 5 x 5; zero where it is taken as exact.
+    pub covariance: [[f64; 5]; 5],
+}
+
+/// Columns of the rows of every joint.
+#[derive(Debug, Clone)]
+pub struct Columns {
+    /// Number of joints n.
+    pub joints: usize,
+    /// Number of shared inertial parameters p.
+    pub shared: usize,
+    /// Own linear terms per joint.
+    pub own: Vec<Vec<Own>>,
+    /// Known friction per joint; its gradient takes five columns.
+    pub known: Vec<Option<KnownFriction>>,
+}
+
+/// Columns that the gradient of a known friction law takes.
+pub const GRADIENT: usize = 5;
+
+impl Columns {
+    /// Number of unknowns: shared ones first, then each joint's own in turn.
+    pub fn unknowns(&self) -> usize {
+        self.shared + self.own.iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Index of the first own unknown of joint j.
+    pub fn first_own(&self, j: usize) -> usize {
+        self.shared + self.own[..j].iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Columns of one row of joint j: unknowns, gradient, target b = tau - F(v).
+    pub fn of_joint(&self, j: usize) -> usize {
+        self.shared + self.own[j].len() + self.gradient(j) + 1
+    }
+
+    /// Gradient columns of joint j.
+    pub fn gradient(&self, j: usize) -> usize {
+        if self.known[j].is_some() { GRADIENT } else { 0 }
+    }
+
+    /// Index of the global unknown that column c of joint j's unknowns stands for.
+    pub fn unknown(&self, j: usize, c: usize) -> usize {
+        if c < self.shared {
+            c
+        } else {
+            self.first_own(j) + c - self.shared
+        }
+    }
+
+    /// Where joint j's columns begin in a row of all channels; after all joints' columns stand the
+    /// n measured torques.
+    pub fn offset(&self, j: usize) -> usize {
+        (0..j).map(|i| self.of_joint(i)).sum()
+    }
+
+    /// Channels per sample over all joints, measured torques included.
+    pub fn channels(&self) -> usize {
+        self.offset(self.joints) + self.joints
+    }
+
+    /// Fills the channels of one sample.
+    pub fn fill(
+        &self,
+        robot: &Robot,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        tau: &[f64],
+        out: &mut [f64],
+    ) {
+        let (n, p) = (self.joints, self.shared);
+
+        let mut y = [0.0; MOST];
+        let y = &mut y[..n * p];
+        robot.regressor(q, v, a, y);
+        let mut at = 0;
+        for j in 0..n {
+            out[at..at + p].copy_from_slice(&y[j * p..(j + 1) * p]);
+            at += p;
+            for own in &self.own[j] {
+                out[at] = own.column(v[j]);
+                at += 1;
+            }
+            let mut b = tau[j];
+            if let Some(known) = &self.known[j] {
+                b -= known.law.torque(v[j]);
+                out[at..at + GRADIENT].copy_from_slice(&known.law.gradient(v[j]));
+                at += GRADIENT;
+            }
+            out[at] = b;
+            at += 1;
+        }
+        out[at..at + n].copy_from_slice(tau);
+    }
+}
+
+/// Most entries of a regressor that fit the buffer on the stack: 8 joints x 104 columns.
+const MOST: usize = 832;

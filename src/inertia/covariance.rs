@@ -1,0 +1,157 @@
+//! Covariance under correlated residuals, and what the known friction adds.
+//!
+//! Filtered residuals are correlated over many rows: the textbook covariance, which counts rows as
+//! independent, is far too small. The middle of the sandwich is the long-run covariance of the
+//! score, from block sums with Bartlett's weights (Newey and West 1987, Econometrica 55) and the
+//! bandwidth of Andrews (1991, Econometrica 59). The friction's parameters enter through
+//! b = tau - F(v): d theta/d theta_f = -A^-1 X' W G.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::accumulate::Sums;
+use super::columns::GRADIENT;
+use super::solve::{Solution, of_joint, parts};
+
+/// The two parts and their sum.
+pub(super) struct Covariances {
+    pub sandwich: DMatrix<f64>,
+    pub total: DMatrix<f64>,
+}
+
+/// Sandwich, textbook covariance, and the sensitivities to each joint's known friction.
+pub(super) fn covariance(
+    sums: &Sums,
+    joints: &[DMatrix<f64>],
+    solution: &Solution,
+    weights: &[f64],
+    residual: &[f64],
+) -> (Covariances, DMatrix<f64>, Vec<Option<DMatrix<f64>>>) {
+    let columns = &sums.columns;
+    let u = columns.unknowns();
+    let rows = sums.rows as f64;
+    // textbook: each joint's residual variance over its weighted normal matrix
+    let mut meat = DMatrix::zeros(u, u);
+    for (j, r) in joints.iter().enumerate() {
+        let own = columns.shared + columns.own[j].len();
+        let x = r.columns(0, own);
+        let normal = x.tr_mul(&x) * (weights[j].powi(4) * residual[j] * residual[j]);
+        for a in 0..own {
+            for b in 0..own {
+                meat[(columns.unknown(j, a), columns.unknown(j, b))] += normal[(a, b)];
+            }
+        }
+    }
+    let freedom = rows / (rows - u as f64 / columns.joints as f64).max(1.0);
+    let textbook = &solution.inverse * meat * &solution.inverse * freedom;
+
+    // score of every block, summed over joints: residuals of joints are correlated with one another
+    let scores: Vec<(usize, DVector<f64>)> = sums
+        .blocks
+        .iter()
+        .map(|block| {
+            let mut g = DVector::zeros(u);
+            for j in 0..columns.joints {
+                let theta = of_joint(sums, &solution.theta, j);
+                let s = parts(sums, &block.r[j], j).score(&theta);
+                for (c, x) in s.iter().enumerate() {
+                    g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
+                }
+            }
+            (block.stretch, g)
+        })
+        .collect();
+    let sandwich = &solution.inverse * long_run(&scores, u) * &solution.inverse * freedom;
+    // Correlation can only take certainty away here: where the estimate of the middle comes out
+    // below the textbook's, the latter is the better one.
+    let sandwich = at_least(sandwich, &textbook);
+
+    let mut total = sandwich.clone();
+    let mut sensitivity = Vec::with_capacity(columns.joints);
+    for (j, r) in joints.iter().enumerate() {
+        let Some(known) = &columns.known[j] else {
+            sensitivity.push(None);
+            continue;
+        };
+        let xg = parts(sums, r, j).with_gradient();
+        let mut global = DMatrix::zeros(u, GRADIENT);
+        for c in 0..xg.nrows() {
+            for k in 0..GRADIENT {
+                global[(columns.unknown(j, c), k)] = weights[j] * weights[j] * xg[(c, k)];
+            }
+        }
+        let s = -(&solution.inverse * global);
+        let cov = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
+        total += &s * cov * s.transpose();
+        sensitivity.push(Some(s));
+    }
+    (Covariances { sandwich, total }, textbook, sensitivity)
+}
+
+/// Long-run covariance of the block scores by Bartlett's weights; lags do not cross stretches.
+fn long_run(scores: &[(usize, DVector<f64>)], u: usize) -> DMatrix<f64> {
+    let lag = bandwidth(scores, u);
+    let mut s = DMatrix::zeros(u, u);
+    for l in 0..=lag {
+        let weight = 1.0 - l as f64 / (lag + 1) as f64;
+        for pair in scores.windows(l + 1) {
+            let (first, last) = (&pair[0], &pair[l]);
+            if first.0 != last.0 {
+                continue;
+            }
+            if l == 0 {
+                s.ger(1.0, &first.1, &first.1, 1.0);
+            } else {
+                s.ger(weight, &first.1, &last.1, 1.0);
+                s.ger(weight, &last.1, &first.1, 1.0);
+            }
+        }
+    }
+    s
+}
+
+/// Andrews' automatic bandwidth for Bartlett's kernel from first-order autoregressions of each
+/// score, equal weights after normalisation.
+fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
+    let n = scores.len();
+    let (mut above, mut below) = (0.0, 0.0);
+    for i in 0..u {
+        let (mut c0, mut c1) = (0.0, 0.0);
+        for w in scores.windows(2) {
+            if w[0].0 == w[1].0 {
+                c0 += w[0].1[i] * w[0].1[i];
+                c1 += w[0].1[i] * w[1].1[i];
+            }
+        }
+        if c0 > 0.0 {
+            let rho = (c1 / c0).clamp(-0.97, 0.97);
+            above += 4.0 * rho * rho / ((1.0 - rho).powi(6) * (1.0 + rho).powi(2));
+            below += 1.0 / (1.0 - rho).powi(4);
+        }
+    }
+    if below <= 0.0 {
+        return 0;
+    }
+    let lag = 1.1447 * (above / below * n as f64).cbrt();
+    // a fifth of the record is the longest correlation that it can still show
+    lag.ceil().min(n as f64 / 5.0) as usize
+}
+
+/// Scales rows and columns of a covariance so that no variance is below that of `floor`.
+fn at_least(mut c: DMatrix<f64>, floor: &DMatrix<f64>) -> DMatrix<f64> {
+    let up: Vec<f64> = (0..c.nrows())
+        .map(|i| {
+            let (have, need) = (c[(i, i)], floor[(i, i)]);
+            if have > 0.0 && have < need {
+                (need / have).sqrt()
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    for i in 0..c.nrows() {
+        for j in 0..c.ncols() {
+            c[(i, j)] *= up[i] * up[j];
+        }
+    }
+    c
+}

@@ -1,0 +1,108 @@
+//! An identified model: a robot with numbers, tau = Y(q, v, a) theta + F(v) + offset.
+
+use super::Robot;
+use super::friction::{DoubleTanh, ViscousCoulomb};
+
+/// Friction of one joint in a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum JointFriction {
+    /// No friction term.
+    None,
+    /// Law (18).
+    DoubleTanh(DoubleTanh),
+    /// Viscous and Coulomb friction with a jump at rest.
+    ViscousCoulomb(ViscousCoulomb),
+}
+
+impl JointFriction {
+    /// F(v) in N or N m.
+    #[inline]
+    pub fn torque(&self, v: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::DoubleTanh(law) => law.torque(v),
+            Self::ViscousCoulomb(law) => law.torque(v),
+        }
+    }
+
+    /// Number of its parameters.
+    pub fn parameters(&self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::DoubleTanh(_) => 5,
+            Self::ViscousCoulomb(_) => 2,
+        }
+    }
+
+    /// dF/d(parameters) into the first entries of `out`, in the order of the law's `NAMES`.
+    #[inline]
+    pub fn gradient(&self, v: f64, out: &mut [f64]) {
+        match self {
+            Self::None => {}
+            Self::DoubleTanh(law) => out[..5].copy_from_slice(&law.gradient(v)),
+            Self::ViscousCoulomb(law) => out[..2].copy_from_slice(&law.gradient(v)),
+        }
+    }
+}
+
+/// Most regressor entries that a model holds on the stack: 8 joints times 104 parameters.
+const MOST: usize = 832;
+
+/// A robot with its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    pub robot: Robot,
+    /// Inertial parameters, in the order of the regressor's columns.
+    pub theta: Vec<f64>,
+    /// Friction per joint.
+    pub friction: Vec<JointFriction>,
+    /// Constant torque per joint [N or N m].
+    pub offset: Vec<f64>,
+}
+
+impl Model {
+    /// Inverse dynamics: the torque of every joint [N or N m] at q, v, a (n numbers each).
+    ///
+    /// # Panics
+    /// Where a slice does not hold n numbers: a mistake of the caller's code.
+    #[inline]
+    pub fn torque(&self, q: &[f64], v: &[f64], a: &[f64], tau: &mut [f64]) {
+        let (n, p) = (self.friction.len(), self.theta.len());
+        let mut buffer = [0.0; MOST];
+        let y = &mut buffer[..n * p];
+        self.robot.regressor(q, v, a, y);
+        for (j, tau) in tau.iter_mut().enumerate().take(n) {
+            let inertial: f64 = y[j * p..(j + 1) * p]
+                .iter()
+                .zip(&self.theta)
+                .map(|(y, t)| y * t)
+                .sum();
+            *tau = inertial + self.friction[j].torque(v[j]) + self.offset[j];
+        }
+    }
+
+    /// Number of parameters in the order theta, friction of each joint, offset of each joint.
+    pub fn parameters(&self) -> usize {
+        let friction: usize = self.friction.iter().map(JointFriction::parameters).sum();
+        self.theta.len() + friction + self.offset.len()
+    }
+
+    /// d tau_j / d(parameters) at q, v, a into `out` of [`Self::parameters`] numbers.
+    pub fn gradient(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
+        let (n, p) = (self.friction.len(), self.theta.len());
+        let mut buffer = [0.0; MOST];
+        let y = &mut buffer[..n * p];
+        self.robot.regressor(q, v, a, y);
+        out.fill(0.0);
+        out[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
+        let mut at = p;
+        for (j, friction) in self.friction.iter().enumerate() {
+            let k = friction.parameters();
+            if j == joint {
+                friction.gradient(v[j], &mut out[at..at + k]);
+            }
+            at += k;
+        }
+        out[at + joint] = 1.0;
+    }
+}
