@@ -13,6 +13,10 @@ const POWERS: [f64; 23] = [
 /// and one pair of quotes are passed over.
 #[inline]
 pub(super) fn parse(field: &[u8]) -> Option<f64> {
+    // So long a number has more digits than f64 holds exactly: looking at them here is in vain.
+    if field.len() > 18 {
+        return parse_any(field);
+    }
     let (negative, mut at) = match field.first() {
         Some(b'-') => (true, 1),
         Some(b'+') => (false, 1),
@@ -25,8 +29,8 @@ pub(super) fn parse(field: &[u8]) -> Option<f64> {
         at += 1;
         fraction = digits(field, &mut at, &mut mantissa);
     }
-    // 19 digits always fit; an overflown mantissa must not pass.
-    if whole + fraction == 0 || whole + fraction > 19 {
+    // At most 18 bytes: the mantissa cannot overflow.
+    if whole + fraction == 0 {
         return parse_any(field);
     }
     let mut power = -(fraction as i64);
@@ -77,9 +81,12 @@ fn digits(field: &[u8], at: &mut usize, value: &mut u64) -> usize {
 }
 
 /// Anything that the standard library takes for a number, NaN and infinities included.
-#[cold]
 fn parse_any(field: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(field).ok()?.trim();
+    let text = std::str::from_utf8(field).ok()?;
+    if let Ok(value) = text.parse() {
+        return Some(value);
+    }
+    let text = text.trim();
     let text = text
         .strip_prefix('"')
         .and_then(|inner| inner.strip_suffix('"'))
