@@ -422,6 +422,14 @@ fn campaigns_name_robot_logs_and_settings() {
     );
 }
 
+#[test]
+fn deeply_nested_text_is_refused_without_overflowing_the_stack() {
+    for (open, close) in [("[", "]"), ("{ a = ", "}")] {
+        let text = format!("robot = {}{}", open.repeat(100_000), close.repeat(100_000));
+        assert!(RobotFile::parse("r.toml", &text).is_err());
+    }
+}
+
 proptest! {
     #[test]
     fn no_text_makes_a_reader_of_configurations_panic(text in "[\\[\\]a-z_=\" .0-9\n{},#\\\\-]{0,200}") {

@@ -290,6 +290,18 @@ fn control_characters_in_names_and_fields_are_escaped_in_messages() {
 }
 
 #[test]
+fn a_long_path_is_shown_whole_and_a_long_name_is_cut() {
+    let folder = Folder::new();
+    let deep = folder.0.path().join("a".repeat(150));
+    let text = read(&deep.to_string_lossy(), &layout())
+        .unwrap_err()
+        .to_string();
+    assert!(text.contains(&"a".repeat(150)), "{text}");
+    let text = message(format!("t,{},tau_q1\n0,1,2\n", "b".repeat(5000)));
+    assert!(text.len() < 600, "{text}");
+}
+
+#[test]
 fn raw_channels_that_belong_to_no_pose_are_told_with_their_line() {
     let robot = RobotFile::load("configs/cft.toml".as_ref()).unwrap();
     let folder = Folder::new();

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use super::ConfigError;
-use crate::log::{escape, nearest};
+use crate::log::{escape, escape_whole, nearest};
 
 /// A TOML text and the name under which errors speak of it.
 pub(crate) struct Document<'a> {
@@ -54,7 +54,7 @@ impl<'a> Document<'a> {
         ConfigError::Syntax {
             file: self.file.to_owned(),
             line,
-            message: escape(&message),
+            message: escape_whole(&message),
         }
     }
 

@@ -19,7 +19,7 @@ mod spec;
 pub use block::Block;
 pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Delimiter, Layout};
-pub use names::{escape, nearest};
+pub use names::{escape, escape_whole, nearest};
 pub use reader::Reader;
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};

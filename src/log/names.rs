@@ -1,16 +1,20 @@
 //! Names that come from files: made safe to print, and compared with the names that are known.
 
 /// Characters of a name that are shown before it is cut.
-const SHOWN: usize = 80;
+const SHOWN: usize = 120;
 
-/// Text from a file made safe to print: control and invisible format characters as escapes, cut to 80 characters.
-pub fn escape(text: &str) -> String {
-    let mut shown = String::new();
-    for (index, character) in text.chars().enumerate() {
-        if index == SHOWN {
-            shown.push('…');
-            break;
-        }
+/// A name from a file made safe to print: control and invisible format characters as escapes, cut to 120 characters.
+pub fn escape(name: &str) -> String {
+    match name.char_indices().nth(SHOWN) {
+        None => escape_whole(name),
+        Some((end, _)) => escape_whole(&name[..end]) + "…",
+    }
+}
+
+/// The same for what must not be cut: a path, a message.
+pub fn escape_whole(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for character in text.chars() {
         // Direction overrides and zero-width characters can forge a message as well.
         let invisible = matches!(character,
             '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}');
@@ -68,7 +72,7 @@ mod tests {
         assert_eq!(escape("q\u{1b}[31m1"), "q\\u{1b}[31m1");
         assert_eq!(escape("a\nb\u{202e}c"), "a\\nb\\u{202e}c");
         assert_eq!(escape("Geschwindigkeit φ"), "Geschwindigkeit φ");
-        assert_eq!(escape(&"x".repeat(200)).chars().count(), 81);
+        assert_eq!(escape(&"x".repeat(200)).chars().count(), 121);
     }
 
     #[test]

@@ -234,7 +234,7 @@ impl Reader {
             return Err(match (self.spec.span, self.seen) {
                 (Span::Percent { .. } | Span::Seconds { .. }, Some((first, last))) => {
                     LogError::EmptySpan {
-                        spec: super::escape(&self.spec.to_string()),
+                        spec: super::escape_whole(&self.spec.to_string()),
                         rows: self.samples,
                         duration_s: last - first,
                     }

@@ -7,7 +7,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::{LogError, escape};
+use super::LogError;
+use super::names::escape_whole;
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,7 +63,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// A path for a message.
 pub(crate) fn shown(path: &Path) -> String {
-    escape(&path.to_string_lossy())
+    escape_whole(&path.to_string_lossy())
 }
 
 /// What to do when the system refuses to read.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::LogError;
+use super::names::escape_whole;
 use super::source::file_name;
 
 /// The part of a log that is used.
@@ -149,7 +150,7 @@ impl FromStr for LogSpec {
                 span,
             }),
             Err(reason) => Err(LogError::Span {
-                spec: text.to_owned(),
+                spec: escape_whole(text),
                 reason,
             }),
         }
