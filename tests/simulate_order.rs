@@ -5,7 +5,9 @@ use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident::log::{Block, LogSpec, Reader};
-use cft_ident::simulate::{Ending, Motion, Order, SimulateError, SimulatedLog, simulate};
+use cft_ident::simulate::{
+    Ending, Motion, Order, SimulateError, SimulatedLog, TruthFile, simulate,
+};
 
 fn robot(name: &str) -> RobotFile {
     RobotFile::load(Path::new(name)).expect("embedded")
@@ -238,6 +240,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     assert_eq!(heavy.truth.effects.len(), 1);
     assert_ne!(heavy.values, synthetic.values);
     let text = heavy.truth.to_toml().expect("written");
+    assert_eq!(TruthFile::parse(&text).expect("read"), heavy.truth);
     let value: toml::Table = text.parse().expect("TOML");
     assert_eq!(value["seed"].as_integer(), Some(1));
     assert_eq!(value["parameter"][0]["value"].as_float(), Some(130.0));

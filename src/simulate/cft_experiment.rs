@@ -6,13 +6,13 @@
 
 use super::SimulateError;
 use super::cft::{CftPlant, CftTruth};
-use super::chance::{Purpose, stream};
 use super::controller::Control;
 use super::effects::{EffectSpec, EffectValue, Effects, Site};
 use super::plant::Plant;
 use super::recording::Recording;
-use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, Travel, travel};
-use super::run::{Drive, Settings, Start, run};
+use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, TURN, Travel, travel};
+use super::run::{Drive, Start, run};
+use super::settings::Settings;
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::{Limits, Setup};
 use crate::robot::cft::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, joints};
@@ -33,10 +33,6 @@ const CONVERSION: [f64; 4] = [
 const SPEED_SHARE: f64 = 0.95;
 /// Distance to every limit, as a fraction of its span.
 const MARGIN: f64 = 0.05;
-/// Speeds of a ladder.
-const LEVELS: usize = 10;
-/// Time from zero speed to a slow plateau \[s\].
-const TURN: f64 = 0.3;
 /// Slowest plateau of q1 \[m/s\] and of q2, q4, q5 \[rad/s\]: a third of the speed at which friction
 /// with a slope of 200 s/m or 60 s/rad bends.
 const LOWEST: [f64; 4] = [0.0015, 0.005, 0.005, 0.005];
@@ -190,19 +186,16 @@ impl OneJointMove {
         };
         let acceleration = self.acceleration.unwrap_or(acceleration);
         let top = SPEED_SHARE * room.top_speed;
-        let ladder = LadderPlan {
-            range,
-            speeds: self
-                .speeds
-                .clone()
-                .unwrap_or_else(|| LadderPlan::geometric(range, lowest, top, LEVELS, acceleration)),
-            acceleration,
-            turn: TURN,
-            seconds: self.seconds,
-        };
-        let ladder = match self.seed {
-            Some(seed) => ladder.build(Some(&mut stream(seed, Purpose::Reference)))?,
-            None => ladder.build(None)?,
+        let ladder = match &self.speeds {
+            None => LadderPlan::usual(range, (lowest, top), acceleration, self.seconds, self.seed)?,
+            Some(speeds) => LadderPlan {
+                range,
+                speeds: speeds.clone(),
+                acceleration,
+                turn: TURN,
+                seconds: self.seconds,
+            }
+            .build_seeded(self.seed)?,
         };
         pose[place] = ladder.at(0.0).0;
         Ok(Reference {
@@ -226,7 +219,15 @@ const fn acceleration(setup: Setup) -> [f64; 4] {
 
 /// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
 pub fn excitation(setup: Setup) -> Reference<4> {
-    let mut series = Fourier::table_3();
+    excitation_of(setup, Fourier::table_3())
+}
+
+/// [`excitation`], begun anywhere in its period.
+pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
+    excitation_of(setup, Fourier::table_3().at_random_phase(seed))
+}
+
+fn excitation_of(setup: Setup, mut series: Fourier<4>) -> Reference<4> {
     if setup == Setup::Dspace {
         series.offset[3] = setup.limits().middles()[3];
     }

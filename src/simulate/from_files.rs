@@ -3,12 +3,11 @@
 use super::SimulateError;
 use super::cft::CftTruth;
 use super::cft_experiment::{Mover, OneJointMove};
-use super::chance::{Purpose, stream};
 use super::controller::Control;
 use super::plant::Plant;
-use super::reference::{Fourier, Frame, LadderPlan, Path, Points, Reference};
-use super::run::Settings;
+use super::reference::{Fourier, Frame, LadderPlan, Path, Points, Reference, TURN};
 use super::sensors::{Noise, Sensors};
+use super::settings::Settings;
 use super::single_joint::{SingleJointFriction, SingleJointTruth};
 use crate::config::robot_file::{FrictionLawKind, RobotFile};
 use crate::config::trajectory::{self, Coordinates, SingleJointMove, Trajectory};
@@ -21,8 +20,7 @@ use crate::robot::cft::{COORDINATES, JOINTS, Limits, Setup};
 const BLEND: f64 = 2.0;
 /// Duration of a ladder where none is given \[s\].
 const SECONDS: f64 = 20.0;
-/// Plateaus of a single joint's ladder, and the ratio of its fastest to its slowest.
-const LEVELS: usize = 10;
+/// Ratio of the fastest to the slowest plateau of a single joint's ladder.
 const SPEED_RATIO: f64 = 300.0;
 
 /// A reference of J coordinates, or why there is none.
@@ -280,22 +278,27 @@ pub fn single_joint_ladder(
         .and_then(|file| file.acceleration)
         .or(limits.acceleration);
     let acceleration = acceleration.unwrap_or(8.0 * (range.1 - range.0));
-    let speeds = match file {
-        Some(file) => file.speeds.clone(),
+    let ladder = match file {
+        Some(file) => LadderPlan {
+            range,
+            speeds: file.speeds.clone(),
+            acceleration,
+            turn: TURN,
+            seconds,
+        }
+        .build_seeded(Some(seed))?,
         None => {
             let fastest = LadderPlan::fastest(range, acceleration);
             let top = fastest.min(limits.speed.unwrap_or(fastest));
-            LadderPlan::geometric(range, top / SPEED_RATIO, top, LEVELS, acceleration)
+            LadderPlan::usual(
+                range,
+                (top / SPEED_RATIO, top),
+                acceleration,
+                seconds,
+                Some(seed),
+            )?
         }
     };
-    let plan = LadderPlan {
-        range,
-        speeds,
-        acceleration,
-        turn: 0.3,
-        seconds,
-    };
-    let ladder = plan.build(Some(&mut stream(seed, Purpose::Reference)))?;
     Ok(Reference {
         frame: Frame::Joints,
         path: Path::Ladder {

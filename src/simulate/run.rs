@@ -3,11 +3,12 @@
 use super::SimulateError;
 use super::controller::{Control, Controller};
 use super::effects::Effects;
-use super::integrate::{DormandPrince, Tolerance};
+use super::integrate::DormandPrince;
 use super::plant::{Moving, Plant, part};
 use super::recording::{Ending, LimitEvent, Recording, Status};
 use super::reference::{Frame, Reference, Target};
-use super::sensors::Sensors;
+use super::settings::{OnLimit, Settings};
+use super::volts::VoltSeries;
 
 /// What drives the motors.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,59 +22,6 @@ pub enum Drive<const J: usize> {
     Volts(VoltSeries<J>),
 }
 
-/// Volts over time, each row held until the next and the last for as long as the others on average;
-/// zero before and after.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VoltSeries<const J: usize> {
-    times: Vec<f64>,
-    volts: Vec<[f64; J]>,
-}
-
-impl<const J: usize> VoltSeries<J> {
-    /// # Errors
-    /// [`SimulateError::Volts`] when the series is empty, its times do not increase, its lengths differ
-    /// or a number is not finite.
-    pub fn new(times: Vec<f64>, volts: Vec<[f64; J]>) -> Result<Self, SimulateError> {
-        let reject = |what: String| Err(SimulateError::Volts { what });
-        if times.len() != volts.len() || times.is_empty() {
-            return reject(format!(
-                "{} times and {} rows of volts; give as many of each, at least one",
-                times.len(),
-                volts.len()
-            ));
-        }
-        if let Some(k) = times.windows(2).position(|t| t[1] <= t[0]) {
-            return reject(format!(
-                "time does not increase from {} s to {} s at row {}",
-                times[k],
-                times[k + 1],
-                k + 2
-            ));
-        }
-        let numbers = times.iter().chain(volts.as_flattened());
-        if numbers.into_iter().any(|x| !x.is_finite()) {
-            return reject("a time or a voltage is not finite".to_owned());
-        }
-        Ok(Self { times, volts })
-    }
-
-    /// Time at which the last row ends \[s\]; a single row lasts for ever.
-    pub fn seconds(&self) -> f64 {
-        match self.times.as_slice() {
-            [first, .., last] => last + (last - first) / (self.times.len() - 1) as f64,
-            _ => f64::INFINITY,
-        }
-    }
-
-    fn at(&self, t: f64) -> [f64; J] {
-        let after = self.times.partition_point(|&x| x <= t);
-        if after == 0 || (after == self.times.len() && t >= self.seconds()) {
-            return [0.0; J];
-        }
-        self.volts[after - 1]
-    }
-}
-
 /// Where the motion starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Start<const J: usize> {
@@ -82,79 +30,6 @@ pub enum Start<const J: usize> {
     Settled,
     /// The initial conditions of the report's block: motor coordinates and their speeds.
     State { position: [f64; J], speed: [f64; J] },
-}
-
-/// What happens when a motor coordinate leaves its limits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OnLimit {
-    /// The run ends at that sample.
-    #[default]
-    Stop,
-    /// The coordinate is held at the limit by an inelastic stop, looked at once per sample.
-    Clamp,
-}
-
-/// How the experiment is run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings<const J: usize> {
-    /// Duration \[s\].
-    pub seconds: f64,
-    /// Control and sampling rate \[Hz\].
-    pub rate_hz: f64,
-    /// Largest voltage of the amplifiers, in both directions \[V\].
-    pub saturation: f64,
-    pub tolerance: Tolerance,
-    pub on_limit: OnLimit,
-    pub sensors: Sensors<J>,
-    pub seed: u64,
-}
-
-impl<const J: usize> Settings<J> {
-    /// 1 kHz, 10 V, encoders as they are, no noise, stop at a limit.
-    pub fn new(seconds: f64) -> Self {
-        Self {
-            seconds,
-            rate_hz: 1000.0,
-            saturation: 10.0,
-            tolerance: Tolerance::default(),
-            on_limit: OnLimit::Stop,
-            sensors: Sensors::default(),
-            seed: 0,
-        }
-    }
-
-    /// # Errors
-    /// [`SimulateError::Parameter`] for the first number that no experiment can have.
-    pub fn check(&self) -> Result<(), SimulateError> {
-        self.sensors.check()?;
-        let numbers = [
-            ("duration", self.seconds, "must be above 0 s and finite"),
-            ("rate", self.rate_hz, "must be above 0 Hz and finite"),
-            (
-                "absolute tolerance",
-                self.tolerance.absolute,
-                "must be above 0",
-            ),
-            (
-                "relative tolerance",
-                self.tolerance.relative,
-                "must be above 0",
-            ),
-        ];
-        for (name, value, rule) in numbers {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(SimulateError::Parameter { name, value, rule });
-            }
-        }
-        if self.saturation.is_nan() || self.saturation <= 0.0 {
-            return Err(SimulateError::Parameter {
-                name: "saturation",
-                value: self.saturation,
-                rule: "must be above 0 V",
-            });
-        }
-        Ok(())
-    }
 }
 
 /// State sizes that the integrator is compiled for: the smallest that holds the plant and its effects

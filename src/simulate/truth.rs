@@ -3,7 +3,7 @@
 //! Only `identify` may look at it, and only after everything is decided. Parameters carry the names,
 //! joints and units of a model file, so that the two can be compared by key.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::cft::CftTruth;
 use super::effects::EffectValue;
@@ -14,7 +14,7 @@ use crate::robot::friction::DoubleTanh;
 use crate::robot::{JointKind, ParameterInfo};
 
 /// Content of LOG.truth.toml.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TruthFile {
     /// Version of the tool.
     pub version: String,
@@ -33,7 +33,7 @@ pub struct TruthFile {
     pub torque_noise: Vec<f64>,
     #[serde(rename = "parameter")]
     pub parameters: Vec<Parameter>,
-    #[serde(rename = "effect", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<EffectValue>,
 }
 
@@ -162,6 +162,14 @@ impl TruthFile {
     /// What the TOML writer says of a number that it cannot write.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
         toml::to_string_pretty(self)
+    }
+
+    /// The truth from the file's text.
+    ///
+    /// # Errors
+    /// What the TOML reader says, with line and column.
+    pub fn parse(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
     }
 }
 

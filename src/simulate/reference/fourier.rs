@@ -2,8 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use rand::RngExt;
+
 use super::Target;
 use crate::simulate::SimulateError;
+use crate::simulate::chance::{Purpose, stream};
 
 /// Positions x_i(t) = offset_i + sum_l a_il/(l w) sin(l w t) - b_il/(l w) cos(l w t), eq. (43).
 ///
@@ -53,6 +56,13 @@ impl Fourier<4> {
 }
 
 impl<const J: usize> Fourier<J> {
+    /// The same series, begun anywhere in its period.
+    pub fn at_random_phase(mut self, seed: u64) -> Self {
+        let mut chance = stream(seed, Purpose::Reference);
+        self.start = self.period() * chance.random::<f64>();
+        self
+    }
+
     /// Duration of one period \[s\].
     pub fn period(&self) -> f64 {
         TAU / self.fundamental
@@ -153,6 +163,21 @@ mod tests {
         for i in 0..4 {
             assert!((one.position[i] - next.position[i]).abs() < 1e-12);
             assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn random_phases_begin_at_rest_on_the_same_path() {
+        let series = Fourier::table_3();
+        let other = series.clone().at_random_phase(4);
+        assert_eq!(other, series.clone().at_random_phase(4));
+        assert_ne!(other.start, series.clone().at_random_phase(5).start);
+        assert!((0.0..series.period()).contains(&other.start));
+        assert_eq!(other.at(0.0).velocity, [0.0; 4]);
+        let on_path = series.at(other.start + 2.0 + 2.0 * series.period());
+        let here = other.at(2.0 + 2.0 * series.period());
+        for i in 0..4 {
+            assert!((here.position[i] - on_path.position[i]).abs() < 1e-12);
         }
     }
 

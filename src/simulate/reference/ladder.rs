@@ -10,7 +10,9 @@ use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use super::stroke::{Meeting, PEAK, Stroke};
 use crate::simulate::SimulateError;
+use crate::simulate::chance::{Purpose, stream};
 
 /// What the ladder has to do.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,92 +37,14 @@ pub struct Ladder {
     seconds: f64,
 }
 
-/// How a stroke's speed meets zero: at rest, or on its way to the next stroke.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Meeting {
-    /// v (10 x^3 - 15 x^4 + 6 x^5): no acceleration at zero speed.
-    Rest,
-    /// v (15 x - 10 x^3 + 3 x^5)/8: the acceleration is largest at zero speed and the next stroke
-    /// starts with the same.
-    Turn,
-}
-
-/// Peak slope of both ramps, in units of speed over ramp time.
-const PEAK: f64 = 1.875;
 /// A sweep must have at least this share of the range at its plateau speed.
 const PLATEAU_SHARE: f64 = 0.25;
+/// Speeds of the usual ladder.
+const SPEEDS: usize = 10;
+/// Time from zero speed to a slow plateau of the usual ladder \[s\].
+pub const TURN: f64 = 0.3;
 /// Duration of one pass through all speeds, the longest \[s\].
 const PASS: f64 = 20.0;
-
-impl Meeting {
-    /// Speed at the fraction x of the ramp, over the plateau speed.
-    fn speed(self, x: f64) -> f64 {
-        let x2 = x * x;
-        match self {
-            Self::Rest => x2 * x * (10.0 - 15.0 * x + 6.0 * x2),
-            Self::Turn => x * (15.0 - 10.0 * x2 + 3.0 * x2 * x2) / 8.0,
-        }
-    }
-
-    /// Distance at the fraction x of the ramp, over plateau speed times ramp time.
-    fn distance(self, x: f64) -> f64 {
-        let x2 = x * x;
-        match self {
-            Self::Rest => x2 * x2 * (2.5 - 3.0 * x + x2),
-            Self::Turn => x2 * (7.5 - 2.5 * x2 + 0.5 * x2 * x2) / 8.0,
-        }
-    }
-}
-
-#[derive(Debug, Clone, PartialEq)]
-struct Stroke {
-    start: f64,
-    from: f64,
-    direction: f64,
-    speed: f64,
-    /// Way in: how it begins and how long the ramp takes.
-    rise: (Meeting, f64),
-    plateau: f64,
-    /// Way out, as the way in.
-    fall: (Meeting, f64),
-}
-
-impl Stroke {
-    fn ramps(&self) -> f64 {
-        self.speed
-            * (self.rise.0.distance(1.0) * self.rise.1 + self.fall.0.distance(1.0) * self.fall.1)
-    }
-
-    fn duration(&self) -> f64 {
-        self.rise.1 + self.plateau + self.fall.1
-    }
-
-    fn length(&self) -> f64 {
-        self.ramps() + self.speed * self.plateau
-    }
-
-    /// Way covered and speed at a time after the start.
-    fn at(&self, elapsed: f64) -> (f64, f64) {
-        let (rise, rise_time) = self.rise;
-        let (fall, fall_time) = self.fall;
-        if elapsed < rise_time {
-            let x = elapsed / rise_time;
-            return (
-                self.speed * rise_time * rise.distance(x),
-                self.speed * rise.speed(x),
-            );
-        }
-        if elapsed < rise_time + self.plateau {
-            let way = rise_time * rise.distance(1.0) + elapsed - rise_time;
-            return (self.speed * way, self.speed);
-        }
-        let x = ((self.duration() - elapsed) / fall_time).clamp(0.0, 1.0);
-        (
-            self.length() - self.speed * fall_time * fall.distance(x),
-            self.speed * fall.speed(x),
-        )
-    }
-}
 
 /// A plateau in the order of the motion: its speed, and whether it goes to the end of the range.
 #[derive(Debug, Clone, Copy)]
@@ -149,6 +73,47 @@ impl LadderPlan {
     /// Largest plateau speed that a range leaves room for at an acceleration.
     pub fn fastest(range: (f64, f64), acceleration: f64) -> f64 {
         top_speed(range, acceleration)
+    }
+
+    /// Ladder of ten speeds in equal ratios from `top` (as far as the range lets it) to `lowest`, or of as
+    /// many as the time suffices for.
+    ///
+    /// # Errors
+    /// As [`LadderPlan::build`], when the time does not suffice for two speeds.
+    pub fn usual(
+        range: (f64, f64),
+        (lowest, top): (f64, f64),
+        acceleration: f64,
+        seconds: f64,
+        seed: Option<u64>,
+    ) -> Result<Ladder, SimulateError> {
+        let build = |count: usize| {
+            let plan = Self {
+                range,
+                speeds: Self::geometric(range, lowest, top, count, acceleration),
+                acceleration,
+                turn: TURN,
+                seconds,
+            };
+            plan.build_seeded(seed)
+        };
+        let mut outcome = build(SPEEDS);
+        for count in (2..SPEEDS).rev() {
+            if outcome.is_ok() {
+                break;
+            }
+            outcome = build(count);
+        }
+        outcome
+    }
+
+    /// [`LadderPlan::build`] with the chance of a seed, or without.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn build_seeded(&self, seed: Option<u64>) -> Result<Ladder, SimulateError> {
+        let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
+        self.build(chance.as_mut())
     }
 
     /// The motion; `chance` shuffles the order of the strokes and the end at which it starts.
@@ -353,7 +318,6 @@ impl Ladder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::chance::{Purpose, stream};
 
     fn plan() -> LadderPlan {
         let range = (0.2, 0.7);
@@ -427,6 +391,26 @@ mod tests {
             before == 0.0 && after == 0.0
         });
         assert_eq!(crossing.count(), 0);
+    }
+
+    #[test]
+    fn short_ladders_have_fewer_speeds_and_still_both_ends_of_the_range_of_speeds() {
+        for seconds in [4.0, 6.0, 10.0, 15.0] {
+            let ladder =
+                LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, seconds, None).expect("fits");
+            assert!(
+                ladder.end <= seconds && ladder.end > 0.9 * seconds,
+                "{}",
+                ladder.end
+            );
+            let speeds = ladder.plateaus().map(|(v, _)| v.abs());
+            let (low, high) = speeds.fold((f64::MAX, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+            assert!(
+                (low - 0.0015).abs() < 1e-12 && (high - 0.633).abs() < 0.03,
+                "{low} {high}"
+            );
+        }
+        assert!(LadderPlan::usual((0.2, 0.7), (0.0015, 0.633), 3.0, 1.0, None).is_err());
     }
 
     #[test]

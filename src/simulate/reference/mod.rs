@@ -3,10 +3,11 @@
 mod fourier;
 mod ladder;
 mod points;
+mod stroke;
 mod travel;
 
 pub use fourier::Fourier;
-pub use ladder::{Ladder, LadderPlan};
+pub use ladder::{Ladder, LadderPlan, TURN};
 pub use points::Points;
 pub use travel::{Travel, travel};
 

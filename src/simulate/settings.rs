@@ -1,0 +1,78 @@
+//! How an experiment is run: duration, rate, saturation, limits, sensors, seed.
+
+use super::SimulateError;
+use super::integrate::Tolerance;
+use super::sensors::Sensors;
+
+/// What happens when a motor coordinate leaves its limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OnLimit {
+    /// The run ends at that sample.
+    #[default]
+    Stop,
+    /// The coordinate is held at the limit by an inelastic stop, looked at once per sample.
+    Clamp,
+}
+
+/// How the experiment is run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings<const J: usize> {
+    /// Duration \[s\].
+    pub seconds: f64,
+    /// Control and sampling rate \[Hz\].
+    pub rate_hz: f64,
+    /// Largest voltage of the amplifiers, in both directions \[V\].
+    pub saturation: f64,
+    pub tolerance: Tolerance,
+    pub on_limit: OnLimit,
+    pub sensors: Sensors<J>,
+    pub seed: u64,
+}
+
+impl<const J: usize> Settings<J> {
+    /// 1 kHz, 10 V, encoders as they are, no noise, stop at a limit.
+    pub fn new(seconds: f64) -> Self {
+        Self {
+            seconds,
+            rate_hz: 1000.0,
+            saturation: 10.0,
+            tolerance: Tolerance::default(),
+            on_limit: OnLimit::Stop,
+            sensors: Sensors::default(),
+            seed: 0,
+        }
+    }
+
+    /// # Errors
+    /// [`SimulateError::Parameter`] for the first number that no experiment can have.
+    pub fn check(&self) -> Result<(), SimulateError> {
+        self.sensors.check()?;
+        let numbers = [
+            ("duration", self.seconds, "must be above 0 s and finite"),
+            ("rate", self.rate_hz, "must be above 0 Hz and finite"),
+            (
+                "absolute tolerance",
+                self.tolerance.absolute,
+                "must be above 0",
+            ),
+            (
+                "relative tolerance",
+                self.tolerance.relative,
+                "must be above 0",
+            ),
+        ];
+        for (name, value, rule) in numbers {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(SimulateError::Parameter { name, value, rule });
+            }
+        }
+        if self.saturation.is_nan() || self.saturation <= 0.0 {
+            return Err(SimulateError::Parameter {
+                name: "saturation",
+                value: self.saturation,
+                rule: "must be above 0 V",
+            });
+        }
+        Ok(())
+    }
+}
