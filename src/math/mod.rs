@@ -70,9 +70,9 @@ pub enum MathError {
         2.0 * cutoff_hz
     )]
     Cutoff {
-        /// Cut-off frequency [Hz].
+        /// Cut-off frequency (Hz).
         cutoff_hz: f64,
-        /// Sampling rate [Hz].
+        /// Sampling rate (Hz).
         rate_hz: f64,
     },
 
@@ -86,7 +86,7 @@ pub enum MathError {
     /// A pass-band ripple that is not a positive number of decibels.
     #[error("a pass-band ripple of {ripple_db} dB is not possible: choose more than 0, 0.05 say")]
     Ripple {
-        /// Ripple [dB].
+        /// Ripple (dB).
         ripple_db: f64,
     },
 

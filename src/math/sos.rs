@@ -49,8 +49,8 @@ pub struct Sos {
 }
 
 impl Sos {
-    /// Butterworth low-pass of `order` 1..=16; gain `1/sqrt 2` at `cutoff_hz` [Hz], sampled at
-    /// `rate_hz` [Hz].
+    /// Butterworth low-pass of `order` 1..=16; gain `1/sqrt 2` at `cutoff_hz` (Hz), sampled at
+    /// `rate_hz` (Hz).
     ///
     /// # Errors
     /// [`MathError::FilterOrder`], [`MathError::Cutoff`].
@@ -59,8 +59,8 @@ impl Sos {
         Ok(Self::from_prototype(order, warped, [1.0, 1.0], 1.0))
     }
 
-    /// Chebyshev low-pass of type I: the pass band up to `cutoff_hz` [Hz] ripples by `ripple_db`
-    /// [dB] below 1; sampled at `rate_hz` [Hz], `order` 1..=16.
+    /// Chebyshev low-pass of type I: the pass band up to `cutoff_hz` (Hz) ripples by `ripple_db`
+    /// (dB) below 1; sampled at `rate_hz` (Hz), `order` 1..=16.
     ///
     /// # Errors
     /// [`MathError::FilterOrder`], [`MathError::Cutoff`], [`MathError::Ripple`].
@@ -122,7 +122,7 @@ impl Sos {
         (factor * self.time_constant()).ceil() as usize
     }
 
-    /// Gain (modulus) at `frequency_hz` [Hz] when sampled at `rate_hz` [Hz]; a zero-phase pass has
+    /// Gain (modulus) at `frequency_hz` (Hz) when sampled at `rate_hz` (Hz); a zero-phase pass has
     /// its square.
     pub fn gain(&self, frequency_hz: f64, rate_hz: f64) -> f64 {
         let w = 2.0 * PI * frequency_hz / rate_hz;

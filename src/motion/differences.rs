@@ -30,7 +30,7 @@ impl Differences {
         }
     }
 
-    /// Writes v and a of `q`, all `k x joints` row-major with step `dt` [s]. Fewer than three rows
+    /// Writes v and a of `q`, all `k x joints` row-major with step `dt` (s). Fewer than three rows
     /// have no derivative: v and a are zero then.
     pub fn apply(self, q: &[f64], joints: usize, dt: f64, v: &mut [f64], a: &mut [f64]) {
         let samples = q.len().checked_div(joints).unwrap_or(0);

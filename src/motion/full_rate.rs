@@ -11,7 +11,7 @@ use crate::log::Block;
 /// Motion at the rows of a record; matrices are `k x joints` row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smooth {
-    /// Sampling step [s].
+    /// Sampling step (s).
     pub dt: f64,
     /// Smoothed positions [m or rad].
     pub q: Vec<f64>,
@@ -41,7 +41,7 @@ pub fn segments(t: &[f64], gap_factor: f64) -> Result<Vec<Range<usize>>, MotionE
     Ok(found)
 }
 
-/// Smooths and differentiates positions `q`, `k x joints` row-major, at times `t` [s] of one record
+/// Smooths and differentiates positions `q`, `k x joints` row-major, at times `t` (s) of one record
 /// without gaps, with the position filter of `settings`. Rows at uneven times are smoothed on an
 /// even grid and read off it again.
 ///

@@ -43,7 +43,7 @@ use crate::math::MathError;
 /// One sample at full rate, after smoothing and differentiation.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample<'a> {
-    /// Time [s].
+    /// Time (s).
     pub t: f64,
     /// Smoothed positions [m or rad].
     pub q: &'a [f64],
@@ -58,7 +58,7 @@ pub struct Sample<'a> {
 /// One row that is kept.
 #[derive(Debug, Clone, Copy)]
 pub struct Row<'a> {
-    /// Time [s].
+    /// Time (s).
     pub t: f64,
     /// Segment of the log, counted from 0 over the segments that are used.
     pub segment: usize,
@@ -106,9 +106,9 @@ pub enum MotionError {
     /// Time stands still or runs backwards.
     #[error("time goes from {before} s to {after} s: sort the log and remove repeated rows")]
     Time {
-        /// Time of a row [s].
+        /// Time of a row (s).
         before: f64,
-        /// Time of the next row [s].
+        /// Time of the next row (s).
         after: f64,
     },
 
@@ -139,9 +139,9 @@ pub enum MotionError {
     /// A record that must be of one piece has a gap.
     #[error("no row between {from} s and {to} s: smooth the stretches before and after it apart")]
     Gap {
-        /// Last time before the gap [s].
+        /// Last time before the gap (s).
         from: f64,
-        /// First time after it [s].
+        /// First time after it (s).
         to: f64,
     },
 
@@ -154,7 +154,7 @@ pub enum MotionError {
         channel: usize,
         /// Its value.
         value: f64,
-        /// Time [s].
+        /// Time (s).
         t: f64,
     },
 }

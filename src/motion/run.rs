@@ -31,9 +31,9 @@ pub struct Summary {
     pub samples: u64,
     /// Rows handed to the sink.
     pub rows: u64,
-    /// Sampling step [s].
+    /// Sampling step (s).
     pub dt: f64,
-    /// Time from the first to the last row of the log [s].
+    /// Time from the first to the last row of the log (s).
     pub duration_s: f64,
     /// Stretches without a gap that were used.
     pub segments: usize,
@@ -41,11 +41,11 @@ pub struct Summary {
     pub skipped: Skipped,
     /// Samples interpolated because no row lay within 2 % of a step from their time.
     pub interpolated: u64,
-    /// Cut-off of the parallel filter [Hz].
+    /// Cut-off of the parallel filter (Hz).
     pub cutoff_hz: f64,
     /// Every how many samples a row was kept.
     pub decimation: usize,
-    /// Cut-off of the position filter [Hz]; none where raw positions were differentiated.
+    /// Cut-off of the position filter (Hz); none where raw positions were differentiated.
     pub q_cutoff_hz: Option<f64>,
 }
 
@@ -56,7 +56,7 @@ pub struct Skipped {
     pub segments: usize,
     /// Their samples together.
     pub samples: u64,
-    /// First and last time [s] of the first 20 of them.
+    /// First and last time (s) of the first 20 of them.
     pub spans_s: Vec<[f64; 2]>,
 }
 

@@ -20,13 +20,13 @@ const HIGHEST_SHARE: f64 = 0.4;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Cut-off of the parallel filter [Hz]: the band of motion and torque that is kept.
+    /// Cut-off of the parallel filter (Hz): the band of motion and torque that is kept.
     pub cutoff_hz: f64,
     /// Kind of the parallel filter.
     pub filter: ParallelFilter,
     /// Every how many samples a row is kept; left out, about ten rows per period of the cut-off.
     pub decimation: Option<usize>,
-    /// Cut-off of the position filter [Hz]; left out, six times `cutoff_hz` but at most 0.4 of the
+    /// Cut-off of the position filter (Hz); left out, six times `cutoff_hz` but at most 0.4 of the
     /// sampling rate.
     pub q_cutoff_hz: Option<f64>,
     /// Order of the (Butterworth) position filter; 0 differentiates raw positions.
@@ -37,10 +37,10 @@ pub struct Settings {
     pub torque: TorqueTiming,
     /// A step longer than this many sampling steps splits the log.
     pub gap_factor: f64,
-    /// Dropped at each end of a segment before the parallel filter [s], where the position filter
+    /// Dropped at each end of a segment before the parallel filter (s), where the position filter
     /// has nothing to look ahead to; left out, ten of that filter's time constants.
     pub q_trim_s: Option<f64>,
-    /// Dropped at each end of a segment after the parallel filter [s]; left out, three of that
+    /// Dropped at each end of a segment after the parallel filter (s); left out, three of that
     /// filter's time constants.
     pub trim_s: Option<f64>,
 }
@@ -76,7 +76,7 @@ pub enum ParallelFilter {
     Chebyshev {
         /// Order of one pass.
         order: usize,
-        /// Ripple in the pass band [dB].
+        /// Ripple in the pass band (dB).
         ripple_db: f64,
     },
 }
@@ -105,7 +105,7 @@ pub enum TorqueTiming {
 /// The filters and lengths for one sampling step.
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
-    /// Sampling step [s].
+    /// Sampling step (s).
     pub dt: f64,
     pub differences: Differences,
     pub position: Option<ZeroPhase>,
@@ -180,7 +180,7 @@ impl Chain {
     }
 }
 
-/// The position filter and its cut-off [Hz].
+/// The position filter and its cut-off (Hz).
 pub(super) fn position_filter(
     settings: &Settings,
     rate: f64,

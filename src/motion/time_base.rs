@@ -24,7 +24,7 @@ const BUFFER: usize = 4096;
 pub(super) enum Event<'a> {
     /// A sample at an even step after the one before.
     Sample {
-        /// Time [s].
+        /// Time (s).
         t: f64,
         /// Positions.
         q: &'a [f64],
@@ -38,14 +38,14 @@ pub(super) enum Event<'a> {
 /// Sampling step and evenness of a list of times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clock {
-    /// Sampling step [s].
+    /// Sampling step (s).
     pub dt: f64,
     /// Whether most steps are even, so that rows are taken as they are.
     pub even: bool,
 }
 
 impl Clock {
-    /// The clock of the rows at times `t` [s]: the mean of the even steps, or the median step
+    /// The clock of the rows at times `t` (s): the mean of the even steps, or the median step
     /// where fewer than half are even.
     pub fn of(t: &[f64]) -> Result<Self, MotionError> {
         let mut steps = Vec::with_capacity(t.len());
@@ -99,7 +99,7 @@ pub(super) struct TimeBase {
     checked: usize,
     /// Row in work: every sample before its time is handed out.
     cursor: usize,
-    /// Time from which the grid is counted [s], and the number of its next point.
+    /// Time from which the grid is counted (s), and the number of its next point.
     anchor: f64,
     next: f64,
     interpolated: u64,
