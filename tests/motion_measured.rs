@@ -1,5 +1,4 @@
-//! The processing published with the EMPS benchmark (Janot, Gautier and Brunot 2019), on the
-//! measured log. The figures are those of numpy and scipy, same processing, to 1e-5.
+//! Measured logs. They lie beside the repository; without them these tests say that they skip.
 
 use std::convert::Infallible;
 use std::path::Path;
@@ -7,12 +6,12 @@ use std::path::Path;
 use cft_ident::log::Block;
 use cft_ident::math::rank;
 use cft_ident::math::rfactor::RFactor;
-use cft_ident::motion::{self, Differences, ParallelFilter, Row, Sample, Settings};
+use cft_ident::motion::{self, Differences, ParallelFilter, Row, Sample, Settings, Summary};
 
-/// Rows of t, q, tau; none where the data folder is absent.
-fn read(name: &str) -> Option<Vec<[f64; 3]>> {
+/// The named columns of a file, row by row; none where the data folder is absent.
+fn read<const N: usize>(name: &str, columns: [&str; N]) -> Option<Vec<[f64; N]>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data/emps")
+        .join("../shared/data")
         .join(name);
     if !path.exists() {
         eprintln!("SKIPPED: no {} beside the repository", path.display());
@@ -20,7 +19,7 @@ fn read(name: &str) -> Option<Vec<[f64; 3]>> {
     }
     let mut reader = csv::Reader::from_path(path).expect("a readable file");
     let header = reader.headers().expect("a header").clone();
-    let at = ["t", "q1", "tau1"].map(|name| {
+    let at = columns.map(|name| {
         let found = header.iter().position(|column| column == name);
         found.expect("the column is there")
     });
@@ -31,6 +30,26 @@ fn read(name: &str) -> Option<Vec<[f64; 3]>> {
     Some(rows.collect())
 }
 
+/// Hands out rows of t, q of all joints, tau of all joints.
+fn blocks<const N: usize>(
+    log: &[[f64; N]],
+) -> impl FnMut(&mut Block) -> Result<bool, Infallible> + '_ {
+    let joints = (N - 1) / 2;
+    let mut blocks = log.chunks(4096);
+    move |block: &mut Block| {
+        let Some(rows) = blocks.next() else {
+            return Ok(false);
+        };
+        for row in rows {
+            block.t.push(row[0]);
+            block.q.extend_from_slice(&row[1..=joints]);
+            block.tau.extend_from_slice(&row[1 + joints..]);
+        }
+        Ok(true)
+    }
+}
+
+/// The processing published with the EMPS benchmark (Janot, Gautier and Brunot 2019).
 fn settings(trim_s: f64) -> Settings {
     Settings {
         cutoff_hz: 40.0,
@@ -51,17 +70,8 @@ fn settings(trim_s: f64) -> Settings {
 /// R factor of [a, v, sign v, 1 | tau].
 fn factor(log: &[[f64; 3]], settings: &Settings) -> RFactor {
     let mut factor = RFactor::new(5);
-    let mut blocks = log.chunks(4096);
-    let summary = motion::run::<Infallible>(
-        &mut |block: &mut Block| {
-            let Some(rows) = blocks.next() else {
-                return Ok(false);
-            };
-            block.t.extend(rows.iter().map(|row| row[0]));
-            block.q.extend(rows.iter().map(|row| row[1]));
-            block.tau.extend(rows.iter().map(|row| row[2]));
-            Ok(true)
-        },
+    let summary = motion::run(
+        &mut blocks(log),
         1,
         settings,
         None,
@@ -91,11 +101,14 @@ fn relative_error(factor: &RFactor, theta: &nalgebra::DVector<f64>) -> f64 {
 
 #[test]
 fn published_processing_on_the_measured_log_gives_the_figures_of_numpy() {
-    let (Some(identification), Some(validation)) =
-        (read("emps_id.csv"), read("emps_pulses_val.csv"))
-    else {
+    let columns = ["t", "q1", "tau1"];
+    let (Some(identification), Some(validation)) = (
+        read("emps/emps_id.csv", columns),
+        read("emps/emps_pulses_val.csv", columns),
+    ) else {
         return;
     };
+    // Figures of numpy and scipy, same processing.
     // (dropped at each end [s], rows, parameters, errors on both logs [%], condition number)
     let cases = [
         (
@@ -132,4 +145,64 @@ fn published_processing_on_the_measured_log_gives_the_figures_of_numpy() {
         let s = rank::svd(&r.columns(0, 4).into_owned()).expect("finite").s;
         assert!((rank::condition(&s) / condition - 1.0).abs() < 1e-5);
     }
+}
+
+/// Relative difference, per joint, between velocities differentiated here and velocities that the
+/// robot logged, both through the parallel filter.
+fn velocity_errors<const N: usize>(log: &[[f64; N]], settings: &Settings) -> (Vec<f64>, Summary) {
+    let joints = (N - 1) / 2;
+    let mut sums = vec![[0.0; 2]; joints];
+    let summary = motion::run(
+        &mut blocks(log),
+        joints,
+        settings,
+        None,
+        2 * joints,
+        &|s: &Sample<'_>, y: &mut [f64]| {
+            y[..joints].copy_from_slice(s.v);
+            y[joints..].copy_from_slice(s.tau);
+        },
+        &mut |row: &Row<'_>| {
+            for (j, sum) in sums.iter_mut().enumerate() {
+                let (found, logged) = (row.filtered[j], row.filtered[joints + j]);
+                sum[0] += (found - logged).powi(2);
+                sum[1] += logged.powi(2);
+            }
+        },
+    )
+    .expect("a log that can be filtered");
+    let errors = sums.iter().map(|[off, size]| (off / size).sqrt());
+    (errors.collect(), summary)
+}
+
+#[test]
+fn velocities_of_a_log_with_an_uneven_clock_are_those_that_the_robot_logged() {
+    let Some(log) = read(
+        "panda/panda_exciting.csv",
+        [
+            "t", "q1", "q2", "q3", "q4", "q5", "q6", "q7", "dq1", "dq2", "dq3", "dq4", "dq5",
+            "dq6", "dq7",
+        ],
+    ) else {
+        return;
+    };
+    let (errors, summary) = velocity_errors(&log, &Settings::default());
+    assert_eq!((summary.samples, summary.segments), (20544, 5));
+    assert_eq!(summary.skipped.segments, 0);
+    assert!(errors.iter().all(|e| *e < 0.02), "{errors:?}");
+}
+
+#[test]
+fn velocities_of_a_slow_log_are_those_that_the_robot_logged() {
+    let Some(log) = read(
+        "ur10/ur10_exciting.csv",
+        [
+            "t", "q1", "q2", "q3", "q4", "q5", "q6", "dq1", "dq2", "dq3", "dq4", "dq5", "dq6",
+        ],
+    ) else {
+        return;
+    };
+    let (errors, summary) = velocity_errors(&log, &Settings::default());
+    assert_eq!((summary.samples, summary.segments), (3441, 1));
+    assert!(errors.iter().all(|e| *e < 0.006), "{errors:?}");
 }
