@@ -2,27 +2,32 @@
 //! asked to stop, and the progress bar.
 
 use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::error::{CliError, indented};
+use super::outputs;
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]
 pub struct Context {
     quiet: bool,
+    json: Option<PathBuf>,
     bars: bool,
     interrupted: Arc<AtomicBool>,
 }
 
 impl Context {
     /// A context that draws bars when standard error is a terminal and `quiet` is false.
-    /// `interrupted` is set from outside when the run is to stop.
-    pub fn new(quiet: bool, interrupted: Arc<AtomicBool>) -> Self {
+    /// `json` is the file of the JSON document; `interrupted` is set from outside when the run is to
+    /// stop.
+    pub fn new(quiet: bool, json: Option<&Path>, interrupted: Arc<AtomicBool>) -> Self {
         Context {
             quiet,
+            json: json.map(Path::to_path_buf),
             bars: !quiet && std::io::stderr().is_terminal(),
             interrupted,
         }
@@ -45,6 +50,18 @@ impl Context {
         } else {
             Ok(())
         }
+    }
+
+    /// Looks at the outputs of a command, the JSON document's file among them, before the long run.
+    /// A file that is renewed in place is not given in `inputs`.
+    ///
+    /// # Errors
+    /// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output,
+    /// when a folder is missing or cannot be written.
+    pub fn check_outputs(&self, inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
+        let mut all = outputs.to_vec();
+        all.extend(self.json.as_deref());
+        outputs::check(inputs, &all)
     }
 
     /// A line on standard error for the person who waits; `-q` silences it.
@@ -111,7 +128,7 @@ mod tests {
     #[test]
     fn a_set_flag_ends_the_command_with_130() {
         let flag = Arc::new(AtomicBool::new(false));
-        let context = Context::new(true, Arc::clone(&flag));
+        let context = Context::new(true, None, Arc::clone(&flag));
         assert!(context.check().is_ok());
         flag.store(true, Ordering::Relaxed);
         let error = context.check().unwrap_err();

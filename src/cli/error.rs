@@ -10,7 +10,9 @@ use std::fmt;
 use super::exit::Exit;
 use crate::config::ConfigError;
 use crate::log::LogError;
+use crate::output::OutputError;
 use crate::report::json::JsonError;
+use crate::simulate::SimulateError;
 
 /// An error ready to be shown: `error: ...`, then the places, then `hint: ...`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -108,6 +110,26 @@ impl From<LogError> for CliError {
 impl From<ConfigError> for CliError {
     fn from(error: ConfigError) -> Self {
         Self::from_room(Exit::BadInput, &error)
+    }
+}
+
+impl From<OutputError> for CliError {
+    fn from(error: OutputError) -> Self {
+        Self::from_room(Exit::OutputFailed, &error)
+    }
+}
+
+impl From<SimulateError> for CliError {
+    fn from(error: SimulateError) -> Self {
+        let exit = match error {
+            // These come from --effect and --move alone.
+            SimulateError::EffectSyntax { .. }
+            | SimulateError::UnknownEffect { .. }
+            | SimulateError::UnknownKey { .. }
+            | SimulateError::UnknownJoint { .. } => Exit::Usage,
+            _ => Exit::BadInput,
+        };
+        Self::from_room(exit, &error)
     }
 }
 

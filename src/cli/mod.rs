@@ -14,6 +14,7 @@ mod arguments;
 mod context;
 mod error;
 mod exit;
+mod files;
 pub mod machine;
 mod outcome;
 mod outputs;
@@ -27,12 +28,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand};
 
+use crate::output;
+
 pub use arguments::Destination;
 pub use context::{Context, Progress};
 pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;
-pub use outputs::check as check_outputs;
 
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
@@ -66,6 +68,7 @@ enum Command {
     Friction(friction::Args),
     Lsq(lsq::Args),
     Validate(validate::Args),
+    Simulate(simulate::Args),
 }
 
 impl Command {
@@ -74,6 +77,7 @@ impl Command {
             Command::Friction(args) => friction::run(args, context),
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
+            Command::Simulate(args) => simulate::run(args, context),
         }
     }
 }
@@ -82,7 +86,15 @@ impl Command {
 pub fn main() -> ExitCode {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    if let Err(error) = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)) {
+    let handler = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            // Asked twice: the graceful end takes too long.
+            output::remove_unfinished();
+            std::process::exit(Exit::Interrupted.code().into());
+        }
+        let _ = writeln!(std::io::stderr(), "stopping; once more to stop at once");
+    };
+    if let Err(error) = ctrlc::set_handler(handler) {
         // Without the handler Ctrl-C ends the process as it does by default.
         let _ = writeln!(std::io::stderr(), "warning: no graceful Ctrl-C: {error}");
     }
@@ -120,10 +132,11 @@ fn execute(cli: &Cli, interrupted: Arc<AtomicBool>) -> Result<Exit, CliError> {
             .build_global();
     }
     let json = cli.common.json.as_ref();
-    if let Some(path) = json.and_then(Destination::file) {
-        check_outputs(&[], &[path])?;
-    }
-    let context = Context::new(cli.common.quiet, interrupted);
+    let context = Context::new(
+        cli.common.quiet,
+        json.and_then(Destination::file),
+        interrupted,
+    );
     let outcome = cli.command.run(&context)?;
     outcome::show(
         &outcome,
@@ -174,7 +187,8 @@ mod tests {
             "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
         )
         .unwrap();
-        assert_eq!(args.effects, ["payload:mass=1", "ripple:q5"]);
+        assert_eq!(args.effects[0].values, [("mass".to_owned(), 1.0)]);
+        assert_eq!(args.effects[1].joint.as_deref(), Some("q5"));
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 

@@ -1,18 +1,13 @@
 //! Outputs are looked at before the long run: an unwritable folder, or a name used twice, is told
 //! at once and not after the work.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
+use crate::output::write_whole;
 
-/// Checks the files that a command is going to write.
-///
-/// # Errors
-/// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output, when
-/// a folder is missing or cannot be written. (A file that a command renews in place is not given in
-/// `inputs`.)
-pub fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
+/// Checks the files that a command is going to write: see [`super::Context::check_outputs`].
+pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
     let inputs: Vec<PathBuf> = inputs.iter().map(|path| resolved(path)).collect();
     let mut seen: Vec<PathBuf> = Vec::with_capacity(outputs.len());
     for output in outputs {
@@ -39,14 +34,7 @@ pub fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
 
 /// Writes a text file whole or not at all.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), CliError> {
-    let written = tempfile::NamedTempFile::new_in(folder(path)).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|error| error.error)
-    });
-    written
-        .map(|_| ())
-        .map_err(|error| CliError::output(format!("cannot write {}: {error}", path.display())))
+    Ok(write_whole(path, |file| file.write_all(text.as_bytes()))?)
 }
 
 fn folder(path: &Path) -> &Path {
@@ -78,6 +66,10 @@ fn writable(path: &Path) -> Result<(), CliError> {
     if !folder.is_dir() {
         return Err(failed("its folder does not exist")
             .hint(format!("make it first: mkdir -p {}", folder.display())));
+    }
+    if path.exists() && !path.is_file() {
+        // A device or a pipe is written directly, not replaced.
+        return Ok(());
     }
     // An unnamed file shows that one can be written here, and leaves nothing behind.
     tempfile::tempfile_in(folder)

@@ -1,9 +1,20 @@
 //! `cft-ident simulate`: a log of the simulated robot, and its truth beside it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::arguments;
-use crate::log::LogSpec;
+use serde_json::{Value, json};
+
+use super::context::Context;
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::{arguments, files};
+use crate::config::RobotFile;
+use crate::log::{Block, LogSpec, Provenance, Reader};
+use crate::output::{LogWriter, write_whole};
+use crate::report::json::Document;
+use crate::report::number;
+use crate::report::table::{Align, Table};
+use crate::simulate::{self, EffectSpec, Ending, Motion, Order, SimulatedLog};
 
 const EXAMPLE: &str = "\
 Example:
@@ -11,6 +22,7 @@ Example:
 
 /// Simulate the robot under control and write its log.
 ///
+/// Without --reference, --move or --volts it runs the excitation trajectory of the report's Table 3.
 /// The truth (parameters, effects, seed) goes to a file of its own beside the log: LOG's stem with
 /// .truth.toml.
 #[derive(Debug, Clone, clap::Args)]
@@ -18,29 +30,254 @@ Example:
 pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]
-    pub robot: String,
+    pub robot: PathBuf,
     /// Model file whose parameters are the truth [default: the robot's nominal ones]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
     /// Trajectory that the controller follows
     #[arg(long, value_name = "TRAJECTORY.toml", group = "motion")]
-    pub reference: Option<String>,
+    pub reference: Option<PathBuf>,
     /// One-joint experiment: JOINT moves over its range at several speeds, the others are held
     #[arg(long = "move", value_name = "JOINT", group = "motion")]
     pub move_joint: Option<String>,
     /// Log whose volts u_1..u_4 drive the motors, without a controller
     #[arg(long, value_name = "LOG", group = "motion")]
     pub volts: Option<LogSpec>,
-    /// Duration [s]
+    /// Duration [s] [default: that of the motion, else 20]
     #[arg(long, value_name = "S", value_parser = arguments::positive)]
     pub seconds: Option<f64>,
     /// Effect that the plant has beyond the model; may be given more than once
     #[arg(long = "effect", value_name = "NAME[:JOINT][:key=value,...]")]
-    pub effects: Vec<String>,
+    pub effects: Vec<EffectSpec>,
     /// Seed of every random number
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Log to write
     #[arg(short, long, value_name = "LOG.csv", value_parser = arguments::csv_file)]
     pub output: PathBuf,
+}
+
+/// Rows between two looks at Ctrl-C.
+const BLOCK: usize = 4096;
+
+/// Simulates, and writes the log and its truth.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let truth_path = args.output.with_extension("truth.toml");
+    let mut read: Vec<&Path> = vec![&args.robot];
+    read.extend(args.reference.as_deref());
+    read.extend(args.model.as_deref());
+    read.extend(args.volts.as_ref().map(|log| log.path.as_path()));
+    context.check_outputs(&read, &[&args.output, &truth_path])?;
+
+    let robot = files::robot(&args.robot)?;
+    let mut inputs = vec![robot.provenance];
+    let robot = robot.value;
+    let model = match &args.model {
+        Some(path) => Some(files::model_of(path, &robot)?),
+        None => None,
+    };
+    inputs.extend(model.iter().map(|model| model.provenance.clone()));
+    let reference = match &args.reference {
+        Some(path) => Some(files::trajectory(path)?),
+        None => None,
+    };
+    inputs.extend(reference.iter().map(|file| file.provenance.clone()));
+    let volts = match &args.volts {
+        Some(log) => Some(Volts::read(log, &robot, context)?),
+        None => None,
+    };
+    inputs.extend(volts.iter().map(|volts| volts.provenance.clone()));
+
+    let motion = match (&reference, &args.move_joint, &volts) {
+        (Some(reference), ..) => Motion::Trajectory(&reference.value),
+        (_, Some(joint), _) => Motion::Move(joint),
+        (_, _, Some(volts)) => Motion::Volts {
+            times: &volts.times,
+            volts: &volts.rows,
+        },
+        _ => Motion::Usual,
+    };
+    let order = Order {
+        robot: &robot,
+        model: model
+            .as_ref()
+            .map(|model| (model.name.as_str(), &model.value)),
+        motion,
+        seconds: args.seconds,
+        effects: args.effects.clone(),
+        seed: args.seed,
+    };
+    context.check()?;
+    let bar = context.progress("simulating", None);
+    let simulated = simulate::simulate(&order)?;
+    drop(bar);
+    context.check()?;
+
+    // The log gets its name last: where it stands, its truth stands too.
+    let log = write_log(&args.output, &simulated, context)?;
+    write_truth(&truth_path, &simulated)?;
+    log.commit()?;
+
+    let names = (file_name(&args.output), file_name(&truth_path));
+    let duration = duration(&robot, &simulated);
+    let result = document(&simulated, args.seed, duration, &names);
+    Ok(Outcome {
+        text: render(&robot, &simulated, duration, &names.0),
+        document: Document::new("simulate", &inputs, &warnings(&simulated), &result)?,
+        missed: Vec::new(),
+    })
+}
+
+/// Volts of a log, to be played back.
+struct Volts {
+    times: Vec<f64>,
+    /// Row by row [V].
+    rows: Vec<f64>,
+    provenance: Provenance,
+}
+
+impl Volts {
+    fn read(log: &LogSpec, robot: &RobotFile, context: &Context) -> Result<Self, CliError> {
+        let mut reader = Reader::open(log, &robot.volts_layout())?;
+        let mut block = Block::default();
+        let (mut times, mut rows) = (Vec::new(), Vec::new());
+        while reader.read(&mut block)? {
+            context.check()?;
+            times.extend_from_slice(&block.t);
+            rows.extend_from_slice(&block.tau);
+        }
+        Ok(Volts {
+            times,
+            rows,
+            provenance: reader.provenance()?,
+        })
+    }
+}
+
+fn write_log(
+    path: &Path,
+    simulated: &SimulatedLog,
+    context: &Context,
+) -> Result<LogWriter, CliError> {
+    let mut writer = LogWriter::create(path, &simulated.header)?;
+    for (k, row) in simulated.rows().enumerate() {
+        if k % BLOCK == 0 {
+            context.check()?;
+        }
+        writer.row(row.iter().copied())?;
+    }
+    Ok(writer)
+}
+
+fn write_truth(path: &Path, simulated: &SimulatedLog) -> Result<(), CliError> {
+    let text = simulated.truth.to_toml().map_err(|error| {
+        CliError::output(format!("the truth cannot be expressed in TOML: {error}"))
+    })?;
+    let head = "# What was true in the simulated log beside this file. SI units and radians.";
+    Ok(write_whole(path, |file| write!(file, "{head}\n\n{text}"))?)
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Time from the first to the last row [s]; the robot file may log it in another unit.
+fn duration(robot: &RobotFile, simulated: &SimulatedLog) -> f64 {
+    match (simulated.rows().next(), simulated.rows().last()) {
+        (Some(first), Some(last)) => (last[0] - first[0]) * robot.layout().time.factor,
+        _ => 0.0,
+    }
+}
+
+fn document(
+    simulated: &SimulatedLog,
+    seed: u64,
+    duration_s: f64,
+    (log, truth): &(String, String),
+) -> Value {
+    let limits = simulated.limits.iter().map(|event| {
+        json!({
+            "coordinate": event.coordinate, "t": event.t, "value": event.value,
+            "lower": event.lower, "upper": event.upper,
+        })
+    });
+    let saturated = simulated
+        .saturated
+        .iter()
+        .map(|(name, share)| json!({"coordinate": name, "share": share}));
+    json!({
+        "effects": simulated.truth.effects,
+        "parameters": simulated.truth.parameters,
+        "seed": seed,
+        "samples": simulated.rows().len(),
+        "duration_s": duration_s,
+        "ending": match simulated.ending {
+            Ending::Completed => "completed",
+            Ending::StoppedAtLimit => "stopped-at-limit",
+        },
+        "limits_reached": limits.collect::<Vec<Value>>(),
+        "saturated": saturated.collect::<Vec<Value>>(),
+        "files": {"log": log, "truth": truth},
+    })
+}
+
+fn warnings(simulated: &SimulatedLog) -> Vec<String> {
+    let ends = match simulated.ending {
+        Ending::StoppedAtLimit => ", and the log ends there",
+        Ending::Completed => "",
+    };
+    let limits = simulated.limits.iter().map(|event| {
+        format!(
+            "{} reached {:.4} at {:.3} s, beyond its limits [{}, {}]{ends}",
+            event.coordinate, event.value, event.t, event.lower, event.upper
+        )
+    });
+    let saturated = simulated.saturated.iter().filter(|(_, share)| *share > 0.0);
+    let saturated = saturated.map(|(name, share)| {
+        let share = number::percent(*share);
+        format!("the amplifier of {name} saturates in {share} of the samples")
+    });
+    limits.chain(saturated).collect()
+}
+
+/// Range and root mean square of every channel of the log.
+fn render(robot: &RobotFile, simulated: &SimulatedLog, duration: f64, log: &str) -> String {
+    let mut table = Table::new(&[
+        ("column", Align::Left),
+        ("from", Align::Decimal),
+        ("to", Align::Decimal),
+        ("rms", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption(&format!(
+        "{log}: {} samples, {} s",
+        simulated.rows().len(),
+        number::significant(duration, 5)
+    ));
+    let layout = robot.layout();
+    let parts = [Some(&layout), layout.otherwise.as_deref()];
+    let channels: Vec<_> = parts
+        .into_iter()
+        .flatten()
+        .flat_map(|part| part.positions.iter().chain(&part.torques))
+        .collect();
+    for (j, column) in simulated.header.iter().enumerate() {
+        let Some(channel) = channels.iter().find(|channel| channel.column == *column) else {
+            continue;
+        };
+        let values = || simulated.rows().map(|row| row[j]);
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
+        let squares: f64 = values().map(|x| x * x).sum();
+        let rms = (squares / simulated.rows().len().max(1) as f64).sqrt();
+        table.row([
+            column.as_str(),
+            &number::significant(low, 4),
+            &number::significant(high, 4),
+            &number::significant(rms, 3),
+            &channel.unit,
+        ]);
+    }
+    table.to_string()
 }

@@ -1,0 +1,54 @@
+//! Configuration files as a command reads them: parsed, and known again by their checksum.
+
+use std::path::Path;
+
+use super::error::CliError;
+use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory};
+use crate::log::{Provenance, escape};
+
+/// A configuration file that was read.
+#[derive(Debug, Clone)]
+pub struct Given<T> {
+    /// The file as the user named it, for messages.
+    pub name: String,
+    /// What it says.
+    pub value: T,
+    /// Its entry among the inputs of the result.
+    pub provenance: Provenance,
+}
+
+fn read<T>(
+    path: &Path,
+    parse: fn(&str, &str) -> Result<T, ConfigError>,
+) -> Result<Given<T>, CliError> {
+    let name = escape(&path.to_string_lossy());
+    let text = config::text(path)?;
+    let file = path.file_name().unwrap_or(path.as_os_str());
+    Ok(Given {
+        value: parse(&name, &text)?,
+        provenance: Provenance::of_text(&file.to_string_lossy(), &text),
+        name,
+    })
+}
+
+/// A robot file, or one that comes with the tool.
+pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
+    read(path, RobotFile::parse)
+}
+
+/// A model file.
+pub fn model(path: &Path) -> Result<Given<ModelFile>, CliError> {
+    read(path, ModelFile::parse)
+}
+
+/// A model file of the robot given.
+pub fn model_of(path: &Path, robot: &RobotFile) -> Result<Given<ModelFile>, CliError> {
+    let model = model(path)?;
+    model.value.belongs_to(&model.name, robot)?;
+    Ok(model)
+}
+
+/// A trajectory file, or one that comes with the tool.
+pub fn trajectory(path: &Path) -> Result<Given<Trajectory>, CliError> {
+    read(path, Trajectory::parse)
+}

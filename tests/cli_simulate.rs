@@ -1,0 +1,229 @@
+//! `simulate` at the boundary of the process: files, streams, statuses.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use cft_ident::config::RobotFile;
+use cft_ident::log::{Block, LogSpec, Reader};
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::{contains, is_empty, starts_with};
+use serde_json::Value;
+
+fn simulate(folder: &Path, line: &str) -> Command {
+    let mut command = Command::cargo_bin("cft-ident").unwrap();
+    command
+        .current_dir(folder)
+        .args(["simulate", "-r", "configs/cft.toml"])
+        .args(line.split_whitespace());
+    command
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn json_on_standard_output_is_one_document_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = simulate(
+        folder.path(),
+        "--seconds 1 --effect torque-offset:q5:c=0.5 -o a.csv --json -",
+    )
+    .assert()
+    .code(0)
+    .stderr(is_empty());
+    let document: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    assert_eq!(document["schema"], "cft-ident/simulate/1");
+    assert_eq!(document["inputs"][0]["name"], "cft.toml");
+    assert_eq!(document["effects"][0]["parameters"]["c"]["value"], 0.5);
+    let parameters = document["parameters"].as_array().unwrap();
+    assert_eq!(parameters.len(), 32);
+    let mut thetas: Vec<u64> = parameters
+        .iter()
+        .map(|parameter| parameter["theta"].as_u64().unwrap())
+        .collect();
+    thetas.sort_unstable();
+    assert_eq!(thetas, (1..=32).collect::<Vec<u64>>());
+    assert_eq!(names(folder.path()), ["a.csv", "a.truth.toml"]);
+}
+
+#[test]
+fn the_log_and_the_truth_are_read_back_by_the_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "--move q4 --seconds 15 -o q4.csv")
+        .assert()
+        .code(0)
+        .stdout(starts_with("q4.csv: 15000 samples"));
+    let robot = RobotFile::load(Path::new("configs/cft.toml")).unwrap();
+    let log = LogSpec::whole(folder.path().join("q4.csv"));
+    let mut reader = Reader::open(&log, &robot.layout()).unwrap();
+    let mut block = Block::default();
+    let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+    while reader.read(&mut block).unwrap() {
+        for q in block.q.as_chunks::<4>().0 {
+            for j in 0..4 {
+                low[j] = low[j].min(q[j]);
+                high[j] = high[j].max(q[j]);
+            }
+        }
+    }
+    assert_eq!(reader.samples(), 15_000);
+    assert!(high[2] - low[2] > 1.5, "q4 moves");
+    assert!(high[1] - low[1] < 0.01, "q2 is held");
+    let truth = fs::read_to_string(folder.path().join("q4.truth.toml")).unwrap();
+    let truth: toml::Table = truth.parse().unwrap();
+    assert_eq!(truth["seed"].as_integer(), Some(1));
+    let theta_1 = &truth["parameter"][0];
+    assert_eq!(theta_1["name"].as_str(), Some("theta_1"));
+    assert_eq!(theta_1["value"].as_float(), Some(121.3049));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_at_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    simulate(
+        path,
+        "--seconds 2 --effect ripple:q5:order=7 --seed 9 -o a.csv",
+    )
+    .assert()
+    .code(0);
+    simulate(
+        path,
+        "--seconds 2 --effect ripple:q5:order=7 --seed 9 --threads 1 -o b.csv",
+    )
+    .assert()
+    .code(0);
+    simulate(
+        path,
+        "--seconds 2 --effect ripple:q5:order=7 --seed 10 -o c.csv",
+    )
+    .assert()
+    .code(0);
+    let bytes = |name: &str| fs::read(path.join(name)).unwrap();
+    assert!(bytes("a.csv") == bytes("b.csv"));
+    assert!(bytes("a.truth.toml") == bytes("b.truth.toml"));
+    assert!(bytes("a.csv") != bytes("c.csv"));
+}
+
+#[test]
+fn a_log_that_ends_at_a_limit_is_a_warning_and_status_0() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    simulate(path, "--seconds 4 -o a.csv").assert().code(0);
+    // The recorded volts no longer carry the arm.
+    let run = simulate(
+        path,
+        "--volts a.csv --effect torque-offset:q1:c=20 -o b.csv --json -",
+    )
+    .assert()
+    .code(0)
+    .stderr(contains("warning: ").and(contains("the log ends there")));
+    let document: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    assert_eq!(document["ending"], "stopped-at-limit");
+    assert_eq!(document["warnings"].as_array().unwrap().len(), 1);
+    assert_eq!(document["inputs"][1]["samples"], 4000);
+}
+
+#[test]
+fn what_cannot_be_simulated_ends_with_its_status_a_hint_and_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases: [(&str, i32); 8] = [
+        ("--move q9 -o a.csv", 2),
+        ("--effect frob -o a.csv", 2),
+        ("--effect ripple:q4:frob=1 -o a.csv", 2),
+        ("-m none.toml -o a.csv", 3),
+        ("--reference none.toml -o a.csv", 3),
+        ("--volts none.csv -o a.csv", 3),
+        ("--move q1 --seconds 1 -o a.csv", 3),
+        ("-o none/a.csv", 5),
+    ];
+    for (arguments, status) in cases {
+        simulate(folder.path(), arguments)
+            .assert()
+            .code(status)
+            .stdout(is_empty())
+            .stderr(starts_with("error: ").and(contains("\nhint: ")));
+        assert!(names(folder.path()).is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn an_output_never_overwrites_an_input() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "--seconds 1 -o a.csv")
+        .assert()
+        .code(0);
+    let before = fs::read(folder.path().join("a.csv")).unwrap();
+    simulate(folder.path(), "--volts a.csv -o a.csv")
+        .assert()
+        .code(2);
+    simulate(folder.path(), "--seconds 1 -o b.csv --json b.csv")
+        .assert()
+        .code(2);
+    assert_eq!(fs::read(folder.path().join("a.csv")).unwrap(), before);
+    assert_eq!(names(folder.path()), ["a.csv", "a.truth.toml"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_output_error() {
+    let folder = tempfile::tempdir().unwrap();
+    simulate(folder.path(), "--seconds 1 -o a.csv --json /dev/full")
+        .assert()
+        .code(5)
+        .stderr(contains("error: /dev/full"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn ctrl_c_ends_with_130_and_leaves_no_file() {
+    use std::process::{Command, Stdio};
+    use std::time::Duration;
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("cft-ident"))
+        .current_dir(folder.path())
+        .args([
+            "simulate",
+            "-r",
+            "configs/cft.toml",
+            "--seconds",
+            "120",
+            "-o",
+            "a.csv",
+        ])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !catches_interrupts(child.id()) {
+        assert_eq!(
+            child.try_wait().unwrap(),
+            None,
+            "ended before it was interrupted"
+        );
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let sent = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(sent.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(names(folder.path()).is_empty());
+}
+
+/// Whether a process has its handler of SIGINT (2) in place.
+#[cfg(target_os = "linux")]
+fn catches_interrupts(process: u32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let mask = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask & 0b10 != 0)
+}
