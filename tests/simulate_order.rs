@@ -6,7 +6,8 @@ use std::path::Path;
 use cft_ident::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident::log::{Block, LogSpec, Reader};
 use cft_ident::simulate::{
-    Ending, Motion, Order, SimulateError, SimulatedLog, TruthFile, simulate,
+    Ending, InitialConditions, Motion, Order, SimulateError, SimulatedLog, TruthFile, simulate,
+    simulate_from,
 };
 
 fn robot(name: &str) -> RobotFile {
@@ -209,6 +210,35 @@ fn logged_volts_of_one_run_drive_another() {
         let name = format!("u_{i}");
         assert_eq!(column(&replayed, &name), column(&first, &name));
     }
+}
+
+#[test]
+fn ordered_initial_conditions_are_where_the_log_begins() {
+    let robot = robot("configs/cft.toml");
+    let (times, volts) = ([0.0, 0.01], [0.0; 8]);
+    let motion = Motion::Volts {
+        times: &times,
+        volts: &volts,
+    };
+    let request = Order {
+        seconds: Some(0.02),
+        ..order(&robot, motion)
+    };
+    let mut initial = InitialConditions {
+        position: vec![-0.1, 0.2, 1.5, 0.3],
+        speed: vec![0.0, 0.0, 0.0, 0.1],
+    };
+    let log = simulate_from(&request, Some(&initial)).expect("runs");
+    for (name, position) in ["x_c1", "x_c2", "x_c3", "x_c4"]
+        .iter()
+        .zip(&initial.position)
+    {
+        assert!((column(&log, name)[0] - position).abs() < 1e-5);
+    }
+    let q1 = column(&log, "q_q1");
+    assert!(((q1[5] - q1[0]) / 5e-3 - 0.1).abs() < 0.01);
+    initial.speed.pop();
+    assert!(simulate_from(&request, Some(&initial)).is_err());
 }
 
 #[test]

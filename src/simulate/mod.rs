@@ -37,7 +37,7 @@ pub use cft::{CftPlant, CftTruth};
 pub use controller::Control;
 pub use effects::{EffectSpec, Effects};
 pub use error::SimulateError;
-pub use order::{Motion, Order, SimulatedLog, simulate};
+pub use order::{InitialConditions, Motion, Order, SimulatedLog, simulate, simulate_from};
 pub use recording::{Ending, LimitEvent, Recording, Status};
 pub use reference::{Frame, Path, Reference};
 pub use run::{Drive, Start, run};

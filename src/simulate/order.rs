@@ -68,21 +68,58 @@ impl SimulatedLog {
     }
 }
 
-/// Simulates what is ordered.
+/// Initial conditions of the report's block, in motor coordinates (x_c1..x_c4; the joint of a single
+/// joint).
+#[derive(Debug, Clone, PartialEq)]
+pub struct InitialConditions {
+    /// m or rad.
+    pub position: Vec<f64>,
+    /// m/s or rad/s.
+    pub speed: Vec<f64>,
+}
+
+impl InitialConditions {
+    fn start<const J: usize>(&self) -> Result<Start<J>, SimulateError> {
+        let fixed = |numbers: &[f64]| {
+            <[f64; J]>::try_from(numbers).map_err(|_| SimulateError::Parameter {
+                name: "number of initial conditions of a kind",
+                value: numbers.len() as f64,
+                rule: "must be one per motor",
+            })
+        };
+        Ok(Start::State {
+            position: fixed(&self.position)?,
+            speed: fixed(&self.speed)?,
+        })
+    }
+}
+
+/// Simulates what is ordered, from the settled start ([`Start::Settled`]).
 ///
 /// # Errors
 /// [`SimulateError`]; reaching a limit is none.
 pub fn simulate(order: &Order) -> Result<SimulatedLog, SimulateError> {
+    simulate_from(order, None)
+}
+
+/// Simulates what is ordered, from initial conditions where they are given.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+) -> Result<SimulatedLog, SimulateError> {
     match order.robot.robot.model {
-        ModelKind::Cft => cft(order),
-        ModelKind::SingleJoint => single(order),
+        ModelKind::Cft => cft(order, initial),
+        ModelKind::SingleJoint => single(order, initial),
         ModelKind::Serial => Err(SimulateError::Unsupported {
             what: "a serial chain; the simulator has `cft` and `single-joint`".to_owned(),
         }),
     }
 }
 
-fn cft(order: &Order) -> Result<SimulatedLog, SimulateError> {
+fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLog, SimulateError> {
     let truth = from_files::cft_truth(order.robot, order.model)?;
     truth.check()?;
     let setup = truth.setup;
@@ -112,7 +149,15 @@ fn cft(order: &Order) -> Result<SimulatedLog, SimulateError> {
         Motion::Volts { .. } => None,
     };
     let control = from_files::control(order.robot, Control::cft(setup))?;
-    let mut outcome = execute(order, &plant, effects, reference, control, None)?;
+    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
+    let driven = Driven {
+        effects,
+        start,
+        reference,
+        control,
+        saturation: None,
+    };
+    let mut outcome = execute(order, &plant, driven)?;
     outcome.truth.model = "cft".to_owned();
     outcome.truth.setup = Some(setup.name().to_owned());
     outcome.truth.parameters = truth.parameters();
@@ -120,7 +165,10 @@ fn cft(order: &Order) -> Result<SimulatedLog, SimulateError> {
     Ok(outcome)
 }
 
-fn single(order: &Order) -> Result<SimulatedLog, SimulateError> {
+fn single(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+) -> Result<SimulatedLog, SimulateError> {
     let truth = from_files::single_joint_truth(order.robot, order.model)?;
     truth.check()?;
     let (effects, values) = single_joint::effects(&truth, &asked_effects(order))?;
@@ -161,7 +209,15 @@ fn single(order: &Order) -> Result<SimulatedLog, SimulateError> {
         limits.torque.or(limits.volts)
     });
     let saturation = saturation.unwrap_or(f64::INFINITY);
-    let mut outcome = execute(order, &truth, effects, reference, control, Some(saturation))?;
+    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
+    let driven = Driven {
+        effects,
+        start,
+        reference,
+        control,
+        saturation: Some(saturation),
+    };
+    let mut outcome = execute(order, &truth, driven)?;
     outcome.truth.model = "single-joint".to_owned();
     outcome.truth.parameters = truth.parameters();
     outcome.truth.effects = values;
@@ -188,15 +244,30 @@ fn asked_effects(order: &Order) -> Vec<EffectSpec> {
     asked
 }
 
+/// What the plant is run with.
+struct Driven<const J: usize> {
+    effects: Effects,
+    start: Start<J>,
+    /// `None` where volts are played back.
+    reference: Option<Reference<J>>,
+    control: Control<J>,
+    /// \[V\]; that of `[control]`, or 10 V, where absent.
+    saturation: Option<f64>,
+}
+
 /// Runs the plant and lays the log out as the robot file's `[log]` reads it.
 fn execute<P: Plant<J>, const J: usize>(
     order: &Order,
     plant: &P,
-    effects: Effects,
-    reference: Option<Reference<J>>,
-    control: Control<J>,
-    saturation: Option<f64>,
+    driven: Driven<J>,
 ) -> Result<SimulatedLog, SimulateError> {
+    let Driven {
+        effects,
+        start,
+        reference,
+        control,
+        saturation,
+    } = driven;
     let (drive, own_seconds) = match (reference, order.motion) {
         (Some(reference), _) => {
             let seconds = match &reference.path {
@@ -234,7 +305,7 @@ fn execute<P: Plant<J>, const J: usize>(
     settings.saturation = saturation
         .or(order.robot.control.saturation_v)
         .unwrap_or(settings.saturation);
-    let recording = run(plant, effects, &Start::Settled, &drive, &settings)?;
+    let recording = run(plant, effects, &start, &drive, &settings)?;
     let (header, values) = lay_out(order.robot, &recording);
     let rows = recording.rows().max(1) as f64;
     let saturated = (0..J).map(|i| {
