@@ -112,8 +112,8 @@ pub fn identify(
     let mut total: Option<(Sums, Summary)> = None;
     let mut inputs = Vec::new();
     for spec in logs {
-        let (mut log, held) = machine.open(spec, context)?;
-        let settings = machine.settings(held);
+        let mut log = machine.open(spec, context)?;
+        let settings = machine.settings();
         let (sums, summary) = accumulate(&machine.robot, &columns, &settings, &mut |block| {
             log.read(block)
         })

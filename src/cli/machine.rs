@@ -9,7 +9,9 @@ use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::motions::motions;
 use crate::friction::prepare::Motion;
 use crate::log::{Block, LogError, LogSpec, Provenance, Reader};
-use crate::motion::{Differences, ParallelFilter, RunError, Settings, Summary, TorqueTiming};
+use crate::motion::{
+    Differences, HeldForces, ParallelFilter, RunError, Settings, Summary, TorqueTiming,
+};
 use crate::robot::Robot;
 
 /// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
@@ -48,6 +50,8 @@ pub enum ReadError {
 pub struct Open<'a> {
     reader: Reader,
     context: &'a Context,
+    /// Brings held motor forces to the rows' own time and pose.
+    centre: Option<(&'a Robot, HeldForces)>,
 }
 
 impl Open<'_> {
@@ -56,7 +60,11 @@ impl Open<'_> {
         if self.context.interrupted() {
             return Err(ReadError::Interrupted);
         }
-        Ok(self.reader.read(block)?)
+        let more = self.reader.read(block)?;
+        if let Some((robot, held)) = &mut self.centre {
+            held.centre(robot, block);
+        }
+        Ok(more)
     }
 
     /// Name, span, checksum and size of what was read.
@@ -81,19 +89,32 @@ impl Machine {
         }
     }
 
-    /// Opens a log, and says whether its torque is held from row to row.
-    pub fn open<'a>(
+    /// Opens a log, its torques as logged, and says whether they are held from row to row.
+    fn open_raw<'a>(
         &self,
         spec: &LogSpec,
         context: &'a Context,
     ) -> Result<(Open<'a>, bool), CliError> {
         let reader = Reader::open(spec, &self.file.layout())?;
         let held = self.file.torque_held(reader.layout().channels);
-        Ok((Open { reader, context }, held))
+        let centre = None;
+        let open = Open {
+            reader,
+            context,
+            centre,
+        };
+        Ok((open, held))
+    }
+
+    /// Opens a log with every torque at the time and pose of its row.
+    pub fn open<'a>(&'a self, spec: &LogSpec, context: &'a Context) -> Result<Open<'a>, CliError> {
+        let (mut open, held) = self.open_raw(spec, context)?;
+        open.centre = held.then(|| (&self.robot, HeldForces::new(self.robot.joints())));
+        Ok(open)
     }
 
     /// Processing of logs for least squares and validation.
-    pub fn settings(&self, held: bool) -> Settings {
+    pub fn settings(&self) -> Settings {
         let f = &self.file.filter;
         let plain = Settings::default();
         let order = f.order.map(|o| o as usize);
@@ -115,11 +136,8 @@ impl Machine {
                 Some(DifferencesKind::Central) => Differences::Central,
                 Some(DifferencesKind::HighOrder) | None => Differences::HighOrder,
             },
-            torque: if held {
-                TorqueTiming::HeldOverSample
-            } else {
-                TorqueTiming::Sampled
-            },
+            // held torques are brought to their rows' time as the log is read
+            torque: TorqueTiming::Sampled,
             gap_factor: f.gap_factor.unwrap_or(plain.gap_factor),
             q_trim_s: f.position_trim_s,
             trim_s: f.trim_s,
@@ -138,7 +156,7 @@ impl Machine {
             ),
             differences: Differences::HighOrder,
             q_trim_s: None,
-            ..self.settings(false)
+            ..self.settings()
         }
     }
 
@@ -148,7 +166,7 @@ impl Machine {
         spec: &LogSpec,
         context: &Context,
     ) -> Result<(Vec<Motion>, bool, Provenance), CliError> {
-        let (mut log, held) = self.open(spec, context)?;
+        let (mut log, held) = self.open_raw(spec, context)?;
         let mut whole = Block::default();
         let mut block = Block::default();
         loop {

@@ -62,8 +62,8 @@ pub fn reconstruct(
     let mut all: Option<Reconstruction> = None;
     let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
     for spec in logs {
-        let (mut log, held) = machine.open(spec, context)?;
-        let settings = machine.settings(held);
+        let mut log = machine.open(spec, context)?;
+        let settings = machine.settings();
         let all = all.get_or_insert_with(|| Reconstruction::new(model));
         let summary = all
             .add(&settings, &mut |block| log.read(block), row)

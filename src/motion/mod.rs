@@ -22,17 +22,20 @@
 //! | [`time_base`] | uniform steps, gaps, torque held over a sample |
 //! | [`differences`] | v and a from q |
 //! | [`run`](mod@run) | the windows of a streamed log |
+//! | [`held_force`] | motor forces held over a sample, where a linkage turns them |
 //! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
 
 mod cutter;
 pub mod differences;
 pub mod full_rate;
+pub mod held_force;
 pub mod run;
 pub mod settings;
 pub mod time_base;
 mod window;
 
 pub use full_rate::{Smooth, full_rate, segments};
+pub use held_force::HeldForces;
 pub use run::{RunError, Skipped, Summary, run};
 pub use settings::{Differences, ParallelFilter, Settings, TorqueTiming};
 
