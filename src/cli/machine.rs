@@ -64,6 +64,10 @@ impl Open<'_> {
         if let Some((robot, held)) = &mut self.centre {
             held.centre(robot, block);
         }
+        if block.tau.is_empty() {
+            // a log without torques moves with none
+            block.tau.resize(block.q.len(), 0.0);
+        }
         Ok(more)
     }
 
@@ -104,6 +108,19 @@ impl Machine {
             centre,
         };
         Ok((open, held))
+    }
+
+    /// Opens a log for its positions alone: it needs no torque channels.
+    pub fn open_positions<'a>(
+        &self,
+        spec: &LogSpec,
+        context: &'a Context,
+    ) -> Result<Open<'a>, CliError> {
+        Ok(Open {
+            reader: Reader::open(spec, &self.file.layout().without_torques())?,
+            context,
+            centre: None,
+        })
     }
 
     /// Opens a log with every torque at the time and pose of its row.

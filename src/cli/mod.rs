@@ -18,7 +18,6 @@ mod files;
 pub mod machine;
 mod outcome;
 mod outputs;
-mod residual_file;
 
 use std::ffi::OsString;
 use std::io::Write;

@@ -1,9 +1,19 @@
 //! `cft-ident torque`: feed-forward torque along a recorded or planned motion.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::arguments;
+use serde_json::json;
+
+use super::lsq::processing;
+use super::machine::{Machine, run_error, summary_warnings};
+use super::{CliError, Context, Outcome, arguments};
+use crate::config::ModelFile;
 use crate::log::LogSpec;
+use crate::motion::{self, Settings};
+use crate::output::LogWriter;
+use crate::report::json::Document;
+use crate::report::number;
+use crate::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:
@@ -22,4 +32,128 @@ pub struct Args {
     /// Log to write
     #[arg(short, long, value_name = "OUT.csv", value_parser = arguments::csv_file)]
     pub output: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: [&Path; 2] = [&args.log.path, &args.model];
+    super::outputs::check(&inputs, &[args.output.as_path()])?;
+    let name = args.model.display().to_string();
+    let file = ModelFile::load(&args.model)?;
+    let model = file.model(&name)?;
+    let machine = Machine::new(&name, file.robot.clone());
+    let joints = machine.robot.joint_names();
+    let n = joints.len();
+    let p = model.parameters();
+    let covariance = file.model_covariance(&model);
+    let residual: Vec<f64> = joints
+        .iter()
+        .map(|j| file.residual_std.get(j).copied().unwrap_or(0.0))
+        .collect();
+    let named = |kind: &'static str| joints.iter().map(move |j| format!("{kind}_{j}"));
+    let columns: Vec<String> = std::iter::once("t".to_owned())
+        .chain(named("tau"))
+        .chain(named("tau_std"))
+        .collect();
+    let mut out = LogWriter::create(&args.output, &columns)?;
+    // every row gets its torque: nothing is decimated, and nothing left off at the ends
+    let settings = Settings {
+        decimation: Some(1),
+        q_trim_s: Some(0.0),
+        trim_s: Some(0.0),
+        ..machine.settings()
+    };
+    let bar = context.progress("torque", None);
+    let mut log = machine.open_positions(&args.log, context)?;
+    let mut failed = None;
+    let mut peak = vec![0.0f64; n];
+    let mut square = vec![0.0f64; n];
+    let summary = motion::run(
+        &mut |block| log.read(block),
+        n,
+        &settings,
+        None,
+        2 * n,
+        &|s, out| {
+            model.torque(s.q, s.v, s.a, &mut out[..n]);
+            GRADIENT.with_borrow_mut(|g| {
+                g.resize(p, 0.0);
+                for j in 0..n {
+                    model.gradient(j, s.q, s.v, s.a, g);
+                    out[n + j] = (quadratic(&covariance, g) + residual[j] * residual[j]).sqrt();
+                }
+            });
+        },
+        &mut |row| {
+            for j in 0..n {
+                peak[j] = peak[j].max(row.raw[j].abs());
+                square[j] += row.raw[j] * row.raw[j];
+            }
+            if failed.is_none() {
+                let values = std::iter::once(row.t).chain(row.raw.iter().copied());
+                failed = out.row(values).err();
+            }
+        },
+    )
+    .map_err(|e| run_error(&args.log, e))?;
+    drop(bar);
+    if let Some(error) = failed {
+        return Err(error.into());
+    }
+    context.check()?;
+    let warnings = summary_warnings(&args.log, &summary);
+    let provenance = [log.provenance()?];
+    let rows = summary.rows.max(1) as f64;
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("rms", Align::Decimal),
+        ("peak", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption(&format!("torque of {} along {}", name, args.log.name()));
+    let mut found = Vec::new();
+    for (j, joint) in joints.iter().enumerate() {
+        let rms = (square[j] / rows).sqrt();
+        let unit = machine.file.torque_unit(j);
+        table.row([
+            joint.as_str(),
+            &number::significant(rms, 4),
+            &number::significant(peak[j], 4),
+            unit,
+        ]);
+        found.push(json!({"joint": joint, "unit": unit, "rms": rms, "peak": peak[j]}));
+    }
+    let result = json!({
+        "joints": found,
+        "samples": summary.rows,
+        "processing": processing(&summary),
+    });
+    let document = Document::new("torque", &provenance, &warnings, &result)?;
+    out.commit()?;
+    Ok(Outcome {
+        text: format!("{table}written: {}\n", args.output.display()),
+        document,
+        missed: Vec::new(),
+    })
+}
+
+thread_local! {
+    /// Gradient of one sample, kept from sample to sample.
+    static GRADIENT: std::cell::RefCell<Vec<f64>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+/// g' C g for a row-major square C; never negative.
+fn quadratic(covariance: &[f64], g: &[f64]) -> f64 {
+    let p = g.len();
+    let sum: f64 = (0..p)
+        .filter(|i| g[*i] != 0.0)
+        .map(|i| {
+            let row = &covariance[i * p..(i + 1) * p];
+            g[i] * row.iter().zip(g).map(|(c, x)| c * x).sum::<f64>()
+        })
+        .sum();
+    sum.max(0.0)
 }

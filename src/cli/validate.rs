@@ -9,11 +9,12 @@ use super::machine::{Machine, run_error, summary_warnings};
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::log::{LogSpec, Provenance};
+use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
 use crate::report::{number, summary};
 use crate::robot::model::Model;
-use crate::validate::{Reconstruction, Validation};
+use crate::validate::{Reconstructed, Reconstruction, Validation};
 
 const EXAMPLE: &str = "\
 Example:
@@ -56,7 +57,7 @@ pub fn reconstruct(
     model: &Model,
     logs: &[LogSpec],
     context: &Context,
-    row: &mut dyn FnMut(&crate::validate::Reconstructed),
+    row: &mut dyn FnMut(&Reconstructed),
 ) -> Result<Validated, CliError> {
     let bar = context.progress("reconstruction", Some(logs.len() as u64));
     let mut all: Option<Reconstruction> = None;
@@ -190,6 +191,21 @@ pub fn missed(validation: &Validation, limit: Option<f64>) -> Vec<String> {
         .collect()
 }
 
+/// Columns of the residual file: measured, reconstructed and residual torque of every joint.
+fn columns(joints: &[String]) -> Vec<String> {
+    let kinds = ["tau", "tau_hat", "residual"];
+    let named = kinds
+        .iter()
+        .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
+    std::iter::once("t".to_owned()).chain(named).collect()
+}
+
+fn residual_row(r: &Reconstructed) -> impl Iterator<Item = f64> {
+    let residual = r.measured.iter().zip(r.reconstructed).map(|(a, b)| a - b);
+    let torques = r.measured.iter().chain(r.reconstructed).copied();
+    std::iter::once(r.t).chain(torques).chain(residual)
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -214,22 +230,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let machine = Machine::new(&name, file.robot.clone());
     let mut residual = match &args.output {
         None => None,
-        Some(path) => Some(super::residual_file::ResidualFile::create(
+        Some(path) => Some(LogWriter::create(
             path,
-            machine.robot.joint_names(),
+            &columns(machine.robot.joint_names()),
         )?),
     };
     let mut failed = None;
     let found = reconstruct(&machine, &model, &args.logs, context, &mut |r| {
         if let Some(file) = &mut residual
             && failed.is_none()
-            && let Err(error) = file.row(r)
+            && let Err(error) = file.row(residual_row(r))
         {
             failed = Some(error);
         }
     })?;
     if let Some(error) = failed {
-        return Err(error);
+        return Err(error.into());
     }
     let validation = &found.validation;
     let title = args
@@ -254,7 +270,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         super::outputs::write_text(path, &figure(&machine, validation, &title).svg())?;
     }
     if let Some(file) = residual {
-        file.finish()?;
+        file.commit()?;
     }
     Ok(Outcome {
         text,
