@@ -11,7 +11,7 @@ use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_theta, friction_unit};
 use crate::config::model_file::{ModelProvenance, Parameter};
-use crate::friction::estimate::{JointEstimate, Options, estimate};
+use crate::friction::estimate::{JointEstimate, Nis, Options, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::passes::{Ending, Given};
 use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
@@ -196,10 +196,25 @@ fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
             e.ending
         ));
     }
-    if !e.nis.consistent() {
+    let Nis {
+        mean,
+        lower_95,
+        upper_95,
+        ..
+    } = e.nis;
+    if mean > upper_95 {
         out.push(format!(
-            "{joint}: mean NIS {:.3} is outside {:.3}..{:.3}: the innovations are not white; the standard deviations hold a factor {:.1} for it",
-            e.nis.mean, e.nis.lower_95, e.nis.upper_95, e.widening.sqrt()
+            "{joint}: mean NIS {mean:.3} is above its bounds {lower_95:.3}..{upper_95:.3}: the innovations are larger than the noise levels allow"
+        ));
+    } else if mean < lower_95 {
+        out.push(format!(
+            "{joint}: mean NIS {mean:.3} is below its bounds {lower_95:.3}..{upper_95:.3}: the position noise is below the encoder's step^2/12, and the standard deviations err on the safe side"
+        ));
+    }
+    if e.widening > 1.5 {
+        out.push(format!(
+            "{joint}: the innovations are coloured, so the model lacks something; the standard deviations hold a factor {:.1} for it",
+            e.widening.sqrt()
         ));
     }
     for (k, value) in e.values.iter().enumerate() {

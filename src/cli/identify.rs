@@ -1,6 +1,22 @@
 //! `cft-ident identify`: the whole way from logs to a validated model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde_json::{Value, json};
+
+use super::machine::Machine;
+use super::{CliError, Context, Outcome, campaign, friction, lsq, validate};
+use crate::config::campaign::EstimatorKind;
+use crate::config::model_file::Parameter;
+use crate::config::{self, Campaign, ModelFile};
+use crate::inertia::solve;
+use crate::log::{LogSpec, Provenance};
+use crate::output::write_whole;
+use crate::report::json::Document;
+use crate::report::summary;
+use crate::simulate::TruthFile;
+use crate::verdict::Verdict;
 
 const EXAMPLE: &str = "\
 Example:
@@ -23,4 +39,245 @@ pub struct Args {
     /// Seed of the simulation and of the starting points [default: the campaign's]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+}
+
+/// Folder where none is named.
+const FOLDER: &str = "cft-ident-run";
+/// Seed where none is named.
+const SEED: u64 = 1;
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; what was finished before stands in the folder, whole.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let folder = args.output.clone().unwrap_or_else(|| match &args.campaign {
+        None => PathBuf::from(FOLDER),
+        Some(file) => file.with_extension("run"),
+    });
+    std::fs::create_dir_all(&folder).map_err(|e| {
+        CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
+            .hint("name another one with -o")
+    })?;
+    let mut warnings = Vec::new();
+    let file = match &args.campaign {
+        Some(file) => file.clone(),
+        None => {
+            warnings = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
+            folder.join("campaign.toml")
+        }
+    };
+    let campaign = Campaign::load(&file)?;
+    let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
+    let mut outcome = execute(&campaign, &base, &folder, context, warnings)?;
+    outcome.text += &format!("written to {}/\n", folder.display());
+    Ok(outcome)
+}
+
+/// A path of a campaign file: relative to the file's folder, or a file that comes with the tool.
+fn resolve(base: &Path, path: &str) -> PathBuf {
+    let beside = base.join(path);
+    if !beside.exists() && config::embedded(Path::new(path)).is_some() {
+        PathBuf::from(path)
+    } else {
+        beside
+    }
+}
+
+fn logs(base: &Path, specs: &[String]) -> Result<Vec<LogSpec>, CliError> {
+    specs
+        .iter()
+        .map(|text| {
+            let mut spec = LogSpec::from_str(text)?;
+            spec.path = base.join(&spec.path);
+            Ok(spec)
+        })
+        .collect()
+}
+
+fn execute(
+    campaign: &Campaign,
+    base: &Path,
+    folder: &Path,
+    context: &Context,
+    mut warnings: Vec<String>,
+) -> Result<Outcome, CliError> {
+    let estimator = match campaign.settings.estimator {
+        EstimatorKind::Wls => solve::Estimator::Wls,
+        EstimatorKind::Ols => solve::Estimator::Ols,
+        other => {
+            return Err(CliError::input(format!(
+                "[settings] estimator: {other:?} is not one of wls, ols"
+            ))
+            .hint("set `estimator = \"wls\"`, or leave it out"));
+        }
+    };
+    let robot = resolve(base, &campaign.robot);
+    let machine = Machine::load(&robot.to_string_lossy())?;
+    let roles = &campaign.logs;
+    let mut files: Vec<String> = Vec::new();
+    let mut inputs: Vec<Provenance> = Vec::new();
+    let mut text = String::new();
+
+    // friction of single joints, where there are logs of it
+    let one_joint = logs(base, &roles.friction)?;
+    let found = match one_joint.as_slice() {
+        [] => None,
+        some => Some(friction::identify(&machine, some, None, context)?),
+    };
+    let mut friction_json = Value::Null;
+    let known = match &found {
+        None => None,
+        Some(found) => {
+            let mut model = friction::new_model(&machine, "identify", &found.inputs);
+            friction::into_model(&machine, found, &mut model);
+            write(folder, "friction.toml", &model.to_toml()?, &mut files)?;
+            let figure = friction::figure(&machine, found).svg();
+            write(folder, "friction.svg", &figure, &mut files)?;
+            friction_json = friction::json(&machine, found);
+            warnings.extend(found.warnings.iter().cloned());
+            inputs.extend(found.inputs.iter().cloned());
+            Some(model)
+        }
+    };
+
+    // inertias
+    let fitted = lsq::identify(
+        &machine,
+        &logs(base, &roles.identification)?,
+        known.as_ref().map(|model| ("friction.toml", model)),
+        estimator,
+        context,
+    )?;
+    let model = lsq::into_model(&machine, &fitted, known.as_ref());
+    write(folder, "model.toml", &model.to_toml()?, &mut files)?;
+    warnings.extend(fitted.warnings.iter().cloned());
+    inputs.extend(fitted.inputs.iter().cloned());
+
+    // torque on logs that were not used
+    let unseen = logs(base, &roles.validation)?;
+    let mut validate_json = Value::Null;
+    let mut missed = Vec::new();
+    let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
+    if !unseen.is_empty() {
+        let numbers = model.model("model.toml")?;
+        let validated = validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_| {})?;
+        let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
+        let title = names.join(", ");
+        let figure = validate::figure(&machine, &validated.validation, &title).svg();
+        write(folder, "validation.svg", &figure, &mut files)?;
+        validate_json = validate::json(&machine, &validated.validation);
+        errors = validate::text(
+            &machine,
+            &validated.validation,
+            &format!("torque on unseen data ({title})"),
+        );
+        missed = validate::missed(&validated.validation, campaign.settings.max_relative_error);
+        warnings.extend(validated.warnings);
+        inputs.extend(validated.inputs);
+    }
+
+    // only now, with everything decided, may the truth be looked at
+    let truth = match &campaign.truth {
+        None => None,
+        Some(path) => Some(load_truth(&base.join(path))?),
+    };
+    text += &parameters(&model, truth.as_ref());
+    text += &lsq::quality(&machine, &fitted);
+    text.push('\n');
+    text += &errors;
+    let truth_json = match &truth {
+        None => Value::Null,
+        Some(truth) => comparison(&model, truth),
+    };
+    context.check()?;
+    write(folder, "summary.txt", &text, &mut files)?;
+    files.push("result.json".into());
+    let result = json!({
+        "friction": friction_json,
+        "lsq": lsq::json(&machine, &fitted),
+        "validate": validate_json,
+        "diagnose": null,
+        "truth": truth_json,
+        "files": files,
+    });
+    let document = Document::new("identify", &inputs, &warnings, &result)?;
+    write_whole(&folder.join("result.json"), |f| {
+        f.write_all(document.text().as_bytes())
+    })?;
+    Ok(Outcome {
+        text,
+        document,
+        missed,
+    })
+}
+
+fn write(folder: &Path, name: &str, text: &str, files: &mut Vec<String>) -> Result<(), CliError> {
+    write_whole(&folder.join(name), |f| f.write_all(text.as_bytes()))?;
+    files.push(name.to_owned());
+    Ok(())
+}
+
+/// Reads the truth of simulated logs.
+fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
+    let unusable = |e: &dyn std::fmt::Display| {
+        CliError::input(format!("{}: {e}", path.display())).hint(
+            "leave `truth` out of the campaign file, or name a .truth.toml that simulate wrote",
+        )
+    };
+    let text = std::fs::read_to_string(path).map_err(|e| unusable(&e))?;
+    toml::from_str(&text).map_err(|e| unusable(&e.message()))
+}
+
+/// The truth of a parameter, where it is known.
+fn true_value(truth: Option<&TruthFile>, parameter: &Parameter) -> Option<f64> {
+    truth?
+        .parameters
+        .iter()
+        .find(|p| p.name == parameter.name && p.joint == parameter.joint)
+        .map(|p| p.value)
+}
+
+/// Every parameter of the model, beside its truth where that is known.
+fn parameters(model: &ModelFile, truth: Option<&TruthFile>) -> String {
+    let rows: Vec<summary::Parameter> = model
+        .parameters
+        .iter()
+        .map(|p| {
+            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
+            summary::Parameter {
+                joint: p.joint.as_deref().unwrap_or(""),
+                name: &p.name,
+                theta: p.theta,
+                value: if unknown { f64::NAN } else { p.value },
+                std: p.std.filter(|_| !unknown).unwrap_or(f64::NAN),
+                unit: &p.unit,
+                verdict: p.verdict.map_or("", Verdict::word),
+                truth: true_value(truth, p),
+            }
+        })
+        .collect();
+    format!("{}\n", summary::parameters("identified parameters", &rows))
+}
+
+/// Parameters against their truth.
+fn comparison(model: &ModelFile, truth: &TruthFile) -> Value {
+    let rows: Vec<Value> = model
+        .parameters
+        .iter()
+        .filter_map(|p| {
+            let true_value = true_value(Some(truth), p)?;
+            let off = p.std.map(|std| (p.value - true_value) / std);
+            Some(json!({
+                "name": p.name,
+                "joint": p.joint,
+                "theta": p.theta,
+                "value": p.value,
+                "std": p.std,
+                "truth": true_value,
+                "standard_deviations_off": off,
+            }))
+        })
+        .collect();
+    json!({ "parameters": rows, "effects": truth.effects })
 }

@@ -374,7 +374,6 @@ pub fn processing(summary: &Summary) -> Value {
 
 /// The tables for a person.
 pub fn text(machine: &Machine, found: &Identified) -> String {
-    let fit = &found.fit;
     let rows: Vec<summary::Parameter> = found
         .unknowns
         .iter()
@@ -396,10 +395,19 @@ pub fn text(machine: &Machine, found: &Identified) -> String {
             }
         })
         .collect();
+    format!(
+        "{}\n{}",
+        summary::parameters("parameters", &rows),
+        quality(machine, found)
+    )
+}
+
+/// Condition, rank, independent rows and residual of the fit, in two lines.
+pub fn quality(machine: &Machine, found: &Identified) -> String {
+    let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
     let mut out = format!(
-        "{}\ncondition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
-        summary::parameters("parameters", &rows),
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
         condition(fit.condition.raw),
         condition(fit.condition.normalised),
         fit.rank,

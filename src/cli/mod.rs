@@ -3,6 +3,7 @@
 //!
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
+mod campaign;
 pub mod friction;
 pub mod identify;
 pub mod lsq;
@@ -64,18 +65,22 @@ struct Common {
 /// The commands.
 #[derive(Debug, Subcommand)]
 enum Command {
+    Identify(identify::Args),
     Friction(friction::Args),
     Lsq(lsq::Args),
     Validate(validate::Args),
+    Torque(torque::Args),
     Simulate(simulate::Args),
 }
 
 impl Command {
     fn run(&self, context: &Context) -> Result<Outcome, CliError> {
         match self {
+            Command::Identify(args) => identify::run(args, context),
             Command::Friction(args) => friction::run(args, context),
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
+            Command::Torque(args) => torque::run(args, context),
             Command::Simulate(args) => simulate::run(args, context),
         }
     }

@@ -107,16 +107,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         effects: args.effects.clone(),
         seed: args.seed,
     };
-    context.check()?;
     let bar = context.progress("simulating", None);
-    let simulated = simulate::simulate(&order)?;
+    let simulated = simulate_to(&order, &args.output, context)?;
     drop(bar);
-    context.check()?;
-
-    // The log gets its name last: where it stands, its truth stands too.
-    let log = write_log(&args.output, &simulated, context)?;
-    write_truth(&truth_path, &simulated)?;
-    log.commit()?;
 
     let names = (file_name(&args.output), file_name(&truth_path));
     let duration = duration(&robot, &simulated);
@@ -126,6 +119,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         document: Document::new("simulate", &inputs, &warnings(&simulated), &result)?,
         missed: Vec::new(),
     })
+}
+
+/// Simulates one order and writes its log, with the truth beside it.
+pub(super) fn simulate_to(
+    order: &Order,
+    path: &Path,
+    context: &Context,
+) -> Result<SimulatedLog, CliError> {
+    context.check()?;
+    let simulated = simulate::simulate(order)?;
+    // The log gets its name last: where it stands, its truth stands too.
+    let log = write_log(path, &simulated, context)?;
+    write_truth(&path.with_extension("truth.toml"), &simulated)?;
+    log.commit()?;
+    Ok(simulated)
 }
 
 /// Volts of a log, to be played back.
@@ -222,7 +230,7 @@ fn document(
     })
 }
 
-fn warnings(simulated: &SimulatedLog) -> Vec<String> {
+pub(super) fn warnings(simulated: &SimulatedLog) -> Vec<String> {
     let ends = match simulated.ending {
         Ending::StoppedAtLimit => ", and the log ends there",
         Ending::Completed => "",

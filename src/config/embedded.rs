@@ -11,8 +11,12 @@ use super::{ConfigError, check};
 use crate::log::{list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
-pub const EMBEDDED: [(&str, &str); 6] = [
+pub const EMBEDDED: [(&str, &str); 7] = [
     ("configs/cft.toml", include_str!("../../configs/cft.toml")),
+    (
+        "configs/cft-validation.toml",
+        include_str!("../../configs/cft-validation.toml"),
+    ),
     (
         "configs/cft-dspace.toml",
         include_str!("../../configs/cft-dspace.toml"),

@@ -13,6 +13,7 @@ use super::prepare::Prepared;
 use super::problem::{FRICTION, Noise, Parameters, Problem};
 use super::score::{Score, log_likelihood, score};
 use super::start::Start;
+use crate::math::minimise;
 
 /// Factors on both noises in the annealed passes.
 const ANNEALING: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
@@ -22,6 +23,9 @@ const SPREAD_LINEAR: f64 = 2.0;
 const SPREAD_SLOPE: f64 = 1.6;
 /// Samples per block of the score's outer product, in seconds.
 const BLOCK_SECONDS: f64 = 0.25;
+/// The noise levels' search ends at this difference of log-likelihoods, or after so many of them.
+const TUNE_TOLERANCE: f64 = 1e-2;
+const TUNE_EVALUATIONS: u64 = 40;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
 
@@ -279,32 +283,14 @@ fn tune(problem: &Problem, p: &[f64], noise: Noise, given: &Given) -> Noise {
         noise.torque.ln(),
         (noise.position_factor - 1.0).max(0.1).ln(),
     ];
-    let mut x = start;
-    let mut best = log_likelihood(problem, p, at(&x));
-    let mut step = [0.7, 1.5];
-    for _ in 0..12 {
-        let mut moved = false;
-        for i in 0..2 {
-            if (i == 0 && !free.0) || (i == 1 && !free.1) {
-                continue;
-            }
-            for sign in [1.0, -1.0] {
-                let mut y = x;
-                y[i] += sign * step[i];
-                let l = log_likelihood(problem, p, at(&y));
-                if l > best {
-                    best = l;
-                    x = y;
-                    moved = true;
-                    break;
-                }
-            }
-        }
-        if !moved {
-            step = [step[0] * 0.4, step[1] * 0.4];
-        }
-    }
-    let best = at(&x);
+    let found = minimise::nelder_mead(
+        &mut |x: &[f64]| -log_likelihood(problem, p, at(x)),
+        &start,
+        &[0.7, 1.5],
+        TUNE_TOLERANCE,
+        TUNE_EVALUATIONS,
+    );
+    let best = at(&found.x);
     if log_likelihood(problem, p, best) > log_likelihood(problem, p, noise) {
         best
     } else {

@@ -1,0 +1,88 @@
+//! The built-in campaign of `identify`: the simulated CFT robot, its logs by role, and the files
+//! that describe them, written so that the same run can be repeated from the folder alone.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::simulate::{simulate_to, warnings};
+use super::{CliError, Context};
+use crate::config::campaign::{CampaignLogs, CampaignSettings};
+use crate::config::{self, Campaign, RobotFile, Trajectory};
+use crate::output::write_whole;
+use crate::simulate::{Motion, Order};
+
+/// Robot file and validation motion of the campaign, as they come with the tool.
+const ROBOT: &str = "configs/cft.toml";
+const UNSEEN: &str = "configs/cft-validation.toml";
+/// Length of a one-joint experiment, of the identification run and of the unseen one [s].
+const ONE_JOINT_S: f64 = 20.0;
+const IDENTIFICATION_S: f64 = 40.0;
+const UNSEEN_S: f64 = 20.0;
+
+/// Simulates the campaign into `folder` and writes its campaign file; returns the warnings of the
+/// simulations.
+///
+/// # Errors
+/// Where the folder cannot be written to, or the user interrupts.
+pub(super) fn simulate(
+    folder: &Path,
+    seed: u64,
+    context: &Context,
+) -> Result<Vec<String>, CliError> {
+    let robot = RobotFile::load(Path::new(ROBOT))?;
+    let unseen = Trajectory::load(Path::new(UNSEEN))?;
+    let joints = robot.joint_names();
+    let moves: Vec<String> = joints.iter().map(|j| format!("{j}.csv")).collect();
+    let mut orders: Vec<(String, Motion, f64)> = joints
+        .iter()
+        .zip(&moves)
+        .map(|(joint, log)| (log.clone(), Motion::Move(joint), ONE_JOINT_S))
+        .collect();
+    orders.push(("identification.csv".into(), Motion::Usual, IDENTIFICATION_S));
+    orders.push(("unseen.csv".into(), Motion::Trajectory(&unseen), UNSEEN_S));
+    let bar = context.progress("simulating the campaign", Some(orders.len() as u64));
+    let said: Vec<Result<Vec<String>, CliError>> = orders
+        .par_iter()
+        .enumerate()
+        .map(|(i, (log, motion, seconds))| {
+            let order = Order {
+                robot: &robot,
+                model: None,
+                motion: *motion,
+                seconds: Some(*seconds),
+                effects: Vec::new(),
+                // every experiment has noise of its own
+                seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
+            };
+            let simulated = simulate_to(&order, &folder.join(log), context)?;
+            bar.advance(1);
+            let named = warnings(&simulated);
+            Ok(named.into_iter().map(|w| format!("{log}: {w}")).collect())
+        })
+        .collect();
+    let said = said.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+    let campaign = Campaign {
+        robot: "robot.toml".into(),
+        truth: Some("identification.truth.toml".into()),
+        logs: CampaignLogs {
+            friction: moves,
+            identification: vec!["identification.csv".into()],
+            validation: vec!["unseen.csv".into()],
+            ..CampaignLogs::default()
+        },
+        settings: CampaignSettings {
+            seed: Some(seed),
+            ..CampaignSettings::default()
+        },
+    };
+    let text = toml::to_string(&campaign)
+        .map_err(|e| CliError::output(format!("the campaign cannot be expressed in TOML: {e}")))?;
+    let robot_text = config::text(Path::new(ROBOT))?;
+    let head = "# The built-in campaign: repeat it with `cft-ident identify campaign.toml`.\n\n";
+    write_whole(&folder.join("robot.toml"), |f| {
+        f.write_all(robot_text.as_bytes())
+    })?;
+    write_whole(&folder.join("campaign.toml"), |f| write!(f, "{head}{text}"))?;
+    Ok(said)
+}
