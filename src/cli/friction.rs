@@ -11,7 +11,7 @@ use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_theta, friction_unit};
 use crate::config::model_file::{ModelProvenance, Parameter};
-use crate::friction::estimate::{JointEstimate, Nis, Options, estimate};
+use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::passes::{Ending, Given};
 use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
@@ -378,6 +378,20 @@ pub fn text(machine: &Machine, found: &Identified) -> String {
     out
 }
 
+/// Velocities at which a curve is drawn, from the most negative to the most positive: in equal
+/// ratios, for the law bends close to 0, and in equal steps.
+fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    const POINTS: usize = 80;
+    let slowest = (0.1 * low).max(1e-4 * high);
+    let share = |k: usize| k as f64 / (POINTS - 1) as f64;
+    let ratios = (0..POINTS).map(|k| slowest * (high / slowest).powf(share(k)));
+    let steps = (0..POINTS).map(|k| low + (high - low) * share(k));
+    let mut speeds: Vec<f64> = ratios.chain(steps).collect();
+    speeds.sort_by(f64::total_cmp);
+    let down: Vec<f64> = speeds.iter().rev().map(|v| -v).collect();
+    down.into_iter().chain([0.0]).chain(speeds)
+}
+
 /// The friction curves with their bands and the plateau map.
 pub fn figure(machine: &Machine, found: &Identified) -> FrictionFigure {
     let panels = found
@@ -388,13 +402,11 @@ pub fn figure(machine: &Machine, found: &Identified) -> FrictionFigure {
             note: format!("NIS {:.2}", e.nis.mean),
             speed_unit: format!("{}/s", machine.robot.joint_kind(*j).position_unit()),
             torque_unit: machine.file.torque_unit(*j).to_owned(),
-            curve: e
-                .curve
-                .iter()
-                .map(|c| CurvePoint {
-                    v: c.v,
-                    torque: c.torque,
-                    std: c.std,
+            curve: speeds_to_draw(e.speeds.covered)
+                .map(|v| CurvePoint {
+                    v,
+                    torque: e.law.torque(v),
+                    std: curve_std(&e.law, &e.covariance, v),
                 })
                 .collect(),
             covered: vec![

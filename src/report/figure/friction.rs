@@ -60,6 +60,9 @@ const NAME: f64 = 20.0;
 const PLOT: f64 = 206.0;
 const BELOW: f64 = 50.0;
 
+/// Radius of a plateau's dot [px].
+const DOT: f64 = 2.3;
+
 const CURVE: Stroke = Stroke::solid(colour::BLUE, 1.8);
 const BEYOND: Stroke = Stroke::dashed(colour::BLUE, 1.2, "3 3");
 const TRUTH: Stroke = Stroke::dashed(colour::VERMILLION, 1.3, "7 2.5 1.5 2.5");
@@ -245,15 +248,16 @@ fn plateau(svg: &mut Svg, panel: &Panel, point: &CurvePoint) {
         return;
     }
     let at = panel.x.px(point.v);
-    if point.std.is_finite() {
+    let [low, high] =
+        [-1.0, 1.0].map(|side| panel.y.px(point.torque + side * WITHIN_95 * point.std));
+    // A bar that the dot hides would only make the dot ragged.
+    if point.std.is_finite() && low - high > 2.0 * DOT + 5.0 {
         let bar = Stroke::solid(colour::INK, 0.9);
-        let [low, high] =
-            [-1.0, 1.0].map(|side| panel.y.px(point.torque + side * WITHIN_95 * point.std));
         svg.line([at, low], [at, high], bar);
         svg.line([at - 2.5, low], [at + 2.5, low], bar);
         svg.line([at - 2.5, high], [at + 2.5, high], bar);
     }
-    svg.dot([at, panel.y.px(point.torque)], 2.3, colour::INK);
+    svg.dot([at, panel.y.px(point.torque)], DOT, colour::INK);
 }
 
 #[cfg(test)]
