@@ -92,3 +92,31 @@ fn the_help_of_every_command_fits_80_columns_and_ends_in_an_example() {
         }
     }
 }
+
+#[test]
+fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = [
+        "friction no.csv -r configs/cft.toml -o m.toml",
+        "lsq no.csv -r configs/emps.toml -o m.toml",
+        "validate no.csv -m no.toml",
+        "torque no.csv -m no.toml -o t.csv",
+        "simulate -r configs/cft.toml --seconds 1 -o a.csv",
+        "identify -o run",
+    ];
+    assert_eq!(
+        lines.len(),
+        commands().iter().filter(|name| *name != "help").count()
+    );
+    for line in lines {
+        tool()
+            .current_dir(folder.path())
+            .args(line.split(' '))
+            .args(["--json", "none/result.json"])
+            .assert()
+            .code(5)
+            .stdout(is_empty())
+            .stderr(starts_with("error: ").and(contains("mkdir -p none")));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

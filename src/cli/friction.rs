@@ -439,7 +439,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs: Vec<&Path> = vec![&args.output];
     outputs.extend(args.plot.iter().map(PathBuf::as_path));
-    super::outputs::check(&inputs, &outputs)?;
+    context.check_outputs(&inputs, &outputs)?;
     let machine = Machine::load(&args.robot)?;
     let old = match &args.model {
         None => None,

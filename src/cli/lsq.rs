@@ -436,7 +436,7 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    super::outputs::check(&inputs, &[args.output.as_path()])?;
+    context.check_outputs(&inputs, &[args.output.as_path()])?;
     let machine = Machine::load(&args.robot)?;
     let friction = match &args.model {
         None => None,

@@ -141,6 +141,8 @@ fn execute(cli: &Cli, interrupted: Arc<AtomicBool>) -> Result<Exit, CliError> {
         json.and_then(Destination::file),
         interrupted,
     );
+    // Told before the long run, also by a command that has no other output.
+    context.check_outputs(&[], &[])?;
     let outcome = cli.command.run(&context)?;
     outcome::show(
         &outcome,

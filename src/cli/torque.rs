@@ -40,7 +40,7 @@ pub struct Args {
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: [&Path; 2] = [&args.log.path, &args.model];
-    super::outputs::check(&inputs, &[args.output.as_path()])?;
+    context.check_outputs(&inputs, &[args.output.as_path()])?;
     let name = args.model.display().to_string();
     let file = ModelFile::load(&args.model)?;
     let model = file.model(&name)?;

@@ -223,7 +223,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .chain(&args.plot)
         .map(PathBuf::as_path)
         .collect();
-    super::outputs::check(&inputs, &outputs)?;
+    context.check_outputs(&inputs, &outputs)?;
     let name = args.model.display().to_string();
     let file = ModelFile::load(&args.model)?;
     let model = file.model(&name)?;
