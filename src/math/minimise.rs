@@ -70,7 +70,13 @@ pub fn nelder_mead(
         }
         let outcome = NelderMead::new(simplex)
             .with_sd_tolerance(tolerance)
-            .and_then(|solver| Executor::new(&problem, solver).timer(false).run());
+            .and_then(|solver| {
+                Executor::new(Values(&problem), solver)
+                    // every step asks for a value at least: this only bounds what follows a refusal
+                    .configure(|state| state.max_iters(max_evaluations))
+                    .timer(false)
+                    .run()
+            });
         let ending = problem.ending(&outcome);
         let gained = before - problem.best().1;
         if ending != Ending::Converged || (shrink < 1.0 && gained <= tolerance) {
@@ -232,6 +238,21 @@ impl CostFunction for &Problem<'_> {
     }
 }
 
+/// The function without errors: the simplex method of `argmin` unwraps them. What is asked for
+/// beyond the limit has the best value so far, so that the simplex levels out and the search ends.
+struct Values<'p, 'f>(&'p Problem<'f>);
+
+impl CostFunction for Values<'_, '_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
+        let mut search = self.0.0.borrow_mut();
+        let value = search.at(x);
+        Ok(value.unwrap_or(search.best.1))
+    }
+}
+
 impl Gradient for &Problem<'_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
@@ -270,6 +291,26 @@ mod tests {
             }
             assert!(found.evaluations < most, "{}", found.evaluations);
             assert_eq!(found.value, rosenbrock(&found.x));
+        }
+    }
+
+    #[test]
+    fn any_budget_is_kept_even_where_it_ends_within_a_shrinking_step() {
+        // rough: makes the simplex shrink, which takes several values at once
+        let rough = |x: &[f64]| {
+            rosenbrock(&x[..2]) + 30.0 * ((40.0 * x[2]).sin() + (50.0 * x[0]).cos()).abs()
+        };
+        for limit in 1..300 {
+            let mut calls = 0;
+            let mut counted = |x: &[f64]| {
+                calls += 1;
+                rough(x)
+            };
+            let start = [-1.2, 1.0, 0.3];
+            let found = nelder_mead(&mut counted, &start, &[0.5; 3], 1e-14, limit);
+            assert_eq!(found.evaluations, calls);
+            assert!(calls <= limit, "{calls} of {limit}");
+            assert!(found.value <= rough(&start));
         }
     }
 
