@@ -38,7 +38,7 @@ impl OutputError {
             io::ErrorKind::StorageFull
             | io::ErrorKind::QuotaExceeded
             | io::ErrorKind::FileTooLarge => {
-                "free some space or choose another disk; nothing was left behind"
+                "free some space or choose another disk; no half file was left"
             }
             io::ErrorKind::BrokenPipe => "the program that reads it has ended",
             _ => "choose another place for it",
@@ -150,9 +150,18 @@ fn open(path: &Path) -> io::Result<Target> {
     }
     // The lock comes first, so that no interruption finds the file before it is known.
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    let file = builder.tempfile_in(folder)?;
+    let file = builder.tempfile_in(folder).map_err(plain)?;
     unfinished.insert(file.path().to_owned());
     Ok(Target::Temporary(file, path))
+}
+
+/// The error of the system alone: the temporary file's own names a path that nobody asked for.
+fn plain(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(|outer| outer.source());
+    let code = inner
+        .and_then(|inner| inner.downcast_ref::<io::Error>())
+        .and_then(io::Error::raw_os_error);
+    code.map_or(error, io::Error::from_raw_os_error)
 }
 
 fn finish(target: Target) -> io::Result<()> {
@@ -179,14 +188,15 @@ fn forget(target: &Target) {
 impl Write for Target {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Temporary(file, _) => file.write(buffer),
+            // The file itself, for its errors: see `plain`.
+            Self::Temporary(file, _) => file.as_file_mut().write(buffer),
             Self::Direct(file) => file.write(buffer),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match self {
-            Self::Temporary(file, _) => file.flush(),
+            Self::Temporary(file, _) => file.as_file_mut().flush(),
             Self::Direct(file) => file.flush(),
         }
     }

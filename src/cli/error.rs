@@ -24,12 +24,15 @@ pub struct CliError {
 }
 
 impl CliError {
-    fn new(exit: Exit, message: impl fmt::Display) -> Self {
+    /// Texts read `what is wrong; what to do; what else helps`: all but the first part become hints.
+    fn new(exit: Exit, text: impl fmt::Display) -> Self {
+        let text = text.to_string();
+        let mut parts = text.split("; ").map(str::to_owned);
         CliError {
             exit,
-            message: message.to_string(),
+            message: parts.next().unwrap_or_default(),
             places: Vec::new(),
-            hints: Vec::new(),
+            hints: parts.collect(),
         }
     }
 
@@ -55,17 +58,12 @@ impl CliError {
 
     /// The run was asked to stop (exit 130).
     pub fn interrupted() -> Self {
-        Self::new(Exit::Interrupted, "interrupted, nothing was written")
+        Self::new(Exit::Interrupted, "interrupted: no half file is left")
     }
 
-    /// The error of a room, whose texts read `what is wrong; what to do`: the last part becomes the
-    /// hint.
+    /// The error of a room, with those that it stems from.
     pub fn from_room(exit: Exit, error: &(dyn Error + 'static)) -> Self {
-        let text = with_sources(error);
-        match text.rsplit_once("; ") {
-            Some((message, hint)) => Self::new(exit, message).hint(hint),
-            None => Self::new(exit, text),
-        }
+        Self::new(exit, with_sources(error))
     }
 
     /// Adds a place: `file:line`, or the name of a setting.

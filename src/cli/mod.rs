@@ -25,6 +25,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 
@@ -92,17 +93,28 @@ pub fn main() -> ExitCode {
     let flag = Arc::clone(&interrupted);
     let handler = move || {
         if flag.swap(true, Ordering::Relaxed) {
-            // Asked twice: the graceful end takes too long.
-            output::remove_unfinished();
-            std::process::exit(Exit::Interrupted.code().into());
+            stop();
         }
         let _ = writeln!(std::io::stderr(), "stopping; once more to stop at once");
+        std::thread::spawn(|| {
+            std::thread::sleep(GRACE);
+            stop();
+        });
     };
     if let Err(error) = ctrlc::set_handler(handler) {
         // Without the handler Ctrl-C ends the process as it does by default.
         let _ = writeln!(std::io::stderr(), "warning: no graceful Ctrl-C: {error}");
     }
     run(std::env::args_os(), interrupted).into()
+}
+
+/// Time that a command has to end by itself after Ctrl-C; some loops do not look up that often.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// Ends the process at once, without an unfinished file.
+fn stop() -> ! {
+    output::remove_unfinished();
+    std::process::exit(Exit::Interrupted.code().into());
 }
 
 /// Runs one command line, the program's name first.

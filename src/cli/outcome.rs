@@ -55,7 +55,7 @@ fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
     stdout
         .write_all(text.as_bytes())
         .and_then(|()| stdout.flush())
-        .map_err(|error| CliError::output(format!("cannot write to standard output: {error}")))
+        .map_err(|error| no_standard_output(&error))
 }
 
 /// Like [`write`], but a reader that has seen enough (`| head`) is no error.
@@ -64,11 +64,14 @@ fn write_for_a_person(stdout: &mut dyn Write, text: &str) -> Result<(), CliError
         .write_all(text.as_bytes())
         .and_then(|()| stdout.flush());
     match written {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::output(format!(
-            "cannot write to standard output: {error}"
-        ))),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(no_standard_output(&error)),
         _ => Ok(()),
     }
+}
+
+fn no_standard_output(error: &io::Error) -> CliError {
+    CliError::output(format!("cannot write to standard output: {error}"))
+        .hint("look at where it leads: a full disk, a program that has ended")
 }
 
 #[cfg(test)]

@@ -51,10 +51,28 @@ impl<'a> Document<'a> {
                 };
             }
         }
+        let message = escape_whole(&message);
+        let told = if let Some([name]) = message.strip_prefix("missing field").map(|_| &listed[..])
+        {
+            return ConfigError::MissingKey {
+                file: self.file.to_owned(),
+                line,
+                key: escape(name),
+                remedy: "it; the files in configs/ show how".to_owned(),
+            };
+        } else if message == "duplicate key" {
+            let name = error.span().and_then(|span| self.text.get(span));
+            let name = escape(name.unwrap_or_default().trim());
+            format!("duplicate key `{name}`; keep one of the two")
+        } else if message.starts_with("invalid type") || message.starts_with("wanted") {
+            format!("{message}; give a value of that kind")
+        } else {
+            format!("{message}; correct this line: `key = value`, text in quotes")
+        };
         ConfigError::Syntax {
             file: self.file.to_owned(),
             line,
-            message: escape_whole(&message),
+            message: told,
         }
     }
 

@@ -240,7 +240,7 @@ impl ModelFile {
         }
         Err(ConfigError::OtherRobot {
             file: file.to_owned(),
-            difference: format!("{theirs}; wanted: {ours}"),
+            difference: format!("{theirs}, where {ours} is wanted"),
             remedy: "give the model that was identified on this robot, or the robot file that it belongs to".to_owned(),
         })
     }

@@ -62,7 +62,9 @@ pub fn moving_joint(
     let share: Vec<f64> = (0..n)
         .map(|j| {
             let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-            for q in motions.iter().flat_map(|m| m.q.iter().skip(j).step_by(n)) {
+            // as measured: smoothing leaves rounding errors in what stands still
+            let measured = motions.iter().flat_map(|m| m.measured.iter());
+            for q in measured.skip(j).step_by(n) {
                 lo = lo.min(*q);
                 hi = hi.max(*q);
             }

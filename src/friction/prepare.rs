@@ -79,7 +79,13 @@ pub fn prepare(
     let velocity_scale = rms(motions
         .iter()
         .flat_map(|m| m.v.iter().skip(joint).step_by(n).copied()));
-    if !(torque_scale > 0.0 && velocity_scale > 0.0) {
+    // as measured: smoothing leaves rounding errors in what stands still
+    let mut measured = motions
+        .iter()
+        .flat_map(|m| m.measured.iter().skip(joint).step_by(n));
+    let first = measured.next();
+    let moves = measured.any(|q| Some(q) != first);
+    if !(moves && torque_scale > 0.0 && velocity_scale > 0.0) {
         return None;
     }
 
