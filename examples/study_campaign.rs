@@ -1,0 +1,413 @@
+//! Monte Carlo study of whole campaigns: four one-joint logs, one identification log, one unseen
+//! log, on plants whose parameters vary by 15 %, with encoder quantisation and 1 % torque noise.
+//!
+//! `cargo run --release --example study_campaign -- [SEEDS] [FOLDER]` writes one line per seed to
+//! FOLDER/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
+//! the end, the summaries that docs/studies.md is generated from.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use cft_ident::config::Trajectory;
+use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
+use cft_ident::friction::motions::motions;
+use cft_ident::friction::passes::Ending;
+use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare};
+use cft_ident::inertia::accumulate;
+use cft_ident::inertia::columns::{Columns, KnownFriction};
+use cft_ident::inertia::solve::{Estimator, fit};
+use cft_ident::inertia::verdict::verdict;
+use cft_ident::log::Block;
+use cft_ident::motion::{HeldForces, Settings as Processing};
+use cft_ident::robot::Robot;
+use cft_ident::robot::cft::dynamics::{Coefficients, inertia};
+use cft_ident::robot::cft::{Setup, Structure};
+use cft_ident::robot::friction::DoubleTanh;
+use cft_ident::robot::model::{JointFriction, Model};
+use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_phase, follow};
+use cft_ident::simulate::reference::Fourier;
+use cft_ident::simulate::{
+    CftTruth, Frame, Noise, Path as Motion, Recording, Reference, Sensors, Settings,
+};
+use cft_ident::validate::Reconstruction;
+use cft_ident::verdict::Verdict;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
+/// Speeds per joint at which the curve's interval is looked at: every fifth point of the hundred.
+const EVERY: usize = 5;
+/// Fault of the starts: every parameter and the inertia times 3^U(-1, 1).
+const FAULT: f64 = 3.0;
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let seeds: u64 = arguments.next().and_then(|s| s.parse().ok()).unwrap_or(200);
+    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "docs/results".into()));
+    std::fs::create_dir_all(&folder).expect("the folder can be made");
+    let log = folder.join("study_campaign.jsonl");
+    let mut rows = finished(&log);
+    let done: Vec<u64> = rows.iter().filter_map(|r| r["seed"].as_u64()).collect();
+    let file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(&log)
+        .expect("the log opens");
+    let file = Mutex::new(file);
+    let fresh: Vec<Value> = (0..seeds)
+        .into_par_iter()
+        .filter(|seed| !done.contains(seed))
+        .map(|seed| {
+            let row = campaign(seed);
+            let mut file = file.lock().expect("no thread panics");
+            writeln!(file, "{row}").expect("the log is written");
+            eprintln!("seed {seed} done");
+            row
+        })
+        .collect();
+    rows.extend(fresh);
+    rows.retain(|r| r["seed"].as_u64().is_some_and(|s| s < seeds));
+    rows.sort_by_key(|r| r["seed"].as_u64());
+    summarise(&rows, &folder);
+}
+
+fn finished(log: &Path) -> Vec<Value> {
+    let Ok(file) = File::open(log) else {
+        return Vec::new();
+    };
+    let lines = BufReader::new(file).lines().map_while(Result::ok);
+    lines
+        .filter_map(|l| serde_json::from_str(&l).ok())
+        .collect()
+}
+
+fn processing() -> Processing {
+    Processing {
+        q_cutoff_hz: Some(100.0),
+        ..Processing::default()
+    }
+}
+
+fn block(recording: &Recording<4>) -> Block {
+    Block {
+        t: recording.t.clone(),
+        q: recording.q.concat(),
+        tau: recording.torque.concat(),
+        ..Block::default()
+    }
+}
+
+/// A source of one block.
+fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, std::convert::Infallible> + '_ {
+    move |out| {
+        out.t.extend_from_slice(&block.t);
+        out.q.extend_from_slice(&block.q);
+        out.tau.extend_from_slice(&block.tau);
+        Ok(false)
+    }
+}
+
+fn noisy(seconds: f64, seed: u64) -> Settings<4> {
+    let mut settings = Settings::new(seconds);
+    settings.seed = seed;
+    settings.sensors.torque_noise = Noise::Relative(0.01);
+    settings
+}
+
+/// The unseen motion: the trajectory file that comes with the tool.
+fn unseen_motion() -> Reference<4> {
+    let Ok(Trajectory::Fourier(file)) = Trajectory::load(Path::new("configs/cft-validation.toml"))
+    else {
+        panic!("the validation trajectory comes with the tool");
+    };
+    let column = |pick: &dyn Fn(usize) -> Vec<f64>| -> Vec<[f64; 4]> {
+        let columns: Vec<Vec<f64>> = (0..4).map(pick).collect();
+        (0..columns[0].len())
+            .map(|l| std::array::from_fn(|i| columns[i][l]))
+            .collect()
+    };
+    let series = Fourier {
+        offset: std::array::from_fn(|i| file.series[i].offset),
+        a: column(&|i| file.series[i].a.clone()),
+        b: column(&|i| file.series[i].b.clone()),
+        fundamental: std::f64::consts::TAU * file.fundamental_hz,
+        ..Fourier::table_3()
+    };
+    Reference {
+        frame: Frame::Motors,
+        path: Motion::Fourier(series),
+    }
+}
+
+fn prepared(robot: &Robot, joint: usize, log: &Block) -> Prepared {
+    let found = motions(&log.t, &log.q, &log.tau, 4, &processing()).expect("a whole log");
+    let variance = |q: &[f64]| robot.encoder_variance(joint, q).unwrap_or(f64::NAN);
+    let sensors = Read {
+        variance: &variance,
+        held: true,
+    };
+    prepare(robot, joint, &found, &sensors).expect("the joint moves")
+}
+
+/// Relative error of the curve over the speeds covered, and at how many speeds the 95 % interval
+/// covers the truth.
+fn curve(e: &JointEstimate, truth: &DoubleTanh) -> (f64, usize, usize) {
+    let (mut off, mut size, mut covered, mut total) = (0.0, 0.0, 0, 0);
+    for (k, point) in e.curve.iter().enumerate() {
+        let f = truth.torque(point.v);
+        off += (point.torque - f).powi(2);
+        size += f * f;
+        if k % EVERY == EVERY / 2 {
+            total += 1;
+            covered += usize::from((point.torque - f).abs() <= 1.96 * point.std);
+        }
+    }
+    ((off / size).sqrt(), covered, total)
+}
+
+fn campaign(seed: u64) -> Value {
+    let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+    let names: Vec<String> = robot
+        .parameters()
+        .iter()
+        .map(|p| p.name.to_owned())
+        .collect();
+    let truth = CftTruth::synthetic(Setup::Tuedacs)
+        .varied(0.15, seed)
+        .expect("a plant");
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let mut joints = Vec::new();
+    let mut known = Vec::new();
+    for j in 0..4 {
+        let motion = OneJointMove::new(j, 20.0, Some(seed))
+            .reference(Setup::Tuedacs)
+            .expect("a ladder");
+        let recording =
+            follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");
+        let log = block(&recording);
+        let prepared = prepared(&robot, j, &log);
+        let e = estimate(JOINTS[j], &names, &prepared, &Options::default()).expect("an estimate");
+        let law = truth.friction[j];
+        let (error, covered, total) = curve(&e, &law);
+        // a start that is wrong by up to a factor of three in everything, alone
+        let mut wrong = |x: f64| x * FAULT.powf(chance.random_range(-1.0..1.0));
+        let start = DoubleTanh::from_parameters(law.parameters().map(&mut wrong));
+        let m = inertia(&recording.q[0], &Coefficients::from_theta22(&truth.theta))[j][j];
+        let options = |only_start| Options {
+            start: Some(start),
+            start_inertia: Some(wrong_inertia(m, seed, j)),
+            only_start,
+            ..Options::default()
+        };
+        let end = |o: &Options| match estimate(JOINTS[j], &names, &prepared, o) {
+            Ok(e) => (curve(&e, &law).0, e.ending == Ending::Converged),
+            Err(_) => (f64::INFINITY, false),
+        };
+        let (with_log, _) = end(&options(false));
+        let (alone, said) = end(&options(true));
+        joints.push(json!({
+            "curve_error": error, "covered": covered, "speeds": total,
+            "value": e.law.parameters(), "truth": law.parameters(),
+            "std": (0..5).map(|i| e.covariance[i][i].sqrt()).collect::<Vec<_>>(),
+            "nis": e.nis.mean, "widening": e.widening,
+            "converged": e.ending == Ending::Converged,
+            "start_with_log": with_log, "start_alone": alone, "start_alone_says_converged": said,
+        }));
+        known.push(Some(KnownFriction {
+            law: e.law,
+            covariance: e.covariance,
+        }));
+    }
+
+    let columns = Columns {
+        joints: 4,
+        shared: 12,
+        own: vec![Vec::new(); 4],
+        known: known.clone(),
+    };
+    let motion = excitation_at_random_phase(Setup::Tuedacs, seed);
+    let recording = follow(&truth, &[], motion, &noisy(40.0, 10 * seed + 5)).expect("a run");
+    let mut log = block(&recording);
+    HeldForces::new(4).centre(&robot, &mut log);
+    let (sums, _) = accumulate(&robot, &columns, &processing(), &mut source(&log)).expect("a log");
+    let fit = fit(&sums, Estimator::Wls).expect("a fit");
+    let theta: Vec<Value> = (0..12)
+        .map(|i| {
+            let std = fit.covariance[(i, i)].sqrt();
+            let share = (0..4)
+                .map(|j| 2.0 * std * fit.column_rms[(j, i)] / fit.torque_rms[j])
+                .fold(0.0, f64::max);
+            let (verdict, negligible) = verdict(fit.theta[i], std, fit.determined[i], share);
+            json!({
+                "value": fit.theta[i], "std": std, "truth": truth.theta[i],
+                "identified": verdict == Verdict::Identified, "negligible": negligible,
+            })
+        })
+        .collect();
+
+    let model = |theta: Vec<f64>, friction: [DoubleTanh; 4]| Model {
+        robot: robot.clone(),
+        theta,
+        friction: friction.map(JointFriction::DoubleTanh).to_vec(),
+        offset: vec![0.0; 4],
+    };
+    let estimated = std::array::from_fn(|j| known[j].as_ref().expect("filled above").law);
+    let estimated = model(fit.theta.as_slice().to_vec(), estimated);
+    let true_model = model(truth.printed().to_vec(), truth.friction);
+    let mut settings = noisy(20.0, 10 * seed + 6);
+    let sensed = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
+    settings.sensors = Sensors::perfect();
+    let clean = errors(&robot, &truth, &settings, &[&estimated, &true_model]);
+    json!({
+        "seed": seed, "joints": joints, "theta": theta,
+        "unseen": sensed[0], "unseen_truth": sensed[1],
+        "clean": clean[0], "clean_truth": clean[1],
+        "rows": fit.rows, "effective_rows": fit.effective_rows,
+    })
+}
+
+fn wrong_inertia(m: f64, seed: u64, joint: usize) -> f64 {
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(1 + 10 * seed + joint as u64);
+    m * FAULT.powf(chance.random_range(-1.0..1.0))
+}
+
+/// Relative torque errors per joint on the unseen motion, for several models.
+fn errors(
+    robot: &Robot,
+    truth: &CftTruth,
+    settings: &Settings<4>,
+    models: &[&Model],
+) -> Vec<Vec<f64>> {
+    let recording = follow(truth, &[], unseen_motion(), settings).expect("a run");
+    let mut log = block(&recording);
+    HeldForces::new(4).centre(robot, &mut log);
+    models
+        .iter()
+        .map(|model| {
+            let mut all = Reconstruction::new(model);
+            let summary = all
+                .add(&processing(), &mut source(&log), &mut |_| {})
+                .expect("a log");
+            all.finish(summary)
+                .joints
+                .iter()
+                .map(|j| j.relative_error)
+                .collect()
+        })
+        .collect()
+}
+
+fn quantile(mut x: Vec<f64>, share: f64) -> f64 {
+    x.sort_by(f64::total_cmp);
+    x[((x.len() - 1) as f64 * share).round() as usize]
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.3} %", 100.0 * x)
+}
+
+/// The numbers that the studies are asked for, as rows of tables.
+fn summarise(rows: &[Value], folder: &Path) {
+    let n = rows.len();
+    let number = |v: &Value| v.as_f64().unwrap_or(f64::INFINITY);
+    let over = |f: &dyn Fn(&Value) -> f64| -> Vec<f64> { rows.iter().map(f).collect() };
+    let share = |f: &dyn Fn(&Value) -> bool| rows.iter().filter(|r| f(r)).count() as f64 / n as f64;
+    let (mut curves, mut starts, mut frictions, mut torques) = (vec![], vec![], vec![], vec![]);
+    for (j, joint) in JOINTS.iter().enumerate() {
+        let error = over(&|r| number(&r["joints"][j]["curve_error"]));
+        let covered: f64 = over(&|r| number(&r["joints"][j]["covered"])).iter().sum();
+        let speeds: f64 = over(&|r| number(&r["joints"][j]["speeds"])).iter().sum();
+        curves.push(json!({
+            "joint": joint,
+            "median curve error": percent(quantile(error.clone(), 0.5)),
+            "95 % of seeds": percent(quantile(error.clone(), 0.95)),
+            "largest": percent(quantile(error, 1.0)),
+            "coverage of the 95 % interval": format!("{:.3}", covered / speeds),
+            "median NIS": format!("{:.3}", quantile(over(&|r| number(&r["joints"][j]["nis"])), 0.5)),
+        }));
+        let ends = |key: &str| share(&|r| number(&r["joints"][j][key]) <= 0.01);
+        starts.push(json!({
+            "joint": joint,
+            "from the wrong start and starts from the log": format!("{:.1} %", 100.0 * ends("start_with_log")),
+            "from the wrong start alone": format!("{:.1} %", 100.0 * ends("start_alone")),
+        }));
+        for (i, name) in DoubleTanh::NAMES.iter().enumerate() {
+            let z = |r: &Value| {
+                let e = &r["joints"][j];
+                (number(&e["value"][i]) - number(&e["truth"][i])) / number(&e["std"][i])
+            };
+            let relative = |r: &Value| {
+                let e = &r["joints"][j];
+                (number(&e["value"][i]) / number(&e["truth"][i]) - 1.0).abs()
+            };
+            frictions.push(json!({
+                "theta": 13 + 4 * i + j,
+                "joint": joint,
+                "parameter": name,
+                "median error": percent(quantile(over(&relative), 0.5)),
+                "within 3 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 3.0)),
+                "within 1.96 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 1.96)),
+            }));
+        }
+        let at = |key: &'static str| over(&|r| number(&r[key][j]));
+        let ratio = over(&|r| number(&r["unseen"][j]) / number(&r["unseen_truth"][j]));
+        torques.push(json!({
+            "joint": joint,
+            "unseen, median": percent(quantile(at("unseen"), 0.5)),
+            "largest": percent(quantile(at("unseen"), 1.0)),
+            "true parameters, median": percent(quantile(at("unseen_truth"), 0.5)),
+            "largest ratio to them": format!("{:.3}", quantile(ratio, 1.0)),
+            "noise-free sensors, median": percent(quantile(at("clean"), 0.5)),
+            "noise-free, true parameters": percent(quantile(at("clean_truth"), 0.5)),
+        }));
+    }
+    frictions.sort_by_key(|r| r["theta"].as_u64());
+    let thetas: Vec<Value> = (0..12)
+        .map(|i| {
+            let z = |r: &Value| {
+                let e = &r["theta"][i];
+                (number(&e["value"]) - number(&e["truth"])) / number(&e["std"])
+            };
+            let relative = |r: &Value| {
+                let e = &r["theta"][i];
+                (number(&e["value"]) / number(&e["truth"]) - 1.0).abs()
+            };
+            json!({
+                "parameter": format!("theta_{}", i + 1),
+                "identified in": format!("{:.1} %", 100.0 * share(&|r| r["theta"][i]["identified"] == true)),
+                "of which negligible": format!("{:.1} %", 100.0 * share(&|r| r["theta"][i]["negligible"] == true)),
+                "median error": percent(quantile(over(&relative), 0.5)),
+                "within 3 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 3.0)),
+                "within 1.96 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 1.96)),
+            })
+        })
+        .collect();
+    for (name, title, rows) in [
+        ("study_curve", "friction curves and their intervals", curves),
+        (
+            "study_friction",
+            "friction parameters theta 13..32",
+            frictions,
+        ),
+        (
+            "study_starts",
+            "share of starts that end at a curve error of at most 1 %",
+            starts,
+        ),
+        ("study_inertia", "inertial parameters theta 1..12", thetas),
+        ("study_torque", "torque error on an unseen log", torques),
+    ] {
+        let document = json!({
+            "study": title,
+            "command": format!("cargo run --release --example study_campaign -- {n}"),
+            "seeds": n,
+            "rows": rows,
+        });
+        let path = folder.join(format!("{name}.json"));
+        std::fs::write(&path, format!("{document:#}\n")).expect("the summary is written");
+        println!("{document:#}");
+    }
+}
