@@ -179,29 +179,38 @@ fn assemble(
         }
     }
     let si = law.parameters();
+    let std = |i: usize| covariance[i][i].max(0.0).sqrt();
     let values = std::array::from_fn(|i| {
-        let std = covariance[i][i].max(0.0).sqrt();
-        let verdict = verdict_of(si[i], std);
-        if i >= 3 && (maximum.at_limit[i - 3] || verdict == Verdict::NotIdentifiable) {
-            // only a slope whose term is there at all has a bound
-            let term = values_of_term(&si, &covariance, i - 2);
-            return match profile_slope(problem, &maximum, i).filter(|_| term) {
-                Some(bound) => Value {
-                    value: bound,
-                    std: f64::NAN,
-                    verdict: Verdict::LowerBound,
-                },
-                None => Value {
-                    value: si[i],
-                    std,
-                    verdict: Verdict::NotIdentifiable,
-                },
-            };
-        }
-        Value {
+        let verdict = verdict_of(si[i], std(i));
+        let plain = Value {
             value: si[i],
-            std,
+            std: std(i),
             verdict,
+        };
+        if i < 3 {
+            return plain;
+        }
+        // a slope is open where its term is: two terms that the data cannot part are one
+        let height = verdict_of(si[i - 2], std(i - 2));
+        let open = maximum.at_limit[i - 3]
+            || verdict == Verdict::NotIdentifiable
+            || height == Verdict::NotIdentifiable;
+        if !open {
+            return plain;
+        }
+        // the steeper one has a bound as long as there is Coulomb friction at all; the other only
+        // where its own term is there
+        let term = i == 3 || height != Verdict::NotIdentifiable;
+        match profile_slope(problem, &maximum, i).filter(|_| term) {
+            Some(bound) => Value {
+                value: bound,
+                std: f64::NAN,
+                verdict: Verdict::LowerBound,
+            },
+            None => Value {
+                verdict: Verdict::NotIdentifiable,
+                ..plain
+            },
         }
     });
 
@@ -233,11 +242,6 @@ fn assemble(
         torque_noise: maximum.noise.torque,
         position_factor: maximum.noise.position_factor,
     }
-}
-
-/// Whether the tanh term `i` (1 or 2) differs from zero by more than its uncertainty.
-fn values_of_term(si: &[f64; 5], covariance: &[[f64; 5]; 5], i: usize) -> bool {
-    si[i].abs() > 2.0 * covariance[i][i].max(0.0).sqrt()
 }
 
 fn curve(
@@ -353,4 +357,116 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
         });
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial::Trial;
+    use super::*;
+
+    fn run(trial: &Trial, seed: u64, options: &Options) -> Result<JointEstimate, FrictionError> {
+        estimate(
+            "q1",
+            &["inertia".to_owned()],
+            &trial.prepared(seed),
+            options,
+        )
+    }
+
+    fn curve_error(e: &JointEstimate, law: &DoubleTanh) -> f64 {
+        let (mut off, mut size) = (0.0, 0.0);
+        for c in &e.curve {
+            off += (c.torque - law.torque(c.v)).powi(2);
+            size += law.torque(c.v).powi(2);
+        }
+        (off / size).sqrt()
+    }
+
+    #[test]
+    fn friction_inertia_and_offset_come_out_of_a_quantised_noisy_log() {
+        let trial = Trial::usual();
+        let e = run(&trial, 3, &Options::default()).unwrap();
+        assert_eq!(e.ending, Ending::Converged);
+        assert!(curve_error(&e, &trial.law) < 2e-3);
+        for (v, truth) in e.values.iter().zip(trial.law.parameters()) {
+            assert_eq!(v.verdict, Verdict::Identified);
+            assert!((v.value - truth).abs() < 3.5 * v.std, "{v:?} {truth}");
+            assert!(v.std < 0.05 * truth.abs());
+        }
+        assert!(
+            (e.nuisance[0].value - 12.0).abs() < 0.05,
+            "{:?}",
+            e.nuisance[0]
+        );
+        assert!(
+            (e.nuisance[1].value - 1.5).abs() < 0.1,
+            "{:?}",
+            e.nuisance[1]
+        );
+        assert!((0.9..1.1).contains(&e.nis.mean));
+        assert!((e.torque_noise / trial.noise - 1.0).abs() < 0.3);
+    }
+
+    #[test]
+    fn a_start_wrong_by_three_in_everything_ends_at_the_same_law() {
+        let trial = Trial::usual();
+        let wrong = [3.0, 1.0 / 3.0, 3.0, 1.0 / 3.0, 3.0];
+        let mut p = trial.law.parameters();
+        for (x, f) in p.iter_mut().zip(wrong) {
+            *x *= f;
+        }
+        let options = Options {
+            start: Some(DoubleTanh::from_parameters(p)),
+            start_inertia: Some(4.0),
+            ..Options::default()
+        };
+        let e = run(&trial, 4, &options).unwrap();
+        assert!(curve_error(&e, &trial.law) < 2e-3);
+    }
+
+    #[test]
+    fn a_reversal_too_quick_to_see_bounds_the_slope_from_below_only() {
+        let mut trial = Trial::usual();
+        trial.law = DoubleTanh::from_parameters([30.0, 14.0, 0.0, 1e5, 12.0]);
+        trial.motion = vec![(0.05, 1.1)];
+        let e = run(&trial, 5, &Options::default()).unwrap();
+        let steep = &e.values[3];
+        assert_eq!(steep.verdict, Verdict::LowerBound);
+        assert!(steep.value < 1e5 && steep.value > 100.0, "{steep:?}");
+        assert!(curve_error(&e, &trial.law) < 1e-2);
+    }
+
+    #[test]
+    fn motion_in_one_direction_is_answered_with_what_is_missing() {
+        let trial = Trial::usual();
+        let mut prepared = trial.prepared(6);
+        for v in &mut prepared.velocity {
+            *v = v.abs();
+        }
+        let error = estimate("q1", &[], &prepared, &Options::default()).unwrap_err();
+        assert!(
+            matches!(error, FrictionError::NeverReverses { .. }),
+            "{error}"
+        );
+        assert!(error.to_string().contains("both directions"));
+    }
+
+    #[test]
+    fn the_plateau_map_lies_on_the_curve() {
+        let mut trial = Trial::usual();
+        // triangles of constant speed, from odd harmonics
+        trial.motion = (0..40)
+            .map(|k| {
+                let n = f64::from(2 * k + 1);
+                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                (sign * 0.1 / (n * n), 0.2 * n)
+            })
+            .collect();
+        let e = run(&trial, 7, &Options::default()).unwrap();
+        assert!(e.plateaus.len() >= 3);
+        for p in &e.plateaus {
+            let f = trial.law.torque(p.v);
+            assert!((p.torque - f).abs() < 0.03 * f.abs(), "{p:?} {f}");
+        }
+    }
 }

@@ -205,3 +205,62 @@ impl Filter {
         (innovation, s)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::passes::{Given, first_noise, spread};
+    use super::super::score::score;
+    use super::super::trial::Trial;
+    use super::*;
+    use nalgebra::DMatrix;
+
+    fn start(trial: &Trial, problem: &Problem) -> Vec<f64> {
+        let mut p = vec![0.0; problem.parameters()];
+        problem.coordinates(&trial.law, &mut p);
+        p
+    }
+
+    #[test]
+    fn the_covariance_stays_symmetric_and_positive_definite() {
+        let trial = Trial::usual();
+        let prepared = trial.prepared(1);
+        let problem = &prepared.problem;
+        let noise = first_noise(problem, &Given::default());
+        let mut p = start(&trial, problem);
+        p[FRICTION..].copy_from_slice(&super::super::start::constant_inertia(&prepared, 12.0));
+        let mut filter = Filter::new(problem);
+        let pass = filter.pass(problem, &p, &spread(problem), noise);
+        let n = problem.parameters();
+        let c = DMatrix::from_row_slice(n, n, &pass.covariance);
+        assert_eq!(c, c.transpose());
+        assert!(c.cholesky().is_some());
+        assert!(pass.parameters.iter().all(|x| x.is_finite()));
+    }
+
+    #[test]
+    fn at_the_maximum_its_covariance_is_the_inverse_information() {
+        let trial = Trial::usual();
+        let prepared = trial.prepared(2);
+        let problem = &prepared.problem;
+        let starts = super::super::start::from_log(&prepared, 2);
+        let top = super::super::passes::maximise(&prepared, &starts, &Given::default()).unwrap();
+        let spread = spread(problem);
+        // a filter that begins at the maximum, sure to within a few standard deviations, moves
+        // little and so linearises there
+        let tight: Vec<f64> = (0..problem.parameters())
+            .map(|i| 3.0 * top.covariance[(i, i)].sqrt())
+            .collect();
+        let pass = Filter::new(problem).pass(problem, &top.parameters, &tight, top.noise);
+        let mut h = score(problem, &top.parameters, top.noise, 100).information;
+        for (i, s) in tight.iter().enumerate() {
+            h[(i, i)] += 1.0 / (s * s);
+        }
+        let c = h.cholesky().unwrap().inverse();
+        assert_eq!(spread.len(), tight.len());
+        for i in 0..FRICTION {
+            let found = pass.covariance[i * problem.parameters() + i].sqrt();
+            let ratio = found / c[(i, i)].sqrt();
+            assert!((0.9..1.1).contains(&ratio), "parameter {i}: {ratio}");
+        }
+    }
+}

@@ -16,3 +16,5 @@ pub mod problem;
 pub mod propagate;
 pub mod score;
 pub mod start;
+#[cfg(test)]
+mod trial;

@@ -15,8 +15,13 @@ use super::score::{Score, log_likelihood, score};
 use super::start::Start;
 use crate::math::minimise;
 
-/// Factors on both noises in the annealed passes.
+/// Factors on both noises in the annealed passes from a start that may be far off, and from one
+/// that a linear fit to the log gave.
 const ANNEALING: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
+const ANNEALING_FROM_LOG: [f64; 1] = [10.0];
+/// Ends that are refined, and steps until the best of them is chosen.
+const REFINED: usize = 3;
+const FIRST_STEPS: usize = 6;
 /// Prior standard deviations in the filter's coordinates: friction terms and nuisance of the size
 /// of the whole torque, slopes within a factor of five.
 const SPREAD_LINEAR: f64 = 2.0;
@@ -24,8 +29,8 @@ const SPREAD_SLOPE: f64 = 1.6;
 /// Samples per block of the score's outer product, in seconds.
 const BLOCK_SECONDS: f64 = 0.25;
 /// The noise levels' search ends at this difference of log-likelihoods, or after so many of them.
-const TUNE_TOLERANCE: f64 = 1e-2;
-const TUNE_EVALUATIONS: u64 = 40;
+const TUNE_TOLERANCE: f64 = 0.3;
+const TUNE_EVALUATIONS: u64 = 24;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
 
@@ -101,7 +106,11 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
     for (i, start) in starts.iter().enumerate() {
         let mut p = start.parameters.clone();
         problem.clamp(&mut p);
-        for factor in ANNEALING {
+        let annealing: &[f64] = match start.residual.is_finite() {
+            true => &ANNEALING_FROM_LOG,
+            false => &ANNEALING,
+        };
+        for &factor in annealing {
             let raised = Noise {
                 torque: noise.torque * factor,
                 position_factor: noise.position_factor * factor * factor,
@@ -123,8 +132,8 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
     }
     ends.sort_by(|a, b| b.2.total_cmp(&a.2));
     let mut best: Option<(usize, Refined)> = None;
-    for (i, p, _) in ends.into_iter().take(3) {
-        let refined = refine(problem, p, noise, &spread, 12);
+    for (i, p, _) in ends.into_iter().take(REFINED) {
+        let refined = refine(problem, p, noise, &spread, FIRST_STEPS);
         if best
             .as_ref()
             .is_none_or(|b| refined.score.log_likelihood > b.1.score.log_likelihood)

@@ -269,3 +269,104 @@ impl Law {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem() -> Problem {
+        Problem {
+            records: Vec::new(),
+            nuisance: 2,
+            torque_scale: 8.0,
+            velocity_scale: 0.4,
+            slope_range: (0.1, 1e5),
+            least_inertia: 1e-6,
+        }
+    }
+
+    /// Bv, Bf1, Bf2, ln w1, ln w2 in the filter's coordinates, then an inertia and a constant.
+    const P: [f64; 7] = [0.2, 0.8, -0.3, 3.2, 0.9, 0.7, 1.1];
+
+    fn interval<'a>(m: &'a [f64; 2], h: &'a [f64; 2]) -> Interval<'a> {
+        Interval {
+            dt: 2e-3,
+            tau: 3.0,
+            m,
+            h,
+        }
+    }
+
+    #[test]
+    fn sensitivities_are_the_differences_of_the_integrated_state() {
+        let problem = problem();
+        let (m, h) = ([1.0, 0.0], [0.4, 1.0]);
+        let interval = interval(&m, &h);
+        let end = |p: &[f64], v: f64, tau: f64| {
+            let law = Law::new(&problem, p);
+            let interval = Interval { tau, ..interval };
+            state(&law, &p[FRICTION..], &interval, 1e-6, 0.1, v)
+        };
+        // across standstill Simpson's rule meets the bend of the tanh with three points a step
+        for (v, tolerance) in [(-1e-3, 1e-2), (0.02, 2e-3), (0.9, 1e-4)] {
+            let mut t = Transition::new(7);
+            let law = Law::new(&problem, &P);
+            let x = with_sensitivities(&law, &P, &interval, 1e-6, 0.1, v, &mut t);
+            assert_eq!(x, end(&P, v, 3.0));
+            let near = |name: &str, found: f64, plus: f64, minus: f64, step: f64, size: f64| {
+                let difference = (plus - minus) / (2.0 * step);
+                assert!(
+                    (found - difference).abs() < tolerance * size,
+                    "{name} at v = {v}: {found} {difference}"
+                );
+            };
+            let (s, dt) = (1e-6, interval.dt);
+            let (a, b) = (end(&P, v + s, 3.0), end(&P, v - s, 3.0));
+            near("dq/dv", t.q_v, a.0, b.0, s, dt);
+            near("dv/dv", t.v_v, a.1, b.1, s, 1.0);
+            let (a, b) = (end(&P, v, 3.0 + s), end(&P, v, 3.0 - s));
+            near("dq/dtau", t.n_q, a.0, b.0, s, dt * dt);
+            near("dv/dtau", t.n_v, a.1, b.1, s, dt);
+            for j in 0..7 {
+                let (mut plus, mut minus) = (P, P);
+                plus[j] += s;
+                minus[j] -= s;
+                let (a, b) = (end(&plus, v, 3.0), end(&minus, v, 3.0));
+                near("dq/dp", t.b_q[j], a.0, b.0, s, 8.0 * dt * dt);
+                near("dv/dp", t.b_v[j], a.1, b.1, s, 8.0 * dt);
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_interval_through_a_steep_reversal_is_cut_until_it_is_right() {
+        let problem = problem();
+        let mut p = P;
+        p[3] = 6.0;
+        let law = Law::new(&problem, &p);
+        let (m, h) = ([1.0, 0.0], [0.0, 0.0]);
+        let whole = Interval {
+            dt: 4e-3,
+            tau: 0.3,
+            m: &m,
+            h: &h,
+        };
+        let one = state(&law, &p[FRICTION..], &whole, 1e-6, 0.0, 0.05);
+        let mut many = (0.0, 0.05);
+        for _ in 0..4000 {
+            let part = Interval { dt: 1e-6, ..whole };
+            many = state(&law, &p[FRICTION..], &part, 1e-6, many.0, many.1);
+        }
+        assert!((one.1 - many.1).abs() < 1e-5, "{one:?} {many:?}");
+        assert!((one.0 - many.0).abs() < 1e-7, "{one:?} {many:?}");
+    }
+
+    #[test]
+    fn the_fast_tanh_is_the_tanh() {
+        for i in -400..=400 {
+            let x = f64::from(i) * 0.1;
+            assert!((tanh(x) - x.tanh()).abs() < 4e-16, "{x}");
+        }
+        assert_eq!((tanh(1e4), tanh(-1e4)), (1.0, -1.0));
+    }
+}
