@@ -8,7 +8,7 @@ use super::friction::new_model;
 use super::machine::{Machine, run_error, summary_warnings};
 use super::{CliError, Context, Outcome};
 use crate::config::ModelFile;
-use crate::config::identified::{friction_meaning, friction_unit};
+use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::accumulate::Sums;
@@ -220,7 +220,7 @@ fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
             name: info.name.to_owned(),
             theta: info.theta,
             joint: None,
-            unit: info.unit.to_owned(),
+            unit: inertia_unit(robot, info.unit, machine.file.torque_unit(0)),
             meaning: info.meaning.to_owned(),
             value,
             std,

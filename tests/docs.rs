@@ -1,0 +1,141 @@
+//! The documents say what the results say, and point to what is there.
+
+#[path = "../examples/docs_tables/blocks.rs"]
+mod blocks;
+#[path = "../examples/docs_tables/tables.rs"]
+mod tables;
+
+use std::fs;
+use std::path::Path;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn every_table_is_that_of_its_result() {
+    for path in blocks::documents(root()) {
+        let text = fs::read_to_string(&path).unwrap();
+        let name = path.strip_prefix(root()).unwrap().display();
+        let anew = blocks::rewritten(&text, &tables::render)
+            .unwrap_or_else(|problem| panic!("{name}: {problem}"));
+        assert!(
+            anew == text,
+            "{name} is not that of docs/results: cargo run --example docs_tables"
+        );
+    }
+}
+
+#[test]
+fn every_result_stands_in_a_document() {
+    let texts: String = blocks::documents(root())
+        .iter()
+        .map(|path| fs::read_to_string(path).unwrap())
+        .collect();
+    let blocks: Vec<&str> = texts
+        .lines()
+        .filter(|line| line.starts_with("<!-- table: "))
+        .collect();
+    for entry in fs::read_dir(root().join("docs/results")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_string_lossy();
+        let shown = |line: &&&str| line.split_whitespace().any(|word| word == name);
+        assert!(
+            blocks.iter().find(shown).is_some(),
+            "{name} is shown nowhere"
+        );
+    }
+}
+
+/// Targets of `[text](target)` and `![text](target)`.
+fn links(text: &str) -> Vec<&str> {
+    let after = text.split("](").skip(1);
+    after.filter_map(|rest| rest.split(')').next()).collect()
+}
+
+#[test]
+fn every_link_inside_the_repository_leads_somewhere() {
+    for path in blocks::documents(root()) {
+        let text = fs::read_to_string(&path).unwrap();
+        for link in links(&text) {
+            let target = link.split('#').next().unwrap();
+            if target.is_empty() || target.contains("://") {
+                continue;
+            }
+            let there = path.parent().unwrap().join(target);
+            assert!(there.exists(), "{}: {link}", path.display());
+        }
+    }
+}
+
+#[test]
+fn every_figure_stands_in_a_document_and_is_the_tools_own() {
+    let texts: Vec<String> = blocks::documents(root())
+        .iter()
+        .map(|path| fs::read_to_string(path).unwrap())
+        .collect();
+    for entry in fs::read_dir(root().join("docs/figures")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy();
+        assert!(name.ends_with(".svg"), "{name}");
+        let shown = texts
+            .iter()
+            .any(|text| links(text).iter().any(|l| l.ends_with(&*name)));
+        assert!(shown, "{name} is shown nowhere");
+    }
+}
+
+#[test]
+fn a_block_is_replaced_and_the_rest_is_kept() {
+    let text = "a\n<!-- table: kind file -->\nold\n<!-- end of table -->\nb\n";
+    let anew = blocks::rewritten(text, &|words| Ok(words.join("+"))).unwrap();
+    assert_eq!(
+        anew,
+        "a\n<!-- table: kind file -->\n\nkind+file\n\n<!-- end of table -->\nb\n"
+    );
+    let unknown = blocks::rewritten(text, &tables::render);
+    assert!(unknown.unwrap_err().contains("no known kind"));
+    let open = "<!-- table: kind file -->\nold\n";
+    assert!(blocks::rewritten(open, &|_| Ok(String::new())).is_err());
+}
+
+/// Words of two texts; numbers may differ in what the table rounds away, or by a little noise.
+fn same_but_for_rounding(committed: &str, fresh: &str) -> Result<(), String> {
+    let lines = |text: &str| -> Vec<String> { text.lines().map(str::to_owned).collect() };
+    let (a, b) = (lines(committed), lines(fresh));
+    if a.len() != b.len() {
+        return Err(format!("{} lines, now {}", a.len(), b.len()));
+    }
+    for (a, b) in a.iter().zip(&b) {
+        let words = |line: &str| -> Vec<String> {
+            let trim = |word: &str| word.trim_matches(['(', ')', ',', ';']).to_owned();
+            // rules are as long as the longest number is
+            let no_rule = |word: &&str| !word.starts_with("--");
+            line.split_whitespace().filter(no_rule).map(trim).collect()
+        };
+        let near = |a: &String, b: &String| match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) => (a - b).abs() <= 0.05 * a.abs().max(b.abs()) + 0.11,
+            _ => a == b,
+        };
+        let (x, y) = (words(a), words(b));
+        if x.len() != y.len() || !x.iter().zip(&y).all(|(x, y)| near(x, y)) {
+            return Err(format!("committed: {a}\nnow:       {b}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_readme_shows_what_identify_prints() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = assert_cmd::Command::cargo_bin("cft-ident")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["identify", "-q"])
+        .assert()
+        .code(0);
+    let fresh = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+    let committed = fs::read_to_string(root().join("docs/results/identify.txt")).unwrap();
+    let same = same_but_for_rounding(&committed, &fresh);
+    assert!(same.is_ok(), "{}\nrun docs/generate", same.unwrap_err());
+}
