@@ -181,6 +181,7 @@ fn campaign(seed: u64) -> Value {
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let mut joints = Vec::new();
     let mut known = Vec::new();
+    #[allow(clippy::needless_range_loop)] // the index is also that of seeds, laws and inertias
     for j in 0..4 {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
             .reference(Setup::Tuedacs)
