@@ -1,11 +1,11 @@
 //! From the `[log]` section to the columns that the reader looks for.
 
 use super::log_section::{
-    ActuatorChannels, ChannelsKind, DelimiterKind, JointChannels, PositionUnit, TimeUnit,
-    TorqueUnit,
+    ActuatorChannels, ChannelsKind, DelimiterKind, JointChannels, PositionUnit, StampKind,
+    TimeUnit, TorqueUnit,
 };
 use super::robot_file::{ModelKind, RobotFile};
-use crate::log::{Channel, Channels, Conversion, Delimiter, Layout};
+use crate::log::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::ENCODER_SCALE;
 use crate::robot::cft::{COORDINATES, Setup, pantograph};
@@ -59,9 +59,18 @@ impl RobotFile {
     fn joint_layout(&self) -> Layout {
         let robot = self.robot();
         let plain = JointChannels::default();
+        let named = |joint: &String| {
+            let channels = self.log.joint.get(joint);
+            let name = channels.and_then(|channels| channels.name.clone());
+            name.unwrap_or_else(|| joint.clone())
+        };
         let mut layout = Layout {
             time: self.time_channel(),
             delimiter: self.delimiter(),
+            messages: self.messages(
+                robot.joint_names().iter().map(named).collect(),
+                Channels::Joint,
+            ),
             ..Layout::joint_columns(robot.joint_names())
         };
         for (index, joint) in robot.joint_names().iter().enumerate() {
@@ -159,7 +168,25 @@ impl RobotFile {
             channels: Channels::Actuator,
             conversion: Some(to_joint_side(self.robot.setup.unwrap_or_default())),
             delimiter: self.delimiter(),
+            messages: self.messages(COORDINATES.map(str::to_owned).to_vec(), Channels::Actuator),
             otherwise: None,
+        }
+    }
+
+    /// Where the channels stand in recordings of messages, for joints of these names there.
+    fn messages(&self, joints: Vec<String>, channels: Channels) -> Messages {
+        Messages {
+            topic: self.log.topic.clone(),
+            torque_topic: self.log.torque_topic.clone(),
+            stamp: match self.log.stamp {
+                StampKind::Auto => Stamp::Auto,
+                StampKind::Header => Stamp::Header,
+                StampKind::Log => Stamp::Log,
+                StampKind::Publish => Stamp::Publish,
+            },
+            joints,
+            torque_held: self.torque_held(channels),
+            torque_delay_s: self.log.torque_delay_s.unwrap_or(0.0),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::robot::cft::COORDINATES;
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let log = &file.log;
     known_names(document, &["log", "joint"], &log.joint, &file.joint_names())?;
+    document.finite(&["log", "torque_delay_s"], log.torque_delay_s.as_slice())?;
     // Which key reads which column: no column may be read twice.
     let mut columns: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     if let Some(time) = &log.time {

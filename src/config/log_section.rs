@@ -1,7 +1,9 @@
 //! The `[log]` section: how the logs of a machine are written.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
+use serde::de::{Deserializer, Error, Visitor};
 use serde::{Deserialize, Serialize};
 
 use super::robot_file::is_default;
@@ -139,12 +141,35 @@ pub enum ChannelsKind {
     Actuator,
 }
 
+/// Which time of a message is the time of its row.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StampKind {
+    /// The field that `time` names, else the header's stamp, else the time of recording.
+    #[default]
+    Auto,
+    /// The stamp in the message's header.
+    Header,
+    /// When the message was recorded.
+    Log,
+    /// When the message was published.
+    Publish,
+}
+
 /// `[log.joint.NAME]`: SI value = sign x scale x unit x logged value + offset.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointChannels {
-    /// Column of the position; `q_NAME` where absent.
+    /// Name of the joint in messages that list their joints by name; NAME where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Column of the position, by name or by number from 1, or field of a message; `q_NAME` where
+    /// absent.
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub position: Option<String>,
     /// Unit of the position column.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -159,10 +184,18 @@ pub struct JointChannels {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_offset: Option<f64>,
     /// Column of the velocity; `dq_NAME` where absent, and then optional.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub velocity: Option<String>,
     /// Column of the torque; `tau_NAME` where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub torque: Option<String>,
     /// Unit of the torque column.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -183,7 +216,11 @@ pub struct JointChannels {
 #[serde(deny_unknown_fields)]
 pub struct ActuatorChannels {
     /// Column of the position; `x_c1`.. where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub position: Option<String>,
     /// Unit of the position: SI where absent, or `counts` (Table 5).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -195,7 +232,11 @@ pub struct ActuatorChannels {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home: Option<f64>,
     /// Column of the volts; `u_1`.. where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub volts: Option<String>,
     /// 1 or -1.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -206,8 +247,12 @@ pub struct ActuatorChannels {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
-    /// Column of the time; `t` where absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Column of the time, or field of a message; `t` where absent.
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub time: Option<String>,
     /// Unit of the time column.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -215,6 +260,18 @@ pub struct LogSection {
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
     pub delimiter: DelimiterKind,
+    /// Topic of a recording that holds the positions; found where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Topic of the torques, where they have one of their own; found where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_topic: Option<String>,
+    /// Which time of a message counts.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub stamp: StampKind,
+    /// Time by which torques of a topic of their own lag behind the positions [s]; it is taken off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque_delay_s: Option<f64>,
     /// Joint or actuator channels.
     #[serde(default, skip_serializing_if = "is_default")]
     pub channels: ChannelsKind,
@@ -230,4 +287,30 @@ pub struct LogSection {
     /// Raw columns by actuator coordinate.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub actuator: BTreeMap<String, ActuatorChannels>,
+}
+
+/// A column by its name, or by its number from 1: `3` is kept as `#3`.
+fn column<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    struct Column;
+    impl Visitor<'_> for Column {
+        type Value = String;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("the name of a column, or its number from 1")
+        }
+
+        fn visit_str<E: Error>(self, name: &str) -> Result<String, E> {
+            Ok(name.to_owned())
+        }
+
+        fn visit_i64<E: Error>(self, number: i64) -> Result<String, E> {
+            if number < 1 {
+                return Err(E::custom(format!(
+                    "columns are numbered from 1, not {number}"
+                )));
+            }
+            Ok(format!("#{number}"))
+        }
+    }
+    deserializer.deserialize_any(Column).map(Some)
 }

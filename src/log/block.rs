@@ -45,4 +45,44 @@ impl Block {
         self.dq.clear();
         self.line0 = 0;
     }
+
+    /// Width of each matrix: positions, torques, velocities.
+    fn widths(&self) -> [usize; 3] {
+        [&self.q, &self.tau, &self.dq].map(|x| x.len().checked_div(self.len()).unwrap_or(0))
+    }
+
+    /// Whether torques and velocities of the last row are those of the row before it.
+    pub(super) fn repeats_beside_positions(&self) -> bool {
+        let [_, tau, dq] = self.widths();
+        let same = |x: &[f64], width: usize| {
+            let Some(last) = x.len().checked_sub(width) else {
+                return false;
+            };
+            last >= width && x[last - width..last] == x[last..]
+        };
+        self.len() > 1 && same(&self.tau, tau) && same(&self.dq, dq)
+    }
+
+    /// Removes `rows` rows right before the last one.
+    pub(super) fn remove_before_last(&mut self, rows: usize) {
+        let end = self.len().saturating_sub(1);
+        let from = end.saturating_sub(rows);
+        let [q, tau, dq] = self.widths();
+        self.t.drain(from..end);
+        self.q.drain(from * q..end * q);
+        self.tau.drain(from * tau..end * tau);
+        self.dq.drain(from * dq..end * dq);
+    }
+
+    /// Takes the last `rows` rows of another block, into this one, which is empty.
+    pub(super) fn split_from(&mut self, other: &mut Self, rows: usize) {
+        self.clear();
+        let from = other.len().saturating_sub(rows);
+        let [q, tau, dq] = other.widths();
+        self.line0 = other.line0 + from as u64;
+        self.t.extend(other.t.drain(from..));
+        self.q.extend(other.q.drain(from * q..));
+        self.tau.extend(other.tau.drain(from * tau..));
+        self.dq.extend(other.dq.drain(from * dq..));
+    }
 }

@@ -1,7 +1,7 @@
 //! Finds the channels of a layout among the columns of a header.
 
 use super::LogError;
-use super::layout::{Channel, Layout};
+use super::layout::{Channel, Layout, column_number};
 use super::names::{escape, list, nearest};
 
 /// Where a channel stands and how its numbers become SI.
@@ -65,9 +65,13 @@ impl Header<'_> {
     }
 
     fn indices<'h>(&'h self, channel: &'h Channel) -> impl Iterator<Item = usize> + 'h {
+        let number = column_number(&channel.column);
         let names = self.names.iter().enumerate();
         names
-            .filter(|(_, name)| **name == channel.column || name_and_unit(name).0 == channel.column)
+            .filter(move |(index, name)| match number {
+                Some(number) => *index == number,
+                None => **name == channel.column || name_and_unit(name).0 == channel.column,
+            })
             .map(|(index, _)| index)
     }
 

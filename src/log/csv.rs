@@ -1,13 +1,15 @@
-//! Text logs: header, then rows one by one.
+//! Text logs as they lie on the disk: header, then records one by one.
 
-use std::fs::File;
-use std::io::{self, Chain, Cursor, Read};
+use std::fmt;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
 
-use super::head::{self, HEAD};
-use super::layout::Delimiter;
+use super::content::{Bytes, Content};
+use super::head;
+use super::layout::Layout;
+use super::time::Instant;
 use super::{LogError, escape, number, source};
 
 /// Bytes that one row may take.
@@ -16,11 +18,16 @@ const LONGEST_ROW: usize = 1 << 20;
 const BUFFER: usize = 1 << 17;
 
 /// Ends the reading of a row that never ends, before it fills the memory.
-#[derive(Debug)]
 struct Guard {
-    inner: Chain<Cursor<Vec<u8>>, File>,
+    inner: Bytes,
     /// Bytes handed out since the last row was complete.
     pending: usize,
+}
+
+impl fmt::Debug for Guard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Guard")
+    }
 }
 
 impl Read for Guard {
@@ -53,19 +60,16 @@ pub(super) struct Rows {
     /// Columns are parted by runs of spaces: where the fields that are not empty stand.
     runs: Option<Vec<usize>>,
     decimal_comma: bool,
+    /// The record is a row that was not handed out yet.
+    ahead: bool,
 }
 
 impl Rows {
-    /// Opens a text log and reads its header.
-    pub(super) fn open(path: &Path, delimiter: Delimiter) -> Result<Self, LogError> {
-        let mut file = source::open(path)?;
-        let mut begin = Vec::with_capacity(HEAD);
-        Read::by_ref(&mut file)
-            .take(HEAD as u64)
-            .read_to_end(&mut begin)
-            .map_err(|error| source::failed(path, error))?;
-        head::refuse_other_formats(path, &begin)?;
-        let found = head::look_at(path, &begin, delimiter)?;
+    /// Reads the header of a text log.
+    pub(super) fn new(path: &Path, content: Content, layout: &Layout) -> Result<Self, LogError> {
+        let begin = content.head();
+        head::refuse_other_formats(path, begin)?;
+        let found = head::look_at(path, begin, layout.delimiter, layout.by_number())?;
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -73,7 +77,7 @@ impl Rows {
             .delimiter(found.delimiter)
             .buffer_capacity(BUFFER)
             .from_reader(Guard {
-                inner: Cursor::new(begin).chain(file),
+                inner: content.into_bytes(),
                 pending: 0,
             });
         let mut rows = Self {
@@ -85,25 +89,25 @@ impl Rows {
             header_line: found.header_line,
             runs: found.spaces.then(Vec::new),
             decimal_comma: found.delimiter != b',',
+            ahead: found.headerless,
         };
-        match found.header_in_comment {
-            Some((names, _)) => {
-                let parts = head::split(&names, found.delimiter, found.spaces);
-                rows.header = parts.into_iter().map(str::to_owned).collect();
+        if let Some((names, _)) = found.header_in_comment {
+            let parts = head::split(&names, found.delimiter, found.spaces);
+            rows.header = parts.into_iter().map(str::to_owned).collect();
+            return Ok(rows);
+        }
+        while rows.advance()? && rows.is_blank() {}
+        let names = (0..rows.fields()).map(|index| {
+            if found.headerless {
+                return format!("#{}", index + 1);
             }
-            None => {
-                while rows.advance()? && rows.is_blank() {}
-                let count = rows.fields();
-                let names = (0..count).map(|index| {
-                    let name = String::from_utf8_lossy(rows.field(index).unwrap_or_default());
-                    name.trim().to_owned()
-                });
-                rows.header = names.collect();
-                // A delimiter at the end of the line names no column.
-                if rows.header.last().is_some_and(String::is_empty) {
-                    rows.header.pop();
-                }
-            }
+            let name = String::from_utf8_lossy(rows.field(index).unwrap_or_default());
+            name.trim().to_owned()
+        });
+        rows.header = names.collect();
+        // A delimiter at the end of the line names no column.
+        if rows.header.last().is_some_and(String::is_empty) {
+            rows.header.pop();
         }
         Ok(rows)
     }
@@ -121,6 +125,9 @@ impl Rows {
     /// Goes on to the next row; false at the end of the file.
     pub(super) fn next(&mut self) -> Result<bool, LogError> {
         loop {
+            if std::mem::take(&mut self.ahead) {
+                return Ok(self.fields() > 0);
+            }
             std::mem::swap(&mut self.record, &mut self.previous);
             if !self.advance()? {
                 return Ok(false);
@@ -228,12 +235,11 @@ impl Rows {
         let text = String::from_utf8_lossy(field);
         let text = text.trim();
         let name = self.header.get(column).map(|name| escape(name));
-        let (file, line) = (self.file(), self.line());
+        let at = self.place();
         let column = name.unwrap_or_default();
         if number::parse(field).is_some() {
             return LogError::NotFinite {
-                file,
-                line,
+                at,
                 column,
                 text: escape(text),
             };
@@ -244,17 +250,30 @@ impl Rows {
         } else if self.decimal_comma && number::parse(with_point.as_bytes()).is_some() {
             "write decimal points instead of decimal commas, e.g. `sed 's/,/./g'`"
         } else if text.contains(':') {
-            "write the time as seconds from the start"
+            "write the time as seconds from the start, or with its date: 2024-05-01T12:34:56.789Z"
         } else {
             "correct the field or delete the row"
         };
         LogError::NotANumber {
-            file,
-            line,
+            at,
             column,
             text: escape(text),
             remedy,
         }
+    }
+
+    /// The instant in a column of the current row: a date, or a number in units of 10^`power` s.
+    pub(super) fn instant(&self, column: usize, power: i32) -> Result<Instant, LogError> {
+        let field = self.field(column).unwrap_or_default();
+        Instant::parse_decimal(field, power)
+            .or_else(|| Instant::parse_iso(field))
+            .ok_or_else(|| self.no_number(column))
+    }
+
+    /// Whether a column of the current row holds a date.
+    pub(super) fn is_date(&self, column: usize) -> bool {
+        self.field(column)
+            .is_some_and(|field| Instant::parse_iso(field).is_some())
     }
 
     /// Whether the current row equals the one before it, byte for byte.
@@ -265,6 +284,12 @@ impl Rows {
     /// The file for a message.
     pub(super) fn file(&self) -> String {
         source::shown(&self.path)
+    }
+
+    /// File and line of the current row, for a message.
+    #[cold]
+    pub(super) fn place(&self) -> String {
+        format!("{}:{}", self.file(), self.line())
     }
 
     /// Line on which the current row ends.
@@ -285,8 +310,9 @@ impl Rows {
 
 /// 1 + the line ends among the first `end` bytes; `\r\n` and a lone `\r` count as one each.
 fn count_lines(path: &Path, end: u64) -> io::Result<u64> {
-    let mut file = File::open(path)?.take(end);
-    let mut buffer = vec![0; HEAD];
+    let content = Content::open(path).map_err(io::Error::other)?;
+    let mut file = content.into_bytes().take(end);
+    let mut buffer = vec![0; BUFFER];
     let (mut lines, mut after_return) = (1, false);
     loop {
         let count = file.read(&mut buffer)?;

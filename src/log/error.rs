@@ -35,6 +35,50 @@ pub enum LogError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A part of a recording that is not what was written.
+    #[error(
+        "{file}: {part} is damaged: its checksum is {calculated:08x}, not {saved:08x}; copy the file again from where it was recorded, or use the part before it: FILE@0..10s"
+    )]
+    Damaged {
+        /// File as the user named it.
+        file: String,
+        /// The part.
+        part: String,
+        /// Checksum in the file.
+        saved: u32,
+        /// Checksum of what was read.
+        calculated: u32,
+    },
+    /// A database that is no recording, or that cannot be read.
+    #[error(
+        "{file}: is no rosbag2 database that can be read: {reason}; check it with `ros2 bag info`"
+    )]
+    Database {
+        /// File as the user named it.
+        file: String,
+        /// What SQLite says, or what it lacks.
+        reason: String,
+    },
+    /// A folder that is no recording.
+    #[error(
+        "{folder}: {problem}; name a file inside this folder, or the folder of one rosbag2 recording"
+    )]
+    Folder {
+        /// Folder as the user named it.
+        folder: String,
+        /// Why it is none.
+        problem: &'static str,
+    },
+    /// A recording without messages that hold the robot's channels.
+    #[error("{file}: {problem}; {remedy}")]
+    Topic {
+        /// File as the user named it.
+        file: String,
+        /// What was looked for and not found.
+        problem: String,
+        /// What there is, and the key that chooses.
+        remedy: String,
+    },
     /// No header line.
     #[error("{file}: is empty; record again, or check that the recorder closed the file")]
     Empty {
@@ -43,7 +87,7 @@ pub enum LogError {
     },
     /// The first line holds numbers.
     #[error(
-        "{file}:{line}: there is no header: the first line holds only numbers; add a line that names the columns, e.g. `t,q_q1,tau_q1`"
+        "{file}:{line}: there is no header: the first line holds only numbers; add a line that names the columns, e.g. `t,q_q1,tau_q1`, or give them by number in [log] of the robot file, e.g. `time = 1`"
     )]
     NoHeader {
         /// File as the user named it.
@@ -134,12 +178,10 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// Text where a number is needed.
-    #[error("{file}:{line}: column `{column}` holds `{text}`, which is no number; {remedy}")]
+    #[error("{at}: column `{column}` holds `{text}`, which is no number; {remedy}")]
     NotANumber {
-        /// File as the user named it.
-        file: String,
-        /// Line.
-        line: u64,
+        /// File and line, or file and message.
+        at: String,
         /// The column.
         column: String,
         /// What it holds.
@@ -149,13 +191,11 @@ pub enum LogError {
     },
     /// NaN or infinity.
     #[error(
-        "{file}:{line}: column `{column}` holds {text}; delete the rows without a measurement: a gap in time is handled, a made-up number is not"
+        "{at}: column `{column}` holds {text}; delete the rows without a measurement: a gap in time is handled, a made-up number is not"
     )]
     NotFinite {
-        /// File as the user named it.
-        file: String,
-        /// Line.
-        line: u64,
+        /// File and line, or file and message.
+        at: String,
         /// The column.
         column: String,
         /// What it holds.
@@ -163,39 +203,23 @@ pub enum LogError {
     },
     /// Two rows at one time.
     #[error(
-        "{file}:{line}: time stands still at {t} s, with other values than the row before; check the clock of the recorder or the time column `{column}`"
+        "{at}: time stands still at {t} s, with other values than the row before; check the clock of the recorder or the time column `{column}`"
     )]
     TimeStandsStill {
-        /// File as the user named it.
-        file: String,
-        /// Line of the second row.
-        line: u64,
+        /// File and line, or file and message.
+        at: String,
         /// The time [s].
         t: f64,
         /// The time column.
         column: String,
     },
-    /// The same row twice.
-    #[error(
-        "{file}:{line}: the row repeats the row before it (t = {t} s); delete duplicate rows: each sample may stand there once"
-    )]
-    DuplicateRow {
-        /// File as the user named it.
-        file: String,
-        /// Line of the second row.
-        line: u64,
-        /// The time [s].
-        t: f64,
-    },
     /// Time runs backwards.
     #[error(
-        "{file}:{line}: time runs backwards, from {before} s to {t} s; sort the rows by time, or split the file where a second recording begins"
+        "{at}: time runs backwards, from {before} s to {t} s; sort the rows by time, or split the file where a second recording begins"
     )]
     TimeBackwards {
-        /// File as the user named it.
-        file: String,
-        /// Line.
-        line: u64,
+        /// File and line, or file and message.
+        at: String,
         /// Time of the row before [s].
         before: f64,
         /// Time of this row [s].
@@ -217,13 +241,11 @@ pub enum LogError {
     },
     /// An actuator position that the robot cannot take.
     #[error(
-        "{file}:{line}: the actuator positions {positions} belong to no pose of the robot; check units, homing offsets and column order in [log.actuator]"
+        "{at}: the actuator positions {positions} belong to no pose of the robot; check units, homing offsets and column order in [log.actuator]"
     )]
     NoPose {
-        /// File as the user named it.
-        file: String,
-        /// Line.
-        line: u64,
+        /// File and line, or file and message.
+        at: String,
         /// x_c1..x_c4 [m, m, rad, m].
         positions: String,
     },

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
+use super::content::HEAD;
 use super::layout::Delimiter;
+use super::time::Instant;
 use super::{LogError, number, source};
-
-/// Bytes that are looked at.
-pub(super) const HEAD: usize = 1 << 16;
 
 /// What the head of a file tells.
 pub(super) struct Head {
@@ -16,34 +15,19 @@ pub(super) struct Head {
     /// Column names that stand in a comment line, as numpy writes them.
     pub(super) header_in_comment: Option<(String, u64)>,
     pub(super) header_line: u64,
+    /// The first line holds numbers, and columns are given by number.
+    pub(super) headerless: bool,
 }
 
 /// Names a file that is no plain text, by its first bytes.
 pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogError> {
-    let (kind, remedy) = if head.starts_with(b"\x89MCAP0") {
-        (
-            "an MCAP recording, which this version does not read",
-            "convert it to CSV with a header line",
-        )
-    } else if head.starts_with(b"SQLite format 3\0") {
-        (
-            "a rosbag2 database, which this version does not read",
-            "convert it to CSV with a header line",
-        )
-    } else if head.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) {
-        (
-            "compressed with zstd, which this version does not read",
-            "decompress it with `unzstd`",
-        )
-    } else if head.starts_with(&[0x1f, 0x8b]) {
-        (
-            "compressed with gzip, which this version does not read",
-            "decompress it with `gunzip`",
-        )
-    } else if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
+    let (kind, remedy) = if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
         ("UTF-16 text", "save it as UTF-8")
     } else if head.iter().take(4096).any(|byte| *byte == 0) {
-        ("binary", "give a text log with a header line")
+        (
+            "binary, and neither an MCAP recording nor a rosbag2 database",
+            "give a text log with a header line, a .mcap or a .db3 file",
+        )
     } else {
         return Ok(());
     };
@@ -54,8 +38,13 @@ pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogEr
     })
 }
 
-/// Finds comment sign, delimiter and header.
-pub(super) fn look_at(path: &Path, head: &[u8], wanted: Delimiter) -> Result<Head, LogError> {
+/// Finds comment sign, delimiter and header; a log may lack one where columns are given `by_number`.
+pub(super) fn look_at(
+    path: &Path,
+    head: &[u8],
+    wanted: Delimiter,
+    by_number: bool,
+) -> Result<Head, LogError> {
     let file = || source::shown(path);
     let bytes = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
     let text = String::from_utf8_lossy(bytes);
@@ -96,21 +85,24 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: Delimiter) -> Result<Hea
     let fields = split(line, delimiter, spaces);
     let mut header_in_comment = None;
     let mut header_line = number;
-    if fields
-        .iter()
-        .all(|field| number::parse(field.as_bytes()).is_some())
-    {
+    let mut headerless = false;
+    if fields.iter().all(|field| is_datum(field)) {
         // numpy.savetxt puts the names into a comment.
         let named =
             last_comment.filter(|(names, _)| split(names, delimiter, spaces).len() == fields.len());
-        let Some((names, at)) = named else {
-            return Err(LogError::NoHeader {
-                file: file(),
-                line: number,
-            });
-        };
-        header_in_comment = Some((names.to_owned(), at));
-        header_line = at;
+        match named {
+            Some((names, at)) => {
+                header_in_comment = Some((names.to_owned(), at));
+                header_line = at;
+            }
+            None if by_number => headerless = true,
+            None => {
+                return Err(LogError::NoHeader {
+                    file: file(),
+                    line: number,
+                });
+            }
+        }
     }
     Ok(Head {
         comment: comment.unwrap_or(b'#'),
@@ -118,7 +110,13 @@ pub(super) fn look_at(path: &Path, head: &[u8], wanted: Delimiter) -> Result<Hea
         spaces,
         header_in_comment,
         header_line,
+        headerless,
     })
+}
+
+/// Whether a field is a number or a date, and so no name of a column.
+fn is_datum(field: &str) -> bool {
+    number::parse(field.as_bytes()).is_some() || Instant::parse_iso(field.as_bytes()).is_some()
 }
 
 /// The delimiter byte, and whether runs of it count as one.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 /// One channel: SI value = `factor` x logged number + `offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Name of the column.
+    /// Name of the column; `#3` is the third one, whatever its name.
     pub column: String,
     /// Unit of the logged number, as a header may state it: `rad`, `deg`, `m`, `N`, ...
     pub unit: String,
@@ -54,7 +54,7 @@ pub enum Channels {
 
 /// Turns one row of actuator positions and volts into joint positions and torques, in place.
 ///
-/// Returns false where the actuator position belongs to no pose of the robot.
+/// Returns false, and leaves both as they are, where the position belongs to no pose of the robot.
 type RowMap = dyn Fn(&mut [f64], &mut [f64]) -> bool + Send + Sync;
 
 /// A conversion that the reader applies to every row, so that its blocks are joint-side.
@@ -79,6 +79,42 @@ impl fmt::Debug for Conversion {
     }
 }
 
+/// Which time of a message is the time of its row.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Stamp {
+    /// The field that the robot file names, else the header's stamp where messages have one, else
+    /// the time of recording.
+    #[default]
+    Auto,
+    /// The stamp in the message's header.
+    Header,
+    /// When the message was recorded.
+    Log,
+    /// When the message was published.
+    Publish,
+}
+
+/// Where the channels stand in recordings of messages.
+///
+/// A channel's column is the path of a field there (`a.b[2]`, `/a/b/2`). Where a message has no such
+/// field, the channel is looked for as `position`, `velocity` or `effort` of the joint that the list
+/// `name` holds, as in `sensor_msgs/msg/JointState`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Messages {
+    /// Topic of the positions, and of all else that it holds; found where absent.
+    pub topic: Option<String>,
+    /// Topic of the torques, where they have one of their own; found where absent.
+    pub torque_topic: Option<String>,
+    /// Which time of a message counts.
+    pub stamp: Stamp,
+    /// Names of the joints in messages, in joint order.
+    pub joints: Vec<String>,
+    /// A torque of its own topic holds until its next message; else it is interpolated.
+    pub torque_held: bool,
+    /// Time by which the torques of an own topic lag behind the positions [s]; it is taken off.
+    pub torque_delay_s: f64,
+}
+
 /// Which columns are read.
 #[derive(Debug, Clone)]
 pub struct Layout {
@@ -98,6 +134,8 @@ pub struct Layout {
     pub conversion: Option<Conversion>,
     /// What parts the columns.
     pub delimiter: Delimiter,
+    /// Where the channels stand in recordings of messages.
+    pub messages: Messages,
     /// Layout to use instead where the log has none of this layout's positions.
     pub otherwise: Option<Box<Layout>>,
 }
@@ -111,17 +149,30 @@ impl Layout {
                 .map(|joint| Channel::si(format!("{prefix}{}", joint.as_ref()), ""))
                 .collect()
         };
+        let joints: Vec<String> = joints.iter().map(|j| j.as_ref().to_owned()).collect();
         Self {
-            joints: joints.iter().map(|j| j.as_ref().to_owned()).collect(),
+            messages: Messages {
+                joints: joints.clone(),
+                ..Messages::default()
+            },
             time: Channel::si("t", "s"),
             positions: each("q_"),
             torques: each("tau_"),
             velocities: each("dq_"),
+            joints,
             channels: Channels::Joint,
             conversion: None,
             delimiter: Delimiter::Auto,
             otherwise: None,
         }
+    }
+
+    /// Whether any column is given by its number (`#1`, `#2`, ...), as a log without a header needs.
+    pub(super) fn by_number(&self) -> bool {
+        let mut channels = (self.positions.iter())
+            .chain(&self.torques)
+            .chain(std::iter::once(&self.time));
+        channels.any(|channel| column_number(&channel.column).is_some())
     }
 
     /// The same layout for a log that need not hold torques: blocks then have an empty `tau`.
@@ -134,4 +185,10 @@ impl Layout {
             .map(|other| Box::new(other.without_torques()));
         self
     }
+}
+
+/// Index of the column that `#1`, `#2`, ... stands for.
+pub(super) fn column_number(column: &str) -> Option<usize> {
+    let number: usize = column.strip_prefix('#')?.parse().ok()?;
+    number.checked_sub(1)
 }

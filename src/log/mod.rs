@@ -1,11 +1,15 @@
 //! The only readers of recordings: from a file to blocks of t, q, tau in SI units.
 //!
-//! A [`LogSpec`] says which part of which file, a [`Layout`] which columns are which channels;
-//! a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not grow
-//! with the log. What comes out is finite, in strictly increasing time, and in SI.
+//! A [`LogSpec`] says which part of which file, a [`Layout`] which columns or message fields are which
+//! channels; a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not
+//! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
+//!
+//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are told
+//! apart by their first bytes.
 
 mod block;
 mod columns;
+mod content;
 mod csv;
 mod error;
 mod head;
@@ -13,16 +17,22 @@ mod layout;
 mod names;
 mod number;
 mod reader;
+mod recording;
+mod row;
 mod source;
 mod spec;
+mod stale;
+mod text;
+mod time;
 
 pub use block::Block;
 pub use error::LogError;
-pub use layout::{Channel, Channels, Conversion, Delimiter, Layout};
+pub use layout::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
 pub use names::{escape, escape_whole, nearest};
 pub use reader::Reader;
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
+pub use time::Instant;
 
 pub(crate) use names::list;
 pub(crate) use source::{remedy, shown};

@@ -1,18 +1,23 @@
 //! Reads one log block by block, in SI units, inside its span, with its time checked.
 
-use super::columns::{Column, Columns, Header};
-use super::csv::Rows;
+use std::path::PathBuf;
+
 use super::layout::Layout;
+use super::row::{LogRows, Stamped};
 use super::source::{self, Provenance};
+use super::stale::{Stale, Verdict};
+use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 
 /// A log that is being read.
 #[derive(Debug)]
 pub struct Reader {
     spec: LogSpec,
-    rows: Rows,
+    files: Vec<PathBuf>,
+    rows: LogRows,
     layout: Layout,
-    columns: Columns,
+    /// The instant from which times are counted; known from the first row.
+    origin: Option<Instant>,
     /// Times of the span [s], half open; set at the first row.
     span: Option<(f64, f64)>,
     /// Times of the first and the last row of the file so far [s].
@@ -22,6 +27,11 @@ pub struct Reader {
     samples: u64,
     finished: bool,
     activity: Vec<Activity>,
+    stale: Stale,
+    /// Rows that repeat the one before them in everything.
+    duplicates: u64,
+    /// Rows at the end of the last block that may turn out to be stale.
+    pending: Block,
 }
 
 /// What a joint did so far.
@@ -33,33 +43,29 @@ struct Activity {
 }
 
 impl Reader {
-    /// Opens a log and finds its columns.
+    /// Opens a log of any format and finds its channels.
     ///
     /// # Errors
-    /// A file that cannot be read, is no text log, has no header, or lacks a column.
+    /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        let rows = Rows::open(&spec.path, layout.delimiter)?;
-        let header = Header {
-            file: rows.file(),
-            line: rows.header_line(),
-            names: rows.header(),
-        };
-        let layout = match &layout.otherwise {
-            Some(other) if !header.has_any(layout) && header.has_any(other) => (**other).clone(),
-            _ => layout.clone(),
-        };
-        let columns = header.columns(&layout)?;
+        let files = spec.files()?;
+        let (rows, layout) = LogRows::open(&files, layout)?;
+        let joints = layout.positions.len();
         Ok(Self {
             spec: spec.clone(),
-            activity: vec![Activity::default(); columns.torques.len().min(columns.positions.len())],
+            files,
+            activity: vec![Activity::default(); layout.torques.len().min(joints)],
             rows,
+            stale: Stale::new(joints),
             layout,
-            columns,
+            origin: None,
             span: None,
             seen: None,
             used: None,
             samples: 0,
             finished: false,
+            duplicates: 0,
+            pending: Block::default(),
         })
     }
 
@@ -70,7 +76,7 @@ impl Reader {
 
     /// Whether the blocks hold logged velocities.
     pub fn has_velocities(&self) -> bool {
-        !self.columns.velocities.is_empty()
+        self.rows.has_velocities()
     }
 
     /// Rows handed out so far.
@@ -83,19 +89,30 @@ impl Reader {
         self.used.map_or(0.0, |(first, last)| last - first)
     }
 
+    /// The instant from which the times of the blocks are counted, once the first row is read.
+    ///
+    /// Zero unless the log's own times are so far from it (epoch and ISO stamps) that f64 seconds
+    /// would lose digits; then the log's first stamp.
+    pub fn origin(&self) -> Instant {
+        self.origin.unwrap_or_default()
+    }
+
     /// Fills the block with the next rows; false, and an empty block, at the end.
     ///
     /// # Errors
     /// A row that cannot be used, a time that does not increase, fewer than two rows in all, a
-    /// torque channel that is dead; each with its line and what to do.
+    /// torque channel that is dead; each with its place and what to do.
     pub fn read(&mut self, block: &mut Block) -> Result<bool, LogError> {
         block.clear();
+        std::mem::swap(block, &mut self.pending);
         while !self.finished && block.len() < Block::ROWS {
-            if !self.rows.next()? {
-                self.finish()?;
+            let Some(stamp) = self.rows.next()? else {
+                self.finish(block)?;
                 break;
-            }
-            let t = self.time()?;
+            };
+            let Some(t) = self.time(stamp)? else {
+                continue;
+            };
             let (from, to) = match self.span {
                 Some(span) => span,
                 None => self.place_span(t)?,
@@ -104,12 +121,37 @@ impl Reader {
                 continue;
             }
             if t >= to {
-                self.finish()?;
+                self.finish(block)?;
                 break;
             }
             self.take(t, block)?;
         }
+        if !self.finished {
+            // What follows decides about the rows at the end.
+            self.pending.split_from(block, self.stale.undecided());
+        }
+        self.count(block);
         Ok(!block.is_empty())
+    }
+
+    /// What was left out, dropped or chosen so far, one sentence each; call it after the last block.
+    pub fn warnings(&self) -> Vec<String> {
+        let name = super::escape(&self.spec.name());
+        let mut found = self.rows.warnings();
+        if self.duplicates > 0 {
+            found.push(format!(
+                "{} rows are the row before once more, time included, and are left out",
+                self.duplicates
+            ));
+        }
+        if self.stale.dropped() > 0 {
+            found.push(format!(
+                "{} rows repeat the positions of the row before; {} of them, in the middle of a motion, are stale samples and are left out",
+                self.stale.repeated(),
+                self.stale.dropped()
+            ));
+        }
+        found.iter().map(|text| format!("{name}: {text}")).collect()
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
@@ -120,47 +162,40 @@ impl Reader {
         Ok(Provenance {
             name: self.spec.name(),
             span: self.spec.span.label(),
-            sha256: source::sha256(&self.spec.path)?,
+            sha256: source::sha256_of(&self.files)?,
             samples: self.samples,
             duration_s: self.duration_s(),
         })
     }
 
-    /// Time of the current row [s], later than the row before.
-    fn time(&mut self) -> Result<f64, LogError> {
-        let t = time_of(&self.rows, self.columns.time)?;
+    /// Time of the current row [s], later than the row before; `None` for a row that is there twice.
+    #[inline]
+    fn time(&mut self, stamp: Stamped) -> Result<Option<f64>, LogError> {
+        let t = seconds(stamp, &mut self.origin);
         let Some((first, before)) = self.seen else {
             self.seen = Some((t, t));
-            return Ok(t);
+            return Ok(Some(t));
         };
         if t <= before {
-            return Err(self.out_of_order(before, t));
+            return self.out_of_order(before, t);
         }
         self.seen = Some((first, t));
-        Ok(t)
+        Ok(Some(t))
     }
 
     #[cold]
-    fn out_of_order(&self, before: f64, t: f64) -> LogError {
-        let (file, line) = (self.rows.file(), self.rows.line());
-        if t < before {
-            LogError::TimeBackwards {
-                file,
-                line,
-                before,
-                t,
-            }
-        } else if self.rows.repeats() {
-            LogError::DuplicateRow { file, line, t }
+    fn out_of_order(&mut self, before: f64, t: f64) -> Result<Option<f64>, LogError> {
+        if t == before && self.rows.repeats() {
+            self.duplicates += 1;
+            return Ok(None);
+        }
+        let at = self.rows.place();
+        Err(if t < before {
+            LogError::TimeBackwards { at, before, t }
         } else {
             let column = super::escape(&self.layout.time.column);
-            LogError::TimeStandsStill {
-                file,
-                line,
-                t,
-                column,
-            }
-        }
+            LogError::TimeStandsStill { at, t, column }
+        })
     }
 
     /// Turns the span into times, once the first row is known.
@@ -179,26 +214,25 @@ impl Reader {
         Ok(span)
     }
 
-    /// Time of the file's last row [s]: one pass in which only times are parsed.
+    /// Time of the log's last row [s]: one pass in which only times are looked at.
     fn last_time(&self) -> Result<f64, LogError> {
-        let mut rows = Rows::open(&self.spec.path, self.layout.delimiter)?;
+        let mut origin = self.origin;
+        let (mut rows, _) = LogRows::open(&self.files, &self.layout)?;
         let mut last = f64::NEG_INFINITY;
-        while rows.next()? {
-            last = time_of(&rows, self.columns.time)?;
+        while let Some(stamp) = rows.next()? {
+            last = seconds(stamp, &mut origin);
         }
         Ok(last)
     }
 
-    /// Appends the current row to the block.
+    /// Appends the current row to the block, and drops rows before it that turn out to be stale.
     fn take(&mut self, t: f64, block: &mut Block) -> Result<(), LogError> {
         if block.is_empty() {
-            block.line0 = self.rows.line_hint();
+            block.line0 = self.rows.number();
         }
         block.t.push(t);
         let (at_q, at_tau) = (block.q.len(), block.tau.len());
-        append(&self.rows, &self.columns.positions, &mut block.q)?;
-        append(&self.rows, &self.columns.torques, &mut block.tau)?;
-        append(&self.rows, &self.columns.velocities, &mut block.dq)?;
+        self.rows.append(block)?;
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
         for ((activity, q), tau) in self.activity.iter_mut().zip(&*q).zip(&*tau) {
             activity.driven |= *tau != 0.0;
@@ -207,66 +241,69 @@ impl Reader {
         if let Some(conversion) = &self.layout.conversion
             && !conversion.apply(q, tau)
         {
-            return Err(self.no_pose());
+            return Err(LogError::NoPose {
+                at: self.rows.place(),
+                positions: format!("{q:?}"),
+            });
         }
-        self.used = Some((self.used.map_or(t, |(first, _)| first), t));
-        self.samples += 1;
+        let verdict = self
+            .stale
+            .judge(t, &block.q[at_q..], || block.repeats_beside_positions());
+        if let Verdict::Drop(rows) = verdict {
+            block.remove_before_last(rows);
+        }
         Ok(())
     }
 
-    #[cold]
-    fn no_pose(&self) -> LogError {
-        let mut positions = Vec::new();
-        // The numbers were read before, so that a second failure cannot be.
-        let _ = append(&self.rows, &self.columns.positions, &mut positions);
-        LogError::NoPose {
-            file: self.rows.file(),
-            line: self.rows.line(),
-            positions: format!("{positions:?}"),
+    /// Counts the rows that are handed out.
+    fn count(&mut self, block: &Block) {
+        if let (Some(first), Some(last)) = (block.t.first(), block.t.last()) {
+            self.used = Some((self.used.map_or(*first, |(first, _)| first), *last));
+            self.samples += block.len() as u64;
         }
     }
 
     /// Judges what can be judged only at the end.
-    fn finish(&mut self) -> Result<(), LogError> {
+    fn finish(&mut self, block: &Block) -> Result<(), LogError> {
         self.finished = true;
-        if self.samples < 2 {
-            let file = self.rows.file();
+        let file = || source::shown_all(&self.files);
+        let rows = self.samples + block.len() as u64;
+        if rows < 2 {
             return Err(match (self.spec.span, self.seen) {
                 (Span::Percent { .. } | Span::Seconds { .. }, Some((first, last))) => {
                     LogError::EmptySpan {
                         spec: super::escape_whole(&self.spec.to_string()),
-                        rows: self.samples,
+                        rows,
                         duration_s: last - first,
                     }
                 }
-                _ => LogError::TooFewRows {
-                    file,
-                    rows: self.samples,
-                },
+                _ => LogError::TooFewRows { file: file(), rows },
             });
         }
         let dead = self.activity.iter().position(|a| a.moved && !a.driven);
         match dead {
             None => Ok(()),
             Some(joint) => Err(LogError::ZeroTorque {
-                file: self.rows.file(),
+                file: file(),
                 column: super::escape(&self.layout.torques[joint].column),
                 joint: super::escape(&self.layout.joints[joint]),
-                rows: self.samples,
+                rows,
             }),
         }
     }
 }
 
-fn time_of(rows: &Rows, column: Column) -> Result<f64, LogError> {
-    rows.scaled(column.index, column.factor, column.offset)
-}
-
-/// Appends the numbers of some columns of the current row.
+/// Seconds of a row's time, counted from the first one where that is far from zero.
 #[inline]
-fn append(rows: &Rows, columns: &[Column], to: &mut Vec<f64>) -> Result<(), LogError> {
-    for column in columns {
-        to.push(rows.scaled(column.index, column.factor, column.offset)?);
+fn seconds(stamp: Stamped, origin: &mut Option<Instant>) -> f64 {
+    match stamp {
+        Stamped::Seconds(seconds) => seconds,
+        Stamped::Exact(instant) => {
+            let origin = *origin.get_or_insert(match instant.is_far() {
+                true => instant,
+                false => Instant::default(),
+            });
+            instant.since(origin)
+        }
     }
-    Ok(())
 }

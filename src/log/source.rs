@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -73,7 +73,17 @@ pub(crate) fn remedy(error: &io::Error) -> &'static str {
         io::ErrorKind::PermissionDenied => "allow reading it, or copy it to where you may read",
         io::ErrorKind::IsADirectory => "name a file inside this folder",
         io::ErrorKind::InvalidData => "it is no UTF-8 text; name the right file",
+        io::ErrorKind::UnexpectedEof => "it is cut off: copy it again from where it was recorded",
         _ => "check the disk or the connection, and try again",
+    }
+}
+
+/// Several paths for a message: the first, and how many more.
+pub(super) fn shown_all(paths: &[PathBuf]) -> String {
+    match paths {
+        [] => String::new(),
+        [path] => shown(path),
+        [first, rest @ ..] => format!("{} and {} more files", shown(first), rest.len()),
     }
 }
 
@@ -99,17 +109,25 @@ pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
 
 /// SHA-256 of a whole file, hexadecimal.
 pub fn sha256(path: &Path) -> Result<String, LogError> {
-    let mut file = open(path)?;
+    sha256_of(&[path.to_owned()])
+}
+
+/// SHA-256 of whole files one after the other, hexadecimal.
+pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
     let mut hasher = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut buffer) {
-            Ok(0) => return Ok(hexadecimal(&hasher.finalize())),
-            Ok(count) => hasher.update(&buffer[..count]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(failed(path, error)),
+    for path in paths {
+        let mut file = open(path)?;
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(count) => hasher.update(&buffer[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(failed(path, error)),
+            }
         }
     }
+    Ok(hexadecimal(&hasher.finalize()))
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

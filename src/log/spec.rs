@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::LogError;
 use super::names::escape_whole;
-use super::source::file_name;
+use super::source::{failed, file_name, shown};
 
 /// The part of a log that is used.
 ///
@@ -97,7 +97,8 @@ impl Span {
 /// A log file and the part of it that is used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogSpec {
-    /// Path as the user wrote it, without the span.
+    /// Path as the user wrote it, without the span: a file, a folder with the parts of one
+    /// recording, or several files of one recording joined with `+`.
     pub path: PathBuf,
     /// The part that is used.
     pub span: Span,
@@ -113,9 +114,84 @@ impl LogSpec {
     }
 
     /// File name without folders: the only form in which a path enters an output.
+    ///
+    /// Files that are joined with `+` keep it between their names.
     pub fn name(&self) -> String {
-        file_name(&self.path)
+        match self.joined() {
+            None => file_name(&self.path),
+            Some(parts) => {
+                let names: Vec<String> = parts.iter().map(|part| file_name(part)).collect();
+                names.join("+")
+            }
+        }
     }
+
+    /// The files of the log, in order: one file; the recordings in a folder; or `A+B`, joined.
+    ///
+    /// # Errors
+    /// A folder without recordings, or one that cannot be read.
+    pub(super) fn files(&self) -> Result<Vec<PathBuf>, LogError> {
+        if self.path.is_dir() {
+            return recordings_in(&self.path);
+        }
+        Ok(self.joined().unwrap_or_else(|| vec![self.path.clone()]))
+    }
+
+    /// The parts of `A+B`, where there is no file of that name and there are files of theirs.
+    fn joined(&self) -> Option<Vec<PathBuf>> {
+        if self.path.exists() {
+            return None;
+        }
+        let text = self.path.to_str()?;
+        let parts: Vec<PathBuf> = text.split('+').map(PathBuf::from).collect();
+        (parts.len() > 1 && parts.iter().all(|part| part.is_file())).then_some(parts)
+    }
+}
+
+/// Recordings in the folder of a rosbag2 recording, which may be split: `bag_0.mcap`, `bag_1.mcap`.
+fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
+    let entries = std::fs::read_dir(folder).map_err(|error| failed(folder, error))?;
+    let mut found: Vec<(bool, PathBuf)> = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|error| failed(folder, error))?.path();
+        let name = file_name(&path).to_lowercase();
+        let plain = [".zst", ".zstd", ".gz"]
+            .iter()
+            .find_map(|end| name.strip_suffix(end))
+            .unwrap_or(&name);
+        if plain.ends_with(".mcap") || plain.ends_with(".db3") {
+            found.push((plain.ends_with(".mcap"), path));
+        }
+    }
+    found.sort_by_cached_key(|(_, path)| natural(&file_name(path)));
+    let problem = match found.first() {
+        None => "holds no .mcap or .db3 file",
+        Some((mcap, _)) if found.iter().any(|(other, _)| other != mcap) => {
+            "holds both .mcap and .db3 files"
+        }
+        Some(_) => return Ok(found.into_iter().map(|(_, path)| path).collect()),
+    };
+    Err(LogError::Folder {
+        folder: shown(folder),
+        problem,
+    })
+}
+
+/// A key by which `bag_2` stands before `bag_10`: digits as numbers, by their length first.
+fn natural(name: &str) -> Vec<(usize, String)> {
+    let mut parts: Vec<(usize, String)> = Vec::new();
+    let mut digits = false;
+    for c in name.chars() {
+        if parts.is_empty() || c.is_ascii_digit() != digits {
+            digits = c.is_ascii_digit();
+            parts.push((0, String::new()));
+        }
+        if let Some((length, part)) = parts.last_mut() {
+            *length += usize::from(digits && !(part.is_empty() && c == '0'));
+            part.push(c);
+        }
+    }
+    parts
 }
 
 impl fmt::Display for LogSpec {
@@ -206,6 +282,29 @@ mod tests {
             let message = text.parse::<LogSpec>().unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");
         }
+    }
+
+    #[test]
+    fn parts_of_a_split_recording_are_ordered_by_their_numbers() {
+        let mut names = ["bag_10.mcap", "bag_9.mcap", "bag_010.mcap", "bag_1.mcap"];
+        names.sort_by_cached_key(|name| natural(name));
+        assert_eq!(
+            names,
+            ["bag_1.mcap", "bag_9.mcap", "bag_010.mcap", "bag_10.mcap"]
+        );
+    }
+
+    #[test]
+    fn files_that_are_joined_with_a_plus_are_one_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+        std::fs::write(&a, "").unwrap();
+        std::fs::write(&b, "").unwrap();
+        let spec = parse(&format!("{}+{}@0..5s", a.display(), b.display()));
+        assert_eq!(spec.files().unwrap(), [a.clone(), b]);
+        assert_eq!(spec.name(), "a.mcap+b.mcap");
+        let missing = parse(&format!("{}+none.mcap", a.display()));
+        assert_eq!(missing.files().unwrap(), [missing.path]);
     }
 
     #[test]

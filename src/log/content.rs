@@ -1,0 +1,102 @@
+//! Files opened for what they hold: decompressed on the way, and known by their first bytes.
+
+use std::fs::File;
+use std::io::{self, BufReader, Chain, Cursor, Read};
+use std::path::Path;
+
+use super::{LogError, source};
+
+/// Bytes that are looked at.
+pub(super) const HEAD: usize = 1 << 16;
+
+/// What a log is, once it is decompressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Text,
+    Mcap,
+    Sqlite,
+}
+
+/// How a file is compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    None,
+    Gzip,
+    Zstd,
+}
+
+/// The bytes of a log.
+pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
+
+/// An open log of any kind.
+pub(super) struct Content {
+    pub(super) kind: Kind,
+    pub(super) compression: Compression,
+    /// Length of the file as it lies on the disk [bytes].
+    pub(super) size: u64,
+    head: Vec<u8>,
+    rest: Box<dyn Read + Send>,
+}
+
+impl Content {
+    /// Opens a log and looks at its first bytes.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a compressed file that is cut off in its first bytes.
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let fail = |error| source::failed(path, error);
+        let mut file = source::open(path)?;
+        let size = file.metadata().map_err(fail)?.len();
+        let mut magic = Vec::new();
+        Read::by_ref(&mut file)
+            .take(4)
+            .read_to_end(&mut magic)
+            .map_err(fail)?;
+        let compression = match magic[..] {
+            [0x1f, 0x8b, ..] => Compression::Gzip,
+            [0x28, 0xb5, 0x2f, 0xfd] => Compression::Zstd,
+            _ => Compression::None,
+        };
+        let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
+        let mut head = Vec::with_capacity(HEAD);
+        Read::by_ref(&mut rest)
+            .take(HEAD as u64)
+            .read_to_end(&mut head)
+            .map_err(fail)?;
+        let kind = if head.starts_with(b"\x89MCAP") {
+            Kind::Mcap
+        } else if head.starts_with(b"SQLite format 3\0") {
+            Kind::Sqlite
+        } else {
+            Kind::Text
+        };
+        Ok(Self {
+            kind,
+            compression,
+            size,
+            head,
+            rest,
+        })
+    }
+
+    /// First bytes, decompressed.
+    pub(super) fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    /// All bytes from the beginning, decompressed.
+    pub(super) fn into_bytes(self) -> Bytes {
+        Cursor::new(self.head).chain(self.rest)
+    }
+}
+
+fn plain(
+    file: Chain<Cursor<Vec<u8>>, File>,
+    compression: Compression,
+) -> io::Result<Box<dyn Read + Send>> {
+    Ok(match compression {
+        Compression::None => Box::new(file),
+        Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))),
+        Compression::Zstd => Box::new(zstd::stream::read::Decoder::new(file)?),
+    })
+}

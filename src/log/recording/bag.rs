@@ -1,0 +1,226 @@
+//! Messages of one rosbag2 database, in the order in which they were recorded: the only door to SQLite.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rusqlite::limits::Limit;
+use rusqlite::{Connection, OpenFlags, params};
+use tempfile::NamedTempFile;
+
+use super::container::{Break, Head, Topic, Wanted};
+use super::decode::Schema;
+use crate::log::content::{Compression, Content};
+use crate::log::{LogError, source};
+
+/// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
+const PAGE: usize = 256;
+const PAGE_BYTES: usize = 4 << 20;
+/// The largest message that is read [bytes].
+const LARGEST_MESSAGE: i32 = 64 << 20;
+/// Bytes that a database may take once it is decompressed, per byte that it takes compressed.
+const LARGEST_RATIO: u64 = 256;
+
+/// A rosbag2 database that is being read.
+pub(super) struct BagFile {
+    connection: Connection,
+    /// The decompressed database, removed when reading ends.
+    _unpacked: Option<NamedTempFile>,
+    topics: Vec<Topic>,
+    /// Topic by its number in the database.
+    numbers: BTreeMap<i64, usize>,
+    /// The wanted ones, as SQL lists them.
+    filter: String,
+    /// Messages that were asked for, the next one last.
+    page: Vec<Stored>,
+    /// Time and number of the last message of the page.
+    last: (i64, i64),
+    ended: bool,
+    size: u64,
+    broken: Option<Break>,
+    messages: u64,
+}
+
+struct Stored {
+    topic: usize,
+    ns: i64,
+    data: Vec<u8>,
+}
+
+impl BagFile {
+    pub(super) fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
+        let refuse = |reason: String| LogError::Database {
+            file: source::shown(path),
+            reason,
+        };
+        let size = content.size;
+        let unpacked = match content.compression {
+            Compression::None => None,
+            _ => Some(unpack(path, content)?),
+        };
+        let place: PathBuf = match &unpacked {
+            None => path.to_owned(),
+            Some(file) => file.path().to_owned(),
+        };
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let failed = |error: rusqlite::Error| refuse(error.to_string());
+        let connection = Connection::open_with_flags(&place, flags).map_err(failed)?;
+        connection
+            .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
+            .map_err(failed)?;
+        // A database from elsewhere: its views and functions are not trusted.
+        connection
+            .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;")
+            .map_err(failed)?;
+        for table in ["topics", "messages"] {
+            let count: i64 = connection
+                .query_row(
+                    "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?1",
+                    params![table],
+                    |row| row.get(0),
+                )
+                .map_err(failed)?;
+            if count == 0 {
+                return Err(refuse(format!("it has no table `{table}`")));
+            }
+        }
+        let (topics, numbers) = read_topics(&connection).map_err(failed)?;
+        let listed = numbers
+            .iter()
+            .filter(|(_, topic)| wanted.includes(&topics[**topic].name));
+        let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
+        Ok(Self {
+            connection,
+            _unpacked: unpacked,
+            topics,
+            numbers,
+            filter: filter.join(","),
+            page: Vec::new(),
+            last: (i64::MIN, i64::MIN),
+            ended: false,
+            size,
+            broken: None,
+            messages: 0,
+        })
+    }
+
+    pub(super) fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    /// Where and why the database breaks off, once it has.
+    pub(super) fn broken(&self) -> Option<&Break> {
+        self.broken.as_ref()
+    }
+
+    /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
+    pub(super) fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<Head>, LogError> {
+        if self.page.is_empty() && !self.ended {
+            // What is read of a page that breaks off is used.
+            if let Err(error) = self.turn() {
+                self.ended = true;
+                self.broken = Some(Break {
+                    reason: error.to_string(),
+                    bytes: self.size,
+                });
+            }
+            self.page.reverse();
+        }
+        let Some(message) = self.page.pop() else {
+            return Ok(None);
+        };
+        self.messages += 1;
+        *data = message.data;
+        let ns = u64::try_from(message.ns).unwrap_or_default();
+        Ok(Some(Head {
+            topic: message.topic,
+            log_ns: ns,
+            publish_ns: ns,
+            number: self.messages,
+        }))
+    }
+
+    /// Reads the next page.
+    fn turn(&mut self) -> Result<(), rusqlite::Error> {
+        let sql = format!(
+            "SELECT topic_id, timestamp, data, rowid FROM messages \
+             WHERE topic_id IN ({}) AND (timestamp, rowid) > (?1, ?2) \
+             ORDER BY timestamp, rowid LIMIT {PAGE}",
+            self.filter
+        );
+        let mut statement = self.connection.prepare(&sql)?;
+        let mut rows = statement.query(params![self.last.0, self.last.1])?;
+        let (mut count, mut bytes) = (0, 0);
+        while bytes < PAGE_BYTES {
+            let Some(row) = rows.next()? else {
+                self.ended = count < PAGE;
+                break;
+            };
+            count += 1;
+            let (number, ns): (i64, i64) = (row.get(0)?, row.get(1)?);
+            self.last = (ns, row.get(3)?);
+            if let Some(topic) = self.numbers.get(&number) {
+                let data = row.get_ref(2)?.as_bytes()?.to_vec();
+                bytes += data.len();
+                self.page.push(Stored {
+                    topic: *topic,
+                    ns,
+                    data,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+type Topics = (Vec<Topic>, BTreeMap<i64, usize>);
+
+/// Topics with the definitions of their types, which older databases do not hold.
+fn read_topics(connection: &Connection) -> Result<Topics, rusqlite::Error> {
+    let mut definitions: BTreeMap<String, (String, String)> = BTreeMap::new();
+    if let Ok(mut statement) = connection
+        .prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+    {
+        let mut rows = statement.query([])?;
+        while let Some(row) = rows.next()? {
+            definitions.insert(row.get(0)?, (row.get(1)?, row.get(2)?));
+        }
+    }
+    let mut topics = Vec::new();
+    let mut numbers = BTreeMap::new();
+    let mut statement = connection
+        .prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let name: String = row.get(2)?;
+        let (language, text) = definitions.get(&name).cloned().unwrap_or_default();
+        numbers.insert(row.get(0)?, topics.len());
+        topics.push(Topic {
+            name: row.get(1)?,
+            schema: Arc::new(Schema {
+                name,
+                language,
+                text: text.into_bytes(),
+                encoding: row.get(3)?,
+            }),
+        });
+    }
+    Ok((topics, numbers))
+}
+
+/// Decompresses a database: SQLite reads files only.
+fn unpack(path: &Path, content: Content) -> Result<NamedTempFile, LogError> {
+    let failed = |error: io::Error| source::failed(path, error);
+    let largest = content.size.saturating_mul(LARGEST_RATIO) + (1 << 20);
+    let mut file = NamedTempFile::new().map_err(failed)?;
+    let mut bytes = io::Read::take(content.into_bytes(), largest + 1);
+    let count = io::copy(&mut bytes, &mut file).map_err(failed)?;
+    if count > largest {
+        return Err(LogError::Database {
+            file: source::shown(path),
+            reason: format!("it is more than {largest} bytes long once it is decompressed"),
+        });
+    }
+    Ok(file)
+}

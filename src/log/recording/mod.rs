@@ -1,0 +1,22 @@
+//! Recordings of messages: MCAP files and rosbag2 databases, CDR, JSON and protobuf.
+//!
+//! Files become one sequence of messages ([`container`]), in which the topics that hold the robot's
+//! channels are looked for ([`survey`]); their messages become rows ([`rows`]).
+
+mod bag;
+mod cdr;
+mod container;
+mod decode;
+mod delay;
+mod fields;
+mod json;
+mod mcap;
+mod msg;
+mod pairing;
+mod path;
+mod proto;
+mod rows;
+mod survey;
+mod value;
+
+pub(super) use rows::MessageRows;

@@ -1,0 +1,240 @@
+//! Positions of one topic and torques of another, each on its own clock, brought onto that of the positions.
+//!
+//! Positions are differentiated later and stay as they were measured; the torque at their times is
+//! interpolated between its neighbours, or held where the robot file says that it is. A row whose
+//! neighbours lie too far apart is left out: nothing is made up across a dropout.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use super::delay::Delay;
+use crate::log::layout::Messages;
+use crate::log::row::Stamped;
+use crate::log::time::Instant;
+
+/// Rows that wait for their torque at most.
+const WAITING: usize = 1 << 14;
+/// Torques that are kept for positions that come late.
+const KEPT: usize = 1 << 12;
+/// Steps of the torques' clock from which its pace is known.
+const PACE: usize = 31;
+/// A step longer than this many usual ones is a dropout.
+const DROPOUT: f64 = 2.5;
+
+/// What one message, or one row, holds: as logged, not scaled.
+#[derive(Debug, Clone)]
+pub(super) struct Sample {
+    pub(super) stamp: Stamped,
+    pub(super) q: Vec<f64>,
+    pub(super) tau: Vec<f64>,
+    pub(super) dq: Vec<f64>,
+    /// Number of the message in its file.
+    pub(super) number: u64,
+    pub(super) path: PathBuf,
+    /// The file for a message to the user.
+    pub(super) file: String,
+}
+
+impl Default for Sample {
+    fn default() -> Self {
+        Self {
+            stamp: Stamped::Seconds(0.0),
+            q: Vec::new(),
+            tau: Vec::new(),
+            dq: Vec::new(),
+            number: 0,
+            path: PathBuf::new(),
+            file: String::new(),
+        }
+    }
+}
+
+impl Sample {
+    fn instant(&self) -> Instant {
+        match self.stamp {
+            Stamped::Exact(instant) => instant,
+            Stamped::Seconds(seconds) => Instant::default().plus(seconds),
+        }
+    }
+}
+
+/// Rows and torques on their way to each other.
+#[derive(Debug)]
+pub(super) struct Pairing {
+    held: bool,
+    delay_s: f64,
+    waiting: VecDeque<Sample>,
+    torques: VecDeque<(Instant, Vec<f64>)>,
+    ready: VecDeque<Sample>,
+    /// Samples whose memory is used again.
+    spare: Vec<Sample>,
+    steps: VecDeque<f64>,
+    paired: u64,
+    /// Rows without a torque on both sides, and inside dropouts of the torques.
+    outside: u64,
+    dropouts: u64,
+    /// Torques whose time does not increase.
+    disordered: u64,
+    delay: Delay,
+}
+
+impl Pairing {
+    pub(super) fn new(messages: &Messages) -> Self {
+        Self {
+            held: messages.torque_held,
+            delay_s: messages.torque_delay_s,
+            waiting: VecDeque::new(),
+            torques: VecDeque::new(),
+            ready: VecDeque::new(),
+            spare: Vec::new(),
+            steps: VecDeque::new(),
+            paired: 0,
+            outside: 0,
+            dropouts: 0,
+            disordered: 0,
+            delay: Delay::default(),
+        }
+    }
+
+    /// Hands out the next row with its torque, where there is one.
+    pub(super) fn take(&mut self, row: &mut Sample) -> bool {
+        match self.ready.pop_front() {
+            None => false,
+            Some(next) => {
+                let old = std::mem::replace(row, next);
+                self.spare.push(old);
+                true
+            }
+        }
+    }
+
+    /// A row that has positions and waits for its torque.
+    pub(super) fn add_positions(&mut self, row: &mut Sample) {
+        let spare = self.spare.pop().unwrap_or_default();
+        self.waiting.push_back(std::mem::replace(row, spare));
+        if self.waiting.len() > WAITING
+            && let Some(row) = self.waiting.pop_front()
+        {
+            self.outside += 1;
+            self.spare.push(row);
+        }
+        self.pair();
+    }
+
+    /// Torques, on their own clock.
+    pub(super) fn add_torques(&mut self, sample: &mut Sample) {
+        let t = sample.instant().plus(-self.delay_s);
+        if let Some((before, _)) = self.torques.back() {
+            if t <= *before {
+                self.disordered += 1;
+                return;
+            }
+            self.steps.push_back(t.since(*before));
+            if self.steps.len() > PACE {
+                self.steps.pop_front();
+            }
+        }
+        let mut numbers = match self.torques.len() > KEPT {
+            true => self.torques.pop_front().map(|(_, old)| old),
+            false => None,
+        }
+        .unwrap_or_default();
+        numbers.clone_from(&sample.tau);
+        self.torques.push_back((t, numbers));
+        self.pair();
+    }
+
+    /// Pairs every waiting row that has torques at or after its time.
+    fn pair(&mut self) {
+        while let (Some(row), Some((last, _))) = (self.waiting.front(), self.torques.back()) {
+            let t = row.instant();
+            if t > *last {
+                return;
+            }
+            let Some(mut row) = self.waiting.pop_front() else {
+                return;
+            };
+            // The first torque at or after the row.
+            let after = self.torques.partition_point(|(time, _)| *time < t);
+            if self.torque_at(t, after, &mut row.tau) {
+                self.paired += 1;
+                let seconds = t.since(Instant::default());
+                self.delay.add(seconds, &row.q, &row.tau);
+                self.ready.push_back(row);
+            } else {
+                self.spare.push(row);
+            }
+        }
+    }
+
+    /// Torque at `t`, between torque `after` and the one before it; whether there is one.
+    fn torque_at(&mut self, t: Instant, after: usize, to: &mut Vec<f64>) -> bool {
+        let Some((after_t, after_tau)) = self.torques.get(after) else {
+            return false;
+        };
+        if *after_t == t {
+            to.clone_from(after_tau);
+            return true;
+        }
+        let before = after
+            .checked_sub(1)
+            .and_then(|index| self.torques.get(index));
+        let Some((before_t, before_tau)) = before else {
+            self.outside += 1;
+            return false;
+        };
+        let step = after_t.since(*before_t);
+        if self.is_dropout(step) {
+            self.dropouts += 1;
+            return false;
+        }
+        to.clear();
+        let share = t.since(*before_t) / step;
+        let pairs = before_tau.iter().zip(after_tau);
+        to.extend(pairs.map(|(before, after)| match self.held {
+            true => *before,
+            false => before + share * (after - before),
+        }));
+        true
+    }
+
+    fn is_dropout(&self, step: f64) -> bool {
+        if self.steps.len() < 5 {
+            return false;
+        }
+        let mut steps: Vec<f64> = self.steps.iter().copied().collect();
+        steps.sort_by(f64::total_cmp);
+        step > DROPOUT * steps[steps.len() / 2]
+    }
+
+    /// What the user should know, topics named.
+    pub(super) fn warnings(&self, positions: &str, torques: &str) -> Vec<String> {
+        let how = match self.held {
+            true => "held from message to message",
+            false => "interpolated linearly",
+        };
+        let mut out = vec![format!(
+            "positions are those of {positions}, torques those of {torques}, {how} at the times of the positions"
+        )];
+        let left = self.outside + self.waiting.len() as u64;
+        if left > 0 {
+            out.push(format!(
+                "{left} messages of {positions} lie before the first or after the last torque and are left out"
+            ));
+        }
+        if self.dropouts > 0 {
+            out.push(format!(
+                "{} messages of {positions} lie in dropouts of {torques} and are left out",
+                self.dropouts
+            ));
+        }
+        if self.disordered > 0 {
+            out.push(format!(
+                "{} messages of {torques} are left out: their time does not increase",
+                self.disordered
+            ));
+        }
+        out.push(self.delay.describe(positions, torques, self.delay_s));
+        out
+    }
+}

@@ -1,0 +1,132 @@
+//! Where a number stands in a message: `header.stamp.sec`, `position[2]`, `position[name=arm]`, `/joints/0/q`.
+
+/// One step from a message to a number in it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// A field of a message; of an array, where it is a number, the element with that index.
+    Field(String),
+    /// An element of an array, counted from 0.
+    Index(usize),
+    /// The element of an array whose index is that of `value` in the list of strings `list`.
+    ///
+    /// The list is looked for beside the array, then further out. Where an array holds messages,
+    /// the element whose own field `list` is `value`.
+    Named {
+        /// Field with the names.
+        list: String,
+        /// The name that is looked for.
+        value: String,
+    },
+}
+
+/// Where a number stands in a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Path {
+    pub(crate) steps: Vec<Step>,
+    text: String,
+}
+
+impl Path {
+    /// Reads a JSON pointer (RFC 6901) or a dotted path.
+    ///
+    /// Text that is neither is the name of a field, spaces and brackets included: any column name
+    /// of a text log is a path too.
+    pub(crate) fn parse(text: &str) -> Self {
+        let steps = match text.strip_prefix('/') {
+            Some(pointer) => pointer
+                .split('/')
+                .map(|part| Step::Field(part.replace("~1", "/").replace("~0", "~")))
+                .collect(),
+            None => dotted(text).unwrap_or_else(|| vec![Step::Field(text.to_owned())]),
+        };
+        Self {
+            steps,
+            text: text.to_owned(),
+        }
+    }
+
+    /// `FIELD[LIST=NAME]`: an element that is found by its name, whatever characters it has.
+    pub(crate) fn named(field: &str, list: &str, name: &str) -> Self {
+        Self {
+            steps: vec![
+                Step::Field(field.to_owned()),
+                Step::Named {
+                    list: list.to_owned(),
+                    value: name.to_owned(),
+                },
+            ],
+            text: format!("{field}[{list}={name}]"),
+        }
+    }
+
+    /// As it was written.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// Steps of a dotted path; `None` where the text has another form.
+fn dotted(text: &str) -> Option<Vec<Step>> {
+    let mut steps = Vec::new();
+    let mut rest = text;
+    loop {
+        let end = rest.find(['.', '[']).unwrap_or(rest.len());
+        let (name, tail) = rest.split_at(end);
+        let plain = |c: char| c.is_alphanumeric() || c == '_';
+        if name.is_empty() || !name.chars().all(plain) {
+            return None;
+        }
+        steps.push(Step::Field(name.to_owned()));
+        rest = tail;
+        while let Some(inner) = rest.strip_prefix('[') {
+            let (selector, tail) = inner.split_once(']')?;
+            steps.push(match selector.split_once('=') {
+                Some((list, value)) => Step::Named {
+                    list: list.trim().to_owned(),
+                    value: value.trim().to_owned(),
+                },
+                None => Step::Index(selector.trim().parse().ok()?),
+            });
+            rest = tail;
+        }
+        match rest.strip_prefix('.') {
+            Some(tail) => rest = tail,
+            None if rest.is_empty() => return Some(steps),
+            None => return None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn field(name: &str) -> Step {
+        Step::Field(name.to_owned())
+    }
+
+    #[test]
+    fn dotted_paths_indices_names_and_pointers_are_read() {
+        let steps = |text: &str| Path::parse(text).steps;
+        assert_eq!(
+            steps("header.stamp.sec"),
+            [field("header"), field("stamp"), field("sec")]
+        );
+        assert_eq!(steps("a[2].b"), [field("a"), Step::Index(2), field("b")]);
+        assert_eq!(
+            steps("position[name=left/arm 1]"),
+            Path::named("position", "name", "left/arm 1").steps
+        );
+        assert_eq!(
+            steps("/joints/0/a~1b~0"),
+            [field("joints"), field("0"), field("a/b~")]
+        );
+    }
+
+    #[test]
+    fn any_other_text_is_the_name_of_one_field() {
+        for text in ["motor torque", "q1 [deg]", "a..b", "a[x]", "a[1", "", "#3"] {
+            assert_eq!(Path::parse(text).steps, [field(text)], "{text}");
+        }
+    }
+}

@@ -1,0 +1,347 @@
+//! Finds the topics that hold a robot's channels, by reading the beginning of a recording.
+
+use std::path::PathBuf;
+
+use super::container::{Recording, Wanted};
+use super::decode::Decoder;
+use super::fields::{Fields, TimeSource};
+use super::value::Value;
+use crate::log::layout::Layout;
+use crate::log::names::{escape, list, nearest};
+use crate::log::{LogError, source};
+
+/// Messages of a topic that are looked at before it is given up.
+const TRIES: u32 = 200;
+/// Messages that are looked at for further topics once the channels are found.
+const FURTHER: u32 = 2000;
+
+/// The topics that are read, and how.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Choice {
+    /// Topic of the positions; of the torques where there are no positions to read.
+    pub(super) topic: String,
+    /// Topic of the torques, where it is another one.
+    pub(super) torque_topic: Option<String>,
+    pub(super) time: TimeSource,
+    /// Whether messages hold velocities of all joints.
+    pub(super) velocities: bool,
+    /// What was decided and the user should know.
+    pub(super) notes: Vec<String>,
+}
+
+/// What the messages of one topic turned out to hold.
+struct Candidate {
+    name: String,
+    kind: String,
+    decoder: Result<Decoder, String>,
+    tries: u32,
+    positions: bool,
+    torques: bool,
+    /// Both in one message.
+    both: bool,
+    /// No message with the positions was without the velocities.
+    velocities: bool,
+    header: bool,
+    time: bool,
+    /// Fields that no message held so far.
+    missing: Vec<bool>,
+    names: Vec<String>,
+}
+
+impl Candidate {
+    /// Looks at one message; whether it shows anything new.
+    fn look(&mut self, data: &[u8], fields: &Fields, values: &mut [Value]) -> bool {
+        let before = self.shown();
+        self.tries += 1;
+        let Ok(decoder) = &mut self.decoder else {
+            return false;
+        };
+        if let Err(reason) = decoder.read(data, values) {
+            if self.tries >= TRIES && self.names.is_empty() {
+                self.decoder = Err(format!("its messages cannot be read: {reason}"));
+            }
+            return false;
+        }
+        if self.names.is_empty() {
+            self.names = decoder.names(data);
+        }
+        for (missing, value) in self.missing.iter_mut().zip(&*values) {
+            *missing &= *value == Value::Absent;
+        }
+        // A robot without positions (or torques) to read finds them everywhere.
+        let all = |range| Fields::all(values, range) || range.is_empty();
+        let (q, tau) = (all(&fields.positions), all(&fields.torques));
+        if q {
+            let first = !self.positions;
+            self.velocities = (self.velocities || first) && Fields::all(values, &fields.velocities);
+        }
+        self.positions |= q && !fields.positions.is_empty();
+        self.torques |= tau && !fields.torques.is_empty();
+        self.both |= q && tau;
+        self.header |= fields.has_header(values);
+        self.time |= fields.has_time(values);
+        before != self.shown()
+    }
+
+    fn shown(&self) -> [bool; 6] {
+        let holds = [self.positions, self.torques, self.both];
+        let also = [self.velocities, self.header, self.time];
+        [holds[0], holds[1], holds[2], also[0], also[1], also[2]]
+    }
+}
+
+/// Reads the beginning of a recording, and chooses.
+///
+/// # Errors
+/// No topic with the robot's channels, or several; a file that cannot be read.
+pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
+    let fields = Fields::new(layout);
+    let found = survey(paths, layout, &fields)?;
+    let chosen = pick(&found, layout, &fields);
+    if let (Err(_), Some(other)) = (&chosen, &layout.otherwise) {
+        let other_fields = Fields::new(other);
+        let others = survey(paths, other, &other_fields)?;
+        if let Ok(choice) = pick(&others, other, &other_fields) {
+            return Ok((choice, (**other).clone()));
+        }
+    }
+    match chosen {
+        Ok(choice) => Ok((choice, layout.clone())),
+        Err((problem, remedy)) => Err(LogError::Topic {
+            file: source::shown_all(paths),
+            problem,
+            remedy,
+        }),
+    }
+}
+
+/// Looks at the messages of every topic until the channels are found and no other topic has them.
+fn survey(paths: &[PathBuf], layout: &Layout, fields: &Fields) -> Result<Vec<Candidate>, LogError> {
+    let mut recording = Recording::open(paths, Wanted::default())?;
+    let mut found: Vec<Candidate> = Vec::new();
+    let mut values = vec![Value::Absent; fields.paths.len()];
+    let (mut complete, mut further) = (false, 0);
+    while let Some(message) = recording.next()? {
+        let index = match found.iter().position(|c| c.name == message.topic.name) {
+            Some(index) => index,
+            None => {
+                found.push(Candidate {
+                    name: message.topic.name.clone(),
+                    kind: message.topic.schema.name.clone(),
+                    decoder: Decoder::new(&message.topic.schema, &fields.paths),
+                    tries: 0,
+                    positions: false,
+                    torques: false,
+                    both: false,
+                    velocities: false,
+                    header: false,
+                    time: false,
+                    missing: vec![true; fields.paths.len()],
+                    names: Vec::new(),
+                });
+                found.len() - 1
+            }
+        };
+        let candidate = &mut found[index];
+        if candidate.tries < TRIES && candidate.look(message.data, fields, &mut values) {
+            complete = pick(&found, layout, fields).is_ok();
+        }
+        if complete {
+            let named = layout.messages.topic.is_some();
+            further += 1;
+            if further > if named { TRIES } else { FURTHER } {
+                break;
+            }
+        }
+    }
+    if found.is_empty() {
+        if let Some((path, size, broken)) = recording.broken.first() {
+            return Err(LogError::Topic {
+                file: source::shown(path),
+                problem: format!(
+                    "holds no message before it breaks off at byte {} of {size}: {}",
+                    broken.bytes,
+                    escape(&broken.reason)
+                ),
+                remedy: "copy it again from where it was recorded, or record again".to_owned(),
+            });
+        }
+        return Err(LogError::Topic {
+            file: source::shown_all(paths),
+            problem: "holds no message".to_owned(),
+            remedy: match recording.seen.is_empty() {
+                true => "record again, with the topics of the robot".to_owned(),
+                false => format!(
+                    "its topics are {}; record again while the robot moves",
+                    list(recording.seen.iter().map(|topic| topic.name.as_str()))
+                ),
+            },
+        });
+    }
+    Ok(found)
+}
+
+/// Chooses among the topics; else what is wrong and what to do.
+fn pick(found: &[Candidate], layout: &Layout, fields: &Fields) -> Result<Choice, (String, String)> {
+    let asked = &layout.messages;
+    let one = |holds: &dyn Fn(&Candidate) -> bool, key: &str, what: &str| {
+        let mut holding = found.iter().filter(|c| holds(c));
+        let first = holding.next();
+        match (first, holding.count()) {
+            (first, 0) => Ok(first),
+            (_, more) => Err((
+                format!("{} topics hold the {what} of all joints", more + 1),
+                format!(
+                    "name one of {} as `{key}` in [log] of the robot file",
+                    list(found.iter().filter(|c| holds(c)).map(|c| c.name.as_str()))
+                ),
+            )),
+        }
+    };
+    let is = |c: &Candidate, name: &Option<String>| name.as_ref().is_none_or(|n| *n == c.name);
+    let separate = asked.torque_topic.is_some() && asked.torque_topic != asked.topic;
+    let both = match separate {
+        true => None,
+        false => one(
+            &|c| c.both && is(c, &asked.topic),
+            "topic",
+            match fields.torques.is_empty() {
+                true => "positions",
+                false => "positions and torques",
+            },
+        )?,
+    };
+    let (first, second) = match both {
+        Some(candidate) => (candidate, None),
+        None => {
+            let q = one(
+                &|c| c.positions && is(c, &asked.topic),
+                "topic",
+                "positions",
+            )?;
+            let tau = one(
+                &|c| c.torques && is(c, &asked.torque_topic),
+                "torque_topic",
+                "torques",
+            )?;
+            match (q, tau) {
+                (Some(q), Some(tau)) => (q, Some(tau)),
+                (q, _) => return Err(missing(found, layout, fields, q)),
+            }
+        }
+    };
+    let all = |holds: &dyn Fn(&Candidate) -> bool| holds(first) && second.is_none_or(holds);
+    let any = |holds: &dyn Fn(&Candidate) -> bool| holds(first) || second.is_some_and(holds);
+    let mut notes = Vec::new();
+    let time = match Fields::asked(asked.stamp) {
+        Some(TimeSource::Header) if !all(&|c| c.header) => {
+            return Err((
+                format!(
+                    "messages of {} have no stamp in a header",
+                    escape(&first.name)
+                ),
+                "set `stamp = \"log\"` in [log] of the robot file".to_owned(),
+            ));
+        }
+        Some(asked) => asked,
+        None if all(&|c| c.time) => TimeSource::Field,
+        None if all(&|c| c.header) => TimeSource::Header,
+        None => {
+            if any(&|c| c.header) {
+                notes.push(
+                    "only one of the two topics has stamps in headers: the times of recording are used for both, delays of transport included".to_owned(),
+                );
+            }
+            TimeSource::Log
+        }
+    };
+    Ok(Choice {
+        topic: first.name.clone(),
+        torque_topic: second.map(|c| c.name.clone()),
+        time,
+        velocities: first.velocities,
+        notes,
+    })
+}
+
+/// Why no topic can be used.
+fn missing(
+    found: &[Candidate],
+    layout: &Layout,
+    fields: &Fields,
+    positions: Option<&Candidate>,
+) -> (String, String) {
+    let asked = &layout.messages;
+    let wanted = match positions {
+        Some(_) => &asked.torque_topic,
+        None => &asked.topic,
+    };
+    let topics = || found.iter().map(|c| c.name.as_str());
+    if let Some(name) = wanted.as_ref().or(asked.topic.as_ref())
+        && !found.iter().any(|c| c.name == *name)
+    {
+        let near = nearest(name, topics()).map(|near| format!("did you mean `{}`? ", escape(near)));
+        return (
+            format!("no message of topic `{}`", escape(name)),
+            format!(
+                "{}the topics are {}",
+                near.unwrap_or_default(),
+                list(topics())
+            ),
+        );
+    }
+    // The topic that comes nearest to what is wanted.
+    let (range, channels, what) = match positions {
+        Some(_) => (&fields.torques, &layout.torques, "torque"),
+        None if fields.positions.is_empty() => (&fields.torques, &layout.torques, "torque"),
+        None => (&fields.positions, &layout.positions, "position"),
+    };
+    let count = |c: &Candidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
+    let best = found
+        .iter()
+        .filter(|c| wanted.as_ref().is_none_or(|name| *name == c.name))
+        .max_by_key(|c| (c.decoder.is_ok(), count(c), c.kind.contains("JointState")));
+    let Some(best) = best else {
+        return (
+            "no topic holds the robot's channels".to_owned(),
+            String::new(),
+        );
+    };
+    if let Err(reason) = &best.decoder {
+        return (
+            format!(
+                "messages of {} ({}) cannot be read: {}",
+                escape(&best.name),
+                escape(&best.kind),
+                escape(reason)
+            ),
+            format!("the topics are {}", list(topics())),
+        );
+    }
+    let lacking = range.clone().find(|index| best.missing[*index]);
+    let index = lacking.map_or(0, |index| index - range.start);
+    let joint = asked.joints.get(index).map_or("", String::as_str);
+    let column = channels.get(index).map_or("", |c| c.column.as_str());
+    let near = nearest(joint, best.names.iter().map(String::as_str));
+    let near = near.map(|name| format!("the nearest is `{}`; ", escape(name)));
+    let problem = match lacking {
+        Some(_) => format!(
+            "no topic holds the {what} of {}: neither field `{}` nor joint `{}`",
+            escape(layout.joints.get(index).map_or(joint, String::as_str)),
+            escape(column),
+            escape(joint)
+        ),
+        None => format!(
+            "no message of {} holds the {what}s of all joints at once",
+            escape(&best.name)
+        ),
+    };
+    let remedy = format!(
+        "{}{} ({}) holds {}: name the joint as `name`, or the field as `{what}`, in [log.joint] of the robot file",
+        near.unwrap_or_default(),
+        escape(&best.name),
+        escape(&best.kind),
+        list(best.names.iter().map(String::as_str)),
+    );
+    (problem, remedy)
+}

@@ -1,0 +1,36 @@
+//! A number as a message holds it, before it is scaled.
+
+/// One field of a message.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Value {
+    /// The message does not have it.
+    #[default]
+    Absent,
+    /// A whole number.
+    Int(i64),
+    /// A whole number that may be beyond `i64`.
+    Unsigned(u64),
+    /// Any other number, NaN and infinities included.
+    Float(f64),
+}
+
+impl Value {
+    /// The number; `None` where it is absent.
+    pub fn number(self) -> Option<f64> {
+        match self {
+            Self::Absent => None,
+            Self::Int(value) => Some(value as f64),
+            Self::Unsigned(value) => Some(value as f64),
+            Self::Float(value) => Some(value),
+        }
+    }
+
+    /// The number, where it is whole and stored as such.
+    pub fn integer(self) -> Option<i128> {
+        match self {
+            Self::Int(value) => Some(i128::from(value)),
+            Self::Unsigned(value) => Some(i128::from(value)),
+            Self::Absent | Self::Float(_) => None,
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Samples that a logger took twice because the robot had no new ones: found while the robot moves.
+//!
+//! A row whose positions are those of the row before may be a robot at rest, or an encoder between
+//! two counts. It is stale where it repeats all else as well and the motion goes on over it: some
+//! joint moves by several of its smallest steps right before and right after, in the same direction
+//! and about as fast. Then its time is wrong, and differentiating it would make a standstill where
+//! there is none. In a log with many such rows, those count too whose positions alone are repeated:
+//! there the torque was read a moment later.
+
+/// Rows in succession that may be stale; a longer standstill is one.
+const LONGEST: usize = 20;
+/// Steps of a joint's resolution that a motion takes from row to row, at least.
+const STEPS: f64 = 4.0;
+/// Stale rows from which a log is known to have them.
+const KNOWN: u64 = 10;
+/// Speeds before and after are the same motion where neither is more than this many times the other.
+const ALIKE: f64 = 3.0;
+
+/// What a new row says about those before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Nothing.
+    Keep,
+    /// The rows before it, so many, are stale.
+    Drop(usize),
+}
+
+/// The motion right before the current row.
+#[derive(Debug)]
+pub(super) struct Stale {
+    /// Time and positions of the last row that moved.
+    t: Option<f64>,
+    q: Vec<f64>,
+    /// Step to it from the last one before, and its duration.
+    step: Vec<f64>,
+    duration: f64,
+    /// Smallest step other than 0 of each joint.
+    resolution: Vec<f64>,
+    /// Rows since then that repeat its positions.
+    run: usize,
+    /// All of them repeat everything.
+    whole: bool,
+    repeated: u64,
+    dropped: u64,
+}
+
+impl Stale {
+    pub(super) fn new(joints: usize) -> Self {
+        Self {
+            t: None,
+            q: vec![0.0; joints],
+            step: vec![0.0; joints],
+            duration: 0.0,
+            resolution: vec![f64::INFINITY; joints],
+            run: 0,
+            whole: true,
+            repeated: 0,
+            dropped: 0,
+        }
+    }
+
+    /// Takes the next row into account; `same` tells whether all but its positions repeats too.
+    #[inline]
+    pub(super) fn judge(&mut self, t: f64, q: &[f64], same: impl FnOnce() -> bool) -> Verdict {
+        if self.q == q && self.t.is_some() && !q.is_empty() {
+            self.run += 1;
+            self.repeated += 1;
+            self.whole &= same();
+            return Verdict::Keep;
+        }
+        let verdict = match self.t {
+            Some(before) => self.moved(t - before, q),
+            None => Verdict::Keep,
+        };
+        self.q.copy_from_slice(q);
+        self.t = Some(t);
+        self.run = 0;
+        self.whole = true;
+        verdict
+    }
+
+    #[inline]
+    fn moved(&mut self, duration: f64, q: &[f64]) -> Verdict {
+        let stale = (1..=LONGEST).contains(&self.run)
+            && (self.whole || self.dropped >= KNOWN)
+            && self.goes_on(duration, q);
+        let joints = self.step.iter_mut().zip(&mut self.resolution);
+        for ((step, resolution), (to, from)) in joints.zip(q.iter().zip(&self.q)) {
+            *step = to - from;
+            if *step != 0.0 {
+                *resolution = resolution.min(step.abs());
+            }
+        }
+        self.duration = duration;
+        if !stale {
+            return Verdict::Keep;
+        }
+        self.dropped += self.run as u64;
+        Verdict::Drop(self.run)
+    }
+
+    /// Whether the motion before the run goes on in the step after it.
+    #[cold]
+    fn goes_on(&self, duration: f64, q: &[f64]) -> bool {
+        (0..q.len()).any(|joint| {
+            let after = q[joint] - self.q[joint];
+            let before = self.step[joint];
+            let enough = STEPS * self.resolution[joint];
+            if before.abs() < enough || after.abs() < enough || (before > 0.0) != (after > 0.0) {
+                return false;
+            }
+            let ratio = (after / duration) / (before / self.duration);
+            (1.0 / ALIKE..=ALIKE).contains(&ratio)
+        })
+    }
+
+    /// Rows at the end of which it is not known yet whether they are stale.
+    pub(super) fn undecided(&self) -> usize {
+        match self.run <= LONGEST {
+            true => self.run,
+            false => 0,
+        }
+    }
+
+    /// Rows so far that repeat the positions of the row before.
+    pub(super) fn repeated(&self) -> u64 {
+        self.repeated
+    }
+
+    /// Rows so far that are stale.
+    pub(super) fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dropped(rows: &[f64]) -> Vec<usize> {
+        let mut stale = Stale::new(1);
+        let verdicts = rows.iter().enumerate();
+        verdicts
+            .filter_map(|(i, q)| match stale.judge(i as f64, &[*q], || true) {
+                Verdict::Drop(rows) => Some(i - rows),
+                Verdict::Keep => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_repeated_sample_inside_a_fast_motion_is_stale() {
+        assert_eq!(dropped(&[0.0, 1.0, 9.0, 17.0, 17.0, 33.0, 41.0]), [4]);
+        assert_eq!(dropped(&[0.0, 1.0, 9.0, 17.0, 17.0, 17.0, 33.0, 41.0]), [4]);
+    }
+
+    #[test]
+    fn an_encoder_between_two_counts_a_reversal_and_a_rest_are_not_stale() {
+        assert!(dropped(&[0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 6.0]).is_empty());
+        assert!(dropped(&[0.0, 1.0, 9.0, 17.0, 17.0, 9.0, 0.0]).is_empty());
+        let mut rest = vec![0.0, 1.0, 9.0, 17.0];
+        rest.extend([17.0; LONGEST + 1]);
+        rest.extend([25.0, 33.0]);
+        assert!(dropped(&rest).is_empty());
+    }
+}
