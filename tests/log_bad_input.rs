@@ -138,7 +138,7 @@ fn lines_are_counted_through_comments_blank_lines_and_carriage_returns() {
 }
 
 #[test]
-fn time_that_stands_still_or_runs_backwards_is_told_apart() {
+fn time_that_stands_still_runs_backwards_or_repeats_a_row_is_told_apart() {
     says(
         "t,q_q1,tau_q1\n0,1,2\n1,2,3\n1,2,4\n",
         &["log.csv:4", "stands still", "1 s"],
@@ -146,6 +146,10 @@ fn time_that_stands_still_or_runs_backwards_is_told_apart() {
     says(
         "t,q_q1,tau_q1\n0,1,2\n1,2,3\n0.5,2,4\n",
         &["log.csv:4", "backwards", "from 1 s to 0.5 s"],
+    );
+    says(
+        "t,q_q1,tau_q1\n0,1,2\n1,2,3\n1,2,3\n",
+        &["log.csv:4", "repeats the row before", "delete duplicate"],
     );
 }
 

@@ -213,6 +213,16 @@ pub enum LogError {
         /// The time column.
         column: String,
     },
+    /// The same row twice.
+    #[error(
+        "{at}: the row repeats the row before it (t = {t} s); delete duplicate rows: each sample may stand there once"
+    )]
+    DuplicateRow {
+        /// File and line.
+        at: String,
+        /// The time [s].
+        t: f64,
+    },
     /// Time runs backwards.
     #[error(
         "{at}: time runs backwards, from {before} s to {t} s; sort the rows by time, or split the file where a second recording begins"

@@ -28,7 +28,7 @@ pub struct Reader {
     finished: bool,
     activity: Vec<Activity>,
     stale: Stale,
-    /// Rows that repeat the one before them in everything.
+    /// Messages that repeat the one before them in everything.
     duplicates: u64,
     /// Rows at the end of the last block that may turn out to be stale.
     pending: Block,
@@ -140,7 +140,7 @@ impl Reader {
         let mut found = self.rows.warnings();
         if self.duplicates > 0 {
             found.push(format!(
-                "{} rows are the row before once more, time included, and are left out",
+                "{} messages are the message before once more, time included, and are left out",
                 self.duplicates
             ));
         }
@@ -185,13 +185,17 @@ impl Reader {
 
     #[cold]
     fn out_of_order(&mut self, before: f64, t: f64) -> Result<Option<f64>, LogError> {
-        if t == before && self.rows.repeats() {
+        let repeats = t == before && self.rows.repeats();
+        // Nobody can delete messages from a recording by hand.
+        if repeats && matches!(self.rows, LogRows::Messages(_)) {
             self.duplicates += 1;
             return Ok(None);
         }
         let at = self.rows.place();
         Err(if t < before {
             LogError::TimeBackwards { at, before, t }
+        } else if repeats {
+            LogError::DuplicateRow { at, t }
         } else {
             let column = super::escape(&self.layout.time.column);
             LogError::TimeStandsStill { at, t, column }
