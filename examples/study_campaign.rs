@@ -10,15 +10,18 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use cft_ident::cli::machine::narrowed;
 use cft_ident::config::Trajectory;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
 use cft_ident::friction::motions::motions;
 use cft_ident::friction::passes::Ending;
-use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare};
-use cft_ident::inertia::accumulate;
+use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare, prepare_again};
+use cft_ident::friction::problem::Problem;
 use cft_ident::inertia::columns::{Columns, KnownFriction};
+use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use cft_ident::inertia::solve::{Estimator, fit};
 use cft_ident::inertia::verdict::verdict;
+use cft_ident::inertia::{accumulate, add_processing};
 use cft_ident::log::Block;
 use cft_ident::motion::{HeldForces, Settings as Processing};
 use cft_ident::robot::Robot;
@@ -142,14 +145,21 @@ fn unseen_motion() -> Reference<4> {
     }
 }
 
-fn prepared(robot: &Robot, joint: usize, log: &Block) -> Prepared {
-    let found = motions(&log.t, &log.q, &log.tau, 4, &processing()).expect("a whole log");
+/// The one-joint problem, and the same with the narrower smoothing of its known inputs.
+fn prepared(robot: &Robot, joint: usize, log: &Block) -> (Prepared, Problem) {
+    let found = |settings: &Processing| {
+        motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
+    };
     let variance = |q: &[f64]| robot.encoder_variance(joint, q).unwrap_or(f64::NAN);
     let sensors = Read {
         variance: &variance,
         held: true,
     };
-    prepare(robot, joint, &found, &sensors).expect("the joint moves")
+    let wide = found(&processing());
+    let first = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
+    let narrower = found(&narrowed(&processing(), 1000.0));
+    let again = prepare_again(robot, joint, &narrower, &sensors, &first).expect("it still moves");
+    (first, again)
 }
 
 /// Relative error of the curve over the speeds covered, and at how many speeds the 95 % interval
@@ -181,16 +191,16 @@ fn campaign(seed: u64) -> Value {
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let mut joints = Vec::new();
     let mut known = Vec::new();
-    #[allow(clippy::needless_range_loop)] // the index is also that of seeds, laws and inertias
-    for j in 0..4 {
+    for (j, name) in JOINTS.iter().enumerate() {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
             .reference(Setup::Tuedacs)
             .expect("a ladder");
         let recording =
             follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");
         let log = block(&recording);
-        let prepared = prepared(&robot, j, &log);
-        let e = estimate(JOINTS[j], &names, &prepared, &Options::default()).expect("an estimate");
+        let (prepared, again) = prepared(&robot, j, &log);
+        let e = estimate(name, &names, &prepared, Some(&again), &Options::default())
+            .expect("an estimate");
         let law = truth.friction[j];
         let (error, covered, total) = curve(&e, &law);
         // a start that is wrong by up to a factor of three in everything, alone
@@ -203,12 +213,21 @@ fn campaign(seed: u64) -> Value {
             only_start,
             ..Options::default()
         };
-        let end = |o: &Options| match estimate(JOINTS[j], &names, &prepared, o) {
+        let end = |o: &Options| match estimate(name, &names, &prepared, None, o) {
             Ok(e) => (curve(&e, &law).0, e.ending == Ending::Converged),
             Err(_) => (f64::INFINITY, false),
         };
-        let (with_log, _) = end(&options(false));
-        let (alone, said) = end(&options(true));
+        let quick = std::env::var_os("QUICK").is_some();
+        let (with_log, _) = if quick {
+            (0.0, true)
+        } else {
+            end(&options(false))
+        };
+        let (alone, said) = if quick {
+            (0.0, true)
+        } else {
+            end(&options(true))
+        };
         joints.push(json!({
             "curve_error": error, "covered": covered, "speeds": total,
             "value": e.law.parameters(), "truth": law.parameters(),
@@ -233,8 +252,21 @@ fn campaign(seed: u64) -> Value {
     let recording = follow(&truth, &[], motion, &noisy(40.0, 10 * seed + 5)).expect("a run");
     let mut log = block(&recording);
     HeldForces::new(4).centre(&robot, &mut log);
-    let (sums, _) = accumulate(&robot, &columns, &processing(), &mut source(&log)).expect("a log");
-    let fit = fit(&sums, Estimator::Wls).expect("a fit");
+    let solved = |settings: &Processing| {
+        let found = accumulate(&robot, &columns, settings, &mut source(&log)).expect("a log");
+        fit(&found.0, Estimator::Wls).expect("a fit")
+    };
+    let mut fit = solved(&processing());
+    add_processing(&mut fit, &solved(&narrowed(&processing(), 1000.0)));
+    let shifted: Vec<_> = (0..GRIDS)
+        .map(|grid| {
+            let mut read = source(&log);
+            let found = accumulate_shifted(&robot, &columns, &processing(), grid, &mut read);
+            let sums = found.expect("a log").expect("its encoders are known");
+            cft_ident::inertia::solve::fit(&sums, Estimator::Wls).expect("a fit")
+        })
+        .collect();
+    add_scatter(&mut fit, &shifted);
     let theta: Vec<Value> = (0..12)
         .map(|i| {
             let std = fit.covariance[(i, i)].sqrt();

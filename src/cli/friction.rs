@@ -14,7 +14,7 @@ use crate::config::model_file::{ModelProvenance, Parameter};
 use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::passes::{Ending, Given};
-use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
+use crate::friction::prepare::{Motion, Sensors, prepare, prepare_again, resolution};
 use crate::log::{LogSpec, Provenance};
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::report::json::Document;
@@ -85,16 +85,17 @@ pub fn identify(
     let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
     let mut inputs = Vec::new();
     for spec in logs {
-        let (motions, held, provenance) = machine.motions(spec, context)?;
-        inputs.push(provenance);
+        let log = machine.motions(spec, context)?;
+        inputs.push(log.provenance);
         let moving = match named {
             Some(j) => j,
-            None => moving_joint(names, &motions, &ranges)
+            None => moving_joint(names, &log.motions, &ranges)
                 .map_err(|e| CliError::undetermined(format!("{}: {e}", spec.name())))?,
         };
         let group = groups.entry(moving).or_default();
-        group.held |= held;
-        group.motions.extend(motions);
+        group.held |= log.held;
+        group.motions.extend(log.motions);
+        group.narrower.extend(log.narrower);
         group.logs.push(spec.name());
     }
     drop(bar);
@@ -132,6 +133,7 @@ pub fn identify(
 #[derive(Default)]
 struct Group {
     motions: Vec<Motion>,
+    narrower: Vec<Motion>,
     held: bool,
     logs: Vec<String>,
 }
@@ -172,7 +174,8 @@ fn one_joint(
         },
         ..Options::default()
     };
-    estimate(name, parameter_names, &prepared, &options).map_err(undetermined)
+    let again = prepare_again(&machine.robot, j, &group.narrower, &sensors, &prepared);
+    estimate(name, parameter_names, &prepared, again.as_ref(), &options).map_err(undetermined)
 }
 
 /// The user's starting values, where all five are given.

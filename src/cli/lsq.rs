@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::friction::new_model;
-use super::machine::{Machine, run_error, summary_warnings};
+use super::machine::{Machine, narrowed, run_error, summary_warnings};
 use super::{CliError, Context, Outcome};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
@@ -13,11 +13,12 @@ use crate::config::model_file::Parameter;
 use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::accumulate::Sums;
 use crate::inertia::columns::{Columns, KnownFriction, Own};
+use crate::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use crate::inertia::solve::{Fit, FitError, fit};
 use crate::inertia::verdict::verdict;
-use crate::inertia::{accumulate, solve};
-use crate::log::{LogSpec, Provenance};
-use crate::motion::Summary;
+use crate::inertia::{accumulate, add_processing, solve};
+use crate::log::{Block, LogSpec, Provenance};
+use crate::motion::{Settings, Summary};
 use crate::report::json::Document;
 use crate::report::{number, summary};
 use crate::robot::friction::DoubleTanh;
@@ -108,34 +109,67 @@ pub fn identify(
             "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it".to_owned(),
         );
     }
-    let bar = context.progress("least squares", Some(logs.len() as u64));
-    let mut total: Option<(Sums, Summary)> = None;
+    let bar = context.progress(
+        "least squares",
+        Some(2 * logs.len() as u64 + u64::from(GRIDS)),
+    );
+    let settings = machine.settings();
     let mut inputs = Vec::new();
-    for spec in logs {
-        let mut log = machine.open(spec, context)?;
-        let settings = machine.settings();
-        let (sums, summary) = accumulate(&machine.robot, &columns, &settings, &mut |block| {
-            log.read(block)
-        })
-        .map_err(|e| run_error(spec, e))?;
-        warnings.extend(summary_warnings(spec, &summary));
-        inputs.push(log.provenance()?);
-        total = Some(match total {
-            None => (sums, summary),
-            Some((mut all, first)) => {
-                all.merge(sums);
-                (all, first)
+    let mut reduce = |settings: &Settings, first: bool| {
+        let mut total: Option<(Sums, Summary)> = None;
+        for spec in logs {
+            let mut log = machine.open(spec, context)?;
+            let (sums, summary) = accumulate(&machine.robot, &columns, settings, &mut |block| {
+                log.read(block)
+            })
+            .map_err(|e| run_error(spec, e))?;
+            if first {
+                warnings.extend(summary_warnings(spec, &summary));
+                inputs.push(log.provenance()?);
             }
-        });
-        bar.advance(1);
-    }
-    let Some((sums, summary)) = total else {
-        return Err(CliError::usage("no log is given"));
+            total = Some(match total {
+                None => (sums, summary),
+                Some((mut all, summary)) => {
+                    all.merge(sums);
+                    (all, summary)
+                }
+            });
+            bar.advance(1);
+        }
+        total.ok_or_else(|| CliError::usage("no log is given"))
     };
-    let fit = fit(&sums, estimator).map_err(|e| match e {
-        FitError::Math(_) => CliError::input(e),
-        FitError::TooFewRows { .. } | FitError::NothingExcited => CliError::undetermined(e),
-    })?;
+    let solved = |sums: &Sums| {
+        fit(sums, estimator).map_err(|e| match e {
+            FitError::Math(_) => CliError::input(e),
+            FitError::TooFewRows { .. } | FitError::NothingExcited => CliError::undetermined(e),
+        })
+    };
+    let (sums, summary) = reduce(&settings, true)?;
+    let mut fit = solved(&sums)?;
+    // once more with a narrower position filter: what that moves is part of the uncertainty
+    let (again, _) = reduce(&narrowed(&settings, 1.0 / summary.dt), false)?;
+    add_processing(&mut fit, &solved(&again)?);
+    if machine.robot.knows_encoders() {
+        let mut shifted = Vec::new();
+        for grid in 0..GRIDS {
+            let mut all: Option<Sums> = None;
+            for spec in logs {
+                let mut log = machine.open(spec, context)?;
+                let mut read = |block: &mut Block| log.read(block);
+                let sums = accumulate_shifted(&machine.robot, &columns, &settings, grid, &mut read)
+                    .map_err(|e| run_error(spec, e))?;
+                match (&mut all, sums) {
+                    (Some(all), Some(sums)) => all.merge(sums),
+                    (none, sums) => *none = sums,
+                }
+            }
+            if let Some(sums) = all {
+                shifted.push(solved(&sums)?);
+            }
+            bar.advance(1);
+        }
+        add_scatter(&mut fit, &shifted);
+    }
     let unknowns = unknowns(machine, &columns, &fit);
     for c in &fit.confounded {
         let words: Vec<String> = c

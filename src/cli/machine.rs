@@ -19,6 +19,28 @@ use crate::robot::Robot;
 /// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
 const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
 
+/// A one-joint log, read and smoothed.
+pub struct OneJointLog {
+    pub motions: Vec<Motion>,
+    /// The same with a narrower position filter.
+    pub narrower: Vec<Motion>,
+    /// The torque is held from row to row.
+    pub held: bool,
+    pub provenance: Provenance,
+}
+
+/// The same processing with a narrower position filter.
+pub fn narrowed(settings: &Settings, rate_hz: f64) -> Settings {
+    let plain = (6.0 * settings.cutoff_hz).min(0.4 * rate_hz);
+    Settings {
+        q_cutoff_hz: Some(NARROWER * settings.q_cutoff_hz.unwrap_or(plain)),
+        ..settings.clone()
+    }
+}
+
+/// Factor from the declared position cut-off to the narrower one.
+const NARROWER: f64 = 0.7;
+
 /// A robot as its file describes it.
 #[derive(Debug, Clone)]
 pub struct Machine {
@@ -177,12 +199,9 @@ impl Machine {
         }
     }
 
-    /// Reads a one-joint log into memory and smooths its motion.
-    pub fn motions(
-        &self,
-        spec: &LogSpec,
-        context: &Context,
-    ) -> Result<(Vec<Motion>, bool, Provenance), CliError> {
+    /// Reads a one-joint log into memory and smooths its motion, once as declared and once with a
+    /// narrower filter, by which the smoothing's own part in an estimate is seen.
+    pub fn motions(&self, spec: &LogSpec, context: &Context) -> Result<OneJointLog, CliError> {
         let (mut log, held) = self.open_raw(spec, context)?;
         let mut whole = Block::default();
         let mut block = Block::default();
@@ -203,15 +222,19 @@ impl Machine {
             }
             _ => 1.0,
         };
-        let found = motions(
-            &whole.t,
-            &whole.q,
-            &whole.tau,
-            self.robot.joints(),
-            &self.friction_settings(rate),
-        )
-        .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))?;
-        Ok((found, held, log.provenance()?))
+        let declared = self.friction_settings(rate);
+        let narrower = narrowed(&declared, rate);
+        let smooth = |settings: &Settings| {
+            let n = self.robot.joints();
+            motions(&whole.t, &whole.q, &whole.tau, n, settings)
+                .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))
+        };
+        Ok(OneJointLog {
+            motions: smooth(&declared)?,
+            narrower: smooth(&narrower)?,
+            held,
+            provenance: log.provenance()?,
+        })
     }
 
     /// Full travel of each joint, by which motions of metres and radians are compared.

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::excitation::{FrictionError, Speeds, speeds};
-use super::passes::{Ending, Given, Maximum, maximise, profile_slope};
+use super::passes::{Ending, Given, Maximum, add_choices, maximise, profile_slope};
 use super::plateau::{Plateau, plateaus};
 use super::prepare::Prepared;
-use super::problem::FRICTION;
+use super::problem::{FRICTION, Problem};
 use super::start::{Start, constant_inertia, from_log};
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
@@ -105,7 +105,8 @@ const CURVE_STEPS: usize = 50;
 /// Starts taken from the log.
 const LOG_STARTS: usize = 4;
 
-/// Estimates the friction of one joint.
+/// Estimates the friction of one joint. `again` is the same problem with its known inputs smoothed
+/// otherwise: what that changes is part of the standard deviations.
 ///
 /// # Errors
 /// [`FrictionError`] where the motion cannot show friction, or no start ends at a finite estimate.
@@ -113,6 +114,7 @@ pub fn estimate(
     joint: &str,
     names: &[String],
     prepared: &Prepared,
+    again: Option<&Problem>,
     options: &Options,
 ) -> Result<JointEstimate, FrictionError> {
     let problem = &prepared.problem;
@@ -142,7 +144,10 @@ pub fn estimate(
     let no_estimate = || FrictionError::NoEstimate {
         joint: joint.to_owned(),
     };
-    let maximum = maximise(prepared, &starts, &options.noise).ok_or_else(no_estimate)?;
+    let mut maximum = maximise(prepared, &starts, &options.noise).ok_or_else(no_estimate)?;
+    if let Some(again) = again {
+        add_choices(problem, again, &mut maximum);
+    }
     Ok(assemble(names, prepared, maximum, speeds))
 }
 
@@ -369,6 +374,7 @@ mod tests {
             "q1",
             &["inertia".to_owned()],
             &trial.prepared(seed),
+            None,
             options,
         )
     }
@@ -443,7 +449,7 @@ mod tests {
         for v in &mut prepared.velocity {
             *v = v.abs();
         }
-        let error = estimate("q1", &[], &prepared, &Options::default()).unwrap_err();
+        let error = estimate("q1", &[], &prepared, None, &Options::default()).unwrap_err();
         assert!(
             matches!(error, FrictionError::NeverReverses { .. }),
             "{error}"

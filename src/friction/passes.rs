@@ -31,6 +31,10 @@ const BLOCK_SECONDS: f64 = 0.25;
 /// The noise levels' search ends at this difference of log-likelihoods, or after so many of them.
 const TUNE_TOLERANCE: f64 = 0.3;
 const TUNE_EVALUATIONS: u64 = 24;
+/// Steps to the maximum of a problem that differs only in a choice of the processing.
+const CHOICE_STEPS: usize = 6;
+/// Factor on the encoder's variance in the other weighting.
+const COARSER: f64 = 4.0;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
 
@@ -265,6 +269,25 @@ fn refine_others(
         parameters: p,
         score: at,
         ending: Ending::IterationLimit,
+    }
+}
+
+/// Adds to the covariance what another smoothing of the known inputs, and another weight of the
+/// encoder, change in the estimate: the innovations cannot show an error that is the same at every
+/// reversal.
+pub fn add_choices(problem: &Problem, again: &Problem, maximum: &mut Maximum) {
+    let spread = spread(again);
+    let p = maximum.parameters.clone();
+    let coarser = Noise {
+        position_factor: COARSER * maximum.noise.position_factor,
+        ..maximum.noise
+    };
+    for (problem, noise) in [(again, maximum.noise), (problem, coarser)] {
+        let moved = refine(problem, p.clone(), noise, &spread, CHOICE_STEPS);
+        if moved.ending != Ending::Diverged {
+            let change = DVector::from_fn(p.len(), |i, _| moved.parameters[i] - p[i]);
+            maximum.covariance.ger(1.0, &change, &change, 1.0);
+        }
     }
 }
 

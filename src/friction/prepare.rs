@@ -90,7 +90,6 @@ pub fn prepare(
     }
 
     let mut y = vec![0.0; n * p];
-    let mut moved = vec![0.0; n * p];
     let mut square = vec![0.0; columns];
     let mut count = 0usize;
     for motion in motions {
@@ -147,6 +146,60 @@ pub fn prepare(
     let e = kept.len();
     let back = DMatrix::from_fn(columns, e, |i, j| scale[i] * svd.v[(i, kept[j])]);
 
+    let built = build(robot, joint, motions, sensors, &back)?;
+    let acceleration_scale = rms(built.acceleration.iter().copied()).max(f64::MIN_POSITIVE);
+    let step = median_step(&built.records);
+    Some(Prepared {
+        problem: Problem {
+            records: built.records,
+            nuisance: e,
+            torque_scale,
+            velocity_scale,
+            slope_range: slope_range(&built.velocity, acceleration_scale, step),
+            least_inertia: 1e-3 * torque_scale / acceleration_scale,
+        },
+        back,
+        velocity: built.velocity,
+        acceleration: built.acceleration,
+    })
+}
+
+/// The same problem, its known inputs from motions that were smoothed otherwise: unknowns and
+/// scales stay, so that estimates can be compared.
+pub fn prepare_again(
+    robot: &Robot,
+    joint: usize,
+    motions: &[Motion],
+    sensors: &Sensors,
+    like: &Prepared,
+) -> Option<Problem> {
+    let built = build(robot, joint, motions, sensors, &like.back)?;
+    Some(Problem {
+        records: built.records,
+        ..like.problem.clone()
+    })
+}
+
+/// Records of all motions, with velocity and acceleration of the moving joint.
+struct Built {
+    records: Vec<Record>,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+fn build(
+    robot: &Robot,
+    joint: usize,
+    motions: &[Motion],
+    sensors: &Sensors,
+    back: &DMatrix<f64>,
+) -> Option<Built> {
+    let n = robot.joints();
+    let p = robot.parameters().len();
+    let columns = p + 1;
+    let e = back.ncols();
+    let mut y = vec![0.0; n * p];
+    let mut moved = vec![0.0; n * p];
     let mut records = Vec::with_capacity(motions.len());
     let mut velocity = Vec::new();
     let mut acceleration = Vec::new();
@@ -186,7 +239,11 @@ pub fn prepare(
                 *hh = raw_h.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
             }
             record.y.push(motion.measured[k * n + joint]);
-            record.r.push((sensors.variance)(&motion.measured[at]));
+            let dt = motion.t[(k + 1).min(samples - 1)] - motion.t[(k + 1).min(samples - 1) - 1];
+            let speed = motion.v[k * n + joint].abs();
+            record
+                .r
+                .push(slowed((sensors.variance)(&motion.measured[at]), speed * dt));
             velocity.push(motion.v[k * n + joint]);
             acceleration.push(motion.a[k * n + joint]);
         }
@@ -212,21 +269,22 @@ pub fn prepare(
     if records.is_empty() {
         return None;
     }
-    let acceleration_scale = rms(acceleration.iter().copied()).max(f64::MIN_POSITIVE);
-    let step = median_step(&records);
-    Some(Prepared {
-        problem: Problem {
-            records,
-            nuisance: e,
-            torque_scale,
-            velocity_scale,
-            slope_range: slope_range(&velocity, acceleration_scale, step),
-            least_inertia: 1e-3 * torque_scale / acceleration_scale,
-        },
-        back,
+    Some(Built {
+        records,
         velocity,
         acceleration,
     })
+}
+
+/// Most samples over which a quantisation error counts as one.
+const LONGEST_ERROR: f64 = 8.0;
+
+/// Variance of a quantised position that moves `travel` per sample. Below one step per sample the
+/// rounding error stays for step / travel samples: a white error of that many times the variance
+/// carries the same information.
+fn slowed(variance: f64, travel: f64) -> f64 {
+    let step = (12.0 * variance).sqrt();
+    variance * (step / travel).clamp(1.0, LONGEST_ERROR)
 }
 
 fn median_step(records: &[Record]) -> f64 {

@@ -109,6 +109,9 @@ fn long_run(scores: &[(usize, DVector<f64>)], u: usize) -> DMatrix<f64> {
     s
 }
 
+/// Least number of neighbouring blocks whose scores count as correlated.
+const LEAST_LAG: f64 = 4.0;
+
 /// Andrews' automatic bandwidth for Bartlett's kernel from first-order autoregressions of each
 /// score, equal weights after normalisation.
 fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
@@ -132,8 +135,9 @@ fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
         return 0;
     }
     let lag = 1.1447 * (above / below * n as f64).cbrt();
-    // a fifth of the record is the longest correlation that it can still show
-    lag.ceil().min(n as f64 / 5.0) as usize
+    // the parallel filter alone correlates neighbouring blocks; and a fifth of the record is the
+    // longest correlation that it can still show
+    lag.ceil().max(LEAST_LAG).min(n as f64 / 5.0) as usize
 }
 
 /// Scales rows and columns of a covariance so that no variance is below that of `floor`.

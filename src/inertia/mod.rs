@@ -6,6 +6,7 @@
 pub mod accumulate;
 pub mod columns;
 mod covariance;
+pub mod encoder;
 pub mod solve;
 pub mod verdict;
 
@@ -40,4 +41,11 @@ pub fn accumulate<E>(
         &mut |row| sums.add(row.segment, row.t, row.filtered),
     )?;
     Ok((sums.finish(), summary))
+}
+
+/// Adds to a fit's covariance what another processing of the same logs changes in its parameters.
+/// Smoothing errs in the same way at every reversal of a periodic motion, which no residual shows.
+pub fn add_processing(fit: &mut solve::Fit, other: &solve::Fit) {
+    let change = &other.theta - &fit.theta;
+    fit.covariance.ger(1.0, &change, &change, 1.0);
 }

@@ -186,6 +186,25 @@ impl Robot {
         }
     }
 
+    /// Whether the steps of the robot's encoders are known.
+    pub fn knows_encoders(&self) -> bool {
+        matches!(self, Self::Cft(_))
+    }
+
+    /// Rounds a pose as the encoders would whose grid is shifted by parts of a step per motor.
+    /// Leaves the pose as it is where the encoders are not known or the pose is out of reach.
+    pub fn round_at_encoders(&self, q: &mut [f64], shift: &[f64; 4]) {
+        if let Self::Cft(_) = self {
+            let mut x = cft::pantograph::cartesian(four(q));
+            for ((x, step), shift) in x.iter_mut().zip(cft::actuation::ENCODER_SCALE).zip(shift) {
+                *x = ((*x / step + shift).round() - shift) * step;
+            }
+            if let Ok(rounded) = cft::pantograph::joints(&x) {
+                q.copy_from_slice(&rounded);
+            }
+        }
+    }
+
     /// Variance of a position measured at the motors, seen at joint i, from the encoders' steps
     /// (resolution^2 / 12 each); pose-dependent on the CFT robot. `None` where the robot's
     /// encoders are not known.

@@ -1,0 +1,138 @@
+//! What the encoders' steps change in the fit.
+//!
+//! A rounding error depends on the position alone, so on a periodic motion it is the same in every
+//! period, no residual shows it, and no covariance of residuals holds it. Here the measured motion
+//! is smoothed and rounded again on grids that are shifted by parts of a step; the scatter of the
+//! fits is the part of the uncertainty that the encoders make.
+
+use std::sync::mpsc::{Receiver, sync_channel};
+
+use nalgebra::DMatrix;
+
+use super::accumulate::Sums;
+use super::columns::Columns;
+use super::solve::Fit;
+use crate::log::Block;
+use crate::motion::{self, RunError, Settings};
+use crate::robot::Robot;
+
+/// Number of shifted grids.
+pub const GRIDS: u32 = 6;
+/// Blocks that wait between the two passes.
+const WAITING: usize = 4;
+
+/// Shifts of grid number `grid`, as parts of a step per motor: multiples of irrational numbers,
+/// spread evenly without chance.
+fn shifts(grid: u32) -> [f64; 4] {
+    const TURNS: [f64; 4] = [
+        0.618_033_988_7,
+        0.414_213_562_4,
+        0.732_050_807_6,
+        0.236_067_977_5,
+    ];
+    TURNS.map(|turn| (turn * f64::from(grid + 1)).fract())
+}
+
+/// Reduces a log whose smoothed positions are rounded anew on a shifted grid. `None` where the
+/// robot's encoders are not known.
+///
+/// # Errors
+/// Those of the source and of [`motion::run`].
+pub fn accumulate_shifted<E: Send>(
+    robot: &Robot,
+    columns: &Columns,
+    settings: &Settings,
+    grid: u32,
+    source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
+) -> Result<Option<Sums>, RunError<E>> {
+    if !robot.knows_encoders() {
+        return Ok(None);
+    }
+    let n = columns.joints;
+    let shift = shifts(grid);
+    let (sender, receiver) = sync_channel::<Block>(WAITING);
+    let smooth = Settings {
+        decimation: Some(1),
+        ..settings.clone()
+    };
+    std::thread::scope(|scope| {
+        let first = scope.spawn(move || {
+            let mut block = Block::default();
+            // a pool of its own: a worker of the shared one may be waiting for these very blocks
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+            let mut ran = || {
+                motion::run(
+                    source,
+                    n,
+                    &smooth,
+                    None,
+                    n,
+                    &|s, out| out.copy_from_slice(s.tau),
+                    &mut |row| {
+                        block.t.push(row.t);
+                        let at = block.q.len();
+                        block.q.extend_from_slice(row.q);
+                        robot.round_at_encoders(&mut block.q[at..], &shift);
+                        block.tau.extend_from_slice(row.raw);
+                        if block.len() == Block::ROWS {
+                            // a receiver that is gone has failed, and says so itself
+                            let _ = sender.send(std::mem::take(&mut block));
+                        }
+                    },
+                )
+            };
+            let ran = match &pool {
+                Ok(pool) => pool.install(ran),
+                Err(_) => ran(),
+            };
+            let _ = sender.send(block);
+            ran.map(|_| ())
+        });
+        let second = super::accumulate(robot, columns, settings, &mut next(&receiver));
+        drop(receiver);
+        match first.join() {
+            Ok(Err(error)) => return Err(error),
+            Ok(Ok(())) => {}
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+        match second {
+            Ok((sums, _)) => Ok(Some(sums)),
+            Err(RunError::Motion(error)) => Err(RunError::Motion(error)),
+            Err(RunError::Source(never)) => match never {},
+        }
+    })
+}
+
+/// The blocks of the first pass, as a source of the second.
+fn next(
+    receiver: &Receiver<Block>,
+) -> impl FnMut(&mut Block) -> Result<bool, std::convert::Infallible> + '_ {
+    move |block| {
+        Ok(match receiver.recv() {
+            Ok(found) => {
+                *block = found;
+                true
+            }
+            Err(_) => false,
+        })
+    }
+}
+
+/// Adds the scatter of the fits on shifted grids to a fit's covariance.
+pub fn add_scatter(fit: &mut Fit, shifted: &[Fit]) {
+    let k = shifted.len();
+    if k < 2 {
+        return;
+    }
+    let u = fit.theta.len();
+    let mut mean = fit.theta.clone() * 0.0;
+    for other in shifted {
+        mean += &other.theta / k as f64;
+    }
+    let mut scatter = DMatrix::zeros(u, u);
+    for other in shifted {
+        let d = &other.theta - &mean;
+        scatter.ger(1.0 / (k - 1) as f64, &d, &d, 1.0);
+    }
+    fit.covariance += scatter;
+}
