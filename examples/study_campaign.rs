@@ -2,8 +2,8 @@
 //! log, on plants whose parameters vary by 15 %, with encoder quantisation and 1 % torque noise.
 //!
 //! `cargo run --release --example study_campaign -- [SEEDS] [FOLDER]` writes one line per seed to
-//! FOLDER/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
-//! the end, the summaries that docs/studies.md is generated from.
+//! target/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
+//! the end, into FOLDER the summaries that docs/studies.md is generated from.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
@@ -51,7 +51,7 @@ fn main() {
     let seeds: u64 = arguments.next().and_then(|s| s.parse().ok()).unwrap_or(200);
     let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "docs/results".into()));
     std::fs::create_dir_all(&folder).expect("the folder can be made");
-    let log = folder.join("study_campaign.jsonl");
+    let log = Path::new("target").join("study_campaign.jsonl");
     let mut rows = finished(&log);
     let done: Vec<u64> = rows.iter().filter_map(|r| r["seed"].as_u64()).collect();
     let file = OpenOptions::new()
