@@ -431,18 +431,6 @@ mod tests {
     }
 
     #[test]
-    fn a_reversal_too_quick_to_see_bounds_the_slope_from_below_only() {
-        let mut trial = Trial::usual();
-        trial.law = DoubleTanh::from_parameters([30.0, 14.0, 0.0, 1e5, 12.0]);
-        trial.motion = vec![(0.05, 1.1)];
-        let e = run(&trial, 5, &Options::default()).unwrap();
-        let steep = &e.values[3];
-        assert_eq!(steep.verdict, Verdict::LowerBound);
-        assert!(steep.value < 1e5 && steep.value > 100.0, "{steep:?}");
-        assert!(curve_error(&e, &trial.law) < 1e-2);
-    }
-
-    #[test]
     fn motion_in_one_direction_is_answered_with_what_is_missing() {
         let trial = Trial::usual();
         let mut prepared = trial.prepared(6);
