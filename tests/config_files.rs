@@ -440,3 +440,23 @@ proptest! {
         let _ = cft_ident::config::ModelFile::parse("m", &format!("{SINGLE}{text}"));
     }
 }
+
+#[test]
+fn gears_that_cannot_be_turned_back_are_refused() {
+    for (gears, words) in [
+        ("[[2, 0]]", &["log.gears", "1 rows and columns"][..]),
+        ("[[0]]", &["log.gears", "inverted"]),
+        ("[[2]]\n", &["log.gears", "torque_is"]),
+    ] {
+        robot_refused(SINGLE, &format!("[log]\ngears = {gears}\n"), words);
+    }
+}
+
+#[test]
+fn columns_by_number_begin_at_one() {
+    robot_refused(
+        SINGLE,
+        "[log]\ntime = 0\n",
+        &["r.toml:6", "numbered from 1"],
+    );
+}

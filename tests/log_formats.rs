@@ -181,6 +181,128 @@ fn blocks_hold_at_most_4096_rows_and_know_their_first_line() {
     assert_eq!((reader.samples(), reader.duration_s()), (10_000, 9999.0));
 }
 
+fn single(log: &str) -> Layout {
+    let head = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"revolute\"\n";
+    RobotFile::parse("r.toml", &format!("{head}{log}"))
+        .unwrap()
+        .layout()
+}
+
+#[test]
+fn a_log_without_a_header_is_read_by_the_numbers_of_its_columns() {
+    let layout = single(
+        "[log]\ntime = 2\ntorque_is = \"joint\"\n[log.joint.q1]\nposition = 3\ntorque = 1\nvelocity = 4\n",
+    );
+    for text in [
+        "-2,0,1.5,7\n1e-3,0.5,2,8\n",
+        "# a comment\n-2 0 1.5 7\n1e-3 0.5 2 8",
+        "tau;t;q;dq\n-2;0;1.5;7\n1e-3;0.5;2;8\n",
+        "a,a,a,a\n-2,0,1.5,7\n1e-3,0.5,2,8\n",
+    ] {
+        let block = read_text(text, &layout);
+        assert_eq!(block.t, [0.0, 0.5], "{text:?}");
+        assert_eq!((&block.q, &block.dq), (&vec![1.5, 2.0], &vec![7.0, 8.0]));
+        assert_eq!(block.tau, [-2.0, 1e-3]);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, "1,2,3\n2,3,4\n").unwrap();
+    let message = Reader::open(&LogSpec::whole(&path), &layout)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("`#4`") && message.contains("velocity"),
+        "{message}"
+    );
+}
+
+#[test]
+fn epoch_times_keep_their_nanoseconds_and_are_counted_from_the_first() {
+    let steps = ["0.000000000", "0.000999999", "0.002000001"];
+    let expected = [0.0, 0.000999999, 0.002000001];
+    let log = |unit: &str| single(&format!("[log]\ntime_unit = \"{unit}\"\n"));
+    let rows = |stamp: &dyn Fn(usize) -> String| {
+        let rows = (0..3).map(|row| format!("{},{row},1\n", stamp(row)));
+        format!("t,q_q1,tau_q1\n{}", rows.collect::<String>())
+    };
+    let seconds = rows(&|row| format!("1700000000{}", &steps[row][1..]));
+    let ns = rows(&|row| format!("1700000000{}", &steps[row][2..]));
+    let ms = rows(&|row| format!("1700000000{}.{}", &steps[row][2..5], &steps[row][5..]));
+    let iso = rows(&|row| format!("2023-11-14T22:13:20{}Z", &steps[row][1..]));
+    let zone = rows(&|row| format!("\"2023-11-14 23:13:20,{}+01:00\"", &steps[row][2..]));
+    for (unit, text) in [
+        ("s", seconds),
+        ("ns", ns),
+        ("ms", ms),
+        ("s", iso),
+        ("s", zone),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        std::fs::write(&path, &text).unwrap();
+        let (block, reader) = read(&path, &log(unit));
+        assert_eq!(block.t, expected, "{text}");
+        assert_eq!(reader.origin().nanoseconds(), 1_700_000_000_000_000_000);
+        let spec = format!("{}@0.000999999..s", path.display());
+        let mut reader = Reader::open(&spec.parse().unwrap(), &log(unit)).unwrap();
+        let mut block = Block::default();
+        assert!(reader.read(&mut block).unwrap());
+        assert_eq!(block.t, expected[1..]);
+    }
+    // Near zero, times are as the log has them.
+    let near = read_text("t,q_q1,tau_q1\n0.3,1,1\n0.4,1,1\n", &log("s"));
+    assert_eq!(near.t, [0.3, 0.4]);
+}
+
+#[test]
+fn coupled_gears_take_the_motors_side_to_the_joints() {
+    let robot = RobotFile::parse(
+        "r.toml",
+        r#"
+        [robot]
+        model = "cft"
+        setup = "tuedacs"
+        [log]
+        torque_is = "motor"
+        gears = [[32, 0, 0, 0], [0, 32, 0, 0], [0, 0, 45, 0], [0, 0, 32, -48]]
+        [log.joint.q2]
+        position_offset = 0.5
+        "#,
+    )
+    .unwrap();
+    let q = [0.25, -1.5, 2.0, 0.75];
+    let gears = [
+        [32.0, 0.0, 0.0, 0.0],
+        [0.0, 32.0, 0.0, 0.0],
+        [0.0, 0.0, 45.0, 0.0],
+        [0.0, 0.0, 32.0, -48.0],
+    ];
+    let mut joint = q;
+    joint[1] -= 0.5;
+    let motor: Vec<f64> = gears
+        .iter()
+        .map(|row| row.iter().zip(&joint).map(|(r, q)| r * q).sum())
+        .collect();
+    let torque = [1.0, 2.0, 3.0, 4.0];
+    let mut text =
+        String::from("t,q_q1,q_q2,q_q4,q_q5,tau_q1,tau_q2,tau_q4,tau_q5,dq_q1,dq_q2,dq_q4,dq_q5\n");
+    for row in 0..2 {
+        let numbers = motor.iter().chain(&torque).chain(&motor);
+        let numbers: Vec<String> = numbers.map(f64::to_string).collect();
+        text.push_str(&format!("{row},{}\n", numbers.join(",")));
+    }
+    let block = read_text(&text, &robot.layout());
+    for joint in 0..4 {
+        assert!((block.q[joint] - q[joint]).abs() < 1e-14);
+        let offset = if joint == 1 { 0.5 } else { 0.0 };
+        assert!((block.dq[joint] - (q[joint] - offset)).abs() < 1e-14);
+    }
+    assert_eq!(
+        block.tau[..4],
+        [32.0, 64.0, 45.0 * 3.0 + 32.0 * 4.0, -48.0 * 4.0]
+    );
+}
+
 fn finite() -> impl Strategy<Value = f64> {
     any::<u64>()
         .prop_map(f64::from_bits)

@@ -83,10 +83,11 @@ pub fn identify(
     let bar = context.progress("reading logs", None);
     let ranges = machine.ranges();
     let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
-    let mut inputs = Vec::new();
+    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
     for spec in logs {
         let log = machine.motions(spec, context)?;
         inputs.push(log.provenance);
+        warnings.extend(log.warnings);
         let moving = match named {
             Some(j) => j,
             None => moving_joint(names, &log.motions, &ranges)
@@ -118,10 +119,8 @@ pub fn identify(
         .collect();
     let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
     context.check()?;
-    let warnings = joints
-        .iter()
-        .flat_map(|(j, e)| joint_warnings(&names[*j], e))
-        .collect();
+    let of_joints = joints.iter();
+    warnings.extend(of_joints.flat_map(|(j, e)| joint_warnings(&names[*j], e)));
     Ok(Identified {
         joints,
         inputs,

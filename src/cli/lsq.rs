@@ -124,6 +124,7 @@ pub fn identify(
             })
             .map_err(|e| run_error(spec, e))?;
             if first {
+                warnings.extend(log.warnings());
                 warnings.extend(summary_warnings(spec, &summary));
                 inputs.push(log.provenance()?);
             }

@@ -27,6 +27,8 @@ pub struct OneJointLog {
     /// The torque is held from row to row.
     pub held: bool,
     pub provenance: Provenance,
+    /// What the reader left out, dropped or chose.
+    pub warnings: Vec<String>,
 }
 
 /// The same processing with a narrower position filter.
@@ -91,6 +93,11 @@ impl Open<'_> {
             block.tau.resize(block.q.len(), 0.0);
         }
         Ok(more)
+    }
+
+    /// What the reader left out, dropped or chose, once the last block is read.
+    pub fn warnings(&self) -> Vec<String> {
+        self.reader.warnings()
     }
 
     /// Name, span, checksum and size of what was read.
@@ -233,6 +240,7 @@ impl Machine {
             motions: smooth(&declared)?,
             narrower: smooth(&narrower)?,
             held,
+            warnings: log.warnings(),
             provenance: log.provenance()?,
         })
     }

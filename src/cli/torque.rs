@@ -104,7 +104,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error.into());
     }
     context.check()?;
-    let warnings = summary_warnings(&args.log, &summary);
+    let mut warnings = log.warnings();
+    warnings.extend(summary_warnings(&args.log, &summary));
     let provenance = [log.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let mut table = Table::new(&[

@@ -69,6 +69,7 @@ pub fn reconstruct(
         let summary = all
             .add(&settings, &mut |block| log.read(block), row)
             .map_err(|e| run_error(spec, e))?;
+        warnings.extend(log.warnings());
         warnings.extend(summary_warnings(spec, &summary));
         inputs.push(log.provenance()?);
         last = Some(summary);

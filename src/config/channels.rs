@@ -1,5 +1,7 @@
 //! From the `[log]` section to the columns that the reader looks for.
 
+use nalgebra::DMatrix;
+
 use super::log_section::{
     ActuatorChannels, ChannelsKind, DelimiterKind, JointChannels, PositionUnit, StampKind,
     TimeUnit, TorqueUnit,
@@ -118,6 +120,11 @@ impl RobotFile {
                 key: key("torque", channels.torque.is_some()),
             };
         }
+        if !self.log.gears.is_empty() {
+            let offsets = layout.positions.iter_mut();
+            let offsets = offsets.map(|channel| std::mem::take(&mut channel.offset));
+            layout.conversion = through_gears(&self.log.gears, offsets.collect());
+        }
         layout
     }
 
@@ -220,7 +227,7 @@ impl RobotFile {
 
 /// Actuator positions to joints by eq. (57), volts to joint torques by Table 6 and eq. (66).
 fn to_joint_side(setup: Setup) -> Conversion {
-    Conversion::new(move |positions, torques| {
+    Conversion::new(move |positions, torques, _| {
         let Ok(x) = <[f64; 4]>::try_from(&*positions) else {
             return false;
         };
@@ -234,4 +241,49 @@ fn to_joint_side(setup: Setup) -> Conversion {
         }
         true
     })
+}
+
+/// Motor side to joint side, for gears that take joint positions to those of the motors, p = R q:
+/// q = R^-1 p + offset, tau = R' c. `None` where R has no inverse.
+fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<Conversion> {
+    let n = gears.len();
+    let inverse = gear_matrix(gears)?.try_inverse()?;
+    let inverse: Vec<Vec<f64>> = inverse
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect();
+    let gears = gears.to_vec();
+    // Gears of up to this many joints need no memory of their own.
+    const JOINTS: usize = 16;
+    Some(Conversion::new(move |positions, torques, velocities| {
+        if n > JOINTS || positions.len() != n {
+            return false;
+        }
+        let times = |side: &mut [f64], entry: &dyn Fn(usize, usize) -> f64| {
+            let mut out = [0.0; JOINTS];
+            for (row, out) in out.iter_mut().enumerate().take(n) {
+                let products = side.iter().enumerate();
+                *out = products.map(|(column, x)| entry(row, column) * x).sum();
+            }
+            side.copy_from_slice(&out[..side.len()]);
+        };
+        times(positions, &|row, column| inverse[row][column]);
+        for (position, offset) in positions.iter_mut().zip(&offsets) {
+            *position += offset;
+        }
+        if velocities.len() == n {
+            times(velocities, &|row, column| inverse[row][column]);
+        }
+        if torques.len() == n {
+            times(torques, &|row, column| gears[column][row]);
+        }
+        true
+    }))
+}
+
+/// The matrix R of `[log] gears`; `None` where it is not square.
+pub(super) fn gear_matrix(gears: &[Vec<f64>]) -> Option<DMatrix<f64>> {
+    let n = gears.len();
+    let square = gears.iter().all(|row| row.len() == n);
+    square.then(|| DMatrix::from_fn(n, n, |row, column| gears[row][column]))
 }

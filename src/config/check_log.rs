@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::ConfigError;
+use super::channels::gear_matrix;
 use super::check::known_names;
 use super::document::Document;
 use super::log_section::{ActuatorChannels, JointChannels, PositionUnit, TorqueIs, TorqueUnit};
@@ -15,6 +16,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     let log = &file.log;
     known_names(document, &["log", "joint"], &log.joint, &file.joint_names())?;
     document.finite(&["log", "torque_delay_s"], log.torque_delay_s.as_slice())?;
+    gears(file, document)?;
     // Which key reads which column: no column may be read twice.
     let mut columns: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     if let Some(time) = &log.time {
@@ -33,6 +35,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
             channels,
             robot.joint_kind(index),
             log.torque_is,
+            !log.gears.is_empty(),
         )?;
         let named = [
             ("position", &channels.position),
@@ -77,6 +80,40 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     Ok(())
 }
 
+/// Refuses gears that cannot be turned back, or that would be applied to what is no motor's.
+fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let log = &file.log;
+    if log.gears.is_empty() {
+        return Ok(());
+    }
+    let at = ["log", "gears"];
+    let joints = file.robot().joints();
+    let matrix = gear_matrix(&log.gears).filter(|matrix| matrix.nrows() == joints);
+    let Some(matrix) = matrix else {
+        return Err(document.value(
+            &at,
+            &format!("is no matrix of {joints} rows and columns"),
+            "give one row for each motor: its turns per unit of each joint",
+        ));
+    };
+    document.finite(&at, matrix.as_slice())?;
+    if matrix.try_inverse().is_none() {
+        return Err(document.value(
+            &at,
+            "cannot be inverted: some motion of the joints moves no motor",
+            "correct the ratios",
+        ));
+    }
+    match log.torque_is {
+        Some(TorqueIs::Motor | TorqueIs::Current) => Ok(()),
+        _ => Err(document.value(
+            &at,
+            "takes motor torques to the joints, but the torques are not said to be of the motors",
+            "set `torque_is = \"motor\"` or \"current\", or delete it",
+        )),
+    }
+}
+
 /// Refuses a column that is empty or already read as something else.
 fn claim<'c>(
     document: &Document,
@@ -102,6 +139,7 @@ fn joint_channels(
     channels: &JointChannels,
     kind: JointKind,
     torque_is: Option<TorqueIs>,
+    geared: bool,
 ) -> Result<(), ConfigError> {
     let at = |key| ["log", "joint", joint, key];
     let position_fits = match channels.position_unit {
@@ -142,7 +180,7 @@ fn joint_channels(
             &["log", "torque_is"],
             "what the torque column is: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
         )),
-        (Some(TorqueIs::Motor), _) if !scaled => Err(document.missing(
+        (Some(TorqueIs::Motor), _) if !scaled && !geared => Err(document.missing(
             &at("torque_scale"),
             "the gear ratio that takes motor torque to the joint (1 where there is no gear)",
         )),

@@ -281,6 +281,10 @@ pub struct LogSection {
     /// The logged torque (or volt) was held from its own sample to the next.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_held: Option<bool>,
+    /// Rows of the matrix R of coupled gears, p = R q, where the log is of the motors' side:
+    /// q = R^-1 p + offset, tau = R' c.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gears: Vec<Vec<f64>>,
     /// Columns by joint.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub joint: BTreeMap<String, JointChannels>,

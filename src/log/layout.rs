@@ -52,24 +52,32 @@ pub enum Channels {
     Actuator,
 }
 
-/// Turns one row of actuator positions and volts into joint positions and torques, in place.
+/// Turns the positions, torques and velocities of one row into those of the joints, in place.
 ///
 /// Returns false, and leaves both as they are, where the position belongs to no pose of the robot.
-type RowMap = dyn Fn(&mut [f64], &mut [f64]) -> bool + Send + Sync;
+type RowMap = dyn Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync;
 
 /// A conversion that the reader applies to every row, so that its blocks are joint-side.
 #[derive(Clone)]
 pub struct Conversion(Arc<RowMap>);
 
 impl Conversion {
-    /// Wraps a map of one row `(positions, torques)`.
-    pub fn new(map: impl Fn(&mut [f64], &mut [f64]) -> bool + Send + Sync + 'static) -> Self {
+    /// Wraps a map of one row `(positions, torques, velocities)`; torques and velocities are empty
+    /// where the log has none.
+    pub fn new(
+        map: impl Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync + 'static,
+    ) -> Self {
         Self(Arc::new(map))
     }
 
     /// Applies it to one row; false where the row has no image.
-    pub fn apply(&self, positions: &mut [f64], torques: &mut [f64]) -> bool {
-        (self.0)(positions, torques)
+    pub fn apply(
+        &self,
+        positions: &mut [f64],
+        torques: &mut [f64],
+        velocities: &mut [f64],
+    ) -> bool {
+        (self.0)(positions, torques, velocities)
     }
 }
 

@@ -30,6 +30,7 @@ pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
 pub use names::{escape, escape_whole, nearest};
 pub use reader::Reader;
+pub use recording::{CdrReader, DefinitionError, Malformed, Value};
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
 pub use time::Instant;

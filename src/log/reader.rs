@@ -235,7 +235,7 @@ impl Reader {
             block.line0 = self.rows.number();
         }
         block.t.push(t);
-        let (at_q, at_tau) = (block.q.len(), block.tau.len());
+        let (at_q, at_tau, at_dq) = (block.q.len(), block.tau.len(), block.dq.len());
         self.rows.append(block)?;
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
         for ((activity, q), tau) in self.activity.iter_mut().zip(&*q).zip(&*tau) {
@@ -243,7 +243,7 @@ impl Reader {
             activity.moved |= *activity.first_position.get_or_insert(*q) != *q;
         }
         if let Some(conversion) = &self.layout.conversion
-            && !conversion.apply(q, tau)
+            && !conversion.apply(q, tau, &mut block.dq[at_dq..])
         {
             return Err(LogError::NoPose {
                 at: self.rows.place(),

@@ -1,4 +1,5 @@
-//! What the tests of logs share.
+//! What the tests of logs share; not each of them needs all of it.
+#![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 

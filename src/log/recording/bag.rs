@@ -12,7 +12,7 @@ use tempfile::NamedTempFile;
 use super::container::{Break, Head, Topic, Wanted};
 use super::decode::Schema;
 use crate::log::content::{Compression, Content};
-use crate::log::{LogError, source};
+use crate::log::{LogError, escape_whole, source};
 
 /// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
 const PAGE: usize = 256;
@@ -52,7 +52,7 @@ impl BagFile {
     pub(super) fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
         let refuse = |reason: String| LogError::Database {
             file: source::shown(path),
-            reason,
+            reason: escape_whole(&reason.replace('\n', " ")),
         };
         let size = content.size;
         let unpacked = match content.compression {

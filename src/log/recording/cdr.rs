@@ -1,129 +1,53 @@
-//! Numbers out of CDR messages (OMG DDSI-RTPS, section 10) by field path, nothing else decoded.
+//! Numbers out of CDR messages by field path, nothing else decoded.
 //!
 //! The definition is turned into a plan once; each message is then walked up to the last field
-//! that is asked for. Numbers are aligned to their own size, counted from after the four bytes that
-//! say the byte order. A length is believed only as far as the message has bytes for it.
+//! that is asked for.
 
-use thiserror::Error;
-
-use super::msg::{Count, Definition, Field, Kind, Primitive};
-use super::path::{Path, Step};
+use super::cursor::{Cursor, Encoding, Malformed, Span};
+use super::msg::{Definition, DefinitionError, Field, Kind};
+use super::path::Path;
+use super::plan::{By, Node, Plan, Slot};
 use super::value::Value;
-
-/// What is wrong with the bytes of a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum Malformed {
-    /// The message ends inside a field.
-    #[error("it ends after {bytes} bytes, inside a field")]
-    Short {
-        /// Length of the message.
-        bytes: usize,
-    },
-    /// An encoding that is not plain CDR.
-    #[error("its encoding {kind:#06x} is not plain CDR")]
-    Encapsulation {
-        /// The identifier in its first two bytes.
-        kind: u16,
-    },
-    /// A count that the message has no bytes for.
-    #[error("it declares {count} elements, for which it has no bytes")]
-    Count {
-        /// The count.
-        count: u64,
-    },
-}
-
-/// How numbers and texts are laid out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Encoding {
-    /// CDR with its four bytes of header, as ROS 2 writes it.
-    Cdr,
-    /// Packed little-endian numbers without padding, as ROS 1 writes them.
-    Ros1,
-}
 
 /// Reads the numbers of some fields out of the messages of one type.
 #[derive(Debug, Clone)]
-pub(crate) struct CdrReader {
+pub struct CdrReader {
     messages: Vec<Vec<Field>>,
     encoding: Encoding,
-    plan: Node,
-    picks: Vec<Pick>,
+    plan: Plan,
     /// Place and number of the elements of each array that is asked for.
     arrays: Vec<Option<Span>>,
-    array_kinds: Vec<Primitive>,
     /// Places of the texts in each list of names.
     lists: Vec<Vec<Span>>,
     outputs: usize,
 }
 
-/// Bytes from `start`: `count` elements of an array, or bytes of a text.
-#[derive(Debug, Clone, Copy)]
-struct Span {
-    start: usize,
-    count: usize,
-}
-
-/// What is taken from a message: its fields in order, those of no interest left out.
-#[derive(Debug, Clone, Default)]
-struct Node {
-    slots: Vec<(usize, Slot)>,
-}
-
-#[derive(Debug, Clone)]
-enum Slot {
-    /// A number for this output.
-    Number(Vec<usize>),
-    /// An array of numbers, remembered under this index.
-    Array(usize),
-    /// A list of texts, remembered under this index.
-    List(usize),
-    /// A message.
-    Inner(Node),
-    /// Some elements of an array of messages.
-    Elements(Vec<(usize, Node)>),
-}
-
-/// An element of an array for one output.
-#[derive(Debug, Clone)]
-struct Pick {
-    output: usize,
-    array: usize,
-    by: By,
-}
-
-#[derive(Debug, Clone)]
-enum By {
-    Index(usize),
-    Name {
-        list: usize,
-        name: String,
-        /// Where it stood in the message before: most likely there again.
-        last: usize,
-    },
-}
-
-/// Where a path leads, before it becomes part of the plan.
-struct Route {
-    /// Field indices and, between them, indices of elements.
-    hops: Vec<Hop>,
-    end: End,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Hop {
-    Field(usize),
-    Element(usize),
-}
-
-enum End {
-    Number,
-    Element(usize, Primitive),
-    /// An element by its name: the route to the list of names.
-    Named(Vec<Hop>, String, Primitive),
-}
-
 impl CdrReader {
+    /// Plans the reading of some fields of message type `name` (`package/msg/Type`), given by paths
+    /// such as `header.stamp.sec`, `position[2]` or `position[name=arm]`, from ROS 2 messages.
+    ///
+    /// `definition` is the type's `.msg` text with its dependencies, as recordings hold it; it may be
+    /// empty for `sensor_msgs/msg/JointState` and some others. A path that leads to no number gives
+    /// [`Value::Absent`].
+    ///
+    /// # Errors
+    /// [`DefinitionError`] where the definition cannot be used.
+    pub fn parse(name: &str, definition: &str, paths: &[&str]) -> Result<Self, DefinitionError> {
+        let definition = Definition::parse(name, definition)?;
+        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        Ok(Self::new(&definition, Encoding::Cdr, &fields).0)
+    }
+
+    /// The fields of one message, in the order of their paths.
+    ///
+    /// # Errors
+    /// [`Malformed`]: the bytes are no message of this type.
+    pub fn values(&mut self, data: &[u8]) -> Result<Vec<Value>, Malformed> {
+        let mut out = vec![Value::Absent; self.outputs];
+        self.read(data, &mut out)?;
+        Ok(out)
+    }
+
     /// Plans the reading of `fields`: for each the paths it may have, the first that leads to a
     /// number is taken. Says for each whether one does.
     pub(crate) fn new(
@@ -131,69 +55,21 @@ impl CdrReader {
         encoding: Encoding,
         fields: &[Vec<Path>],
     ) -> (Self, Vec<bool>) {
-        let mut reader = Self {
-            messages: definition.messages.clone(),
-            encoding,
-            plan: Node::default(),
-            picks: Vec::new(),
-            arrays: Vec::new(),
-            array_kinds: Vec::new(),
-            lists: Vec::new(),
-            outputs: fields.len(),
-        };
+        let mut plan = Plan::default();
         let mut found = Vec::with_capacity(fields.len());
         for (output, paths) in fields.iter().enumerate() {
-            let route = paths
-                .iter()
-                .find_map(|path| route(&reader.messages, &path.steps));
-            found.push(route.is_some());
-            if let Some(route) = route {
-                reader.add(output, route);
-            }
+            let mut steps = paths.iter().map(|path| &path.steps);
+            found.push(steps.any(|steps| plan.add(&definition.messages, steps, output)));
         }
+        let reader = Self {
+            messages: definition.messages.clone(),
+            encoding,
+            arrays: vec![None; plan.arrays.len()],
+            lists: vec![Vec::new(); plan.lists],
+            plan,
+            outputs: fields.len(),
+        };
         (reader, found)
-    }
-
-    fn add(&mut self, output: usize, route: Route) {
-        let by = match route.end {
-            End::Number => {
-                if let Slot::Number(outputs) =
-                    slot(&mut self.plan, &route.hops, || Slot::Number(Vec::new()))
-                {
-                    outputs.push(output);
-                }
-                return;
-            }
-            End::Element(index, _) => By::Index(index),
-            End::Named(ref list, ref name, _) => {
-                let next = self.lists.len();
-                let list = match slot(&mut self.plan, list, || Slot::List(next)) {
-                    Slot::List(list) => *list,
-                    _ => return,
-                };
-                if list == next {
-                    self.lists.push(Vec::new());
-                }
-                By::Name {
-                    list,
-                    name: name.clone(),
-                    last: 0,
-                }
-            }
-        };
-        let (End::Element(_, kind) | End::Named(_, _, kind)) = route.end else {
-            return;
-        };
-        let next = self.arrays.len();
-        let Slot::Array(array) = slot(&mut self.plan, &route.hops, || Slot::Array(next)) else {
-            return;
-        };
-        let array = *array;
-        if array == next {
-            self.arrays.push(None);
-            self.array_kinds.push(kind);
-        }
-        self.picks.push(Pick { output, array, by });
     }
 
     /// Reads the fields of one message into `out`, one value for each field that was asked for.
@@ -214,8 +90,8 @@ impl CdrReader {
             lists: &mut self.lists,
             out,
         };
-        walk.message(&mut cursor, 0, Some(&self.plan))?;
-        for pick in &mut self.picks {
+        walk.message(&mut cursor, 0, Some(&self.plan.root))?;
+        for pick in &mut self.plan.picks {
             let Some(Some(array)) = self.arrays.get(pick.array) else {
                 continue;
             };
@@ -232,7 +108,7 @@ impl CdrReader {
                     }
                 }
             };
-            let kind = self.array_kinds[pick.array];
+            let kind = self.plan.arrays[pick.array];
             if index < array.count {
                 let at = array.start + index * kind.size();
                 out[pick.output] = cursor.number_at(at, kind)?;
@@ -262,243 +138,6 @@ fn find(data: &[u8], names: &[Span], name: &str, last: usize) -> Option<usize> {
         return Some(last);
     }
     names.iter().position(is)
-}
-
-/// Follows a path through the types.
-fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
-    let mut hops = Vec::new();
-    let mut inside = 0;
-    let mut steps = steps.iter().peekable();
-    // Messages on the way, with the hops that lead to them: where lists of names are looked for.
-    let mut outer = vec![(0, 0)];
-    loop {
-        let Step::Field(name) = steps.next()? else {
-            return None;
-        };
-        let (index, field) = find_field(&messages[inside], name)?;
-        hops.push(Hop::Field(index));
-        let selector = match field.count {
-            Count::One => None,
-            Count::Fixed(_) | Count::Sequence => Some(steps.next()?),
-        };
-        let number = match selector {
-            None => None,
-            Some(Step::Index(index)) => Some(*index),
-            Some(Step::Field(digits)) => Some(digits.parse().ok()?),
-            Some(Step::Named { list, value }) => {
-                let Kind::Primitive(kind) = field.kind else {
-                    return None;
-                };
-                let list = outer.iter().rev().find_map(|(message, depth)| {
-                    let (index, field) = find_field(&messages[*message], list)?;
-                    let texts = field.kind == Kind::String && field.count != Count::One;
-                    texts.then(|| [&hops[..*depth], &[Hop::Field(index)]].concat())
-                })?;
-                return steps.next().is_none().then(|| Route {
-                    hops,
-                    end: End::Named(list, value.clone(), kind),
-                });
-            }
-        };
-        match field.kind {
-            Kind::String | Kind::WideString => return None,
-            Kind::Primitive(kind) => {
-                let end = match number {
-                    None => End::Number,
-                    Some(number) => End::Element(number, kind),
-                };
-                return steps.next().is_none().then_some(Route { hops, end });
-            }
-            Kind::Message(message) => {
-                hops.extend(number.map(Hop::Element));
-                inside = message;
-                outer.push((message, hops.len()));
-            }
-        }
-    }
-}
-
-fn find_field<'f>(fields: &'f [Field], name: &str) -> Option<(usize, &'f Field)> {
-    fields.iter().enumerate().find(|(_, f)| f.name == name)
-}
-
-/// The slot at the end of some hops, made where there is none.
-fn slot<'n>(mut node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
-    let mut rest = hops;
-    loop {
-        let (field, tail) = match rest.split_first() {
-            Some((Hop::Field(field), tail)) => (*field, tail),
-            // Hops begin with a field, and an element is followed by one.
-            _ => (0, &[][..]),
-        };
-        if tail.is_empty() {
-            return node.entry(field, new);
-        }
-        rest = tail;
-        node = match tail[0] {
-            Hop::Field(_) => match node.entry(field, || Slot::Inner(Node::default())) {
-                Slot::Inner(inner) => inner,
-                other => return other,
-            },
-            Hop::Element(element) => {
-                rest = &tail[1..];
-                let elements = match node.entry(field, || Slot::Elements(Vec::new())) {
-                    Slot::Elements(elements) => elements,
-                    other => return other,
-                };
-                let at = elements.partition_point(|(index, _)| *index < element);
-                if elements.get(at).is_none_or(|(index, _)| *index != element) {
-                    elements.insert(at, (element, Node::default()));
-                }
-                &mut elements[at].1
-            }
-        };
-    }
-}
-
-impl Node {
-    fn entry(&mut self, field: usize, new: impl FnOnce() -> Slot) -> &mut Slot {
-        let at = self.slots.partition_point(|(index, _)| *index < field);
-        if self.slots.get(at).is_none_or(|(index, _)| *index != field) {
-            self.slots.insert(at, (field, new()));
-        }
-        &mut self.slots[at].1
-    }
-}
-
-/// The bytes of one message, and how far they are read.
-struct Cursor<'d> {
-    data: &'d [u8],
-    at: usize,
-    big: bool,
-    /// Largest alignment; 1 for none.
-    align: usize,
-    /// Length of the message with its header, for errors.
-    total: usize,
-}
-
-impl<'d> Cursor<'d> {
-    fn new(data: &'d [u8], encoding: Encoding) -> Result<Self, Malformed> {
-        let total = data.len();
-        let (data, big, align) = match (encoding, data) {
-            (Encoding::Ros1, data) => (data, false, 1),
-            (Encoding::Cdr, [high, low, _, _, body @ ..]) => {
-                let kind = u16::from_be_bytes([*high, *low]);
-                // 0 and 1: CDR; 6 and 7: the plain form of its second version, aligned to 4 at most.
-                match kind {
-                    0 => (body, true, 8),
-                    1 => (body, false, 8),
-                    6 => (body, true, 4),
-                    7 => (body, false, 4),
-                    _ => return Err(Malformed::Encapsulation { kind }),
-                }
-            }
-            (Encoding::Cdr, _) => return Err(Malformed::Short { bytes: total }),
-        };
-        Ok(Self {
-            data,
-            at: 0,
-            big,
-            align,
-            total,
-        })
-    }
-
-    fn short(&self) -> Malformed {
-        Malformed::Short { bytes: self.total }
-    }
-
-    #[inline]
-    fn align_to(&mut self, size: usize) {
-        let size = size.min(self.align);
-        self.at = self.at.next_multiple_of(size);
-    }
-
-    /// Passes over `count` bytes; where they begin.
-    #[inline]
-    fn pass(&mut self, count: usize) -> Result<usize, Malformed> {
-        let start = self.at;
-        match start.checked_add(count) {
-            Some(end) if end <= self.data.len() => {
-                self.at = end;
-                Ok(start)
-            }
-            _ => Err(self.short()),
-        }
-    }
-
-    #[inline]
-    fn bytes_at<const N: usize>(&self, at: usize) -> Result<[u8; N], Malformed> {
-        let bytes = self.data.get(at..).and_then(|tail| tail.first_chunk());
-        let mut bytes: [u8; N] = *bytes.ok_or_else(|| self.short())?;
-        if self.big {
-            bytes.reverse();
-        }
-        Ok(bytes)
-    }
-
-    #[inline]
-    fn number_at(&self, at: usize, kind: Primitive) -> Result<Value, Malformed> {
-        Ok(match kind {
-            Primitive::F64 => Value::Float(f64::from_le_bytes(self.bytes_at(at)?)),
-            Primitive::F32 => Value::Float(f32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::Bool | Primitive::U8 => {
-                Value::Int(u8::from_le_bytes(self.bytes_at(at)?).into())
-            }
-            Primitive::I8 => Value::Int(i8::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U16 => Value::Int(u16::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::I16 => Value::Int(i16::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U32 => Value::Int(u32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::I32 => Value::Int(i32::from_le_bytes(self.bytes_at(at)?).into()),
-            Primitive::U64 => Value::Unsigned(u64::from_le_bytes(self.bytes_at(at)?)),
-            Primitive::I64 => Value::Int(i64::from_le_bytes(self.bytes_at(at)?)),
-        })
-    }
-
-    fn length(&mut self) -> Result<usize, Malformed> {
-        self.align_to(4);
-        let at = self.pass(4)?;
-        Ok(u32::from_le_bytes(self.bytes_at(at)?) as usize)
-    }
-
-    /// Number of elements of a field; refused where fewer bytes than elements are left.
-    fn count(&mut self, count: Count) -> Result<usize, Malformed> {
-        let count = match count {
-            Count::One => return Ok(1),
-            Count::Fixed(count) => count,
-            Count::Sequence => self.length()?,
-        };
-        if count > self.data.len().saturating_sub(self.at) {
-            return Err(Malformed::Count {
-                count: count as u64,
-            });
-        }
-        Ok(count)
-    }
-
-    /// A text without its closing NUL.
-    fn text(&mut self) -> Result<Span, Malformed> {
-        let length = self.length()?;
-        let start = self.pass(length)?;
-        let closed = length > 0 && self.data.get(start + length - 1) == Some(&0);
-        Ok(Span {
-            start,
-            count: length - usize::from(closed),
-        })
-    }
-
-    fn primitives(&mut self, count: usize, kind: Primitive) -> Result<Span, Malformed> {
-        if count == 0 {
-            return Ok(Span {
-                start: self.at,
-                count,
-            });
-        }
-        self.align_to(kind.size());
-        let bytes = count.checked_mul(kind.size()).ok_or_else(|| self.short())?;
-        let start = self.pass(bytes)?;
-        Ok(Span { start, count })
-    }
 }
 
 /// One message being walked, and where its numbers go.
@@ -589,5 +228,253 @@ impl Walk<'_> {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Writes CDR by its rules, independently of the reader.
+    struct Writer {
+        bytes: Vec<u8>,
+        big: bool,
+        align: usize,
+    }
+
+    impl Writer {
+        fn new(kind: u8) -> Self {
+            Self {
+                bytes: vec![0, kind, 0, 0],
+                big: kind & 1 == 0,
+                align: if kind < 2 { 8 } else { 4 },
+            }
+        }
+
+        fn put(&mut self, little: &[u8]) {
+            let size = little.len().min(self.align);
+            while !(self.bytes.len() - 4).is_multiple_of(size) {
+                self.bytes.push(0xee);
+            }
+            let mut bytes = little.to_vec();
+            if self.big {
+                bytes.reverse();
+            }
+            self.bytes.extend(bytes);
+        }
+
+        fn text(&mut self, text: &str) {
+            self.put(&(text.len() as u32 + 1).to_le_bytes());
+            self.bytes.extend(text.as_bytes());
+            self.bytes.push(0);
+        }
+
+        fn numbers(&mut self, numbers: &[f64]) {
+            self.put(&(numbers.len() as u32).to_le_bytes());
+            for number in numbers {
+                self.put(&number.to_le_bytes());
+            }
+        }
+    }
+
+    #[derive(Debug, Clone)]
+    struct State {
+        stamp: (i32, u32),
+        frame: String,
+        joints: Vec<(String, f64, f64)>,
+    }
+
+    fn states() -> impl Strategy<Value = State> {
+        let joints = prop::collection::btree_map("[a-z]{1,9}", (any::<f64>(), any::<f64>()), 0..6);
+        let joints = joints.prop_map(|joints| {
+            let joints = joints.into_iter();
+            joints
+                .map(|(name, (q, tau))| (name, q, tau))
+                .collect::<Vec<_>>()
+        });
+        let joints = joints.prop_shuffle();
+        (any::<(i32, u32)>(), "\\PC{0,9}", joints).prop_map(|(stamp, frame, joints)| State {
+            stamp,
+            frame,
+            joints,
+        })
+    }
+
+    fn written(state: &State, kind: u8) -> Vec<u8> {
+        let mut out = Writer::new(kind);
+        out.put(&state.stamp.0.to_le_bytes());
+        out.put(&state.stamp.1.to_le_bytes());
+        out.text(&state.frame);
+        out.put(&(state.joints.len() as u32).to_le_bytes());
+        for (name, _, _) in &state.joints {
+            out.text(name);
+        }
+        out.numbers(&state.joints.iter().map(|joint| joint.1).collect::<Vec<_>>());
+        out.numbers(&[]);
+        out.numbers(&state.joints.iter().map(|joint| joint.2).collect::<Vec<_>>());
+        out.bytes
+    }
+
+    fn reader(paths: &[&str]) -> (CdrReader, Vec<bool>) {
+        let definition = Definition::parse("sensor_msgs/msg/JointState", "").unwrap();
+        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        CdrReader::new(&definition, Encoding::Cdr, &fields)
+    }
+
+    #[test]
+    fn paths_that_lead_to_no_number_are_told() {
+        let paths = [
+            "header.stamp.sec",
+            "position[3]",
+            "/effort/0",
+            "position[name=a]",
+            "position",
+            "name[0]",
+            "header",
+            "header.frame_id",
+            "position[frame=a]",
+            "header.stamp.sec[0]",
+            "none",
+        ];
+        let (_, found) = reader(&paths);
+        let expected = [
+            true, true, true, true, false, false, false, false, false, false, false,
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn arrays_of_messages_are_read_by_index_past_fields_of_changing_size() {
+        let text = "Drive[] drives\nint8 last\n===\nMSG: p/Drive\nstring[] notes\nint16 code\nfloat64[2] pair\nbool on\n";
+        let definition = Definition::parse("p/msg/Drives", text).unwrap();
+        let paths = [
+            "drives[1].pair[1]",
+            "drives[0].code",
+            "drives[1].on",
+            "last",
+            "drives[2].code",
+        ];
+        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        let (mut reader, found) = CdrReader::new(&definition, Encoding::Cdr, &fields);
+        assert_eq!(found, [true; 5]);
+        let mut out = Writer::new(1);
+        out.put(&2u32.to_le_bytes());
+        for (notes, code, pair) in [
+            (&["x"][..], -7i16, [1.0, 2.0f64]),
+            (&["", "yz"], 9, [3.0, 4.0]),
+        ] {
+            out.put(&(notes.len() as u32).to_le_bytes());
+            for note in notes {
+                out.text(note);
+            }
+            out.put(&code.to_le_bytes());
+            for number in pair {
+                out.put(&number.to_le_bytes());
+            }
+            out.put(&[1]);
+        }
+        out.put(&[0xff]);
+        let mut values = [Value::Absent; 5];
+        reader.read(&out.bytes, &mut values).unwrap();
+        let expected = [
+            Value::Float(4.0),
+            Value::Int(-7),
+            Value::Int(1),
+            Value::Int(-1),
+            Value::Absent,
+        ];
+        assert_eq!(values, expected);
+    }
+
+    #[test]
+    fn packed_messages_of_the_first_ros_are_read_without_padding() {
+        let text = "Header header\nfloat64[] position\n===\nMSG: std_msgs/Header\nuint32 seq\nuint8 odd\ntime stamp\n";
+        let definition = Definition::parse("p/M", text).unwrap();
+        let fields = [
+            vec![Path::parse("header.stamp.nsecs")],
+            vec![Path::parse("position[1]")],
+        ];
+        let (mut reader, _) = CdrReader::new(&definition, Encoding::Ros1, &fields);
+        let mut bytes = vec![1, 0, 0, 0, 5];
+        bytes.extend([3u32, 250].map(u32::to_le_bytes).concat());
+        bytes.extend(2u32.to_le_bytes());
+        bytes.extend([7.0f64, 8.0].map(f64::to_le_bytes).concat());
+        let mut values = [Value::Absent; 2];
+        reader.read(&bytes, &mut values).unwrap();
+        assert_eq!(values, [Value::Int(250), Value::Float(8.0)]);
+    }
+
+    #[test]
+    fn other_encodings_and_short_messages_are_refused() {
+        let (mut reader, _) = reader(&["position[0]"]);
+        let mut out = [Value::Absent];
+        let mut refused = |data: &[u8]| reader.read(data, &mut out).unwrap_err().to_string();
+        assert!(refused(&[0, 3, 0, 0, 1]).contains("0x0003"));
+        assert!(refused(&[0, 1]).contains("ends after 2 bytes"));
+        assert!(refused(&[0, 1, 0, 0, 1, 2]).contains("inside a field"));
+        let long = [&[0, 1, 0, 0][..], &[0; 12], &[0xff; 4], &[0; 8]].concat();
+        assert!(
+            refused(&long).contains("4294967295 elements"),
+            "{}",
+            refused(&long)
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn any_joint_state_is_read_in_both_byte_orders_and_both_versions(
+            states in prop::collection::vec(states(), 1..4),
+            kind in prop::sample::select(vec![0u8, 1, 6, 7]),
+            wanted in "[a-z]{1,2}",
+        ) {
+            let named = states[0].joints.first().map_or(wanted, |joint| joint.0.clone());
+            let paths = [
+                "header.stamp.sec".to_owned(),
+                "header.stamp.nanosec".to_owned(),
+                format!("position[name={named}]"),
+                format!("effort[name={named}]"),
+                "velocity[0]".to_owned(),
+                "position[1]".to_owned(),
+            ];
+            let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+            let (mut reader, _) = reader(&paths);
+            let mut out = [Value::Absent; 6];
+            for state in &states {
+                reader.read(&written(state, kind), &mut out).unwrap();
+                let joint = state.joints.iter().find(|joint| joint.0 == named);
+                let float = |number: Option<f64>| number.map_or(Value::Absent, Value::Float);
+                let bits = |value: Value| value.number().map(f64::to_bits);
+                prop_assert_eq!(out[0], Value::Int(state.stamp.0.into()));
+                prop_assert_eq!(out[1], Value::Int(state.stamp.1.into()));
+                prop_assert_eq!(bits(out[2]), bits(float(joint.map(|j| j.1))));
+                prop_assert_eq!(bits(out[3]), bits(float(joint.map(|j| j.2))));
+                prop_assert_eq!(out[4], Value::Absent);
+                prop_assert_eq!(bits(out[5]), bits(float(state.joints.get(1).map(|j| j.1))));
+            }
+        }
+
+        #[test]
+        fn no_bytes_and_no_definition_make_the_decoder_panic(
+            text in prop_oneof![
+                "(((float64|string|uint8|A|B)(\\[\\]|\\[[0-9]{1,9}\\])? [ab]|===|MSG: p/[AB])\n){0,9}",
+                "\\PC{0,60}",
+            ],
+            path in "[ab](\\[[0-9]\\]|\\[[ab]=[ab]\\])?(\\.[ab](\\[[0-9]\\])?){0,2}",
+            data in prop::collection::vec(any::<u8>(), 0..80),
+            kind in prop::sample::select(vec![0u8, 1, 7]),
+        ) {
+            let Ok(definition) = Definition::parse("p/R", &text) else {
+                return Ok(());
+            };
+            let fields = [vec![Path::parse(&path)]];
+            for encoding in [Encoding::Cdr, Encoding::Ros1] {
+                let (mut reader, _) = CdrReader::new(&definition, encoding, &fields);
+                let message = [&[0, kind, 0, 0][..], &data].concat();
+                let mut out = [Value::Absent];
+                let _ = reader.read(&message, &mut out);
+                reader.names(&message);
+            }
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 use prost_reflect::MessageDescriptor;
 
-use super::cdr::{CdrReader, Encoding};
+use super::cdr::CdrReader;
+use super::cursor::Encoding;
 use super::msg::Definition;
 use super::path::Path;
 use super::value::Value;

@@ -6,6 +6,7 @@
 mod bag;
 mod cdr;
 mod container;
+mod cursor;
 mod decode;
 mod delay;
 mod fields;
@@ -14,9 +15,15 @@ mod mcap;
 mod msg;
 mod pairing;
 mod path;
+mod plan;
 mod proto;
 mod rows;
 mod survey;
 mod value;
 
 pub(super) use rows::MessageRows;
+
+pub use cdr::CdrReader;
+pub use cursor::Malformed;
+pub use msg::DefinitionError;
+pub use value::Value;

@@ -119,12 +119,12 @@ pub(crate) struct Field {
 
 /// A message type with every type that it needs; the first one is the message itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Definition {
+pub(crate) struct Definition {
     pub(crate) messages: Vec<Vec<Field>>,
 }
 
 /// Definitions that recordings may leave out: some recorders store type names alone.
-const KNOWN: [(&str, &str); 6] = [
+const KNOWN: [(&str, &str); 9] = [
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
@@ -143,12 +143,14 @@ const KNOWN: [(&str, &str); 6] = [
         "std_msgs/MultiArrayLayout",
         "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n",
     ),
+    (
+        "std_msgs/MultiArrayDimension",
+        "string label\nuint32 size\nuint32 stride\n",
+    ),
+    // Types of ROS 1 that are part of its language.
+    ("time", "uint32 secs\nuint32 nsecs\n"),
+    ("duration", "int32 secs\nint32 nsecs\n"),
 ];
-
-const DIMENSION: (&str, &str) = (
-    "std_msgs/MultiArrayDimension",
-    "string label\nuint32 size\nuint32 stride\n",
-);
 
 /// A field as its line says, its type not yet looked up.
 struct Unresolved<'t> {
@@ -164,13 +166,13 @@ impl Definition {
     ///
     /// # Errors
     /// [`DefinitionError`]: a line that is none, a type that is not defined, an endless nesting.
-    pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
+    pub(crate) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         if text.len() > LONGEST {
             return Err(DefinitionError::Long { bytes: text.len() });
         }
         let root = short(name);
         let mut sections: BTreeMap<String, Vec<Unresolved<'_>>> = BTreeMap::new();
-        for (name, known) in KNOWN.into_iter().chain([DIMENSION]) {
+        for (name, known) in KNOWN {
             sections.insert(name.to_owned(), section(name, known)?);
         }
         if !text.trim().is_empty() {

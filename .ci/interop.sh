@@ -1,0 +1,29 @@
+#!/bin/bash
+# Logs written by the official Python packages of MCAP, ROS 2 and protobuf, read by this tool.
+#   .ci/interop.sh
+# Installs the packages into a folder of its own, writes a log that no fixture holds in every format,
+# and runs the tests of the fixtures on it. Says so, and passes, where the packages cannot be had.
+set -u
+cd "$(dirname "$0")/.." || exit 1
+
+skip() {
+  echo "== interop: SKIPPED, $1"
+  exit 0
+}
+
+command -v python3 > /dev/null || skip "python3 is not installed"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+python3 -m venv "$work/venv" > "$work/venv.log" 2>&1 ||
+  skip "python3 cannot make a virtual environment: $(tail -n 1 "$work/venv.log")"
+timeout 300 "$work/venv/bin/pip" install --quiet --disable-pip-version-check \
+  mcap mcap-ros2-support mcap-protobuf-support rosbags zstandard > "$work/pip.log" 2>&1 ||
+  skip "the Python packages cannot be installed: $(tail -n 1 "$work/pip.log")"
+"$work/venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
+  grep -iE "^(mcap|rosbags|protobuf|zstandard)"
+
+# Another motion and another seed than those of the fixtures.
+cargo run --locked --quiet -- simulate -q -r configs/cft.toml --seconds 3 --seed 20 \
+  -o "$work/sim.csv" > /dev/null || exit 1
+"$work/venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
+CFT_IDENT_LOGS="$work/logs" cargo test --locked --test log_fixtures

@@ -1,0 +1,183 @@
+//! The bytes of one CDR message, read from front to back.
+//!
+//! Numbers are aligned to their own size, counted from after the four bytes that say the byte order
+//! (OMG DDSI-RTPS, section 10). A length is believed only as far as the message has bytes for it.
+
+use thiserror::Error;
+
+use super::msg::{Count, Primitive};
+use super::value::Value;
+
+/// What is wrong with the bytes of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Malformed {
+    /// The message ends inside a field.
+    #[error("it ends after {bytes} bytes, inside a field")]
+    Short {
+        /// Length of the message.
+        bytes: usize,
+    },
+    /// An encoding that is not plain CDR.
+    #[error("its encoding {kind:#06x} is not plain CDR")]
+    Encapsulation {
+        /// The identifier in its first two bytes.
+        kind: u16,
+    },
+    /// A count that the message has no bytes for.
+    #[error("it declares {count} elements, for which it has no bytes")]
+    Count {
+        /// The count.
+        count: u64,
+    },
+}
+
+/// How numbers and texts are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Encoding {
+    /// CDR with its four bytes of header, as ROS 2 writes it.
+    Cdr,
+    /// Packed little-endian numbers without padding, as ROS 1 writes them.
+    Ros1,
+}
+
+/// Bytes from `start`: `count` elements of an array, or bytes of a text.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Span {
+    pub(super) start: usize,
+    pub(super) count: usize,
+}
+
+/// The bytes of one message, and how far they are read.
+pub(super) struct Cursor<'d> {
+    pub(super) data: &'d [u8],
+    at: usize,
+    big: bool,
+    /// Largest alignment; 1 for none.
+    align: usize,
+    /// Length of the message with its header, for errors.
+    total: usize,
+}
+
+impl<'d> Cursor<'d> {
+    pub(super) fn new(data: &'d [u8], encoding: Encoding) -> Result<Self, Malformed> {
+        let total = data.len();
+        let (data, big, align) = match (encoding, data) {
+            (Encoding::Ros1, data) => (data, false, 1),
+            (Encoding::Cdr, [high, low, _, _, body @ ..]) => {
+                let kind = u16::from_be_bytes([*high, *low]);
+                // 0 and 1: CDR; 6 and 7: the plain form of its second version, aligned to 4 at most.
+                match kind {
+                    0 => (body, true, 8),
+                    1 => (body, false, 8),
+                    6 => (body, true, 4),
+                    7 => (body, false, 4),
+                    _ => return Err(Malformed::Encapsulation { kind }),
+                }
+            }
+            (Encoding::Cdr, _) => return Err(Malformed::Short { bytes: total }),
+        };
+        Ok(Self {
+            data,
+            at: 0,
+            big,
+            align,
+            total,
+        })
+    }
+
+    pub(super) fn short(&self) -> Malformed {
+        Malformed::Short { bytes: self.total }
+    }
+
+    #[inline]
+    fn align_to(&mut self, size: usize) {
+        let size = size.min(self.align);
+        self.at = self.at.next_multiple_of(size);
+    }
+
+    /// Passes over `count` bytes; where they begin.
+    #[inline]
+    pub(super) fn pass(&mut self, count: usize) -> Result<usize, Malformed> {
+        let start = self.at;
+        match start.checked_add(count) {
+            Some(end) if end <= self.data.len() => {
+                self.at = end;
+                Ok(start)
+            }
+            _ => Err(self.short()),
+        }
+    }
+
+    #[inline]
+    fn bytes_at<const N: usize>(&self, at: usize) -> Result<[u8; N], Malformed> {
+        let bytes = self.data.get(at..).and_then(|tail| tail.first_chunk());
+        let mut bytes: [u8; N] = *bytes.ok_or_else(|| self.short())?;
+        if self.big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
+    #[inline]
+    pub(super) fn number_at(&self, at: usize, kind: Primitive) -> Result<Value, Malformed> {
+        Ok(match kind {
+            Primitive::F64 => Value::Float(f64::from_le_bytes(self.bytes_at(at)?)),
+            Primitive::F32 => Value::Float(f32::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::Bool | Primitive::U8 => {
+                Value::Int(u8::from_le_bytes(self.bytes_at(at)?).into())
+            }
+            Primitive::I8 => Value::Int(i8::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::U16 => Value::Int(u16::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::I16 => Value::Int(i16::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::U32 => Value::Int(u32::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::I32 => Value::Int(i32::from_le_bytes(self.bytes_at(at)?).into()),
+            Primitive::U64 => Value::Unsigned(u64::from_le_bytes(self.bytes_at(at)?)),
+            Primitive::I64 => Value::Int(i64::from_le_bytes(self.bytes_at(at)?)),
+        })
+    }
+
+    pub(super) fn length(&mut self) -> Result<usize, Malformed> {
+        self.align_to(4);
+        let at = self.pass(4)?;
+        Ok(u32::from_le_bytes(self.bytes_at(at)?) as usize)
+    }
+
+    /// Number of elements of a field; refused where fewer bytes than elements are left.
+    pub(super) fn count(&mut self, count: Count) -> Result<usize, Malformed> {
+        let count = match count {
+            Count::One => return Ok(1),
+            Count::Fixed(count) => count,
+            Count::Sequence => self.length()?,
+        };
+        if count > self.data.len().saturating_sub(self.at) {
+            return Err(Malformed::Count {
+                count: count as u64,
+            });
+        }
+        Ok(count)
+    }
+
+    /// A text without its closing NUL.
+    pub(super) fn text(&mut self) -> Result<Span, Malformed> {
+        let length = self.length()?;
+        let start = self.pass(length)?;
+        let closed = length > 0 && self.data.get(start + length - 1) == Some(&0);
+        Ok(Span {
+            start,
+            count: length - usize::from(closed),
+        })
+    }
+
+    pub(super) fn primitives(&mut self, count: usize, kind: Primitive) -> Result<Span, Malformed> {
+        if count == 0 {
+            return Ok(Span {
+                start: self.at,
+                count,
+            });
+        }
+        self.align_to(kind.size());
+        let bytes = count.checked_mul(kind.size()).ok_or_else(|| self.short())?;
+        let start = self.pass(bytes)?;
+        Ok(Span { start, count })
+    }
+}

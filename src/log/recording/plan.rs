@@ -1,0 +1,228 @@
+//! Which numbers are taken from the messages of one type: field paths resolved against its definition.
+
+use super::msg::{Count, Field, Kind, Primitive};
+use super::path::Step;
+
+/// What is taken from a message, and where it goes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Plan {
+    pub(super) root: Node,
+    pub(super) picks: Vec<Pick>,
+    /// Type of the elements of each array that is remembered.
+    pub(super) arrays: Vec<Primitive>,
+    /// Number of lists of names that are remembered.
+    pub(super) lists: usize,
+}
+
+/// What is taken from a message: its fields in order, those of no interest left out.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Node {
+    pub(super) slots: Vec<(usize, Slot)>,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Slot {
+    /// A number for this output.
+    Number(Vec<usize>),
+    /// An array of numbers, remembered under this index.
+    Array(usize),
+    /// A list of texts, remembered under this index.
+    List(usize),
+    /// A message.
+    Inner(Node),
+    /// Some elements of an array of messages.
+    Elements(Vec<(usize, Node)>),
+}
+
+/// An element of an array for one output.
+#[derive(Debug, Clone)]
+pub(super) struct Pick {
+    pub(super) output: usize,
+    pub(super) array: usize,
+    pub(super) by: By,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum By {
+    Index(usize),
+    Name {
+        list: usize,
+        name: String,
+        /// Where it stood in the message before: most likely there again.
+        last: usize,
+    },
+}
+
+/// Where a path leads, before it becomes part of the plan.
+struct Route {
+    /// Field indices and, between them, indices of elements.
+    hops: Vec<Hop>,
+    end: End,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hop {
+    Field(usize),
+    Element(usize),
+}
+
+enum End {
+    Number,
+    Element(usize, Primitive),
+    /// An element by its name: the route to the list of names.
+    Named(Vec<Hop>, String, Primitive),
+}
+
+impl Plan {
+    /// Adds the number at the end of a path to the plan; false where the path leads to none.
+    pub(super) fn add(&mut self, messages: &[Vec<Field>], steps: &[Step], output: usize) -> bool {
+        match route(messages, steps) {
+            Some(route) => {
+                self.follow(output, route);
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn follow(&mut self, output: usize, route: Route) {
+        let by = match route.end {
+            End::Number => {
+                if let Slot::Number(outputs) =
+                    slot(&mut self.root, &route.hops, || Slot::Number(Vec::new()))
+                {
+                    outputs.push(output);
+                }
+                return;
+            }
+            End::Element(index, _) => By::Index(index),
+            End::Named(ref list, ref name, _) => {
+                let next = self.lists;
+                let list = match slot(&mut self.root, list, || Slot::List(next)) {
+                    Slot::List(list) => *list,
+                    _ => return,
+                };
+                self.lists += usize::from(list == next);
+                By::Name {
+                    list,
+                    name: name.clone(),
+                    last: 0,
+                }
+            }
+        };
+        let (End::Element(_, kind) | End::Named(_, _, kind)) = route.end else {
+            return;
+        };
+        let next = self.arrays.len();
+        let Slot::Array(array) = slot(&mut self.root, &route.hops, || Slot::Array(next)) else {
+            return;
+        };
+        let array = *array;
+        if array == next {
+            self.arrays.push(kind);
+        }
+        self.picks.push(Pick { output, array, by });
+    }
+}
+
+/// Follows a path through the types.
+fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
+    let mut hops = Vec::new();
+    let mut inside = 0;
+    let mut steps = steps.iter().peekable();
+    // Messages on the way, with the hops that lead to them: where lists of names are looked for.
+    let mut outer = vec![(0, 0)];
+    loop {
+        let Step::Field(name) = steps.next()? else {
+            return None;
+        };
+        let (index, field) = find_field(&messages[inside], name)?;
+        hops.push(Hop::Field(index));
+        let selector = match field.count {
+            Count::One => None,
+            Count::Fixed(_) | Count::Sequence => Some(steps.next()?),
+        };
+        let number = match selector {
+            None => None,
+            Some(Step::Index(index)) => Some(*index),
+            Some(Step::Field(digits)) => Some(digits.parse().ok()?),
+            Some(Step::Named { list, value }) => {
+                let Kind::Primitive(kind) = field.kind else {
+                    return None;
+                };
+                let list = outer.iter().rev().find_map(|(message, depth)| {
+                    let (index, field) = find_field(&messages[*message], list)?;
+                    let texts = field.kind == Kind::String && field.count != Count::One;
+                    texts.then(|| [&hops[..*depth], &[Hop::Field(index)]].concat())
+                })?;
+                return steps.next().is_none().then(|| Route {
+                    hops,
+                    end: End::Named(list, value.clone(), kind),
+                });
+            }
+        };
+        match field.kind {
+            Kind::String | Kind::WideString => return None,
+            Kind::Primitive(kind) => {
+                let end = match number {
+                    None => End::Number,
+                    Some(number) => End::Element(number, kind),
+                };
+                return steps.next().is_none().then_some(Route { hops, end });
+            }
+            Kind::Message(message) => {
+                hops.extend(number.map(Hop::Element));
+                inside = message;
+                outer.push((message, hops.len()));
+            }
+        }
+    }
+}
+
+fn find_field<'f>(fields: &'f [Field], name: &str) -> Option<(usize, &'f Field)> {
+    fields.iter().enumerate().find(|(_, f)| f.name == name)
+}
+
+/// The slot at the end of some hops, made where there is none.
+fn slot<'n>(mut node: &'n mut Node, hops: &[Hop], new: impl FnOnce() -> Slot) -> &'n mut Slot {
+    let mut rest = hops;
+    loop {
+        let (field, tail) = match rest.split_first() {
+            Some((Hop::Field(field), tail)) => (*field, tail),
+            // Hops begin with a field, and an element is followed by one.
+            _ => (0, &[][..]),
+        };
+        if tail.is_empty() {
+            return node.entry(field, new);
+        }
+        rest = tail;
+        node = match tail[0] {
+            Hop::Field(_) => match node.entry(field, || Slot::Inner(Node::default())) {
+                Slot::Inner(inner) => inner,
+                other => return other,
+            },
+            Hop::Element(element) => {
+                rest = &tail[1..];
+                let elements = match node.entry(field, || Slot::Elements(Vec::new())) {
+                    Slot::Elements(elements) => elements,
+                    other => return other,
+                };
+                let at = elements.partition_point(|(index, _)| *index < element);
+                if elements.get(at).is_none_or(|(index, _)| *index != element) {
+                    elements.insert(at, (element, Node::default()));
+                }
+                &mut elements[at].1
+            }
+        };
+    }
+}
+
+impl Node {
+    fn entry(&mut self, field: usize, new: impl FnOnce() -> Slot) -> &mut Slot {
+        let at = self.slots.partition_point(|(index, _)| *index < field);
+        if self.slots.get(at).is_none_or(|(index, _)| *index != field) {
+            self.slots.insert(at, (field, new()));
+        }
+        &mut self.slots[at].1
+    }
+}
