@@ -304,7 +304,6 @@ fn an_unknown_key_is_refused_in_every_kind_of_configuration() {
         "`identifcation`",
         "did you mean `identification`?",
     ];
-    fs::create_dir(bench.0.path().join("out")).unwrap();
     bench.refuses("identify bad.toml -o out", 3, &words);
 
     bench.file("bad.toml", "kindd = \"fourier\"\n");

@@ -39,6 +39,11 @@ const DOORS: &[(&str, &str)] = &[
     ("indicatif", "cli/context.rs"),
     ("ctrlc", "cli/mod.rs"),
     ("csv", "log/csv.rs"),
+    ("mcap", "log/recording/mcap.rs"),
+    ("rusqlite", "log/recording/bag.rs"),
+    ("prost_reflect", "log/recording/"),
+    ("flate2", "log/content.rs"),
+    ("zstd", "log/content.rs"),
     ("sha2", "log/source.rs"),
 ];
 

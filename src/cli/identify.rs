@@ -55,6 +55,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         None => PathBuf::from(FOLDER),
         Some(file) => file.with_extension("run"),
     });
+    if let Some(file) = &args.campaign {
+        // read again below: no folder is made for a campaign that cannot be run
+        Campaign::load(file)?;
+    }
     std::fs::create_dir_all(&folder).map_err(|e| {
         CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
             .hint("name another one with -o")
