@@ -1,15 +1,13 @@
 //! Speed of the stages that decide how long an identification takes, each beside a plain way of
-//! doing the same, so that what is quoted is a ratio: the filter, the regressor with its
-//! accumulation, the reading of text logs. `cargo bench --bench pipeline`.
+//! doing the same, so that what is quoted is a ratio: the filter, and the regressor with its
+//! accumulation. `cargo bench --bench pipeline`.
 
 use std::hint::black_box;
-use std::io::Write;
 
 use cft_ident::friction::filter::Filter;
 use cft_ident::friction::passes::spread;
 use cft_ident::friction::problem::{FRICTION, Noise, Problem, Record};
 use cft_ident::friction::score::score;
-use cft_ident::log::{Block, Layout, LogSpec, Reader};
 use cft_ident::math::rfactor::RFactor;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
@@ -201,55 +199,5 @@ fn regressor(c: &mut Criterion) {
     group.finish();
 }
 
-fn csv(c: &mut Criterion) {
-    const ROWS: usize = 50_000;
-    let names: Vec<String> = (1..=6).map(|j| format!("q{j}")).collect();
-    let mut file = tempfile::NamedTempFile::with_suffix(".csv").expect("a temporary file");
-    let columns: Vec<String> = ["q", "tau"]
-        .iter()
-        .flat_map(|kind| names.iter().map(move |n| format!("{kind}_{n}")))
-        .collect();
-    let mut text = format!("t,{}\n", columns.join(","));
-    for k in 0..ROWS {
-        text += &format!("{}", k as f64 * 2e-4);
-        for j in 0..12 {
-            text += &format!(",{:.7}", (k as f64 * 1e-3 * f64::from(j + 1)).sin() * 3.0);
-        }
-        text.push('\n');
-    }
-    file.write_all(text.as_bytes())
-        .expect("the file is written");
-    let layout = Layout::joint_columns(&names);
-    let spec = LogSpec::whole(file.path());
-    let mut group = c.benchmark_group("CSV of 13 columns");
-    group
-        .throughput(Throughput::Elements(ROWS as u64))
-        .sample_size(10);
-    group.bench_function("reader", |b| {
-        let mut block = Block::default();
-        b.iter(|| {
-            let mut reader = Reader::open(&spec, &layout).expect("the log opens");
-            let mut rows = 0;
-            while reader.read(&mut block).expect("the log is whole") {
-                rows += block.len();
-            }
-            assert_eq!(rows, ROWS);
-        });
-    });
-    group.bench_function("plain: lines, split, parse", |b| {
-        b.iter(|| {
-            let text = std::fs::read_to_string(file.path()).expect("the file is there");
-            let sum: f64 = text
-                .lines()
-                .skip(1)
-                .flat_map(|l| l.split(','))
-                .map(|x| x.parse::<f64>().expect("a number"))
-                .sum();
-            black_box(sum)
-        });
-    });
-    group.finish();
-}
-
-criterion_group!(benches, filter, regressor, csv);
+criterion_group!(benches, filter, regressor);
 criterion_main!(benches);

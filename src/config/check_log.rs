@@ -17,6 +17,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     known_names(document, &["log", "joint"], &log.joint, &file.joint_names())?;
     document.finite(&["log", "torque_delay_s"], log.torque_delay_s.as_slice())?;
     gears(file, document)?;
+    foreign_effort(file, document)?;
     // Which key reads which column: no column may be read twice.
     let mut columns: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     if let Some(time) = &log.time {
@@ -76,6 +77,20 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
                 )?;
             }
         }
+    }
+    Ok(())
+}
+
+/// Refuses to take the effort of a foreign recording for a torque at the joint: many drivers publish
+/// motor currents there.
+fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let log = &file.log;
+    let mapped = log.joint.values().any(|channels| channels.name.is_some());
+    if log.torque_is.is_none() && (mapped || log.torque_topic.is_some()) {
+        return Err(document.missing(
+            &["log", "torque_is"],
+            "what the messages hold as torque or effort: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
+        ));
     }
     Ok(())
 }
@@ -146,10 +161,13 @@ fn joint_channels(
         None => true,
         Some(PositionUnit::Metre | PositionUnit::Millimetre) => kind == JointKind::Prismatic,
         Some(PositionUnit::Radian | PositionUnit::Degree) => kind == JointKind::Revolute,
-        Some(PositionUnit::Counts) => false,
+        Some(PositionUnit::Counts) => channels.position_scale.is_some(),
     };
     if !position_fits {
         let remedy = match kind {
+            _ if channels.position_unit == Some(PositionUnit::Counts) => {
+                "give `position_scale`, metres or radians per count"
+            }
             JointKind::Prismatic => "a prismatic joint is logged in \"m\" or \"mm\"",
             JointKind::Revolute => "a revolute joint is logged in \"rad\" or \"deg\"",
         };

@@ -23,7 +23,7 @@ pub enum PositionUnit {
     /// Degree.
     #[serde(rename = "deg")]
     Degree,
-    /// Encoder counts of the CFT robot (Table 5), actuator coordinates only.
+    /// Encoder counts: those of the CFT robot's actuators by Table 5, of a joint by `position_scale`.
     #[serde(rename = "counts")]
     Counts,
 }
@@ -177,7 +177,7 @@ pub struct JointChannels {
     /// 1 or -1; holds for the velocity too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_sign: Option<f64>,
-    /// Factor, e.g. a gear ratio; holds for the velocity too.
+    /// Factor, e.g. the inverse of a gear ratio, or m or rad per count; holds for the velocity too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_scale: Option<f64>,
     /// Offset added after scaling [m or rad].

@@ -242,6 +242,7 @@ impl Rows {
                 at,
                 column,
                 text: escape(text),
+                remedy: "delete the rows without a measurement: a gap in time is handled, a made-up number is not",
             };
         }
         let with_point = text.replace(',', ".");

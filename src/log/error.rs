@@ -190,9 +190,7 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// NaN or infinity.
-    #[error(
-        "{at}: column `{column}` holds {text}; delete the rows without a measurement: a gap in time is handled, a made-up number is not"
-    )]
+    #[error("{at}: column `{column}` holds {text}; {remedy}")]
     NotFinite {
         /// File and line, or file and message.
         at: String,
@@ -200,18 +198,18 @@ pub enum LogError {
         column: String,
         /// What it holds.
         text: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// Two rows at one time.
-    #[error(
-        "{at}: time stands still at {t} s, with other values than the row before; check the clock of the recorder or the time column `{column}`"
-    )]
+    #[error("{at}: time stands still at {t} s, with other values than the row before; {remedy}")]
     TimeStandsStill {
         /// File and line, or file and message.
         at: String,
         /// The time [s].
         t: f64,
-        /// The time column.
-        column: String,
+        /// What to do.
+        remedy: String,
     },
     /// The same row twice.
     #[error(
@@ -224,9 +222,7 @@ pub enum LogError {
         t: f64,
     },
     /// Time runs backwards.
-    #[error(
-        "{at}: time runs backwards, from {before} s to {t} s; sort the rows by time, or split the file where a second recording begins"
-    )]
+    #[error("{at}: time runs backwards, from {before} s to {t} s; {remedy}")]
     TimeBackwards {
         /// File and line, or file and message.
         at: String,
@@ -234,6 +230,8 @@ pub enum LogError {
         before: f64,
         /// Time of this row [s].
         t: f64,
+        /// What to do.
+        remedy: String,
     },
     /// A joint that moves though its torque channel is dead.
     #[error(

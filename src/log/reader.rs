@@ -192,13 +192,29 @@ impl Reader {
             return Ok(None);
         }
         let at = self.rows.place();
+        let remedy = |text: String| match &self.rows {
+            LogRows::Messages(rows) => rows.clock_remedy(before - self.seen.map_or(0.0, |s| s.0)),
+            LogRows::Text(_) => text,
+        };
         Err(if t < before {
-            LogError::TimeBackwards { at, before, t }
+            let remedy = remedy(
+                "sort the rows by time, or split the file where a second recording begins"
+                    .to_owned(),
+            );
+            LogError::TimeBackwards {
+                at,
+                before,
+                t,
+                remedy,
+            }
         } else if repeats {
             LogError::DuplicateRow { at, t }
         } else {
             let column = super::escape(&self.layout.time.column);
-            LogError::TimeStandsStill { at, t, column }
+            let remedy = remedy(format!(
+                "check the clock of the recorder or the time column `{column}`"
+            ));
+            LogError::TimeStandsStill { at, t, remedy }
         })
     }
 

@@ -1,6 +1,8 @@
 //! What the tests of logs share; not each of them needs all of it.
 #![allow(dead_code)]
 
+pub mod recording;
+
 use std::path::{Path, PathBuf};
 
 use cft_ident::log::{Block, Layout, LogSpec, Reader};

@@ -1,13 +1,17 @@
 //! Messages of one rosbag2 database, in the order in which they were recorded: the only door to SQLite.
+//!
+//! A database is opened as one that nobody writes, so that no lock and no file beside it is made. Where
+//! its recorder was killed, its journal lies beside it: then a copy of both is brought into order.
 
 use std::collections::BTreeMap;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
-use tempfile::NamedTempFile;
+use tempfile::TempDir;
 
 use super::container::{Break, Head, Topic, Wanted};
 use super::decode::Schema;
@@ -19,14 +23,18 @@ const PAGE: usize = 256;
 const PAGE_BYTES: usize = 4 << 20;
 /// The largest message that is read [bytes].
 const LARGEST_MESSAGE: i32 = 64 << 20;
+/// Why a database with a journal ends early.
+const UNCLOSED: &str = "the recorder did not close it: what it had not committed is lost";
+/// Name of a copy in its folder.
+const COPY: &str = "copy.db3";
 /// Bytes that a database may take once it is decompressed, per byte that it takes compressed.
 const LARGEST_RATIO: u64 = 256;
 
 /// A rosbag2 database that is being read.
 pub(super) struct BagFile {
     connection: Connection,
-    /// The decompressed database, removed when reading ends.
-    _unpacked: Option<NamedTempFile>,
+    /// Folder of the copy that is read instead of the file, removed when reading ends.
+    _copy: Option<TempDir>,
     topics: Vec<Topic>,
     /// Topic by its number in the database.
     numbers: BTreeMap<i64, usize>,
@@ -55,17 +63,30 @@ impl BagFile {
             reason: escape_whole(&reason.replace('\n', " ")),
         };
         let size = content.size;
-        let unpacked = match content.compression {
-            Compression::None => None,
-            _ => Some(unpack(path, content)?),
+        let journal = match content.compression {
+            Compression::None => journal_of(path),
+            _ => None,
         };
-        let place: PathBuf = match &unpacked {
+        let copy = match (&journal, content.compression) {
+            (None, Compression::None) => None,
+            _ => Some(copy_of(path, content, journal.as_ref())?),
+        };
+        let place = match &copy {
             None => path.to_owned(),
-            Some(file) => file.path().to_owned(),
+            Some(folder) => folder.path().join(COPY),
         };
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
         let failed = |error: rusqlite::Error| refuse(error.to_string());
-        let connection = Connection::open_with_flags(&place, flags).map_err(failed)?;
+        let thread = OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let connection = match &journal {
+            None => Connection::open_with_flags(
+                unwritten(&place),
+                thread | OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI,
+            ),
+            Some(_) => {
+                Connection::open_with_flags(&place, thread | OpenFlags::SQLITE_OPEN_READ_WRITE)
+            }
+        };
+        let connection = connection.map_err(failed)?;
         connection
             .set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_MESSAGE)
             .map_err(failed)?;
@@ -92,7 +113,7 @@ impl BagFile {
         let filter: Vec<String> = listed.map(|(number, _)| number.to_string()).collect();
         Ok(Self {
             connection,
-            _unpacked: unpacked,
+            _copy: copy,
             topics,
             numbers,
             filter: filter.join(","),
@@ -100,7 +121,10 @@ impl BagFile {
             last: (i64::MIN, i64::MIN),
             ended: false,
             size,
-            broken: None,
+            broken: journal.map(|_| Break {
+                reason: UNCLOSED.to_owned(),
+                bytes: size,
+            }),
             messages: 0,
         })
     }
@@ -209,12 +233,44 @@ fn read_topics(connection: &Connection) -> Result<Topics, rusqlite::Error> {
     Ok((topics, numbers))
 }
 
-/// Decompresses a database: SQLite reads files only.
-fn unpack(path: &Path, content: Content) -> Result<NamedTempFile, LogError> {
+/// What a recorder left beside a database that it did not close: the end of its name, and the bytes
+/// with which it begins where it holds anything.
+const JOURNALS: [(&str, &[u8]); 2] = [
+    ("-wal", b"\x37\x7f\x06"),
+    ("-journal", b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"),
+];
+
+/// A journal in use beside a database.
+struct Journal {
+    path: PathBuf,
+    ending: &'static str,
+}
+
+fn journal_of(database: &Path) -> Option<Journal> {
+    JOURNALS.into_iter().find_map(|(ending, magic)| {
+        let path = beside(database, ending);
+        let mut first = Vec::new();
+        let file = File::open(&path).ok()?;
+        file.take(magic.len() as u64).read_to_end(&mut first).ok()?;
+        (first == magic).then_some(Journal { path, ending })
+    })
+}
+
+fn beside(database: &Path, ending: &str) -> PathBuf {
+    let mut name = database.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// Copies a database into a folder of its own, decompressed (SQLite reads files only) and with its
+/// journal.
+fn copy_of(path: &Path, content: Content, journal: Option<&Journal>) -> Result<TempDir, LogError> {
     let failed = |error: io::Error| source::failed(path, error);
     let largest = content.size.saturating_mul(LARGEST_RATIO) + (1 << 20);
-    let mut file = NamedTempFile::new().map_err(failed)?;
-    let mut bytes = io::Read::take(content.into_bytes(), largest + 1);
+    let folder = tempfile::tempdir().map_err(failed)?;
+    let place = folder.path().join(COPY);
+    let mut file = File::create(&place).map_err(failed)?;
+    let mut bytes = content.into_bytes().take(largest + 1);
     let count = io::copy(&mut bytes, &mut file).map_err(failed)?;
     if count > largest {
         return Err(LogError::Database {
@@ -222,5 +278,30 @@ fn unpack(path: &Path, content: Content) -> Result<NamedTempFile, LogError> {
             reason: format!("it is more than {largest} bytes long once it is decompressed"),
         });
     }
-    Ok(file)
+    if let Some(journal) = journal {
+        let failed = |error: io::Error| source::failed(&journal.path, error);
+        let mut from = File::open(&journal.path).map_err(failed)?;
+        let mut to = File::create(beside(&place, journal.ending)).map_err(failed)?;
+        io::copy(&mut from, &mut to).map_err(failed)?;
+    }
+    Ok(folder)
+}
+
+/// The address of a database that nobody writes: SQLite then neither locks it nor makes files
+/// beside it.
+fn unwritten(path: &Path) -> String {
+    let mut address = String::from("file:");
+    for byte in path.as_os_str().as_encoded_bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'/' => {
+                address.push(char::from(*byte));
+            }
+            b'\\' if cfg!(windows) => address.push('/'),
+            _ => address.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    if cfg!(windows) && path.is_absolute() {
+        address.insert("file:".len(), '/');
+    }
+    address + "?immutable=1"
 }

@@ -68,7 +68,9 @@ pub(super) struct Pairing {
     ready: VecDeque<Sample>,
     /// Samples whose memory is used again.
     spare: Vec<Sample>,
-    steps: VecDeque<f64>,
+    /// The last steps of the torques' clock, and how many there were.
+    steps: [f64; PACE],
+    stepped: usize,
     paired: u64,
     /// Rows without a torque on both sides, and inside dropouts of the torques.
     outside: u64,
@@ -87,7 +89,8 @@ impl Pairing {
             torques: VecDeque::new(),
             ready: VecDeque::new(),
             spare: Vec::new(),
-            steps: VecDeque::new(),
+            steps: [0.0; PACE],
+            stepped: 0,
             paired: 0,
             outside: 0,
             dropouts: 0,
@@ -129,10 +132,8 @@ impl Pairing {
                 self.disordered += 1;
                 return;
             }
-            self.steps.push_back(t.since(*before));
-            if self.steps.len() > PACE {
-                self.steps.pop_front();
-            }
+            self.steps[self.stepped % PACE] = t.since(*before);
+            self.stepped += 1;
         }
         let mut numbers = match self.torques.len() > KEPT {
             true => self.torques.pop_front().map(|(_, old)| old),
@@ -199,12 +200,13 @@ impl Pairing {
     }
 
     fn is_dropout(&self, step: f64) -> bool {
-        if self.steps.len() < 5 {
+        let known = self.stepped.min(PACE);
+        if known < 5 {
             return false;
         }
-        let mut steps: Vec<f64> = self.steps.iter().copied().collect();
-        steps.sort_by(f64::total_cmp);
-        step > DROPOUT * steps[steps.len() / 2]
+        let mut steps = self.steps;
+        let (_, usual, _) = steps[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
+        step > DROPOUT * *usual
     }
 
     /// What the user should know, topics named.

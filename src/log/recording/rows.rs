@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::container::{Recording, Wanted};
 use super::decode::{Decoder, Schema};
-use super::fields::Fields;
+use super::fields::{Fields, TimeSource};
 use super::pairing::{Pairing, Sample};
 use super::survey::{self, Choice};
 use super::value::Value;
@@ -159,6 +159,7 @@ impl MessageRows {
                     at: self.place(),
                     column: escape(&channel.column),
                     text: number.to_string(),
+                    remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
                 });
             }
             to.push(value);
@@ -185,6 +186,18 @@ impl MessageRows {
             self.row.number,
             escape(&self.reading.choice.topic)
         )
+    }
+
+    /// What to do about a time that is not later than the one before, `t` being that of the row.
+    #[cold]
+    pub(in crate::log) fn clock_remedy(&self, t: f64) -> String {
+        let part = format!("use the part before it: FILE@0..{t}s");
+        match self.reading.choice.time {
+            TimeSource::Log => part,
+            _ => format!(
+                "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
+            ),
+        }
     }
 
     /// Number of the message in its file.
