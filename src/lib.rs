@@ -23,6 +23,8 @@ pub mod log;
 
 pub mod motion;
 
+pub mod inspect;
+
 pub mod friction;
 pub mod inertia;
 

@@ -6,12 +6,14 @@
 mod campaign;
 pub mod friction;
 pub mod identify;
+pub mod inspect;
 pub mod lsq;
 pub mod simulate;
 pub mod torque;
 pub mod validate;
 
 mod arguments;
+mod columns;
 mod context;
 mod error;
 mod exit;
@@ -67,6 +69,7 @@ struct Common {
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::Args),
+    Inspect(inspect::Args),
     Friction(friction::Args),
     Lsq(lsq::Args),
     Validate(validate::Args),
@@ -78,6 +81,7 @@ impl Command {
     fn run(&self, context: &Context) -> Result<Outcome, CliError> {
         match self {
             Command::Identify(args) => identify::run(args, context),
+            Command::Inspect(args) => inspect::run(args, context),
             Command::Friction(args) => friction::run(args, context),
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
@@ -221,7 +225,7 @@ mod tests {
 
     #[test]
     fn every_help_fits_80_columns_and_has_an_example() {
-        use super::{friction, identify, lsq, simulate, torque, validate};
+        use super::{friction, identify, inspect, lsq, simulate, torque, validate};
         let texts = [
             help::<friction::Args>(),
             help::<lsq::Args>(),
@@ -229,6 +233,7 @@ mod tests {
             help::<torque::Args>(),
             help::<simulate::Args>(),
             help::<identify::Args>(),
+            help::<inspect::Args>(),
         ];
         for text in texts {
             assert!(text.contains("Example:\n  cft-ident "), "{text}");

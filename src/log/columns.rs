@@ -31,7 +31,7 @@ pub(super) struct Header<'a> {
 
 impl Header<'_> {
     /// Whether any position or torque of the layout is there.
-    pub(super) fn has_any(&self, layout: &Layout) -> bool {
+    fn has_any(&self, layout: &Layout) -> bool {
         let channels = layout.positions.iter().chain(&layout.torques);
         channels
             .into_iter()
@@ -62,6 +62,19 @@ impl Header<'_> {
             torques,
             velocities,
         })
+    }
+
+    /// The first column that a channel may be.
+    pub(super) fn first(&self, channel: &Channel) -> Option<usize> {
+        self.indices(channel).next()
+    }
+
+    /// The layout to use: the other one where the header has channels of that alone.
+    pub(super) fn choose(&self, layout: &Layout) -> Layout {
+        match &layout.otherwise {
+            Some(other) if !self.has_any(layout) && self.has_any(other) => (**other).clone(),
+            _ => layout.clone(),
+        }
     }
 
     fn indices<'h>(&'h self, channel: &'h Channel) -> impl Iterator<Item = usize> + 'h {
@@ -119,7 +132,7 @@ impl Header<'_> {
 
     /// Refuses a header that states another unit than the one that the number is read in.
     fn check_unit(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
-        let stated = name_and_unit(name).1.or_else(|| suffix_unit(name));
+        let stated = unit_of(name);
         let (Some(found), Some(declared)) =
             (stated.and_then(known_unit), known_unit(&channel.unit))
         else {
@@ -152,6 +165,11 @@ fn name_and_unit(name: &str) -> (&str, Option<&str>) {
         }
     }
     (name, None)
+}
+
+/// The unit that a name states in brackets or as its ending.
+pub(super) fn unit_of(name: &str) -> Option<&str> {
+    name_and_unit(name).1.or_else(|| suffix_unit(name))
 }
 
 /// `q1_deg` says that it is in deg.

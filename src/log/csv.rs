@@ -229,6 +229,17 @@ impl Rows {
         }
     }
 
+    /// The number in a column of the current row, NaN and infinities included; NaN for an empty
+    /// field, `None` for words.
+    #[inline]
+    pub(super) fn lenient(&self, column: usize) -> Option<f64> {
+        let field = self.field(column).unwrap_or_default();
+        match number::parse(field) {
+            None if field.trim_ascii().is_empty() => Some(f64::NAN),
+            number => number,
+        }
+    }
+
     #[cold]
     fn no_number(&self, column: usize) -> LogError {
         let field = self.field(column).unwrap_or_default();

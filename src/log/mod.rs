@@ -22,6 +22,7 @@ mod row;
 mod source;
 mod spec;
 mod stale;
+mod table;
 mod text;
 mod time;
 
@@ -33,6 +34,7 @@ pub use reader::Reader;
 pub use recording::{CdrReader, DefinitionError, Malformed, Value};
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
+pub use table::{Table, TableBlock};
 pub use time::Instant;
 
 pub(crate) use names::list;

@@ -315,7 +315,7 @@ impl Reader {
 
 /// Seconds of a row's time, counted from the first one where that is far from zero.
 #[inline]
-fn seconds(stamp: Stamped, origin: &mut Option<Instant>) -> f64 {
+pub(super) fn seconds(stamp: Stamped, origin: &mut Option<Instant>) -> f64 {
     match stamp {
         Stamped::Seconds(seconds) => seconds,
         Stamped::Exact(instant) => {

@@ -42,10 +42,7 @@ impl TextRows {
             line: rows.header_line(),
             names: rows.header(),
         };
-        let layout = match &layout.otherwise {
-            Some(other) if !header.has_any(layout) && header.has_any(other) => (**other).clone(),
-            _ => layout.clone(),
-        };
+        let layout = header.choose(layout);
         let columns = header.columns(&layout)?;
         let clock = Clock::Unknown;
         Ok((
@@ -115,7 +112,7 @@ impl TextRows {
 }
 
 /// Exponent of a power of ten, for those that units of time have.
-fn power_of_ten(factor: f64) -> Option<i32> {
+pub(super) fn power_of_ten(factor: f64) -> Option<i32> {
     [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)]
         .into_iter()
         .find(|(unit, _)| *unit == factor)

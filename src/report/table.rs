@@ -178,6 +178,16 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
     }
 }
 
+/// `text` as lines that are indented by `indent` columns and fit [`WIDTH`], each with its line end.
+pub fn paragraph(text: &str, indent: usize) -> String {
+    let lines = wrapped(&printable(text), WIDTH.saturating_sub(indent));
+    let margin = " ".repeat(indent);
+    lines
+        .iter()
+        .map(|line| format!("{margin}{line}\n"))
+        .collect()
+}
+
 /// `text` in lines of at most `width` characters, broken at spaces, and inside a word only where the
 /// word alone is too long.
 fn wrapped(text: &str, width: usize) -> Vec<String> {

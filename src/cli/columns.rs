@@ -1,0 +1,153 @@
+//! Which columns of a table are which channels: by the robot file, or by their names.
+
+use super::CliError;
+use super::machine::Machine;
+use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
+use crate::log::{self, Channels, Layout, LogError, Table};
+
+/// Channels by their names alone.
+///
+/// # Errors
+/// Where no column is a time.
+pub(super) fn guessed(table: &Table) -> Result<(Plan, Option<Fault>), CliError> {
+    let names = table.names();
+    let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
+        CliError::input(format!(
+            "no column is a time; the header has {}",
+            log::list(names.iter().map(String::as_str))
+        ))
+        .hint("name the time column in the [log] section of a robot file and give it with -r")
+    })?;
+    let mut channels = Vec::new();
+    for column in 0..names.len() {
+        if column != time {
+            channels.push(other(table, column));
+        }
+    }
+    let plan = Plan {
+        time: Some((time, seconds(table.unit(time)))),
+        channels,
+    };
+    Ok((plan, None))
+}
+
+/// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
+/// reading the log.
+pub(super) fn of_robot(table: &Table, machine: &Machine) -> (Plan, Option<Fault>) {
+    let (layout, refused) = table.layout();
+    let names = table.names();
+    let time = table.find(&layout.time);
+    let time = time.or_else(|| names.iter().position(|name| is_time(name)));
+    let mut known: Vec<Option<Planned>> = vec![None; names.len()];
+    place(table, machine, &layout, &mut known);
+    if let Some(other) = &layout.otherwise {
+        // A log may hold both sides of the gears.
+        place(table, machine, other, &mut known);
+    }
+    let columns = known.into_iter().enumerate();
+    let channels = columns
+        .filter(|(column, _)| Some(*column) != time)
+        .map(|(column, planned)| planned.unwrap_or_else(|| other(table, column)))
+        .collect();
+    let plan = Plan {
+        time: time.map(|time| (time, layout.time.factor)),
+        channels,
+    };
+    (plan, refused.map(refusal))
+}
+
+/// Finds the channels of a layout among the columns that are not known yet.
+fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<Planned>]) {
+    let raw = layout.channels == Channels::Actuator;
+    let kinds = [
+        (&layout.positions, Role::Position),
+        (&layout.velocities, Role::Velocity),
+        (&layout.torques, Role::Torque),
+    ];
+    for (channels, role) in kinds {
+        for (j, channel) in channels.iter().enumerate() {
+            let Some(column) = table
+                .find(channel)
+                .filter(|column| known[*column].is_none())
+            else {
+                continue;
+            };
+            let joint = &layout.joints[j];
+            let position = match (raw, j) {
+                (true, 2) => "rad",
+                (true, _) => "m",
+                (false, j) => machine.robot.joint_kind(j).position_unit(),
+            };
+            let unit = match role {
+                Role::Velocity => format!("{position}/s"),
+                Role::Torque if raw => "V".to_owned(),
+                Role::Torque => machine.file.torque_unit(j).to_owned(),
+                _ => position.to_owned(),
+            };
+            let name = &table.names()[column];
+            let mut seen = Channel::new(name, role, Some(joint), Some(&unit));
+            (seen.limits, seen.saturates) = limits(machine, joint, role, raw);
+            known[column] = Some(Planned {
+                column,
+                factor: channel.factor,
+                offset: channel.offset,
+                channel: seen,
+            });
+        }
+    }
+}
+
+/// A column that no robot file names.
+fn other(table: &Table, column: usize) -> Planned {
+    let mut channel = Channel::guessed(&table.names()[column]);
+    channel.unit = table.unit(column).map(str::to_owned);
+    Planned {
+        column,
+        factor: 1.0,
+        offset: 0.0,
+        channel,
+    }
+}
+
+/// Seconds per unit of a time column.
+fn seconds(unit: Option<&str>) -> f64 {
+    match unit.map(str::to_lowercase).as_deref() {
+        Some("ms") => 1e-3,
+        Some("us" | "µs" | "μs") => 1e-6,
+        Some("ns") => 1e-9,
+        _ => 1.0,
+    }
+}
+
+/// Limits of a channel, and whether a number at the limit is what was applied.
+fn limits(machine: &Machine, joint: &str, role: Role, raw: bool) -> (Option<[f64; 2]>, bool) {
+    let Some(limits) = machine.file.limits.get(joint) else {
+        return (None, false);
+    };
+    let both = |limit: Option<f64>| limit.map(|limit| [-limit, limit]);
+    match role {
+        Role::Position => (limits.position, false),
+        Role::Velocity => (both(limits.speed), false),
+        Role::Torque if raw => (both(limits.volts), true),
+        Role::Torque => (both(limits.torque), false),
+        _ => (None, false),
+    }
+}
+
+/// What keeps the strict reader from a log, as a fault.
+fn refusal(error: LogError) -> Fault {
+    let text = error.to_string();
+    let (effect, remedy) = text
+        .rsplit_once("; ")
+        .unwrap_or((&text, "correct the file"));
+    Fault {
+        kind: Kind::MissingChannel,
+        severity: Severity::Error,
+        channel: None,
+        from_s: 0.0,
+        to_s: 0.0,
+        rows: 0,
+        effect: effect.to_owned(),
+        remedy: remedy.to_owned(),
+    }
+}

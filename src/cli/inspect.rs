@@ -1,0 +1,246 @@
+//! `cft-ident inspect`: what logs hold and what is wrong with them.
+
+use serde_json::{Value, json};
+
+use super::machine::Machine;
+use super::{CliError, Context, Outcome, columns};
+use crate::inspect::{Fault, Findings, Severity, look};
+use crate::log::{LogSpec, Provenance, Table, escape};
+use crate::report::json::Document;
+use crate::report::number;
+use crate::report::table;
+use crate::report::table::Align;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident inspect run.csv
+  cft-ident inspect run.csv@0..70% -r configs/cft.toml --json -";
+
+/// Say what logs hold and what is wrong with them.
+///
+/// Rate, gaps, range and grain of every channel, what each joint does, and the faults: what, where,
+/// what it does to a fit, and what to do about it. Without a robot file channels are known by their
+/// names (q_elbow, dq1, tau_2, Position ...). Ends with status 0 whatever it finds.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Robot file, or a built-in one such as configs/cft.toml: maps columns, knows units and limits
+    #[arg(short, long, value_name = "ROBOT.toml")]
+    pub robot: Option<String>,
+}
+
+/// One log as it was found.
+struct Inspected {
+    name: String,
+    findings: Findings,
+}
+
+/// Looks at one log.
+fn inspect(
+    spec: &LogSpec,
+    machine: Option<&Machine>,
+    context: &Context,
+) -> Result<(Inspected, Provenance), CliError> {
+    let layout = machine.map(|machine| machine.file.layout());
+    let mut table = Table::open(spec, layout.as_ref())?;
+    let (plan, refused) = match machine {
+        Some(machine) => columns::of_robot(&table, machine),
+        None => columns::guessed(&table)?,
+    };
+    let found = look(&mut table, &plan, &|| context.interrupted())?;
+    let mut findings = found.ok_or_else(CliError::interrupted)?;
+    findings.faults.splice(0..0, refused);
+    let name = spec.name();
+    Ok((Inspected { name, findings }, table.provenance()?))
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file that cannot be read at all.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
+    context.check_outputs(&inputs, &[])?;
+    let machine = args.robot.as_deref().map(Machine::load).transpose()?;
+    let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
+    let (mut logs, mut provenance) = (Vec::new(), Vec::new());
+    for spec in &args.logs {
+        let (log, input) = inspect(spec, machine.as_ref(), context)?;
+        logs.push(log);
+        provenance.push(input);
+        bar.advance(1);
+    }
+    drop(bar);
+    context.check()?;
+    Ok(Outcome {
+        text: logs.iter().map(text).collect(),
+        document: Document::new("inspect", &provenance, &[], &document(&logs))?,
+        missed: Vec::new(),
+    })
+}
+
+/// The fields of one log stand at the top; of several, in `logs`, with the lists together at the
+/// top, each entry with its log's name.
+fn document(logs: &[Inspected]) -> Value {
+    let mut fields = serde_json::Map::new();
+    if let [log] = logs {
+        if let Value::Object(own) = json!(log.findings) {
+            fields = own;
+        }
+        return Value::Object(fields);
+    }
+    let mut each = Vec::new();
+    let lists = ["channels", "gaps", "joints", "faults"];
+    let mut all = lists.map(|_| Vec::new());
+    for log in logs {
+        let mut own = json!(log.findings);
+        own["log"] = log.name.clone().into();
+        for (list, all) in lists.iter().zip(&mut all) {
+            for entry in own[*list].as_array().into_iter().flatten() {
+                let mut entry = entry.clone();
+                entry["log"] = log.name.clone().into();
+                all.push(entry);
+            }
+        }
+        each.push(own);
+    }
+    let rates = logs.iter().filter_map(|log| log.findings.rate_hz);
+    let jitters = logs.iter().filter_map(|log| log.findings.jitter);
+    fields.insert("rate_hz".into(), json!(rates.reduce(f64::min)));
+    fields.insert("jitter".into(), json!(jitters.reduce(f64::max)));
+    for (list, all) in lists.iter().zip(all) {
+        fields.insert((*list).to_owned(), all.into());
+    }
+    fields.insert("logs".into(), each.into());
+    Value::Object(fields)
+}
+
+fn text(log: &Inspected) -> String {
+    let found = &log.findings;
+    let mut out = format!(
+        "{}: {} rows in {} s",
+        escape(&log.name),
+        found.rows,
+        number::significant(found.duration_s, 5)
+    );
+    if let (Some(rate), Some(jitter)) = (found.rate_hz, found.jitter) {
+        out += &format!(
+            ", {} Hz, jitter {}, {} gap(s)",
+            number::significant(rate, 5),
+            number::percent(jitter),
+            found.gaps.len()
+        );
+    }
+    out += "\n\n";
+    out += &channels(found).to_string();
+    if !found.joints.is_empty() {
+        out += &format!("\n{}", joints(found));
+    }
+    out += &faults(found);
+    out + "\n"
+}
+
+fn channels(found: &Findings) -> table::Table {
+    let mut table = table::Table::new(&[
+        ("channel", Align::Left),
+        ("from", Align::Decimal),
+        ("to", Align::Decimal),
+        ("unit", Align::Left),
+        ("step", Align::Decimal),
+        ("limits", Align::Left),
+    ]);
+    for channel in &found.channels {
+        let limits = channel.limits.map(|[low, high]| {
+            format!(
+                "{}..{}",
+                number::significant(low, 4),
+                number::significant(high, 4)
+            )
+        });
+        let absent = f64::NAN;
+        table.row([
+            escape(&channel.name),
+            number::significant(channel.min.unwrap_or(absent), 5),
+            number::significant(channel.max.unwrap_or(absent), 5),
+            channel.unit.clone().unwrap_or_default(),
+            channel
+                .step
+                .map(|step| number::significant(step, 3))
+                .unwrap_or_default(),
+            limits.unwrap_or_default(),
+        ]);
+    }
+    table
+}
+
+fn joints(found: &Findings) -> table::Table {
+    let mut table = table::Table::new(&[
+        ("joint", Align::Left),
+        ("moves", Align::Left),
+        ("travel", Align::Decimal),
+        ("speed", Align::Decimal),
+        ("acceleration", Align::Decimal),
+        ("reversals", Align::Right),
+        ("moving", Align::Decimal),
+        ("condition", Align::Decimal),
+    ]);
+    for joint in &found.joints {
+        table.row([
+            escape(&joint.joint),
+            if joint.moves { "yes" } else { "no" }.to_owned(),
+            number::significant(joint.travel, 3),
+            number::significant(joint.speed_max, 3),
+            number::significant(joint.acceleration_max, 3),
+            joint.reversals.to_string(),
+            number::percent(joint.moving_share),
+            joint
+                .condition
+                .map(|condition| number::significant(condition, 3))
+                .unwrap_or_default(),
+        ]);
+    }
+    table
+}
+
+fn faults(found: &Findings) -> String {
+    if found.faults.is_empty() {
+        return "\nno faults found\n".to_owned();
+    }
+    let count = |severity| found.of(severity).count();
+    let mut out = format!(
+        "\n{} error(s), {} warning(s), {} note(s)\n",
+        count(Severity::Error),
+        count(Severity::Warning),
+        count(Severity::Info)
+    );
+    let alike = |a: &Fault, b: &Fault| {
+        (a.kind, a.severity, &a.channel, &a.remedy) == (b.kind, b.severity, &b.channel, &b.remedy)
+    };
+    let mut told: Vec<&Fault> = Vec::new();
+    for fault in &found.faults {
+        if told.iter().any(|earlier| alike(earlier, fault)) {
+            continue;
+        }
+        let all: Vec<&Fault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
+        told.push(fault);
+        let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
+        let spans: Vec<String> = all
+            .iter()
+            .map(|fault| match fault.to_s > fault.from_s {
+                true => format!("{:.3}..{:.3}", fault.from_s, fault.to_s),
+                false => format!("{:.3}", fault.from_s),
+            })
+            .collect();
+        let head = [fault.severity.word(), fault.kind.word(), &channel].join(" ");
+        out += &format!(
+            "\n{}{}{}",
+            table::paragraph(&format!("{}: {} s", head.trim_end(), spans.join(", ")), 0),
+            table::paragraph(&fault.effect, 4),
+            table::paragraph(&format!("-> {}", fault.remedy), 4)
+        );
+    }
+    out
+}

@@ -1,0 +1,197 @@
+//! The clock of a log: its step, how even it is, and where it stands still, runs back or leaps.
+
+use super::fault::Episodes;
+use super::histogram::Histogram;
+
+/// A step longer than this many median ones is a gap (as `motion::Settings::gap_factor`).
+pub(super) const GAP: f64 = 2.5;
+/// A step within this share of the median is even.
+const EVEN: f64 = 0.10;
+/// Long steps that are kept until the median is known.
+const MOST: usize = 1 << 16;
+
+/// What a row's time is to the row before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Step {
+    /// The next row of the same stretch.
+    Next,
+    /// The first row of a stretch: the first at all, after a gap, or after time ran back.
+    Apart,
+    /// No row to go on with: its time is that of the row before, or no number.
+    Unusable,
+}
+
+/// The times of a log, seen one after the other.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Clock {
+    pub(super) rows: u64,
+    pub(super) first: Option<f64>,
+    /// Time of the last row that had one [s].
+    pub(super) last: f64,
+    steps: Histogram,
+    /// Steps from, to [s] that may be gaps.
+    long: Vec<[f64; 2]>,
+    /// What is long for now.
+    long_from: f64,
+    pub(super) repeated: Episodes,
+    pub(super) backward: Episodes,
+    pub(super) without_time: u64,
+}
+
+/// What the clock was like.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct ClockFacts {
+    /// Median step [s]; 0 where there is none.
+    pub(super) dt: f64,
+    /// Half the range that the middle 90 % of the steps take, over the median.
+    pub(super) jitter: f64,
+    /// Share of the steps that are off the median by more than a tenth, gaps aside.
+    pub(super) uneven: f64,
+    /// From, to [s].
+    pub(super) gaps: Vec<[f64; 2]>,
+    pub(super) least: f64,
+    pub(super) largest: f64,
+}
+
+impl Clock {
+    /// Takes the times of some rows, and says for each what it is to the row before.
+    pub(super) fn take(&mut self, times: &[f64], steps: &mut Vec<Step>) {
+        steps.clear();
+        if self.rows == 0 {
+            self.long_from = GAP * typical_step(times);
+        } else {
+            self.long_from = GAP * self.steps.quantile_not_zero(0.5);
+        }
+        for &t in times {
+            self.rows += 1;
+            steps.push(self.step(t));
+        }
+    }
+
+    fn step(&mut self, t: f64) -> Step {
+        if !t.is_finite() {
+            self.without_time += 1;
+            return Step::Unusable;
+        }
+        if self.first.is_none() {
+            self.first = Some(t);
+            self.last = t;
+            return Step::Apart;
+        }
+        let before = self.last;
+        let step = t - before;
+        if step == 0.0 {
+            self.repeated.add(t, t, 1, 0.0);
+            return Step::Unusable;
+        }
+        self.last = t;
+        if step < 0.0 {
+            self.backward.add(t, before, 1, -1.0);
+            return Step::Apart;
+        }
+        self.steps.add(step);
+        if step > self.long_from && self.long_from > 0.0 {
+            self.note_long(before, t);
+            return Step::Apart;
+        }
+        Step::Next
+    }
+
+    #[cold]
+    fn note_long(&mut self, from: f64, to: f64) {
+        if self.long.len() == MOST {
+            // The shorter half is the less likely to be gaps once the median is known.
+            let mut lengths: Vec<f64> = self.long.iter().map(|[a, b]| b - a).collect();
+            lengths.sort_by(f64::total_cmp);
+            let middle = lengths[MOST / 2];
+            self.long.retain(|[a, b]| b - a > middle);
+        }
+        if self.long.len() < MOST {
+            self.long.push([from, to]);
+        }
+    }
+
+    /// Median step of the rows so far [s].
+    pub(super) fn step_so_far(&self) -> f64 {
+        self.steps.quantile(0.5)
+    }
+
+    /// Time from the first to the last row [s].
+    pub(super) fn duration(&self) -> f64 {
+        self.first.map_or(0.0, |first| self.last - first)
+    }
+
+    /// What is known at the end.
+    pub(super) fn facts(&self) -> ClockFacts {
+        let dt = self.steps.quantile(0.5);
+        if dt <= 0.0 {
+            return ClockFacts::default();
+        }
+        let gaps = self.long.iter().filter(|[a, b]| b - a > GAP * dt);
+        let (low, high) = (self.steps.quantile(0.05), self.steps.quantile(0.95));
+        ClockFacts {
+            dt,
+            jitter: 0.5 * (high - low) / dt,
+            uneven: self
+                .steps
+                .share_outside((1.0 - EVEN) * dt, (1.0 + EVEN) * dt),
+            gaps: gaps.copied().collect(),
+            least: self.steps.quantile(0.0),
+            largest: self.steps.quantile(1.0),
+        }
+    }
+}
+
+/// Median of the steps forward between some times [s]; 0 where there is none.
+pub(super) fn typical_step(times: &[f64]) -> f64 {
+    let pairs = times.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut steps: Vec<f64> = pairs.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_repeats_and_steps_back_are_told_apart_and_placed() {
+        let mut clock = Clock::default();
+        let mut times: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.001).collect();
+        times.drain(500..550);
+        times[100] = times[99];
+        times[200] = 0.15;
+        times[300] = f64::NAN;
+        let mut steps = Vec::new();
+        clock.take(&times, &mut steps);
+        let facts = clock.facts();
+        assert!((facts.dt - 0.001).abs() < 1e-6, "{facts:?}");
+        assert_eq!((steps[0], steps[1]), (Step::Apart, Step::Next));
+        assert_eq!((steps[100], steps[300]), (Step::Unusable, Step::Unusable));
+        assert_eq!((steps[200], steps[500]), (Step::Apart, Step::Apart));
+        assert_eq!(clock.repeated.rows(), 1);
+        assert_eq!(clock.backward.rows(), 1);
+        // from 0.15 back up to 0.201, and over the rows that are gone
+        assert_eq!(facts.gaps, [[0.15, 0.201], [0.499, 0.55]]);
+        assert!(facts.jitter < 0.01, "{facts:?}");
+    }
+
+    #[test]
+    fn an_uneven_clock_has_its_spread_over_the_step_as_jitter() {
+        let mut clock = Clock::default();
+        let times: Vec<f64> = (0..20_000)
+            .map(|k| f64::from(k) * 0.01 + if k % 2 == 0 { 0.001 } else { -0.001 })
+            .collect();
+        clock.take(&times, &mut Vec::new());
+        let facts = clock.facts();
+        assert!(
+            (facts.jitter - 0.2 / facts.dt * 0.01).abs() < 0.02,
+            "{facts:?}"
+        );
+        assert!(
+            facts.uneven > 0.9 || (facts.dt - 0.01).abs() > 0.001,
+            "{facts:?}"
+        );
+        assert!(facts.gaps.is_empty());
+    }
+}

@@ -1,0 +1,287 @@
+//! Runs every detector over the rows of a log, and gathers what they know at the end.
+
+use super::channel::{Channel, Role};
+use super::clock::{self, Clock, Step};
+use super::copies::Copies;
+use super::excitation::Excitation;
+use super::fault::Episodes;
+use super::findings::Findings;
+use super::flat::Flat;
+use super::repeats::Repeats;
+use super::spike::Spikes;
+use super::verdicts::conclude;
+use super::windows::Windows;
+
+/// A joint moves where it travels further than this share of what the farthest joint does.
+const TRAVELS: f64 = 0.02;
+
+/// How much is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Depth {
+    /// What a fit must know before it begins: errors, and rows to leave out.
+    Gate,
+    /// Everything.
+    Whole,
+}
+
+/// One channel's detectors.
+#[derive(Debug, Clone)]
+pub(super) struct Track {
+    pub(super) channel: Channel,
+    /// Rows with a number.
+    pub(super) rows: u64,
+    pub(super) low: f64,
+    pub(super) high: f64,
+    mean: f64,
+    scatter: f64,
+    pub(super) missing: Episodes,
+    pub(super) beyond: Episodes,
+    pub(super) at_limit: Episodes,
+    pub(super) flat: Flat,
+    pub(super) spikes: Spikes,
+    pub(super) excitation: Option<Excitation>,
+    /// The channel with the position of the same joint.
+    pub(super) position: Option<usize>,
+    /// Whether its shape is looked at, or only its numbers.
+    shaped: bool,
+}
+
+impl Track {
+    fn new(channel: Channel, position: Option<usize>) -> Self {
+        let shaped = matches!(channel.role, Role::Position | Role::Velocity | Role::Torque);
+        Self {
+            channel,
+            rows: 0,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            mean: 0.0,
+            scatter: 0.0,
+            missing: Episodes::default(),
+            beyond: Episodes::default(),
+            at_limit: Episodes::default(),
+            flat: Flat::default(),
+            spikes: Spikes::default(),
+            excitation: None,
+            position,
+            shaped,
+        }
+    }
+
+    /// Largest less smallest number; 0 where there is none.
+    pub(super) fn travel(&self) -> f64 {
+        (self.high - self.low).max(0.0)
+    }
+
+    /// Standard deviation of its numbers.
+    pub(super) fn deviation(&self) -> f64 {
+        (self.scatter / self.rows.max(1) as f64).sqrt()
+    }
+
+    fn part(&mut self) {
+        self.flat.part();
+        self.spikes.part();
+        if let Some(excitation) = &mut self.excitation {
+            excitation.part();
+        }
+    }
+
+    fn take(
+        &mut self,
+        times: &[f64],
+        steps: &[Step],
+        values: &[f64],
+        positions: Option<&[f64]>,
+        join: f64,
+    ) {
+        self.spikes.settle();
+        for (k, ((&t, step), &value)) in times.iter().zip(steps).zip(values).enumerate() {
+            if !value.is_finite() {
+                self.missing.add(t, t, 1, join);
+                self.part();
+                continue;
+            }
+            self.number(t, value, join);
+            if *step == Step::Unusable || !self.shaped {
+                continue;
+            }
+            if *step == Step::Apart {
+                self.part();
+            }
+            let position = positions.map_or(f64::NAN, |positions| positions[k]);
+            self.flat.take(t, value, position);
+            self.spikes.take(t, value);
+            if let Some(excitation) = &mut self.excitation {
+                excitation.take(t, value);
+            }
+        }
+    }
+
+    #[inline]
+    fn number(&mut self, t: f64, value: f64, join: f64) {
+        self.rows += 1;
+        self.low = self.low.min(value);
+        self.high = self.high.max(value);
+        // Welford 1962
+        let d = value - self.mean;
+        self.mean += d / self.rows as f64;
+        self.scatter += d * (value - self.mean);
+        if let Some([low, high]) = self.channel.limits {
+            let slack = 1e-9 * (high - low);
+            if value < low - slack || value > high + slack {
+                self.beyond.add(t, t, 1, join);
+            } else if self.channel.saturates && (value <= low + slack || value >= high - slack) {
+                self.at_limit.add(t, t, 1, join);
+            }
+        }
+    }
+}
+
+/// Looks at the rows of one log.
+#[derive(Debug, Clone)]
+pub struct Judge {
+    pub(super) depth: Depth,
+    pub(super) clock: Clock,
+    pub(super) tracks: Vec<Track>,
+    pub(super) repeats: Repeats,
+    pub(super) copies: Copies,
+    /// Channels whose copies are looked for.
+    pub(super) compared: Vec<usize>,
+    /// Channels that hold positions.
+    pub(super) positions: Vec<usize>,
+    pub(super) windows: Windows,
+    steps: Vec<Step>,
+    /// Channels with torques and velocities.
+    others: Vec<usize>,
+    row: [Vec<f64>; 2],
+}
+
+impl Judge {
+    /// For a log of these channels, time aside.
+    pub fn new(channels: Vec<Channel>, depth: Depth) -> Self {
+        let of_role = |role: Role| -> Vec<usize> {
+            let all = channels.iter().enumerate();
+            all.filter(|(_, channel)| channel.role == role)
+                .map(|(index, _)| index)
+                .collect()
+        };
+        let positions = of_role(Role::Position);
+        let position_of = |channel: &Channel| {
+            let joint = channel.joint.as_deref()?;
+            let of_joint = |index: &&usize| channels[**index].joint.as_deref() == Some(joint);
+            let only = match positions[..] {
+                // A name without a joint means the only one there is.
+                [only] if joint.is_empty() => Some(only),
+                _ => None,
+            };
+            let found = positions.iter().find(of_joint).copied().or(only);
+            found.filter(|_| channel.role != Role::Position)
+        };
+        let tracks: Vec<Track> = channels
+            .iter()
+            .map(|channel| Track::new(channel.clone(), position_of(channel)))
+            .collect();
+        let mut compared = Vec::new();
+        for role in [Role::Position, Role::Velocity, Role::Torque, Role::Command] {
+            if depth == Depth::Whole || role == Role::Position || role == Role::Torque {
+                compared.extend(of_role(role));
+            }
+        }
+        compared.sort_unstable();
+        let mut others = of_role(Role::Torque);
+        others.extend(of_role(Role::Velocity));
+        Self {
+            depth,
+            clock: Clock::default(),
+            repeats: Repeats::new(positions.len(), others.len()),
+            copies: Copies::new(compared.len()),
+            compared,
+            row: [vec![0.0; positions.len()], vec![0.0; others.len()]],
+            others,
+            positions,
+            tracks,
+            windows: Windows::default(),
+            steps: Vec::new(),
+        }
+    }
+
+    /// Takes consecutive rows: times [s], and one column per channel.
+    pub fn take(&mut self, times: &[f64], columns: &[&[f64]]) {
+        if times.is_empty() {
+            return;
+        }
+        if self.clock.rows == 0 && self.depth == Depth::Whole {
+            let dt = clock::typical_step(times);
+            for &index in &self.positions {
+                self.tracks[index].excitation = Some(Excitation::new(dt));
+            }
+        }
+        let mut steps = std::mem::take(&mut self.steps);
+        self.clock.take(times, &mut steps);
+        // What happens again within a few rows is one event.
+        let join = 10.5 * self.clock.step_so_far();
+        for (track, values) in self.tracks.iter_mut().zip(columns) {
+            let positions = track.position.map(|index| columns[index]);
+            track.take(times, &steps, values, positions, join);
+        }
+        let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
+        for (k, step) in steps.iter().enumerate() {
+            if *step != Step::Unusable {
+                self.copies.take(&compared, k);
+            }
+        }
+        self.watch_repeats(times, &steps, columns);
+        let whole = steps.iter().skip(1).all(|step| *step == Step::Next);
+        let finite = || {
+            columns
+                .iter()
+                .zip(&self.tracks)
+                .all(|(column, track)| !track.shaped || column.iter().all(|x| x.is_finite()))
+        };
+        if self.depth == Depth::Whole && whole && finite() {
+            self.windows.offer(times, columns);
+        }
+        self.steps = steps;
+    }
+
+    fn watch_repeats(&mut self, times: &[f64], steps: &[Step], columns: &[&[f64]]) {
+        if self.positions.is_empty() {
+            return;
+        }
+        for (k, (&t, step)) in times.iter().zip(steps).enumerate() {
+            if *step == Step::Unusable {
+                continue;
+            }
+            let [positions, others] = &mut self.row;
+            let gather = |row: &mut [f64], indices: &[usize]| {
+                for (value, index) in row.iter_mut().zip(indices) {
+                    *value = columns[*index][k];
+                }
+            };
+            gather(positions, &self.positions);
+            gather(others, &self.others);
+            if *step == Step::Apart || positions.iter().any(|x| !x.is_finite()) {
+                self.repeats.part();
+            }
+            self.repeats.take(t, positions, others);
+        }
+    }
+
+    /// Whether a position channel moves: further than its grain, and not far less than the others.
+    pub(super) fn moves(&self, track: &Track) -> bool {
+        let travels = self
+            .positions
+            .iter()
+            .map(|index| self.tracks[*index].travel());
+        let farthest = travels.fold(0.0, f64::max);
+        let step = track.flat.steps.quantile_not_zero(0.05);
+        track.travel() > (30.0 * step).max(TRAVELS * farthest)
+    }
+
+    /// What there is to say about the log.
+    pub fn finish(mut self) -> Findings {
+        for track in &mut self.tracks {
+            track.part();
+        }
+        conclude(&self)
+    }
+}

@@ -1,0 +1,37 @@
+//! What a log holds, and what is wrong with it, before it spoils a fit.
+//!
+//! ```text
+//! rows of any log -> judge -> facts (rate, range, motion per joint)
+//!   (NaN and all)     |       faults (what, where, what it does, what to do)
+//!                     +-----> spans to leave out of a fit
+//! ```
+//!
+//! One pass in fixed memory: each detector keeps what it needs of the rows just seen, a histogram,
+//! and a bounded list of candidates; what is unusual is decided at the end, by the log's own
+//! measure. Nothing is assumed about rate, units or noise.
+
+mod channel;
+mod clock;
+mod copies;
+mod excitation;
+mod fault;
+mod findings;
+mod flat;
+mod grain;
+mod histogram;
+mod judge;
+mod look;
+mod repeats;
+mod shape;
+mod spike;
+mod together;
+mod velocity;
+mod verdicts;
+mod windows;
+
+pub use channel::{Channel, Role, is_time};
+pub use excitation::JointMotion;
+pub use fault::{Fault, Kind, Severity};
+pub use findings::{ChannelFacts, Findings, Gap};
+pub use judge::{Depth, Judge};
+pub use look::{Plan, Planned, look};

@@ -1,0 +1,257 @@
+//! Rows that show the positions of the row before although the robot moves.
+//!
+//! A recorder that is faster than the robot, or runs beside it on a clock of its own, now and then
+//! logs one sample twice and leaves out the next. Differentiated, that is a stop and a leap.
+
+use super::fault::Episodes;
+use super::flat::Flat;
+
+/// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
+const LONGEST: usize = 20;
+/// Runs that are kept.
+const MOST: usize = 1 << 18;
+
+/// Rows that repeat the positions of the row before them.
+#[derive(Debug, Clone)]
+struct Run {
+    /// Times of the first row that shows these positions, and of the last.
+    first: f64,
+    last: f64,
+    /// Times of the second row and of the last but one: what is left of the run without its first,
+    /// or without its last row.
+    second: f64,
+    before_last: f64,
+    rows: u32,
+    /// Steps of each joint into the run and out of it.
+    steps: Vec<[f32; 2]>,
+    /// Whether torques and velocities repeat too.
+    identical: bool,
+}
+
+/// Watches the positions of all joints together.
+#[derive(Debug, Clone)]
+pub(super) struct Repeats {
+    joints: usize,
+    previous: Vec<f64>,
+    entry: Vec<f64>,
+    /// Times of the run's first, second, last but one and last row; rows of it.
+    times: [f64; 4],
+    rows: usize,
+    /// Torques and velocities of the row before, and whether they were the same all through the run.
+    others: Vec<f64>,
+    identical: bool,
+    /// Rows in which positions changed, and those of them in which nothing else did.
+    changed: u64,
+    coincidences: u64,
+    runs: Vec<Run>,
+}
+
+impl Repeats {
+    /// For so many positions, and torques and velocities.
+    pub(super) fn new(joints: usize, others: usize) -> Self {
+        Self {
+            joints,
+            previous: vec![f64::NAN; joints],
+            entry: vec![f64::NAN; joints],
+            times: [f64::NAN; 4],
+            rows: 0,
+            others: vec![f64::NAN; others],
+            identical: true,
+            changed: 0,
+            coincidences: 0,
+            runs: Vec::new(),
+        }
+    }
+
+    /// Takes the positions of the next row, and its torques and velocities.
+    #[inline]
+    pub(super) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
+        let same = others == self.others;
+        if self.rows > 0 && positions == self.previous {
+            self.rows += 1;
+            if self.rows == 2 {
+                self.times[1] = t;
+            }
+            self.times[2] = self.times[3];
+            self.times[3] = t;
+            self.identical &= same;
+            self.others.copy_from_slice(others);
+            return;
+        }
+        self.changed += 1;
+        self.coincidences += u64::from(same);
+        self.others.copy_from_slice(others);
+        if self.rows > 1 {
+            self.end(positions);
+        }
+        self.identical = true;
+        for ((entry, previous), position) in
+            self.entry.iter_mut().zip(&mut self.previous).zip(positions)
+        {
+            *entry = *position - *previous;
+            *previous = *position;
+        }
+        self.times = [t, t, t, t];
+        self.rows = 1;
+    }
+
+    /// The next row belongs to another stretch.
+    pub(super) fn part(&mut self) {
+        self.previous.fill(f64::NAN);
+        self.entry.fill(f64::NAN);
+        self.rows = 0;
+    }
+
+    #[cold]
+    fn end(&mut self, next: &[f64]) {
+        if self.rows > LONGEST || self.runs.len() == MOST {
+            return;
+        }
+        let out = next
+            .iter()
+            .zip(&self.previous)
+            .map(|(next, last)| next - last);
+        let [first, second, before_last, last] = self.times;
+        self.runs.push(Run {
+            first,
+            last,
+            second,
+            before_last,
+            rows: self.rows as u32 - 1,
+            steps: self
+                .entry
+                .iter()
+                .zip(out)
+                .map(|(entry, exit)| [*entry as f32, exit as f32])
+                .collect(),
+            identical: self.identical,
+        });
+    }
+
+    /// What was found; `channels` are the joints' own, in the same order.
+    pub(super) fn judge(&self, channels: &[&Flat]) -> Stale {
+        debug_assert_eq!(channels.len(), self.joints);
+        let least: Vec<f64> = channels
+            .iter()
+            .map(|flat| flat.steps.quantile_not_zero(0.05))
+            .collect();
+        // Whether the robot goes on in the same direction, in steps of so many usual least ones.
+        let goes_on = |run: &Run, factor: f64| {
+            run.steps.iter().zip(&least).any(|(&[entry, exit], least)| {
+                let (entry, exit) = (f64::from(entry), f64::from(exit));
+                let smaller = entry.abs().min(exit.abs());
+                entry * exit > 0.0 && *least > 0.0 && smaller >= factor * least
+            })
+        };
+        // A coarse encoder on a slow joint repeats its number for good; but not all that is measured
+        // does at once, where it does not do so in motion.
+        let telling = !self.others.is_empty() && 100 * self.coincidences < self.changed;
+        let certain = |run: &Run| telling && run.identical && goes_on(run, 0.9);
+        let likely = |run: &Run| goes_on(run, 3.0);
+        let count = |which: &dyn Fn(&Run) -> bool| -> u64 {
+            let runs = self.runs.iter().filter(|run| which(run));
+            runs.map(|run| u64::from(run.rows)).sum()
+        };
+        let all = count(&|_| true);
+        let sure = count(&certain);
+        let mostly = 5 * sure > 4 * all;
+        let in_motion =
+            |run: &&Run| certain(run) || ((mostly || self.others.is_empty()) && likely(run));
+        let moving = count(&|run| in_motion(&run));
+        let mut stale = Stale {
+            // Where most are of that kind, so are those at the slow turns of the motion.
+            rows: if mostly { all } else { moving },
+            moving,
+            ..Stale::default()
+        };
+        for run in self.runs.iter().filter(in_motion) {
+            stale
+                .where_
+                .add(run.first, run.last, u64::from(run.rows), 0.0);
+            // The leap is on the side where a sample is missing: what lies next to it is in time.
+            let size = |side: usize| -> f64 {
+                let shares = run.steps.iter().zip(&least);
+                shares
+                    .map(|(steps, least)| f64::from(steps[side].abs()) / least)
+                    .sum()
+            };
+            let cut = if size(0) > size(1) {
+                [run.first, run.before_last]
+            } else {
+                [run.second, run.last]
+            };
+            stale.cuts.push(cut);
+        }
+        stale
+    }
+}
+
+/// Repeated rows of a log.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stale {
+    /// All of them, and those at whose place the robot certainly moves.
+    pub(super) rows: u64,
+    pub(super) moving: u64,
+    pub(super) where_: Episodes,
+    /// Rows to be left out: from, to [s].
+    pub(super) cuts: Vec<[f64; 2]>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Positions alone, or with a torque that is different in every row but the repeated ones.
+    fn judged(positions: &[f64], repeated: Option<&[usize]>) -> Stale {
+        let width = usize::from(repeated.is_some());
+        let (mut repeats, mut flat) = (Repeats::new(1, width), Flat::default());
+        let mut torque = 0.0;
+        for (k, q) in positions.iter().enumerate() {
+            if repeated.is_none_or(|rows| !rows.contains(&k)) {
+                torque += 1.0;
+            }
+            repeats.take(k as f64, &[*q], &[torque][..width]);
+            flat.take(k as f64, *q, f64::NAN);
+        }
+        repeats.judge(&[&flat])
+    }
+
+    #[test]
+    fn a_sample_that_is_logged_twice_is_found_and_the_one_out_of_time_is_cut() {
+        let mut q: Vec<f64> = (0..500).map(|k| (f64::from(k) * 0.01).sin()).collect();
+        q[100] = q[99];
+        q[200] = q[201];
+        for repeated in [None, Some(&[100, 201][..])] {
+            let stale = judged(&q, repeated);
+            assert_eq!((stale.rows, stale.moving), (2, 2));
+            assert_eq!(stale.cuts, [[100.0, 100.0], [200.0, 200.0]]);
+        }
+    }
+
+    #[test]
+    fn a_coarse_encoder_on_a_slow_joint_repeats_nothing() {
+        let slow = (0..5000).map(|k| (f64::from(k) * 0.3).floor() * 1e-4);
+        let fast = (0..500).map(|k| 0.15 + f64::from(k) * 5e-4);
+        let rest = (0..300).map(|_| 0.4);
+        let q: Vec<f64> = slow.chain(fast).chain(rest).collect();
+        for repeated in [None, Some(&[][..])] {
+            let stale = judged(&q, repeated);
+            assert!(stale.rows == 0 && stale.cuts.is_empty(), "{stale:?}");
+        }
+    }
+
+    #[test]
+    fn at_slow_speed_only_what_repeats_in_all_channels_is_a_repetition() {
+        let q: Vec<f64> = (0..5000)
+            .map(|k| (f64::from(k) * 0.3).floor() * 1e-4)
+            .collect();
+        let repeated: Vec<usize> = (1..5000)
+            .filter(|k| k % 500 == 2 && q[*k] == q[k - 1])
+            .collect();
+        let stale = judged(&q, Some(&repeated));
+        let pairs = repeated
+            .iter()
+            .filter(|k| q[**k + 1] != q[**k] && q[**k - 2] != q[**k - 1]);
+        assert_eq!(stale.rows as usize, pairs.count());
+    }
+}

@@ -1,0 +1,393 @@
+//! Faults in the shape of one channel: flat where it should change, off where it should be smooth,
+//! coarse.
+
+use super::channel::Role;
+use super::clock::ClockFacts;
+use super::fault::{Episodes, Kind, Severity};
+use super::flat::{Levels, Run};
+use super::grain;
+use super::judge::{Depth, Judge, Track};
+use super::verdicts::{Draft, rows_text};
+
+/// Rows of one value from which a channel may be stuck.
+const STUCK_ROWS: u64 = 10;
+/// An edge is abrupt where its step is so many times the usual bends of the channel...
+const ABRUPT: f64 = 6.0;
+/// ... and so many times its smallest usual step.
+const GRAINS: f64 = 4.0;
+/// A spike is so many times what 99.5 % of the rows differ from their neighbours...
+const SPIKE: f64 = 8.0;
+/// ... and at least this share of the channel's deviation.
+const SPIKE_SHARE: f64 = 0.1;
+/// Levels over its range from which a channel's grain is not worth a word.
+const FINE: f64 = 4096.0;
+/// Acceleration noise by the grain of a position, over the acceleration, that spoils a fit.
+const COARSE: f64 = 0.1;
+/// Grain of a torque over its deviation that spoils a fit.
+const COARSE_TORQUE: f64 = 0.1;
+/// Band in which the acceleration noise is counted [Hz].
+const BAND_HZ: f64 = 20.0;
+
+/// The faults of one channel.
+pub(super) fn faults(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
+    match track.channel.role {
+        Role::Position | Role::Velocity | Role::Torque => {}
+        Role::Acceleration | Role::Command | Role::Other => return,
+    }
+    if track.rows == 0 {
+        return;
+    }
+    if track.travel() == 0.0 {
+        constant(judge, track, draft);
+        return;
+    }
+    let mut flat = Flatness::of(judge, track);
+    flat.tops();
+    flat.stuck();
+    flat.tell(track, draft);
+    spikes(track, &flat, clock, draft);
+    if judge.depth == Depth::Whole {
+        coarse(judge, track, clock, draft);
+    }
+}
+
+/// A channel that never changes.
+fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
+    let name = Some(track.channel.name.as_str());
+    let value = track.low;
+    let joint_moves = track
+        .position
+        .map(|index| &judge.tracks[index])
+        .is_some_and(|position| {
+            position.travel() > 30.0 * position.flat.steps.quantile_not_zero(0.05)
+                && position.travel() > 0.0
+        });
+    let all_rest = judge
+        .positions
+        .iter()
+        .all(|index| judge.tracks[*index].travel() == 0.0);
+    match track.channel.role {
+        Role::Torque | Role::Velocity if joint_moves => {
+            let severity = if track.channel.role == Role::Torque {
+                Severity::Error
+            } else {
+                Severity::Warning
+            };
+            let effect = format!(
+                "{value} in all {} rows although the joint moves: nothing can be fitted to it",
+                track.rows
+            );
+            let remedy = "check the sensor and the recorder, or name the right column in the [log] section of the robot file";
+            draft.whole(
+                Kind::StuckChannel,
+                severity,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+        }
+        Role::Position if all_rest => {
+            let effect = format!(
+                "{value} in all {} rows, and no other joint moves: a log at rest determines nothing",
+                track.rows
+            );
+            let remedy = "check the encoder and the recorder; log a motion";
+            draft.whole(
+                Kind::StuckChannel,
+                Severity::Warning,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+        }
+        Role::Position => {
+            let effect = format!(
+                "{value} in all {} rows: either the joint is held, or its channel is dead",
+                track.rows
+            );
+            let remedy = "nothing, if this joint is not to move in this log";
+            draft.whole(
+                Kind::StuckChannel,
+                Severity::Info,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+        }
+        _ => {}
+    }
+}
+
+/// What is flat in a channel.
+struct Flatness<'a> {
+    track: &'a Track,
+    /// An edge with a larger step is abrupt.
+    abrupt: f64,
+    /// Rows of one value that are usual.
+    usual: f64,
+    /// A joint has moved where it travelled further.
+    moved: f64,
+    tops: Vec<Run>,
+    stuck: Vec<Run>,
+}
+
+impl<'a> Flatness<'a> {
+    fn of(judge: &Judge, track: &'a Track) -> Self {
+        let flat = &track.flat;
+        let bends = flat.bends.quantile_not_zero(0.99);
+        let grain = flat.steps.quantile_not_zero(0.05);
+        let moved = track.position.map_or(f64::INFINITY, |index| {
+            let position = &judge.tracks[index];
+            let grain = position.flat.steps.quantile_not_zero(0.05);
+            (10.0 * grain).max(0.002 * position.travel())
+        });
+        Self {
+            track,
+            abrupt: (ABRUPT * bends).max(GRAINS * grain),
+            usual: flat.lengths.quantile(0.99),
+            moved,
+            tops: Vec::new(),
+            stuck: Vec::new(),
+        }
+    }
+
+    fn is_abrupt(&self, run: &Run) -> bool {
+        run.entry.abs() > self.abrupt || run.exit.abs() > self.abrupt
+    }
+
+    /// Runs at a value that the channel does not exceed.
+    fn tops(&mut self) {
+        let (top, bottom) = (&self.track.flat.top, &self.track.flat.bottom);
+        let levels: [(&Levels, f64); 2] = [(top, 1.0), (bottom, -1.0)];
+        for (levels, sign) in levels {
+            let value = sign * levels.extreme();
+            if !levels.piles_up() {
+                continue;
+            }
+            let runs: Vec<Run> = self
+                .track
+                .flat
+                .runs()
+                .iter()
+                .filter(|run| run.value == value)
+                .copied()
+                .collect();
+            let position = self.track.channel.role == Role::Position;
+            let longest = runs.iter().map(|run| run.rows).max().unwrap_or(0);
+            // A torque that meets a limit does so while its joint is driven; positions and
+            // velocities also rest where they are largest, but do not get there at once.
+            let real = runs.iter().any(|run| {
+                let driven = !position && run.travel > self.moved;
+                self.is_abrupt(run) || (driven && run.rows as f64 >= 3.0 * self.usual)
+            });
+            if longest >= 5 && real {
+                self.tops.extend(runs);
+            }
+        }
+    }
+
+    /// Runs at any other value.
+    fn stuck(&mut self) {
+        let position = self.track.channel.role == Role::Position;
+        for run in self.track.flat.runs() {
+            let long = run.rows >= STUCK_ROWS
+                && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
+            if !long || self.tops.contains(run) {
+                continue;
+            }
+            let meanwhile =
+                !position && run.travel > self.moved && run.rows as f64 >= 5.0 * self.usual;
+            if meanwhile || (self.is_abrupt(run) && (position || run.travel > self.moved)) {
+                self.stuck.push(*run);
+            }
+        }
+    }
+
+    fn tell(&self, track: &Track, draft: &mut Draft) {
+        let name = Some(track.channel.name.as_str());
+        let role = track.channel.role;
+        let used = matches!(role, Role::Position | Role::Torque);
+        let then = if used {
+            "these rows are left out of a fit"
+        } else {
+            "a fit does not read this channel"
+        };
+        let gathered = |runs: &[Run]| {
+            let mut episodes = Episodes::default();
+            for run in runs {
+                // Noise about the limit breaks a flat top into many.
+                episodes.add(run.from, run.to, run.rows, 3.0 * (run.to - run.from));
+            }
+            episodes
+        };
+        let tops = gathered(&self.tops);
+        let kind = if role == Role::Torque {
+            Kind::Saturation
+        } else {
+            Kind::Clipping
+        };
+        let effect = |rows: u64, times: usize| {
+            format!(
+                "{} flat at {} or {}, which is never exceeded: the true values are beyond, so that {then}",
+                rows_text(rows, times),
+                track.low,
+                track.high
+            )
+        };
+        let remedy = "choose a slower motion or a wider measuring range; if the actuator itself saturates, what it gave is in the log and may be used";
+        let severity = if used {
+            Severity::Warning
+        } else {
+            Severity::Info
+        };
+        draft.stretches(kind, severity, name, &tops, (&effect, remedy));
+        let stuck = gathered(&self.stuck);
+        let effect = |rows: u64, times: usize| {
+            format!(
+                "{} of one value while the joint moves: {then}",
+                rows_text(rows, times)
+            )
+        };
+        let remedy =
+            "check cable, sensor and recorder of this channel; record again if much is lost";
+        draft.stretches(
+            Kind::StuckChannel,
+            severity,
+            name,
+            &stuck,
+            (&effect, remedy),
+        );
+        if used {
+            draft.cut(&tops);
+            draft.cut(&stuck);
+        }
+    }
+}
+
+fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft) {
+    let usual = track.spikes.differences_seen.quantile(0.995);
+    let grain = track.flat.steps.quantile_not_zero(0.05);
+    let least = (SPIKE * usual)
+        .max(GRAINS * grain)
+        .max(match track.channel.role {
+            Role::Position => 0.0,
+            _ => SPIKE_SHARE * track.deviation(),
+        });
+    // Where a channel leaps out of a flat stretch it is told already.
+    let reach = 5.5 * clock.dt;
+    let told = |t: f64| {
+        let runs = flat.tops.iter().chain(&flat.stuck);
+        runs.into_iter()
+            .any(|run| run.from - reach <= t && t <= run.to + reach)
+    };
+    let mut episodes = Episodes::default();
+    let mut highest = 0.0f64;
+    for spike in track
+        .spikes
+        .found()
+        .iter()
+        .filter(|s| s.height.abs() > least && !told(s.t))
+    {
+        episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
+        highest = highest.max(spike.height.abs());
+    }
+    if episodes.is_empty() {
+        return;
+    }
+    let used = matches!(track.channel.role, Role::Position | Role::Torque);
+    let (severity, then) = if used {
+        (
+            Severity::Warning,
+            "differentiated or squared they outweigh thousands of good rows; a fit leaves them out",
+        )
+    } else {
+        (Severity::Info, "a fit does not read this channel")
+    };
+    let effect = |rows: u64, times: usize| {
+        format!(
+            "{} off the rows about by up to {highest:.3e}: {then}",
+            rows_text(rows, times)
+        )
+    };
+    let remedy = "look for a loose cable, a lost bus message or a counter that overflows";
+    draft.stretches(
+        Kind::Spike,
+        severity,
+        Some(&track.channel.name),
+        &episodes,
+        (&effect, remedy),
+    );
+    if used {
+        draft.cut(&episodes);
+    }
+}
+
+fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
+    let index = judge
+        .tracks
+        .iter()
+        .position(|other| std::ptr::eq(other, track));
+    let Some(step) = index.and_then(|index| grain::step(judge.windows.iter(), index)) else {
+        return;
+    };
+    let levels = track.travel() / step;
+    // A joint that is held shows a few counts, which is no fault.
+    if levels < 30.0 && track.channel.role != Role::Torque {
+        return;
+    }
+    if track.channel.role == Role::Position && !judge.moves(track) {
+        return;
+    }
+    let name = Some(track.channel.name.as_str());
+    let remedy =
+        "use a finer sensor or more digits; lower the cut-off in [filter] of the robot file";
+    match (track.channel.role, &track.excitation) {
+        (Role::Position, Some(excitation)) => {
+            // White noise of step^2/12, differentiated twice, up to the cut-off.
+            let w = std::f64::consts::TAU * BAND_HZ;
+            let noise = step * (clock.dt * BAND_HZ / 30.0).sqrt() * w * w;
+            let share = noise / excitation.acceleration_rms();
+            if share > COARSE {
+                let effect = format!(
+                    "steps of {step:.3e}: below {BAND_HZ} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
+                    100.0 * share
+                );
+                draft.whole(
+                    Kind::Quantisation,
+                    Severity::Warning,
+                    name,
+                    track.rows,
+                    (effect, remedy),
+                );
+                return;
+            }
+        }
+        (Role::Torque, _) if step > COARSE_TORQUE * track.deviation() => {
+            let effect = format!(
+                "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters drown in it",
+                100.0 * step / track.deviation()
+            );
+            draft.whole(
+                Kind::Quantisation,
+                Severity::Warning,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+            return;
+        }
+        _ => {}
+    }
+    if levels < FINE {
+        let effect = format!(
+            "steps of {step:.3e}, {levels:.0} levels over the range: a fit averages them out"
+        );
+        draft.whole(
+            Kind::Quantisation,
+            Severity::Info,
+            name,
+            track.rows,
+            (effect, remedy),
+        );
+    }
+}

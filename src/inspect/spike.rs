@@ -1,0 +1,245 @@
+//! Single rows that are far off their neighbours.
+//!
+//! A row is compared with the median of the seven rows about it (Hampel 1974): on a slope or a step
+//! that difference is nothing, at a spike of one to three rows it is the spike's height. At a turn
+//! of smooth motion it is small but not nothing: what stands out there as well must also be off the
+//! cubic through the rows four and five away.
+
+use super::histogram::Histogram;
+
+/// Rows of the median.
+const WIDTH: usize = 7;
+const HALF: usize = WIDTH / 2;
+/// Rows to each side in which a spike must stand alone.
+const AROUND: usize = 25;
+/// Differences that are remembered.
+const RING: usize = 64;
+/// Spikes that are kept, the highest.
+const MOST: usize = 4096;
+
+/// A row that stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spike {
+    pub(super) t: f64,
+    /// Difference from the median of its neighbours.
+    pub(super) height: f64,
+}
+
+/// Looks for the spikes of one channel.
+#[derive(Debug, Clone)]
+pub(super) struct Spikes {
+    values: [f64; RING],
+    times: [f64; RING],
+    differences: [f64; RING],
+    /// Rows since the stretch began.
+    count: usize,
+    /// Rows whose difference was looked at as a spike.
+    judged: usize,
+    pub(super) differences_seen: Histogram,
+    /// A difference above it may be a spike.
+    suspect: f64,
+    found: Vec<Spike>,
+    /// Height of the lowest spike that is kept, once there are too many.
+    lowest: f64,
+}
+
+impl Default for Spikes {
+    fn default() -> Self {
+        Self {
+            values: [0.0; RING],
+            times: [0.0; RING],
+            differences: [0.0; RING],
+            count: 0,
+            judged: 0,
+            differences_seen: Histogram::default(),
+            suspect: 0.0,
+            found: Vec::new(),
+            lowest: 0.0,
+        }
+    }
+}
+
+impl Spikes {
+    /// Takes the next row.
+    #[inline]
+    pub(super) fn take(&mut self, t: f64, value: f64) {
+        let k = self.count;
+        self.values[k % RING] = value;
+        self.times[k % RING] = t;
+        self.count += 1;
+        if self.count < WIDTH {
+            return;
+        }
+        let centre = k - HALF;
+        let window = std::array::from_fn(|i| self.values[(k - i) % RING]);
+        let difference = self.values[centre % RING] - median(window);
+        self.differences[centre % RING] = difference;
+        self.differences_seen.add(difference);
+        if centre >= HALF + AROUND {
+            self.judge(centre - AROUND, centre);
+        }
+    }
+
+    /// The next row belongs to another stretch.
+    pub(super) fn part(&mut self) {
+        if self.count >= WIDTH {
+            let last = self.count - 1 - HALF;
+            for row in self.judged.max(HALF)..=last {
+                self.judge(row, last);
+            }
+        }
+        self.count = 0;
+        self.judged = 0;
+    }
+
+    /// Brings the suspicion up to date with what was seen so far.
+    pub(super) fn settle(&mut self) {
+        self.suspect = 3.0 * self.differences_seen.quantile(0.99);
+    }
+
+    /// Looks whether a row stands alone among those up to `last`.
+    #[inline]
+    fn judge(&mut self, row: usize, last: usize) {
+        self.judged = row + 1;
+        let height = self.differences[row % RING];
+        if height.abs() > self.suspect.max(self.lowest) {
+            self.judge_closely(row, last, height);
+        }
+    }
+
+    #[cold]
+    fn judge_closely(&mut self, row: usize, last: usize, height: f64) {
+        let from = row.saturating_sub(AROUND).max(HALF);
+        let others = (from..=last.min(row + AROUND)).filter(|k| k.abs_diff(row) > HALF);
+        let high = others.filter(|k| self.differences[k % RING].abs() > 0.25 * height.abs());
+        // A second spike may be near, a rough stretch may not.
+        if high.count() > 3 {
+            return;
+        }
+        let Some(height) = self.off_cubic(row, height) else {
+            return;
+        };
+        if self.found.len() == MOST {
+            let mut heights: Vec<f64> = self.found.iter().map(|s| s.height.abs()).collect();
+            heights.sort_by(f64::total_cmp);
+            self.lowest = heights[MOST / 2];
+            self.found.retain(|spike| spike.height.abs() > self.lowest);
+        }
+        self.found.push(Spike {
+            t: self.times[row % RING],
+            height,
+        });
+    }
+
+    /// How far a row is off the cubic through rows beside it, or `height` where that is less; `None`
+    /// where it is as good as on it, or rows are missing.
+    fn off_cubic(&self, row: usize, height: f64) -> Option<f64> {
+        if row < 5 || row + 5 >= self.count {
+            return None;
+        }
+        let value = |k: usize| self.values[k % RING];
+        let mean = |away: usize| 0.5 * (value(row - away) + value(row + away));
+        let off = value(row) - (25.0 * mean(4) - 16.0 * mean(5)) / 9.0;
+        let agrees = off * height > 0.0 && off.abs() > 0.5 * height.abs();
+        agrees.then(|| off.abs().min(height.abs()).copysign(height))
+    }
+
+    /// Those that may be spikes, in the order of time.
+    pub(super) fn found(&self) -> &[Spike] {
+        &self.found
+    }
+}
+
+/// Median of seven numbers.
+#[inline]
+fn median(mut x: [f64; WIDTH]) -> f64 {
+    // Exchanges that leave the middle one in its place (Devillard 1998).
+    const EXCHANGES: [(usize, usize); 13] = [
+        (0, 5),
+        (0, 3),
+        (1, 6),
+        (2, 4),
+        (0, 1),
+        (3, 5),
+        (2, 6),
+        (2, 3),
+        (3, 6),
+        (4, 5),
+        (1, 4),
+        (1, 3),
+        (3, 4),
+    ];
+    for (a, b) in EXCHANGES {
+        let (low, high) = (x[a].min(x[b]), x[a].max(x[b]));
+        x[a] = low;
+        x[b] = high;
+    }
+    x[HALF]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn fed(values: &[f64]) -> Spikes {
+        let mut spikes = Spikes::default();
+        for (k, value) in values.iter().enumerate() {
+            if k % 256 == 0 {
+                spikes.settle();
+            }
+            spikes.take(k as f64, *value);
+        }
+        spikes.part();
+        spikes
+    }
+
+    proptest! {
+        #[test]
+        fn the_median_is_the_middle_of_the_sorted_numbers(x in prop::array::uniform7(-10i32..10)) {
+            let x = x.map(f64::from);
+            let mut sorted = x;
+            sorted.sort_by(f64::total_cmp);
+            prop_assert_eq!(median(x), sorted[3]);
+        }
+    }
+
+    #[test]
+    fn spikes_of_one_to_three_rows_are_found_at_their_rows_near_the_end_too() {
+        let mut values: Vec<f64> = (0..3000).map(|k| (f64::from(k) * 0.01).sin()).collect();
+        for k in [500, 1200, 1201, 1202, 2990] {
+            values[k] += 0.5;
+        }
+        let found: Vec<f64> = fed(&values)
+            .found()
+            .iter()
+            .filter(|s| s.height > 0.3)
+            .map(|s| s.t)
+            .collect();
+        assert_eq!(found, [500.0, 1200.0, 1201.0, 1202.0, 2990.0]);
+    }
+
+    #[test]
+    fn a_step_and_a_rough_stretch_are_no_spikes() {
+        let mut values: Vec<f64> = (0..3000)
+            .map(|k| if k < 1000 { 0.0 } else { 5.0 })
+            .collect();
+        for k in (2000..2500).step_by(9) {
+            values[k] += 3.0;
+        }
+        let spikes = fed(&values);
+        assert!(
+            spikes
+                .found()
+                .iter()
+                .all(|s| s.height.abs() < 1e-9 || s.t < 2030.0 || s.t > 2470.0),
+            "{:?}",
+            spikes.found()
+        );
+        assert!(
+            !spikes.found().iter().any(|s| s.t < 1990.0),
+            "{:?}",
+            spikes.found()
+        );
+    }
+}

@@ -1,0 +1,210 @@
+//! Faults that show between channels: copies, rows that repeat, velocities that lag.
+
+use super::channel::Role;
+use super::clock::ClockFacts;
+use super::fault::{Kind, Severity};
+use super::grain;
+use super::judge::{Depth, Judge, Track};
+use super::velocity;
+use super::verdicts::{Draft, seconds};
+
+/// A velocity that lags by more rows is filtered.
+const LAG_ROWS: f64 = 1.5;
+/// What the lag must explain: the part of the velocity left over without it, over that with it.
+const EXPLAINED: f64 = 1.3;
+/// Noise over range below which a position is no measurement.
+const NOISELESS: f64 = 1e-8;
+
+/// The faults between channels.
+pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+    repeated_rows(judge, draft);
+    copies(judge, draft);
+    if judge.depth == Depth::Whole {
+        velocities(judge, clock, draft);
+        noiseless(judge, draft);
+    }
+}
+
+fn repeated_rows(judge: &Judge, draft: &mut Draft) {
+    let flats: Vec<_> = judge
+        .positions
+        .iter()
+        .map(|index| &judge.tracks[*index].flat)
+        .collect();
+    let stale = judge.repeats.judge(&flats);
+    if stale.moving == 0 {
+        return;
+    }
+    let episodes = stale.where_.told();
+    let (from, to) = match (episodes.first(), episodes.last()) {
+        (Some((first, _)), Some((last, _))) => (first.from, last.to),
+        _ => return,
+    };
+    let effect = format!(
+        "{} the positions of the row before while the robot moves, so that it seems to stop and to leap: they are left out of a fit, and the log is interpolated over single ones",
+        match stale.rows {
+            1 => "1 row repeats".to_owned(),
+            rows => format!("{rows} rows repeat"),
+        }
+    );
+    let remedy = "log each sample of the robot once, by the robot's own clock";
+    draft.faults.push(super::fault::Fault {
+        kind: Kind::RepeatedRows,
+        severity: Severity::Warning,
+        channel: None,
+        from_s: from - judge.clock.first.unwrap_or(0.0),
+        to_s: to - judge.clock.first.unwrap_or(0.0),
+        rows: stale.rows,
+        effect,
+        remedy: remedy.to_owned(),
+    });
+    draft.cuts.extend(stale.cuts);
+}
+
+fn copies(judge: &Judge, draft: &mut Draft) {
+    for copy in judge.copies.found() {
+        let track = |index: usize| &judge.tracks[judge.compared[index]];
+        let (first, second) = (track(copy.first), track(copy.second));
+        let (a, b) = (first.channel.role, second.channel.role);
+        let sign = if copy.opposite {
+            ", with the other sign,"
+        } else {
+            ""
+        };
+        let name = |track: &Track| crate::log::escape(&track.channel.name);
+        let tell = |draft: &mut Draft, kind, severity, of: &Track, text: String, remedy: &str| {
+            draft.whole(
+                kind,
+                severity,
+                Some(&of.channel.name),
+                copy.rows,
+                (text, remedy),
+            );
+        };
+        match (a, b) {
+            (Role::Command, Role::Command) => {}
+            (Role::Command, _) | (_, Role::Command) => {
+                let (command, measured) = if a == Role::Command {
+                    (first, second)
+                } else {
+                    (second, first)
+                };
+                let text = format!(
+                    "equals `{}`{sign} in every row: it is the command and no measurement, and a fit takes tracking errors for forces",
+                    name(command)
+                );
+                tell(
+                    draft,
+                    Kind::CommandAsMeasurement,
+                    Severity::Warning,
+                    measured,
+                    text,
+                    "log the measured value, or name the measured column in the [log] section of the robot file",
+                );
+            }
+            (Role::Position, Role::Position) | (Role::Torque, Role::Torque) => {
+                let text = format!(
+                    "equals `{}`{sign} in every row: one of the two is not what it says, and the data of a joint are missing",
+                    name(first)
+                );
+                tell(
+                    draft,
+                    Kind::CopiedChannel,
+                    Severity::Error,
+                    second,
+                    text,
+                    "check the columns of the recorder; name the right ones in the [log] section of the robot file",
+                );
+            }
+            _ => {
+                let text = format!("equals `{}`{sign} in every row", name(first));
+                tell(
+                    draft,
+                    Kind::CopiedChannel,
+                    Severity::Warning,
+                    second,
+                    text,
+                    "check the columns of the recorder",
+                );
+            }
+        }
+    }
+}
+
+fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+    for (index, track) in judge.tracks.iter().enumerate() {
+        let (Role::Velocity, Some(position)) = (track.channel.role, track.position) else {
+            continue;
+        };
+        let Some(found) = velocity::follows(judge.windows.iter(), position, index) else {
+            continue;
+        };
+        let name = Some(track.channel.name.as_str());
+        let of = crate::log::escape(&judge.tracks[position].channel.name);
+        if found.best < -0.7 {
+            let effect = format!(
+                "runs against the derivative of `{of}` (correlation {:.3}): one of the two has the wrong sign",
+                found.best
+            );
+            let remedy = "turn the sign of one of them in the [log] section of the robot file";
+            draft.whole(
+                Kind::WrongSignOrOrder,
+                Severity::Error,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+            continue;
+        }
+        if found.best < 0.7 {
+            continue;
+        }
+        let left = |correlation: f64| 1.0 - correlation * correlation;
+        if found.rows.abs() > LAG_ROWS && left(found.now) > EXPLAINED * left(found.best) {
+            let side = if found.rows > 0.0 {
+                "behind"
+            } else {
+                "ahead of"
+            };
+            let effect = format!(
+                "{} {side} the derivative of `{of}`: it is filtered; friction fitted on it would open a loop at every reversal",
+                seconds(found.rows.abs() * clock.dt)
+            );
+            let remedy = "nothing here: velocities are formed from the positions; do not use this channel elsewhere";
+            draft.whole(
+                Kind::Filter,
+                Severity::Warning,
+                name,
+                track.rows,
+                (effect, remedy),
+            );
+        }
+    }
+}
+
+/// Positions without any noise or grain are no measurement.
+fn noiseless(judge: &Judge, draft: &mut Draft) {
+    for &index in &judge.positions {
+        let track = &judge.tracks[index];
+        let noise = match grain::step(judge.windows.iter(), index) {
+            Some(_) => continue,
+            None => grain::noise(judge.windows.iter(), index),
+        };
+        let told = draft.faults.iter().any(|fault| {
+            fault.kind == Kind::CommandAsMeasurement
+                && fault.channel.as_ref() == Some(&track.channel.name)
+        });
+        if told || noise.is_none_or(|noise| noise > NOISELESS * track.travel()) {
+            continue;
+        }
+        let effect = "has neither noise nor the step of an encoder: it was filtered or computed, or it is a command, in which case a fit takes tracking errors for forces".to_owned();
+        let remedy = "make sure that it is the measured position";
+        draft.whole(
+            Kind::CommandAsMeasurement,
+            Severity::Info,
+            Some(&track.channel.name),
+            track.rows,
+            (effect, remedy),
+        );
+    }
+}

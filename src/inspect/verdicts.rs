@@ -1,0 +1,334 @@
+//! From what the detectors gathered to faults: all thresholds stand here and in [`super::shape`].
+
+use super::channel::Role;
+use super::clock::ClockFacts;
+use super::fault::{Episodes, Fault, Kind, Severity};
+use super::findings::{ChannelFacts, Findings, Gap, joined};
+use super::judge::{Depth, Judge, Track};
+use super::{grain, shape, together};
+
+/// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
+const UNEVEN: f64 = 0.05;
+/// Jitter from which it is worth knowing.
+const JITTER: f64 = 0.02;
+
+/// Faults under construction, and what is to be cut out.
+pub(super) struct Draft {
+    pub(super) faults: Vec<Fault>,
+    pub(super) cuts: Vec<[f64; 2]>,
+    first: f64,
+    last: f64,
+}
+
+impl Draft {
+    /// Adds a fault of the whole log.
+    pub(super) fn whole(
+        &mut self,
+        kind: Kind,
+        severity: Severity,
+        channel: Option<&str>,
+        rows: u64,
+        (effect, remedy): (String, &str),
+    ) {
+        self.faults.push(Fault {
+            kind,
+            severity,
+            channel: channel.map(str::to_owned),
+            from_s: 0.0,
+            to_s: self.last - self.first,
+            rows,
+            effect,
+            remedy: remedy.to_owned(),
+        });
+    }
+
+    /// Adds a fault for each stretch, or one for all of them where they are many; `effect` is
+    /// given the rows and the number of stretches.
+    pub(super) fn stretches(
+        &mut self,
+        kind: Kind,
+        severity: Severity,
+        channel: Option<&str>,
+        episodes: &Episodes,
+        (effect, remedy): (&dyn Fn(u64, usize) -> String, &str),
+    ) {
+        for (episode, count) in episodes.told() {
+            self.faults.push(Fault {
+                kind,
+                severity,
+                channel: channel.map(str::to_owned),
+                from_s: episode.from - self.first,
+                to_s: episode.to - self.first,
+                rows: episode.rows,
+                effect: effect(episode.rows, count),
+                remedy: remedy.to_owned(),
+            });
+        }
+    }
+
+    /// Marks the rows of some stretches as bad.
+    pub(super) fn cut(&mut self, episodes: &Episodes) {
+        self.cuts.extend(episodes.iter().map(|e| [e.from, e.to]));
+    }
+}
+
+/// `1 row`, `7 rows`, `7 rows in 3 stretches`.
+pub(super) fn rows_text(rows: u64, stretches: usize) -> String {
+    match (rows, stretches) {
+        (1, _) => "1 row".to_owned(),
+        (rows, 0 | 1) => format!("{rows} rows"),
+        (rows, many) => format!("{rows} rows in {many} stretches"),
+    }
+}
+
+/// Everything there is to say.
+pub(super) fn conclude(judge: &Judge) -> Findings {
+    let clock = judge.clock.facts();
+    let first = judge.clock.first.unwrap_or(0.0);
+    let mut draft = Draft {
+        faults: Vec::new(),
+        cuts: Vec::new(),
+        first,
+        last: first + judge.clock.duration().max(0.0),
+    };
+    time_faults(judge, &clock, &mut draft);
+    for track in &judge.tracks {
+        number_faults(track, &mut draft);
+        shape::faults(judge, track, &clock, &mut draft);
+    }
+    together::faults(judge, &clock, &mut draft);
+    let Draft {
+        mut faults, cuts, ..
+    } = draft;
+    faults.sort_by(|a, b| {
+        let severity = b.severity.cmp(&a.severity);
+        severity
+            .then(a.from_s.total_cmp(&b.from_s))
+            .then(a.kind.cmp(&b.kind))
+    });
+    let rate = (clock.dt > 0.0).then(|| 1.0 / clock.dt);
+    Findings {
+        rows: judge.clock.rows,
+        duration_s: judge.clock.duration(),
+        rate_hz: rate,
+        jitter: rate.map(|_| clock.jitter),
+        gaps: clock
+            .gaps
+            .iter()
+            .map(|[from, to]| Gap {
+                from_s: from - first,
+                to_s: to - first,
+            })
+            .collect(),
+        channels: judge
+            .tracks
+            .iter()
+            .enumerate()
+            .map(|(index, track)| channel_facts(judge, index, track, rate))
+            .collect(),
+        joints: joints(judge),
+        faults,
+        cuts: joined(cuts),
+    }
+}
+
+fn channel_facts(judge: &Judge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {
+    let number = |x: f64| x.is_finite().then_some(x);
+    let share = track.rows as f64 / judge.clock.rows.max(1) as f64;
+    let step = match judge.depth {
+        Depth::Gate => None,
+        Depth::Whole => grain::step(judge.windows.iter(), index),
+    };
+    ChannelFacts {
+        name: track.channel.name.clone(),
+        role: track.channel.role,
+        unit: track.channel.unit.clone(),
+        min: number(track.low),
+        max: number(track.high),
+        rate_hz: rate.map(|rate| rate * share),
+        step,
+        limits: track.channel.limits,
+    }
+}
+
+fn joints(judge: &Judge) -> Vec<super::JointMotion> {
+    let tracks = judge.positions.iter().map(|index| &judge.tracks[*index]);
+    tracks
+        .filter_map(|track| {
+            let name = match track.channel.joint.as_deref() {
+                None | Some("") => &track.channel.name,
+                Some(joint) => joint,
+            };
+            let excitation = track.excitation.as_ref()?;
+            let moves = judge.moves(track);
+            Some(excitation.facts(name, &track.channel.name, track.travel(), moves))
+        })
+        .collect()
+}
+
+fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+    let seen = &judge.clock;
+    if seen.without_time > 0 {
+        let effect = format!(
+            "{} without a time: no reader takes them",
+            rows_text(seen.without_time, 1)
+        );
+        let remedy = "delete these rows, or name the right time column in the [log] section of the robot file";
+        draft.whole(
+            Kind::Nan,
+            Severity::Error,
+            None,
+            seen.without_time,
+            (effect, remedy),
+        );
+    }
+    let effect = |rows: u64, times: usize| {
+        let which = if times > 1 {
+            format!("{times} times, ")
+        } else {
+            String::new()
+        };
+        format!(
+            "{which}{} at the time of the row before: no velocity can be formed, and the log is refused",
+            rows_text(rows, 1)
+        )
+    };
+    let remedy = "delete duplicate rows; if the clock is too coarse, log time with more digits";
+    draft.stretches(
+        Kind::RepeatedTime,
+        Severity::Error,
+        None,
+        &seen.repeated,
+        (&effect, remedy),
+    );
+    let effect = |_: u64, times: usize| {
+        let which = if times > 1 {
+            format!("{times} times ")
+        } else {
+            String::new()
+        };
+        format!(
+            "time runs {which}backwards: derivatives across it are wrong, and the log is refused"
+        )
+    };
+    let remedy = "sort the rows by time, or split the file where a second recording begins";
+    draft.stretches(
+        Kind::BackwardTime,
+        Severity::Error,
+        None,
+        &seen.backward,
+        (&effect, remedy),
+    );
+    let mut gaps = Episodes::default();
+    for [from, to] in &clock.gaps {
+        let lost = ((to - from) / clock.dt).round() - 1.0;
+        gaps.add(*from, *to, lost.clamp(0.0, 1e15) as u64, -1.0);
+    }
+    let effect = |rows: u64, times: usize| {
+        let many = if times > 1 {
+            format!("{times} gaps, ")
+        } else {
+            String::new()
+        };
+        format!(
+            "{many}about {} lost: nothing is differentiated across a gap, the log is parted there and the ends of its stretches are given up",
+            rows_text(rows, 1)
+        )
+    };
+    let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
+    draft.stretches(
+        Kind::Dropout,
+        Severity::Warning,
+        None,
+        &gaps,
+        (&effect, remedy),
+    );
+    if clock.uneven > UNEVEN || clock.jitter > JITTER {
+        let severity = if clock.uneven > UNEVEN {
+            Severity::Warning
+        } else {
+            Severity::Info
+        };
+        let effect = format!(
+            "steps from {} to {}, median {}, {:.1} % of them off it by more than a tenth: samples are interpolated onto an even clock, which is right as far as the times are those of the measurements",
+            seconds(clock.least),
+            seconds(clock.largest),
+            seconds(clock.dt),
+            100.0 * clock.uneven
+        );
+        let remedy = "log the time at which a sample was taken, not at which it was written";
+        draft.whole(
+            Kind::IrregularClock,
+            severity,
+            None,
+            seen.rows,
+            (effect, remedy),
+        );
+    }
+}
+
+/// A time for a person: `1.000 ms`.
+pub(super) fn seconds(s: f64) -> String {
+    match s.abs() {
+        x if x >= 1.0 => format!("{s:.3} s"),
+        x if x >= 1e-3 => format!("{:.3} ms", s * 1e3),
+        _ => format!("{:.3} us", s * 1e6),
+    }
+}
+
+fn number_faults(track: &Track, draft: &mut Draft) {
+    let name = Some(track.channel.name.as_str());
+    let used = matches!(track.channel.role, Role::Position | Role::Torque);
+    if track.rows == 0 {
+        // A column of words is no channel.
+        return;
+    }
+    let severity = if used {
+        Severity::Error
+    } else {
+        Severity::Info
+    };
+    let effect = |rows: u64, times: usize| {
+        let then = if used {
+            "a fit refuses the log"
+        } else {
+            "a fit does not read this channel"
+        };
+        format!("{} without a finite number: {then}", rows_text(rows, times))
+    };
+    let remedy =
+        "delete the rows without a measurement: a gap in time is handled, a made-up number is not";
+    draft.stretches(Kind::Nan, severity, name, &track.missing, (&effect, remedy));
+    if let Some([low, high]) = track.channel.limits {
+        let effect = |rows: u64, times: usize| {
+            format!(
+                "{} outside [{low}, {high}], reaching {} and {}: unit, sign, offset or limit is wrong, or the machine was driven too far",
+                rows_text(rows, times),
+                track.low,
+                track.high
+            )
+        };
+        let remedy = "check the unit and offset of this channel in [log], and the limit in [limits] of the robot file";
+        draft.stretches(
+            Kind::BeyondLimits,
+            Severity::Warning,
+            name,
+            &track.beyond,
+            (&effect, remedy),
+        );
+        let effect = |rows: u64, times: usize| {
+            format!(
+                "{} at the limit of [{low}, {high}]: the amplifier gives no more; as what is logged is what was applied, a fit may use it",
+                rows_text(rows, times)
+            )
+        };
+        let remedy = "choose a slower motion where the robot should follow its reference";
+        draft.stretches(
+            Kind::Saturation,
+            Severity::Info,
+            name,
+            &track.at_limit,
+            (&effect, remedy),
+        );
+    }
+}

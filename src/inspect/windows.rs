@@ -1,0 +1,83 @@
+//! A few stretches of a log, evenly spread over it, for what is judged from many rows at once.
+
+/// Stretches that are kept at most.
+const MOST: usize = 16;
+
+/// Consecutive rows without a gap.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Window {
+    pub(super) t: Vec<f64>,
+    /// One list per channel.
+    pub(super) columns: Vec<Vec<f64>>,
+}
+
+/// Stretches of a log of any length.
+#[derive(Debug, Clone)]
+pub(super) struct Windows {
+    kept: Vec<Window>,
+    /// Every how many stretches one is kept.
+    stride: u64,
+    seen: u64,
+}
+
+impl Default for Windows {
+    fn default() -> Self {
+        Self {
+            kept: Vec::new(),
+            stride: 1,
+            seen: 0,
+        }
+    }
+}
+
+impl Windows {
+    /// Offers the next stretch.
+    pub(super) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
+        let number = self.seen;
+        self.seen += 1;
+        if !number.is_multiple_of(self.stride) {
+            return;
+        }
+        if self.kept.len() == MOST {
+            // Every other one goes, so that what is kept stays evenly spread.
+            let mut index = 0;
+            self.kept.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.stride *= 2;
+            if !number.is_multiple_of(self.stride) {
+                return;
+            }
+        }
+        self.kept.push(Window {
+            t: t.to_vec(),
+            columns: columns.iter().map(|column| column.to_vec()).collect(),
+        });
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Window> + Clone {
+        self.kept.iter()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_of_a_long_log_are_kept_evenly_and_in_order() {
+        let mut windows = Windows::default();
+        for k in 0..1000 {
+            windows.offer(&[f64::from(k)], &[&[f64::from(-k)]]);
+        }
+        let times: Vec<f64> = windows.iter().map(|w| w.t[0]).collect();
+        assert!(times.len() > MOST / 2 && times.len() <= MOST);
+        let step = times[1] - times[0];
+        assert!(
+            times.windows(2).all(|pair| pair[1] - pair[0] == step),
+            "{times:?}"
+        );
+        assert!(*times.last().unwrap() >= 1000.0 - 2.0 * step);
+    }
+}

@@ -1,0 +1,135 @@
+//! Simulated logs that a test alters, and what `inspect` says of them.
+#![allow(dead_code)]
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use cft_ident::config::RobotFile;
+use cft_ident::simulate::{Motion, Order, simulate};
+use serde_json::Value;
+
+/// A log as columns.
+#[derive(Debug, Clone)]
+pub struct Log {
+    pub names: Vec<String>,
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl Log {
+    /// The CFT robot, with what its robot file says of encoders and noise: joint channels alone.
+    pub fn simulated(motion: Motion, seconds: f64) -> Self {
+        let robot = RobotFile::load(Path::new("configs/cft.toml")).unwrap();
+        let log = simulate(&Order {
+            robot: &robot,
+            model: None,
+            motion,
+            seconds: Some(seconds),
+            effects: Vec::new(),
+            seed: 11,
+        })
+        .unwrap();
+        let wanted = |name: &String| name == "t" || name.contains("q_") || name.contains("tau_");
+        let kept: Vec<usize> = (0..log.header.len())
+            .filter(|j| wanted(&log.header[*j]))
+            .collect();
+        Self {
+            names: kept.iter().map(|j| log.header[*j].clone()).collect(),
+            columns: kept
+                .iter()
+                .map(|j| log.rows().map(|row| row[*j]).collect())
+                .collect(),
+        }
+    }
+
+    pub fn column(&mut self, name: &str) -> &mut Vec<f64> {
+        let index = self.names.iter().position(|known| known == name);
+        &mut self.columns[index.expect(name)]
+    }
+
+    pub fn add(&mut self, name: &str, column: Vec<f64>) {
+        self.names.push(name.to_owned());
+        self.columns.push(column);
+    }
+
+    /// Removes some rows.
+    pub fn drain(&mut self, rows: std::ops::Range<usize>) {
+        for column in &mut self.columns {
+            column.drain(rows.clone());
+        }
+    }
+
+    pub fn write(&self, path: &Path) {
+        let mut file = BufWriter::new(File::create(path).unwrap());
+        writeln!(file, "{}", self.names.join(",")).unwrap();
+        for k in 0..self.columns[0].len() {
+            let row: Vec<String> = self.columns.iter().map(|c| format!("{:?}", c[k])).collect();
+            writeln!(file, "{}", row.join(",")).unwrap();
+        }
+    }
+
+    /// What `inspect` says of it, with the robot file or without.
+    pub fn inspected(&self, robot: Option<&str>) -> Value {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        self.write(&path);
+        inspect(&path.to_string_lossy(), robot)
+    }
+}
+
+/// The JSON document of `inspect`.
+pub fn inspect(log: &str, robot: Option<&str>) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("found.json");
+    let mut line = vec!["cft-ident", "inspect", log, "-q", "--json"];
+    let json_text = json.to_string_lossy().into_owned();
+    line.push(&json_text);
+    if let Some(robot) = robot {
+        line.extend(["-r", robot]);
+    }
+    let exit = cft_ident::cli::run(
+        line.into_iter().map(Into::into),
+        Arc::new(AtomicBool::new(false)),
+    );
+    assert_eq!(exit.code(), 0, "{log}");
+    serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap()
+}
+
+/// A fault in short: severity, kind, channel, from and to.
+pub type Short = (String, String, String, f64, f64);
+
+/// The faults that are more than worth knowing.
+pub fn faults(found: &Value) -> Vec<Short> {
+    let all = found["faults"].as_array().unwrap().iter();
+    all.filter(|fault| fault["severity"] != "info")
+        .map(|fault| {
+            let text = |key: &str| fault[key].as_str().unwrap_or("").to_owned();
+            let number = |key: &str| fault[key].as_f64().unwrap();
+            assert!(
+                !text("effect").is_empty() && !text("remedy").is_empty(),
+                "{fault}"
+            );
+            (
+                text("severity"),
+                text("kind"),
+                text("channel"),
+                number("from_s"),
+                number("to_s"),
+            )
+        })
+        .collect()
+}
+
+/// Asserts that exactly these faults were found, spans to 2 ms.
+pub fn assert_faults(found: &Value, expected: &[(&str, &str, &str, f64, f64)]) {
+    let all = faults(found);
+    let same = all.len() == expected.len()
+        && all.iter().zip(expected).all(|(a, b)| {
+            (a.0.as_str(), a.1.as_str(), a.2.as_str()) == (b.0, b.1, b.2)
+                && (a.3 - b.3).abs() < 2e-3
+                && (a.4 - b.4).abs() < 2e-3
+        });
+    assert!(same, "found {all:#?}\nexpected {expected:#?}");
+}
