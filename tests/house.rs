@@ -17,6 +17,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("friction", &["math", "robot", "log", "motion", "verdict"]),
     ("inertia", &["math", "robot", "log", "motion", "verdict"]),
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
+    ("inspect", &["math", "log"]),
     ("simulate", &["math", "robot", "log", "config"]),
     (
         "report",
@@ -26,7 +27,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "robot", "log", "config", "output", "motion", "friction", "inertia",
-            "validate", "simulate", "report",
+            "validate", "inspect", "simulate", "report",
         ],
     ),
 ];
@@ -169,7 +170,9 @@ fn the_plan_itself_has_no_way_back() {
 
 #[test]
 fn estimators_know_nothing_of_the_simulator() {
-    for room in ["motion", "friction", "inertia", "validate", "log", "report"] {
+    for room in [
+        "motion", "friction", "inertia", "validate", "inspect", "log", "report",
+    ] {
         let (_, may) = ROOMS.iter().find(|(name, _)| *name == room).unwrap();
         assert!(!may.contains(&"simulate"), "{room}");
     }
