@@ -1,8 +1,9 @@
 #!/bin/bash
-# Logs written by the official Python packages of MCAP, ROS 2 and protobuf, read by this tool.
+# The official Python packages of MCAP, ROS 2 and protobuf against this tool, both ways.
 #   .ci/interop.sh
-# Installs the packages into a folder of its own, writes a log that no fixture holds in every format,
-# and runs the tests of the fixtures on it. Says so, and passes, where the packages cannot be had.
+# Installs the packages into a folder of its own, has them write a log that no fixture holds in every
+# format and runs the tests of the fixtures on it; then has them read what this tool writes. Says so,
+# and passes, where the packages cannot be had.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 
@@ -21,9 +22,21 @@ timeout 300 "$work/venv/bin/pip" install --quiet --disable-pip-version-check \
   skip "the Python packages cannot be installed: $(tail -n 1 "$work/pip.log")"
 "$work/venv/bin/pip" list --disable-pip-version-check 2> /dev/null |
   grep -iE "^(mcap|rosbags|protobuf|zstandard)"
+export PYTHONDONTWRITEBYTECODE=1
 
-# Another motion and another seed than those of the fixtures.
-cargo run --locked --quiet -- simulate -q -r configs/cft.toml --seconds 3 --seed 20 \
-  -o "$work/sim.csv" > /dev/null || exit 1
+# Theirs, read by this tool: another motion and another seed than those of the fixtures.
+tool() { cargo run --locked --quiet -- "$@" < /dev/null; }
+tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/sim.csv" > /dev/null || exit 1
 "$work/venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
-CFT_IDENT_LOGS="$work/logs" cargo test --locked --test log_fixtures
+CFT_IDENT_LOGS="$work/logs" cargo test --locked --test log_fixtures || exit 1
+
+# This tool's, read by them.
+if ! tool help convert > /dev/null 2>&1; then
+  echo "== interop: this version writes no recordings, so the packages have none to read"
+  exit 0
+fi
+tool convert -q "$work/sim.csv" "$work/converted.mcap" > /dev/null || exit 1
+tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/simulated.mcap" > /dev/null ||
+  exit 1
+"$work/venv/bin/python" fixtures/logs/read.py "$work/sim.csv" \
+  "$work/converted.mcap" "$work/simulated.mcap"

@@ -42,7 +42,6 @@ const DOORS: &[(&str, &str)] = &[
     ("csv", "log/csv.rs"),
     ("mcap", "log/recording/mcap.rs"),
     ("rusqlite", "log/recording/bag.rs"),
-    ("prost_reflect", "log/recording/"),
     ("flate2", "log/content.rs"),
     ("zstd", "log/content.rs"),
     ("sha2", "log/source.rs"),

@@ -60,6 +60,7 @@ fn joint_states_equal_the_text_whatever_holds_them() {
         "unindexed.mcap",
         "big-endian.mcap",
         "arm.db3",
+        "compressed.db3",
         "split",
     ] {
         let (block, reader) = read(&log(name), &layout(""));

@@ -155,6 +155,22 @@ fn a_small_file_that_declares_gigabytes_is_read_within_its_own_size() {
     let cases: Vec<(&str, Vec<u8>)> = vec![
         ("message", [beginning(), lie(5)].concat()),
         ("schema", [MAGIC.to_vec(), lie(3)].concat()),
+        (
+            "name of a schema",
+            [
+                MAGIC.to_vec(),
+                record(3, &[&[1, 0][..], &[0xff; 4]].concat()),
+            ]
+            .concat(),
+        ),
+        (
+            "topic",
+            [
+                beginning(),
+                record(4, &[&[9, 0, 1, 0][..], &[0xff; 4]].concat()),
+            ]
+            .concat(),
+        ),
         ("attachment", [beginning(), lie(9)].concat()),
         (
             "short attachment",
@@ -265,6 +281,7 @@ fn any_file() -> impl Strategy<Value = Vec<u8>> {
         mutated("json.mcap"),
         mutated("protobuf.mcap"),
         mutated("arm.db3"),
+        mutated("compressed.db3"),
         mutated("arm.csv.gz"),
         mutated("arm.csv.zst"),
         mutated("arm.csv"),

@@ -54,7 +54,7 @@ impl Content {
             .map_err(fail)?;
         let compression = match magic[..] {
             [0x1f, 0x8b, ..] => Compression::Gzip,
-            [0x28, 0xb5, 0x2f, 0xfd] => Compression::Zstd,
+            _ if magic == ZSTD => Compression::Zstd,
             _ => Compression::None,
         };
         let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
@@ -87,6 +87,41 @@ impl Content {
     /// All bytes from the beginning, decompressed.
     pub(super) fn into_bytes(self) -> Bytes {
         Cursor::new(self.head).chain(self.rest)
+    }
+}
+
+/// First bytes of what zstd compressed.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+/// Bytes that a message may take once it is decompressed, per byte that it takes compressed.
+const LARGEST_RATIO: usize = 1024;
+
+/// Decompresses messages that were compressed one by one; its memory is used again.
+#[derive(Default)]
+pub(super) struct Unpacker {
+    inner: Option<zstd::bulk::Decompressor<'static>>,
+    plain: Vec<u8>,
+}
+
+impl Unpacker {
+    /// Decompresses a message in place; one that is not compressed, or damaged, stays as it is.
+    pub(super) fn unpack(&mut self, data: &mut Vec<u8>) {
+        if !data.starts_with(&ZSTD) {
+            return;
+        }
+        if self.inner.is_none() {
+            self.inner = zstd::bulk::Decompressor::new().ok();
+        }
+        let Some(inner) = &mut self.inner else {
+            return;
+        };
+        let largest = data.len().saturating_mul(LARGEST_RATIO);
+        let stated = zstd::zstd_safe::get_frame_content_size(data).ok().flatten();
+        let stated = stated.and_then(|bytes| usize::try_from(bytes).ok());
+        self.plain.clear();
+        self.plain.reserve(stated.unwrap_or(largest).min(largest));
+        if inner.decompress_to_buffer(data, &mut self.plain).is_ok() {
+            std::mem::swap(data, &mut self.plain);
+        }
     }
 }
 

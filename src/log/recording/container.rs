@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::bag::BagFile;
 use super::decode::Schema;
 use super::mcap::McapFile;
-use crate::log::content::{Content, Kind};
+use crate::log::content::{Content, Kind, Unpacker};
 use crate::log::{LogError, source};
 
 /// Files of one recording that are open at a time.
@@ -65,6 +65,7 @@ struct Part {
     form: Form,
     head: Option<Head>,
     data: Vec<u8>,
+    unpacker: Unpacker,
 }
 
 impl Part {
@@ -88,6 +89,7 @@ impl Part {
             form,
             head: None,
             data: Vec::new(),
+            unpacker: Unpacker::default(),
         };
         part.advance()?;
         Ok(part)
@@ -98,6 +100,11 @@ impl Part {
             Form::Mcap(file) => file.next(&mut self.data)?,
             Form::Bag(file) => file.next(&mut self.data)?,
         };
+        // A recorder of ROS 2 may compress each message by itself.
+        let topic = self.head.and_then(|head| self.topics().get(head.topic));
+        if topic.is_some_and(|topic| topic.schema.encoding == "cdr") {
+            self.unpacker.unpack(&mut self.data);
+        }
         Ok(())
     }
 

@@ -1,13 +1,12 @@
 //! One decoder for the messages of a topic, whatever their encoding.
 
-use prost_reflect::MessageDescriptor;
-
 use super::cdr::CdrReader;
 use super::cursor::Encoding;
+use super::json;
 use super::msg::Definition;
 use super::path::Path;
+use super::proto::ProtoReader;
 use super::value::Value;
-use super::{json, proto};
 
 /// How the messages of a topic are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -33,7 +32,7 @@ pub(crate) struct Decoder {
 enum Form {
     Cdr(CdrReader),
     Json,
-    Proto(MessageDescriptor),
+    Proto(ProtoReader),
 }
 
 impl Decoder {
@@ -55,7 +54,7 @@ impl Decoder {
             ("cdr", "ros2msg" | "") => cdr(Encoding::Cdr)?,
             ("ros1", "ros1msg" | "") => cdr(Encoding::Ros1)?,
             ("json", _) => Form::Json,
-            ("protobuf", "protobuf") => Form::Proto(proto::descriptor(&schema.name, &schema.text)?),
+            ("protobuf", "protobuf") => Form::Proto(ProtoReader::new(&schema.name, &schema.text)?),
             (encoding, language) => {
                 return Err(format!(
                     "its encoding `{encoding}` with a `{language}` definition is not read"
@@ -76,7 +75,7 @@ impl Decoder {
         match &mut self.form {
             Form::Cdr(reader) => reader.read(data, out).map_err(|error| error.to_string()),
             Form::Json => json::read(data, &self.fields, out).map_err(|error| error.to_string()),
-            Form::Proto(descriptor) => proto::read(descriptor, data, &self.fields, out),
+            Form::Proto(reader) => reader.read(data, &self.fields, out),
         }
     }
 
@@ -85,7 +84,7 @@ impl Decoder {
         match &self.form {
             Form::Cdr(reader) => reader.names(data),
             Form::Json => json::names(data),
-            Form::Proto(descriptor) => proto::names(descriptor),
+            Form::Proto(reader) => reader.names(),
         }
     }
 }

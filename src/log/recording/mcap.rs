@@ -10,11 +10,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use mcap::McapError;
-use mcap::records::{Record, op};
+use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::container::{Break, Head, Topic, Wanted};
 use super::decode::Schema;
+use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
 use crate::log::content::{Bytes, Content};
 use crate::log::{LogError, source};
 
@@ -50,6 +51,14 @@ struct SchemaText {
     name: String,
     language: String,
     text: Vec<u8>,
+}
+
+/// A topic as the file declares it.
+struct Channel {
+    id: u16,
+    schema: u16,
+    topic: String,
+    encoding: String,
 }
 
 impl McapFile {
@@ -97,41 +106,52 @@ impl McapFile {
                 Some(Ok(LinearReadEvent::ReadRequest(_))) => Step::Read,
                 Some(Ok(LinearReadEvent::Record { data: body, opcode })) => match opcode {
                     op::DATA_END => Step::End,
-                    op::SCHEMA | op::CHANNEL | op::MESSAGE => {
-                        match mcap::parse_record(opcode, body) {
-                            Ok(Record::Message { header, data: body }) => {
-                                self.messages += 1;
-                                match self.channels.get(&header.channel_id) {
-                                    Some((_, false)) => continue,
-                                    Some((topic, true)) => {
-                                        data.clear();
-                                        data.extend_from_slice(&body);
-                                        return Ok(Some(Head {
-                                            topic: *topic,
-                                            log_ns: header.log_time,
-                                            publish_ns: header.publish_time,
-                                            number: self.messages,
-                                        }));
-                                    }
-                                    None => Step::Break(format!(
-                                        "message {} is of a channel that was not declared",
-                                        self.messages
-                                    )),
+                    op::MESSAGE => match MessageRecord::parse(body) {
+                        Some(message) => {
+                            self.messages += 1;
+                            match self.channels.get(&message.channel) {
+                                Some((_, false)) => continue,
+                                Some((topic, true)) => {
+                                    data.clear();
+                                    data.extend_from_slice(message.data);
+                                    return Ok(Some(Head {
+                                        topic: *topic,
+                                        log_ns: message.log_ns,
+                                        publish_ns: message.publish_ns,
+                                        number: self.messages,
+                                    }));
                                 }
+                                None => Step::Break(format!(
+                                    "message {} is of a channel that was not declared",
+                                    self.messages
+                                )),
                             }
-                            Ok(Record::Schema { header, data }) => {
-                                let schema = SchemaText {
-                                    name: header.name,
-                                    language: header.encoding,
-                                    text: data.into_owned(),
-                                };
-                                Step::Schema(header.id, schema)
-                            }
-                            Ok(Record::Channel(channel)) => Step::Channel(channel),
-                            Ok(_) => continue,
-                            Err(error) => Step::Break(error.to_string()),
                         }
-                    }
+                        None => Step::Break(CUT.to_owned()),
+                    },
+                    op::SCHEMA => match SchemaRecord::parse(body) {
+                        Some(schema) if self.schemas.contains_key(&schema.id) => continue,
+                        Some(schema) => Step::Schema(
+                            schema.id,
+                            SchemaText {
+                                name: schema.name.to_owned(),
+                                language: schema.language.to_owned(),
+                                text: schema.text.to_owned(),
+                            },
+                        ),
+                        None => Step::Break(CUT.to_owned()),
+                    },
+                    op::CHANNEL => match ChannelRecord::parse(body) {
+                        // A file may repeat its definitions in every chunk.
+                        Some(channel) if self.channels.contains_key(&channel.id) => continue,
+                        Some(channel) => Step::Channel(Channel {
+                            id: channel.id,
+                            schema: channel.schema,
+                            topic: channel.topic.to_owned(),
+                            encoding: channel.encoding.to_owned(),
+                        }),
+                        None => Step::Break(CUT.to_owned()),
+                    },
                     _ => continue,
                 },
                 Some(Err(McapError::BadChunkCrc { saved, calculated })) => {
@@ -193,10 +213,6 @@ impl McapFile {
     }
 
     fn add_schema(&mut self, id: u16, schema: SchemaText) {
-        // A file may repeat its definitions in every chunk.
-        if self.schemas.contains_key(&id) {
-            return;
-        }
         self.schema_bytes += schema.text.len() + schema.name.len() + schema.language.len();
         if self.schema_bytes > LARGEST_SCHEMAS {
             let limit = LARGEST_SCHEMAS;
@@ -205,16 +221,13 @@ impl McapFile {
         self.schemas.insert(id, Arc::new(schema));
     }
 
-    fn add_channel(&mut self, channel: mcap::records::Channel) {
-        if self.channels.contains_key(&channel.id) {
-            return;
-        }
-        let schema = self.schemas.get(&channel.schema_id);
+    fn add_channel(&mut self, channel: Channel) {
+        let schema = self.schemas.get(&channel.schema);
         let schema = Schema {
             name: schema.map_or_else(String::new, |s| s.name.clone()),
             language: schema.map_or_else(String::new, |s| s.language.clone()),
             text: schema.map_or_else(Vec::new, |s| s.text.clone()),
-            encoding: channel.message_encoding,
+            encoding: channel.encoding,
         };
         self.schema_bytes += schema.text.len() + channel.topic.len();
         if self.schema_bytes > LARGEST_SCHEMAS {
@@ -243,5 +256,5 @@ enum Step {
     End,
     Break(String),
     Schema(u16, SchemaText),
-    Channel(mcap::records::Channel),
+    Channel(Channel),
 }

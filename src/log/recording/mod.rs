@@ -9,6 +9,7 @@ mod container;
 mod cursor;
 mod decode;
 mod delay;
+mod descriptor;
 mod fields;
 mod json;
 mod mcap;
@@ -17,9 +18,11 @@ mod pairing;
 mod path;
 mod plan;
 mod proto;
+mod record;
 mod rows;
 mod survey;
 mod value;
+mod wire;
 
 pub(super) use rows::MessageRows;
 

@@ -1,135 +1,546 @@
-//! Numbers out of protobuf messages by field path: the only door to prost-reflect.
+//! Numbers out of protobuf messages by field path.
+//!
+//! Each path is followed through the bytes of the message as they are; nothing is decoded that no path
+//! leads to, and nothing is allocated. Of a field that stands there twice the last one counts.
 
-use prost_reflect::{
-    Cardinality, DescriptorPool, DynamicMessage, MapKey, MessageDescriptor, ReflectMessage,
-    Value as Field,
-};
-
+use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
 use super::path::{Path, Step};
 use super::value::Value;
+use super::wire::{Broken, Fields, Item, fixed, varint};
 
-/// Finds message type `name` in the descriptor set that a recording carries.
-///
-/// # Errors
-/// What is wrong with the set, or that it lacks the type.
-pub(crate) fn descriptor(name: &str, set: &[u8]) -> Result<MessageDescriptor, String> {
-    let pool = DescriptorPool::decode(set).map_err(|error| error.to_string())?;
-    pool.get_message_by_name(name)
-        .ok_or_else(|| format!("its descriptor set does not define {name}"))
+/// Steps that a path may have.
+const LONGEST: usize = 16;
+
+/// Reads messages of one type.
+#[derive(Debug, Clone)]
+pub(crate) struct ProtoReader {
+    types: Types,
 }
 
-/// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-///
-/// # Errors
-/// What the decoder says of bytes that are no message of this type.
-pub(crate) fn read(
-    descriptor: &MessageDescriptor,
-    data: &[u8],
-    fields: &[Vec<Path>],
-    out: &mut [Value],
-) -> Result<(), String> {
-    let decoded = DynamicMessage::decode(descriptor.clone(), data);
-    let root = Field::Message(decoded.map_err(|error| error.to_string())?);
-    for (paths, out) in fields.iter().zip(out) {
-        let numbers = paths.iter().map(|path| find(&root, &path.steps));
-        *out = numbers
-            .into_iter()
-            .find(|value| *value != Value::Absent)
-            .unwrap_or_default();
+/// Where a path has come to.
+#[derive(Clone, Copy)]
+enum Place<'m> {
+    Message(&'m [u8], &'m MessageType),
+    /// All elements of a field of the message.
+    Elements(&'m [u8], &'m FieldType),
+    Number(Value),
+    Nothing,
+}
+
+impl ProtoReader {
+    /// A reader for message type `name` of the descriptor set that a recording carries.
+    ///
+    /// # Errors
+    /// What is wrong with the set, or that it lacks the type.
+    pub(crate) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
+        let types = Types::parse(name, set)?;
+        Ok(Self { types })
     }
-    Ok(())
-}
 
-fn number(field: &Field) -> Value {
-    match field {
-        Field::Bool(value) => Value::Int((*value).into()),
-        Field::I32(value) | Field::EnumNumber(value) => Value::Int((*value).into()),
-        Field::U32(value) => Value::Int((*value).into()),
-        Field::I64(value) => Value::Int(*value),
-        Field::U64(value) => Value::Unsigned(*value),
-        Field::F32(value) => Value::Float((*value).into()),
-        Field::F64(value) => Value::Float(*value),
-        _ => Value::Absent,
-    }
-}
-
-/// Where a step leads: to a field that the message holds, or to a number that is left out because
-/// it is 0.
-enum Stop<'f> {
-    Field(&'f Field),
-    Zero(Value),
-}
-
-/// Follows a path; elements that are named are looked up beside their array, then further out.
-fn find(root: &Field, steps: &[Step]) -> Value {
-    let mut at = root;
-    let mut outer = vec![root];
-    let mut steps = steps.iter();
-    while let Some(step) = steps.next() {
-        match go(at, step, &outer) {
-            None => return Value::Absent,
-            Some(Stop::Zero(value)) if steps.len() == 0 => return value,
-            Some(Stop::Zero(_)) => return Value::Absent,
-            Some(Stop::Field(field)) => at = field,
+    /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
+    ///
+    /// # Errors
+    /// Bytes that are no message.
+    pub(crate) fn read(
+        &self,
+        data: &[u8],
+        fields: &[Vec<Path>],
+        out: &mut [Value],
+    ) -> Result<(), String> {
+        let broken = |_: Broken| "it is no protobuf message, or is cut off".to_owned();
+        for field in Fields::new(data) {
+            field.map_err(broken)?;
         }
-        outer.push(at);
-    }
-    number(at)
-}
-
-fn go<'f>(at: &'f Field, step: &Step, outer: &[&'f Field]) -> Option<Stop<'f>> {
-    let field = match (step, at) {
-        (Step::Field(name), Field::Message(message)) => return member(message, name),
-        (Step::Field(name), Field::Map(map)) => map.get(&MapKey::String(name.clone()))?,
-        (Step::Field(name), Field::List(list)) => list.get(name.parse::<usize>().ok()?)?,
-        (Step::Index(index), Field::List(list)) => list.get(*index)?,
-        (Step::Named { list, value }, Field::List(elements)) => {
-            let is = |field: &Field| field.as_str() == Some(value);
-            let own = |element: &&Field| match element {
-                Field::Message(message) => text(message, list).is_some_and(is),
-                _ => false,
-            };
-            match elements.iter().find(own) {
-                Some(element) => element,
-                None => {
-                    let names = outer.iter().rev().find_map(|o| match o {
-                        Field::Message(message) => text(message, list)?.as_list(),
-                        _ => None,
-                    })?;
-                    elements.get(names.iter().position(is)?)?
+        for (paths, out) in fields.iter().zip(out) {
+            *out = Value::Absent;
+            for path in paths {
+                *out = self.find(data, &path.steps).map_err(broken)?;
+                if *out != Value::Absent {
+                    break;
                 }
             }
         }
-        _ => return None,
+        Ok(())
+    }
+
+    /// Names of the type's fields, for messages to the user.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let fields = self.types.messages.get(self.types.root);
+        let fields = fields.map_or(&[][..], |root| &root.fields);
+        fields.iter().map(|field| field.name.clone()).collect()
+    }
+
+    /// Follows a path; elements that are named are looked up beside their array, then further out.
+    fn find(&self, data: &[u8], steps: &[Step]) -> Result<Value, Broken> {
+        let Some(root) = self.types.messages.get(self.types.root) else {
+            return Ok(Value::Absent);
+        };
+        // Places on the way.
+        let mut way = [Place::Nothing; LONGEST + 1];
+        way[0] = Place::Message(data, root);
+        if steps.len() > LONGEST {
+            return Ok(Value::Absent);
+        }
+        for (index, step) in steps.iter().enumerate() {
+            let next = self.go(&way[..=index], step)?;
+            if matches!(next, Place::Nothing) {
+                return Ok(Value::Absent);
+            }
+            way[index + 1] = next;
+        }
+        Ok(match way[steps.len()] {
+            Place::Number(value) => value,
+            _ => Value::Absent,
+        })
+    }
+
+    /// One step from the last place of the way.
+    fn go<'m>(&'m self, way: &[Place<'m>], step: &Step) -> Result<Place<'m>, Broken> {
+        let Some(at) = way.last() else {
+            return Ok(Place::Nothing);
+        };
+        match (at, step) {
+            (Place::Message(data, kind), Step::Field(name)) => {
+                let Some(field) = field(kind, name) else {
+                    return Ok(Place::Nothing);
+                };
+                if field.repeated {
+                    return Ok(Place::Elements(data, field));
+                }
+                self.last(data, field)
+            }
+            (Place::Elements(data, field), Step::Index(index)) => self.element(data, field, *index),
+            (Place::Elements(data, field), Step::Field(name)) => match self.map_entry(field) {
+                Some(entry) => self.map_value(data, field, entry, name),
+                None => match name.parse() {
+                    Ok(index) => self.element(data, field, index),
+                    Err(_) => Ok(Place::Nothing),
+                },
+            },
+            (Place::Elements(data, field), Step::Named { list, value }) => {
+                if let Kind::Message(kind) = field.kind {
+                    let kind = &self.types.messages[kind];
+                    for element in elements(data, field.number) {
+                        let Item::Bytes(element) = element? else {
+                            continue;
+                        };
+                        if text_is(element, kind, list, value)? {
+                            return Ok(Place::Message(element, kind));
+                        }
+                    }
+                }
+                for place in way.iter().rev() {
+                    if let Some(index) = named(place, list, value)? {
+                        return match index {
+                            Some(index) => self.element(data, field, index),
+                            None => Ok(Place::Nothing),
+                        };
+                    }
+                }
+                Ok(Place::Nothing)
+            }
+            _ => Ok(Place::Nothing),
+        }
+    }
+
+    /// A field that stands there once.
+    fn last<'m>(&'m self, data: &'m [u8], field: &'m FieldType) -> Result<Place<'m>, Broken> {
+        let mut found = match (field.zero_if_absent, field.kind) {
+            (true, Kind::Number(Number::Double | Number::Float)) => {
+                Place::Number(Value::Float(0.0))
+            }
+            (true, Kind::Number(_)) => Place::Number(Value::Int(0)),
+            _ => Place::Nothing,
+        };
+        for item in elements(data, field.number) {
+            match self.place(field.kind, item?) {
+                Place::Nothing => {}
+                place => found = place,
+            }
+        }
+        Ok(found)
+    }
+
+    /// What one item of a field is.
+    fn place<'m>(&'m self, kind: Kind, item: Item<'m>) -> Place<'m> {
+        match (kind, item) {
+            (Kind::Number(number), item) => {
+                number_of(number, item).map_or(Place::Nothing, Place::Number)
+            }
+            (Kind::Message(kind), Item::Bytes(data)) => {
+                Place::Message(data, &self.types.messages[kind])
+            }
+            _ => Place::Nothing,
+        }
+    }
+
+    /// Element `index` of a field; numbers may lie packed one after the other.
+    fn element<'m>(
+        &'m self,
+        data: &'m [u8],
+        field: &'m FieldType,
+        index: usize,
+    ) -> Result<Place<'m>, Broken> {
+        let mut left = index;
+        for item in elements(data, field.number) {
+            let item = item?;
+            if let (Kind::Number(kind), Item::Bytes(packed)) = (field.kind, item) {
+                match packed_number(kind, packed, &mut left)? {
+                    Some(value) => return Ok(Place::Number(value)),
+                    None => continue,
+                }
+            }
+            if left == 0 {
+                return Ok(self.place(field.kind, item));
+            }
+            left -= 1;
+        }
+        Ok(Place::Nothing)
+    }
+
+    /// The type of a map's entries; `None` for a field that is no map.
+    fn map_entry(&self, field: &FieldType) -> Option<&MessageType> {
+        match field.kind {
+            Kind::Message(kind) => {
+                Some(&self.types.messages[kind]).filter(|kind| kind.is_map_entry)
+            }
+            _ => None,
+        }
+    }
+
+    /// The value of a key that is a text.
+    fn map_value<'m>(
+        &'m self,
+        data: &'m [u8],
+        map: &'m FieldType,
+        entry: &'m MessageType,
+        key: &str,
+    ) -> Result<Place<'m>, Broken> {
+        let Some(value) = field(entry, "value") else {
+            return Ok(Place::Nothing);
+        };
+        let mut found = Place::Nothing;
+        for item in elements(data, map.number) {
+            if let Item::Bytes(item) = item?
+                && text_is(item, entry, "key", key)?
+            {
+                found = self.last(item, value)?;
+            }
+        }
+        Ok(found)
+    }
+}
+
+fn field<'t>(kind: &'t MessageType, name: &str) -> Option<&'t FieldType> {
+    kind.fields.iter().find(|field| field.name == name)
+}
+
+/// All items of one field of a message.
+fn elements(data: &[u8], number: u32) -> impl Iterator<Item = Result<Item<'_>, Broken>> {
+    Fields::new(data).filter_map(move |field| match field {
+        Ok((found, item)) => (found == number).then_some(Ok(item)),
+        Err(broken) => Some(Err(broken)),
+    })
+}
+
+/// Whether the text field `name` of a message is `value`.
+fn text_is(data: &[u8], kind: &MessageType, name: &str, value: &str) -> Result<bool, Broken> {
+    let Some(field) = field(kind, name).filter(|f| f.kind == Kind::Text && !f.repeated) else {
+        return Ok(false);
     };
-    Some(Stop::Field(field))
+    let mut is = false;
+    for item in elements(data, field.number) {
+        if let Item::Bytes(text) = item? {
+            is = text == value.as_bytes();
+        }
+    }
+    Ok(is)
 }
 
-/// A field that a message holds.
-fn text<'f>(message: &'f DynamicMessage, name: &str) -> Option<&'f Field> {
-    message
-        .fields()
-        .find(|(descriptor, _)| descriptor.name() == name)
-        .map(|(_, field)| field)
+/// Where `value` stands in the list of texts `list` of a message: the outer option tells whether there
+/// is such a list.
+fn named(place: &Place<'_>, list: &str, value: &str) -> Result<Option<Option<usize>>, Broken> {
+    let Place::Message(data, kind) = place else {
+        return Ok(None);
+    };
+    let Some(field) = field(kind, list).filter(|f| f.kind == Kind::Text && f.repeated) else {
+        return Ok(None);
+    };
+    for (index, item) in elements(data, field.number).enumerate() {
+        if item? == Item::Bytes(value.as_bytes()) {
+            return Ok(Some(Some(index)));
+        }
+    }
+    Ok(Some(None))
 }
 
-fn member<'f>(message: &'f DynamicMessage, name: &str) -> Option<Stop<'f>> {
-    if let Some(field) = text(message, name) {
-        return Some(Stop::Field(field));
-    }
-    let descriptor = message.descriptor().get_field_by_name(name)?;
-    // A number without presence that is 0 is not written.
-    if descriptor.supports_presence() || descriptor.cardinality() == Cardinality::Repeated {
-        return None;
-    }
-    match number(&descriptor.default_value()) {
-        Value::Absent => None,
-        zero => Some(Stop::Zero(zero)),
-    }
+/// A number as an item of its own; `None` for an item of another form.
+fn number_of(kind: Number, item: Item<'_>) -> Option<Value> {
+    Some(match (kind, item) {
+        (Number::Double, Item::Fixed64(bytes)) => Value::Float(f64::from_le_bytes(bytes)),
+        (Number::Fixed64, Item::Fixed64(bytes)) => Value::Unsigned(u64::from_le_bytes(bytes)),
+        (Number::Sfixed64, Item::Fixed64(bytes)) => Value::Int(i64::from_le_bytes(bytes)),
+        (Number::Float, Item::Fixed32(bytes)) => Value::Float(f32::from_le_bytes(bytes).into()),
+        (Number::Fixed32, Item::Fixed32(bytes)) => Value::Int(u32::from_le_bytes(bytes).into()),
+        (Number::Sfixed32, Item::Fixed32(bytes)) => Value::Int(i32::from_le_bytes(bytes).into()),
+        // Numbers of 32 bits are cut to these, as everyone does.
+        (Number::Int32, Item::Varint(number)) => Value::Int((number as i32).into()),
+        (Number::Uint32, Item::Varint(number)) => Value::Int((number as u32).into()),
+        (Number::Sint32, Item::Varint(number)) => {
+            let number = number as u32;
+            Value::Int(((number >> 1) as i32 ^ -((number & 1) as i32)).into())
+        }
+        (Number::Int64, Item::Varint(number)) => Value::Int(number as i64),
+        (Number::Uint64, Item::Varint(number)) => Value::Unsigned(number),
+        (Number::Sint64, Item::Varint(number)) => {
+            Value::Int((number >> 1) as i64 ^ -((number & 1) as i64))
+        }
+        (Number::Bool, Item::Varint(number)) => Value::Int((number != 0).into()),
+        _ => return None,
+    })
 }
 
-/// Names of the message's fields, for messages to the user.
-pub(crate) fn names(descriptor: &MessageDescriptor) -> Vec<String> {
-    let fields = descriptor.fields();
-    fields.map(|field| field.name().to_owned()).collect()
+/// Number `left` of those that lie one after the other; counts `left` down where there are fewer.
+fn packed_number(kind: Number, packed: &[u8], left: &mut usize) -> Result<Option<Value>, Broken> {
+    let size = match kind {
+        Number::Double | Number::Fixed64 | Number::Sfixed64 => 8,
+        Number::Float | Number::Fixed32 | Number::Sfixed32 => 4,
+        _ => 1,
+    };
+    let mut rest = packed;
+    if size > 1 {
+        let count = packed.len() / size;
+        if *left >= count {
+            *left -= count;
+            return Ok(None);
+        }
+        rest = &packed[*left * size..];
+        let item = match size {
+            8 => Item::Fixed64(fixed(&mut rest)?),
+            _ => Item::Fixed32(fixed(&mut rest)?),
+        };
+        return Ok(number_of(kind, item));
+    }
+    while !rest.is_empty() {
+        let number = varint(&mut rest)?;
+        if *left == 0 {
+            return Ok(number_of(kind, Item::Varint(number)));
+        }
+        *left -= 1;
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A field with its bytes after their length.
+    fn bytes(number: u8, data: &[u8]) -> Vec<u8> {
+        let mut out = vec![number << 3 | 2];
+        out.extend(number_bytes(data.len() as u64));
+        out.extend(data);
+        out
+    }
+
+    fn number_bytes(mut value: u64) -> Vec<u8> {
+        let mut out = Vec::new();
+        while value > 0x7f {
+            out.push(value as u8 | 0x80);
+            value >>= 7;
+        }
+        out.push(value as u8);
+        out
+    }
+
+    fn whole(number: u8, value: u64) -> Vec<u8> {
+        [vec![number << 3], number_bytes(value)].concat()
+    }
+
+    fn double(number: u8, value: f64) -> Vec<u8> {
+        [&[number << 3 | 1][..], &value.to_le_bytes()].concat()
+    }
+
+    /// A field of a type: label 1 for one, 3 for many; type as in descriptor.proto.
+    fn field_of(name: &str, number: u8, label: u64, kind: u64, type_name: &str) -> Vec<u8> {
+        let mut out = [
+            bytes(1, name.as_bytes()),
+            whole(3, number.into()),
+            whole(4, label),
+            whole(5, kind),
+        ]
+        .concat();
+        if !type_name.is_empty() {
+            out.extend(bytes(6, type_name.as_bytes()));
+        }
+        bytes(2, &out)
+    }
+
+    fn message_of(name: &str, parts: &[Vec<u8>]) -> Vec<u8> {
+        [bytes(1, name.as_bytes()), parts.concat()].concat()
+    }
+
+    fn set(syntax: &str) -> Vec<u8> {
+        let joint = message_of(
+            "Joint",
+            &[
+                field_of("name", 1, 1, 9, ""),
+                field_of("q", 2, 1, 1, ""),
+                field_of("code", 3, 1, 17, ""),
+                field_of("parent", 4, 1, 11, ".lab.Arm.Joint"),
+            ],
+        );
+        let entry = message_of(
+            "GainsEntry",
+            &[
+                field_of("key", 1, 1, 9, ""),
+                field_of("value", 2, 1, 1, ""),
+                bytes(7, &whole(7, 1)),
+            ],
+        );
+        let arm = message_of(
+            "Arm",
+            &[
+                field_of("joints", 1, 3, 11, ".lab.Arm.Joint"),
+                field_of("name", 2, 3, 9, ""),
+                field_of("speeds", 3, 3, 2, ""),
+                field_of("counts", 4, 3, 5, ""),
+                field_of("gains", 5, 3, 11, ".lab.Arm.GainsEntry"),
+                field_of("on", 6, 1, 8, ""),
+                field_of("big", 7, 1, 4, ""),
+                field_of("lost", 8, 1, 11, ".lab.None"),
+                bytes(3, &joint),
+                bytes(3, &entry),
+            ],
+        );
+        let file = [
+            bytes(1, b"arm.proto"),
+            bytes(2, b"lab"),
+            bytes(4, &arm),
+            bytes(12, syntax.as_bytes()),
+        ];
+        bytes(1, &file.concat())
+    }
+
+    fn arm() -> Vec<u8> {
+        let joint = |name: &str, q: f64| [bytes(1, name.as_bytes()), double(2, q)].concat();
+        let floats = [1.5f32, -2.5].map(f32::to_le_bytes).concat();
+        let gain = |key: &str, value: f64| [bytes(1, key.as_bytes()), double(2, value)].concat();
+        [
+            bytes(1, &[joint("a", 1.0), whole(3, 5)].concat()),
+            bytes(
+                1,
+                &[joint("b", 2.0), bytes(4, &joint("root", 9.0))].concat(),
+            ),
+            bytes(2, b"left"),
+            bytes(2, b"right"),
+            bytes(3, &floats),
+            // the third one is not packed
+            [&[3 << 3 | 5][..], &7.25f32.to_le_bytes()].concat(),
+            bytes(4, &[number_bytes(-3i64 as u64), number_bytes(300)].concat()),
+            whole(4, 12),
+            bytes(5, &gain("p", 4.0)),
+            bytes(5, &gain("d", 0.5)),
+            whole(7, 1),
+            // the last one counts
+            whole(7, u64::MAX),
+        ]
+        .concat()
+    }
+
+    fn value(syntax: &str, data: &[u8], path: &str) -> Result<Value, String> {
+        let reader = ProtoReader::new("lab.Arm", &set(syntax)).unwrap();
+        let mut out = [Value::Absent];
+        reader.read(data, &[vec![Path::parse(path)]], &mut out)?;
+        Ok(out[0])
+    }
+
+    #[test]
+    fn paths_lead_to_numbers_in_messages_arrays_and_maps() {
+        for (path, expected) in [
+            ("joints[1].q", Value::Float(2.0)),
+            ("/joints/0/code", Value::Int(-3)),
+            ("joints[name=b].q", Value::Float(2.0)),
+            ("joints[name=b].parent.q", Value::Float(9.0)),
+            ("speeds[0]", Value::Float(1.5)),
+            ("speeds[name=right]", Value::Float(-2.5)),
+            ("speeds[2]", Value::Float(7.25)),
+            ("counts[0]", Value::Int(-3)),
+            ("/counts/1", Value::Int(300)),
+            ("counts[2]", Value::Int(12)),
+            ("gains.d", Value::Float(0.5)),
+            ("/gains/p", Value::Float(4.0)),
+            ("big", Value::Unsigned(u64::MAX)),
+        ] {
+            assert_eq!(value("proto3", &arm(), path), Ok(expected), "{path}");
+        }
+        for path in [
+            "joints",
+            "joints[2].q",
+            "joints[name=c].q",
+            "joints[0]",
+            "joints[0].name",
+            "name[0]",
+            "speeds[3]",
+            "counts[3]",
+            "gains.i",
+            "gains",
+            "none",
+            "lost.q",
+            "big.q",
+            "speeds[name=up]",
+            "joints[0].parent.q",
+            "joints[0].q[0]",
+        ] {
+            assert_eq!(value("proto3", &arm(), path), Ok(Value::Absent), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_left_out_is_0_where_the_language_says_so() {
+        for (path, expected) in [("on", Value::Int(0)), ("big", Value::Int(0))] {
+            assert_eq!(value("proto3", &[], path), Ok(expected));
+            assert_eq!(value("proto2", &[], path), Ok(Value::Absent));
+        }
+        let data = bytes(1, &bytes(1, b"a"));
+        assert_eq!(
+            value("proto3", &data, "joints[name=a].q"),
+            Ok(Value::Float(0.0))
+        );
+        assert_eq!(
+            value("proto3", &data, "joints[name=a].parent.q"),
+            Ok(Value::Absent)
+        );
+    }
+
+    #[test]
+    fn broken_messages_and_sets_without_the_type_are_refused() {
+        let cut = &arm()[..arm().len() - 1];
+        assert!(value("proto3", cut, "big").unwrap_err().contains("cut off"));
+        let missing = ProtoReader::new("lab.Leg", &set("proto3")).unwrap_err();
+        assert!(missing.contains("does not define lab.Leg"), "{missing}");
+        let damaged = ProtoReader::new("lab.Arm", &set("proto3")[..50]).unwrap_err();
+        assert!(damaged.contains("damaged"), "{damaged}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_set_and_no_message_makes_the_reader_panic(
+            changes in prop::collection::vec((any::<u16>(), any::<u8>()), 0..9),
+            data in prop_oneof![Just(arm()), prop::collection::vec(any::<u8>(), 0..80)],
+            path in "(joints|name|speeds|counts|gains|big)(\\[[0-9]\\]|\\[name=[ab]\\])?(\\.(q|parent|p)){0,2}",
+        ) {
+            let mut set = set("proto3");
+            for (at, byte) in changes {
+                let length = set.len();
+                set[usize::from(at) % length] = byte;
+            }
+            if let Ok(reader) = ProtoReader::new("lab.Arm", &set) {
+                let mut out = [Value::Absent];
+                let _ = reader.read(&data, &[vec![Path::parse(&path)]], &mut out);
+                reader.names();
+            }
+        }
+    }
 }

@@ -1,0 +1,267 @@
+//! Types of protobuf messages, from the descriptor set that a recording carries.
+//!
+//! A set is what `protoc --descriptor_set_out` writes: messages of `descriptor.proto` themselves. What
+//! is needed of them, names, numbers and types of fields, is read as any other message is, field by
+//! field, and what a damaged set says is taken for a type that has no such fields.
+
+use std::collections::BTreeMap;
+
+use super::wire::{Broken, Fields, Item};
+
+/// Messages inside messages inside ..., deepest.
+const DEEPEST: usize = 64;
+
+/// The types of one set.
+#[derive(Debug, Clone)]
+pub(super) struct Types {
+    pub(super) messages: Vec<MessageType>,
+    /// Index of the type that was asked for.
+    pub(super) root: usize,
+}
+
+/// A type of messages.
+#[derive(Debug, Clone, Default)]
+pub(super) struct MessageType {
+    pub(super) fields: Vec<FieldType>,
+    /// It is the pair of key and value that a map is made of.
+    pub(super) is_map_entry: bool,
+}
+
+/// A field of a type.
+#[derive(Debug, Clone)]
+pub(super) struct FieldType {
+    pub(super) name: String,
+    pub(super) number: u32,
+    pub(super) repeated: bool,
+    /// Not written where it is 0.
+    pub(super) zero_if_absent: bool,
+    pub(super) kind: Kind,
+}
+
+/// What a field holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Number(Number),
+    Text,
+    /// A message of this type.
+    Message(usize),
+    /// Bytes, groups, types that the set does not define: no number is in them.
+    Other,
+}
+
+/// A type of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Number {
+    Double,
+    Float,
+    Int32,
+    Int64,
+    Uint32,
+    Uint64,
+    Sint32,
+    Sint64,
+    Fixed32,
+    Fixed64,
+    Sfixed32,
+    Sfixed64,
+    Bool,
+}
+
+/// Whether fields say that they are there although they are 0.
+#[derive(Clone, Copy)]
+struct Presence {
+    implicit: bool,
+}
+
+/// A field whose type is not looked up yet.
+struct Unresolved {
+    field: FieldType,
+    type_name: Option<String>,
+}
+
+/// All types of a set, by their full name.
+#[derive(Default)]
+struct Found {
+    names: BTreeMap<String, usize>,
+    messages: Vec<(Vec<Unresolved>, bool)>,
+}
+
+impl Types {
+    /// Finds message type `name` in a descriptor set.
+    ///
+    /// # Errors
+    /// What is wrong with the set, or that it lacks the type.
+    pub(super) fn parse(name: &str, set: &[u8]) -> Result<Self, String> {
+        let damaged = |_: Broken| "its descriptor set is damaged".to_owned();
+        let mut found = Found::default();
+        for field in Fields::new(set) {
+            if let (1, Item::Bytes(file)) = field.map_err(damaged)? {
+                found.add_file(file).map_err(damaged)?;
+            }
+        }
+        let full = format!(".{}", name.trim_start_matches('.'));
+        let root = found.names.get(&full).copied();
+        let root = root.ok_or_else(|| format!("its descriptor set does not define {name}"))?;
+        let Found { names, messages } = found;
+        let resolve = |unresolved: Unresolved| {
+            let mut field = unresolved.field;
+            if let (Kind::Message(index), Some(name)) = (&mut field.kind, &unresolved.type_name) {
+                match names.get(name) {
+                    Some(found) => *index = *found,
+                    None => field.kind = Kind::Other,
+                }
+            }
+            field
+        };
+        let messages = messages
+            .into_iter()
+            .map(|(fields, is_map_entry)| MessageType {
+                fields: fields.into_iter().map(resolve).collect(),
+                is_map_entry,
+            });
+        Ok(Self {
+            messages: messages.collect(),
+            root,
+        })
+    }
+}
+
+impl Found {
+    /// `FileDescriptorProto`: package 2, messages 4, options 8, syntax 12, edition 14.
+    fn add_file(&mut self, file: &[u8]) -> Result<(), Broken> {
+        let mut package = String::new();
+        let mut presence = Presence { implicit: false };
+        for field in Fields::new(file) {
+            match field? {
+                (2, Item::Bytes(name)) => package = format!(".{}", text(name)),
+                (12, Item::Bytes(syntax)) => presence.implicit |= syntax == b"proto3",
+                // features 50, field_presence 1
+                (8, Item::Bytes(options)) => presence.ask(options, 50)?,
+                _ => {}
+            }
+        }
+        let mut waiting: Vec<(String, &[u8], usize)> = Vec::new();
+        let messages = |scope: &str, data, tag, depth, to: &mut Vec<_>| -> Result<(), Broken> {
+            for field in Fields::new(data) {
+                match field? {
+                    (number, Item::Bytes(message)) if number == tag && depth < DEEPEST => {
+                        to.push((scope.to_owned(), message, depth));
+                    }
+                    _ => {}
+                }
+            }
+            Ok(())
+        };
+        messages(&package, file, 4, 0, &mut waiting)?;
+        while let Some((scope, message, depth)) = waiting.pop() {
+            let full = self.add_message(&scope, message, presence)?;
+            messages(&full, message, 3, depth + 1, &mut waiting)?;
+        }
+        Ok(())
+    }
+
+    /// `DescriptorProto`: name 1, fields 2, options 7 (map_entry 7); its full name.
+    fn add_message(
+        &mut self,
+        scope: &str,
+        message: &[u8],
+        presence: Presence,
+    ) -> Result<String, Broken> {
+        let (mut full, mut fields, mut is_map_entry) = (String::new(), Vec::new(), false);
+        for field in Fields::new(message) {
+            match field? {
+                (1, Item::Bytes(name)) => full = format!("{scope}.{}", text(name)),
+                (2, Item::Bytes(field)) => fields.push(field_type(field, presence)?),
+                (7, Item::Bytes(options)) => {
+                    for option in Fields::new(options) {
+                        is_map_entry |= matches!(option?, (7, Item::Varint(1..)));
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.names
+            .entry(full.clone())
+            .or_insert(self.messages.len());
+        self.messages.push((fields, is_map_entry));
+        Ok(full)
+    }
+}
+
+impl Presence {
+    /// Takes what options say of it in their `FeatureSet`: 1 explicit, 2 implicit, 3 required.
+    fn ask(&mut self, options: &[u8], features: u32) -> Result<(), Broken> {
+        for option in Fields::new(options) {
+            let (number, Item::Bytes(set)) = option? else {
+                continue;
+            };
+            if number != features {
+                continue;
+            }
+            for feature in Fields::new(set) {
+                if let (1, Item::Varint(presence)) = feature? {
+                    self.implicit = presence == 2;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `FieldDescriptorProto`: name 1, number 3, label 4, type 5, type name 6, options 8, oneof 9,
+/// proto3_optional 17.
+fn field_type(field: &[u8], mut presence: Presence) -> Result<Unresolved, Broken> {
+    let (mut name, mut type_name) = (String::new(), None);
+    let (mut number, mut label, mut kind, mut chosen) = (0, 1, 0, false);
+    for item in Fields::new(field) {
+        match item? {
+            (1, Item::Bytes(text_of)) => name = text(text_of),
+            (3, Item::Varint(value)) => number = u32::try_from(value).unwrap_or(0),
+            (4, Item::Varint(value)) => label = value,
+            (5, Item::Varint(value)) => kind = value,
+            (6, Item::Bytes(name)) => type_name = Some(text(name)),
+            // features 21
+            (8, Item::Bytes(options)) => presence.ask(options, 21)?,
+            (9, Item::Varint(_)) | (17, Item::Varint(1..)) => chosen = true,
+            _ => {}
+        }
+    }
+    let number_of = |kind| match kind {
+        1 => Some(Number::Double),
+        2 => Some(Number::Float),
+        3 => Some(Number::Int64),
+        4 => Some(Number::Uint64),
+        // An enumeration is a number too.
+        5 | 14 => Some(Number::Int32),
+        6 => Some(Number::Fixed64),
+        7 => Some(Number::Fixed32),
+        8 => Some(Number::Bool),
+        13 => Some(Number::Uint32),
+        15 => Some(Number::Sfixed32),
+        16 => Some(Number::Sfixed64),
+        17 => Some(Number::Sint32),
+        18 => Some(Number::Sint64),
+        _ => None,
+    };
+    let kind = match (kind, number_of(kind)) {
+        (_, Some(number)) => Kind::Number(number),
+        (9, _) => Kind::Text,
+        (11, _) if type_name.is_some() => Kind::Message(0),
+        _ => Kind::Other,
+    };
+    let repeated = label == 3;
+    Ok(Unresolved {
+        field: FieldType {
+            name,
+            number,
+            repeated,
+            zero_if_absent: presence.implicit && !chosen && !repeated,
+            kind,
+        },
+        type_name,
+    })
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}

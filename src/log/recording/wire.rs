@@ -1,0 +1,159 @@
+//! The wire format of protobuf: fields of a message one after the other, borrowed from its bytes.
+
+/// Bytes that are no protobuf message: a field that ends behind them, or of no known form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Broken;
+
+/// What a field holds on the wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Item<'m> {
+    Varint(u64),
+    Fixed64([u8; 8]),
+    Fixed32([u8; 4]),
+    /// A text, a message, or numbers one after the other.
+    Bytes(&'m [u8]),
+}
+
+/// The fields of a message: number and what it holds; groups are passed over.
+///
+/// Ends after the first broken field.
+#[derive(Debug, Clone)]
+pub(super) struct Fields<'m> {
+    rest: &'m [u8],
+}
+
+impl<'m> Fields<'m> {
+    pub(super) fn new(message: &'m [u8]) -> Self {
+        Self { rest: message }
+    }
+
+    fn read(&mut self) -> Result<Option<(u32, Item<'m>)>, Broken> {
+        let mut groups = 0usize;
+        loop {
+            if self.rest.is_empty() {
+                return if groups == 0 { Ok(None) } else { Err(Broken) };
+            }
+            let tag = u32::try_from(varint(&mut self.rest)?).map_err(|_| Broken)?;
+            let item = match tag & 7 {
+                0 => Item::Varint(varint(&mut self.rest)?),
+                1 => Item::Fixed64(fixed(&mut self.rest)?),
+                2 => {
+                    let length = varint(&mut self.rest)?;
+                    let length = usize::try_from(length).map_err(|_| Broken)?;
+                    Item::Bytes(take(&mut self.rest, length)?)
+                }
+                3 => {
+                    groups += 1;
+                    continue;
+                }
+                4 => {
+                    groups = groups.checked_sub(1).ok_or(Broken)?;
+                    continue;
+                }
+                5 => Item::Fixed32(fixed(&mut self.rest)?),
+                _ => return Err(Broken),
+            };
+            if groups == 0 {
+                return Ok(Some((tag >> 3, item)));
+            }
+        }
+    }
+}
+
+impl<'m> Iterator for Fields<'m> {
+    type Item = Result<(u32, Item<'m>), Broken>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        let read = self.read().transpose();
+        if let Some(Err(_)) = read {
+            self.rest = &[];
+        }
+        read
+    }
+}
+
+/// Takes a number of changing length off the bytes: seven bits a byte, lowest first.
+#[inline]
+pub(super) fn varint(rest: &mut &[u8]) -> Result<u64, Broken> {
+    let mut value = 0;
+    for (index, byte) in rest.iter().take(10).enumerate() {
+        // Of the tenth byte one bit is left; what is beyond is dropped, as everyone does.
+        value |= u64::from(byte & 0x7f) << (7 * index);
+        if byte & 0x80 == 0 {
+            *rest = &rest[index + 1..];
+            return Ok(value);
+        }
+    }
+    Err(Broken)
+}
+
+pub(super) fn fixed<const N: usize>(rest: &mut &[u8]) -> Result<[u8; N], Broken> {
+    let (bytes, tail) = rest.split_first_chunk().ok_or(Broken)?;
+    *rest = tail;
+    Ok(*bytes)
+}
+
+fn take<'m>(rest: &mut &'m [u8], count: usize) -> Result<&'m [u8], Broken> {
+    let (bytes, tail) = rest.split_at_checked(count).ok_or(Broken)?;
+    *rest = tail;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fields(bytes: &[u8]) -> Vec<Result<(u32, Item<'_>), Broken>> {
+        Fields::new(bytes).collect()
+    }
+
+    #[test]
+    fn fields_of_every_form_are_read_and_groups_passed_over() {
+        // The first example of the encoding's documentation: field 1 is 150.
+        assert_eq!(fields(&[0x08, 0x96, 0x01]), [Ok((1, Item::Varint(150)))]);
+        let bytes = [
+            &[0x12, 2, b'h', b'i'][..],
+            // a group of field 3 with a group of field 4 in it
+            &[0x1b, 0x08, 1, 0x23, 0x24, 0x1c],
+            &[0x2d, 1, 2, 3, 4],
+            &[0x31, 1, 2, 3, 4, 5, 6, 7, 8],
+            &[
+                0x38, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1,
+            ],
+        ]
+        .concat();
+        let expected = [
+            Ok((2, Item::Bytes(&b"hi"[..]))),
+            Ok((5, Item::Fixed32([1, 2, 3, 4]))),
+            Ok((6, Item::Fixed64([1, 2, 3, 4, 5, 6, 7, 8]))),
+            Ok((7, Item::Varint(u64::MAX))),
+        ];
+        assert_eq!(fields(&bytes), expected);
+        assert_eq!(fields(&[]), []);
+    }
+
+    #[test]
+    fn broken_bytes_end_the_fields_with_an_error() {
+        for bytes in [
+            &[0x08][..],
+            &[0x08, 0x80],
+            &[0x12, 3, b'h', b'i'],
+            &[
+                0x12, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1,
+            ],
+            &[0x2d, 1, 2, 3],
+            &[0x31, 1],
+            &[0x1b, 0x08, 1],
+            &[0x1c],
+            &[0x0e],
+            &[0x80; 11],
+        ] {
+            assert_eq!(fields(bytes), [Err(Broken)], "{bytes:?}");
+        }
+        assert_eq!(
+            fields(&[0x08, 1, 0x0f]),
+            [Ok((1, Item::Varint(1))), Err(Broken)]
+        );
+    }
+}
