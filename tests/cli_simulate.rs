@@ -227,3 +227,50 @@ fn catches_interrupts(process: u32) -> bool {
     let mask = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     mask.is_some_and(|mask| mask & 0b10 != 0)
 }
+
+#[test]
+fn effects_that_cannot_be_are_usage_errors_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for (effect, message, hint) in [
+        (
+            "stiction:q4",
+            "there is no effect `stiction`",
+            "torque-offset",
+        ),
+        (
+            "payload:q4",
+            "`payload` has no place at",
+            "leave the joint out",
+        ),
+        ("backlash:q4:gap=-1", "gap is -1", "above 0"),
+        ("actuator-friction:q4", "no joint `q4`", "x_r, y_r"),
+    ] {
+        simulate(
+            folder.path(),
+            &format!("--seconds 1 --effect {effect} -o a.csv"),
+        )
+        .assert()
+        .code(2)
+        .stderr(contains(message).and(contains(hint)));
+    }
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn joints_of_effects_on_the_whole_robot_are_null_in_the_document_and_absent_in_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = simulate(
+        folder.path(),
+        "--seconds 1 --effect payload:mass=2,mx=0.5 --effect delay:q5 -o a.csv --json -",
+    )
+    .assert()
+    .code(0);
+    let document: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    let effects = document["effects"].as_array().unwrap();
+    assert!(effects[0].as_object().unwrap()["joint"].is_null());
+    assert_eq!(effects[0]["parameters"]["mx"]["unit"], "kg m");
+    assert_eq!(effects[1]["joint"], "q5");
+    let truth = fs::read_to_string(folder.path().join("a.truth.toml")).unwrap();
+    assert_eq!(truth.matches("[[effect]]").count(), 2);
+    assert_eq!(truth.matches("joint = \"q5\"").count(), 1 + 5);
+}

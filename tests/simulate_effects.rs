@@ -1,5 +1,16 @@
 //! Effects: what they add to the torque, and the mechanism for states, memory and inertia.
 
+#[path = "simulate_effects/data.rs"]
+mod data;
+#[path = "simulate_effects/load_and_memory.rs"]
+mod load_and_memory;
+#[path = "simulate_effects/missing.rs"]
+mod missing;
+#[path = "simulate_effects/orders.rs"]
+mod orders;
+#[path = "simulate_effects/static_torques.rs"]
+mod static_torques;
+
 use cft_ident::robot::cft::pantograph::reference_jacobian;
 use cft_ident::robot::cft::{Coefficients, Setup, dynamics};
 use cft_ident::simulate::cft_experiment::{effects, excitation, follow};
@@ -73,7 +84,7 @@ fn effects_without_a_joint_act_on_all_in_proportion_to_their_friction() {
 #[test]
 fn unknown_effects_keys_and_joints_are_refused_with_what_is_known() {
     let text = |specs: &[&str]| build(specs).expect_err("refused").to_string();
-    assert!(text(&["stiction"]).contains("torque-offset, ripple"));
+    assert!(text(&["stiction"]).contains("torque-offset, asymmetric-friction"));
     assert!(text(&["ripple:q3"]).contains("q1, q2, q4, q5"));
     assert!(text(&["torque-offset:q4:d=1"]).contains("its keys are c"));
     assert!(text(&["ripple:q4:order"]).contains("cannot read `order`"));
@@ -86,8 +97,8 @@ fn resolved_effects_name_every_value_with_its_unit() {
     assert_eq!(values.len(), 1);
     let ripple = &values[0];
     assert_eq!(
-        (ripple.effect.as_str(), ripple.joint.as_str()),
-        ("ripple", "q1")
+        (ripple.effect.as_str(), ripple.joint.as_deref()),
+        ("ripple", Some("q1"))
     );
     assert_eq!(ripple.parameters["order"].unit, "1/m");
     assert_eq!(ripple.parameters["order"].value, 20.0);

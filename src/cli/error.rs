@@ -124,7 +124,9 @@ impl From<SimulateError> for CliError {
             SimulateError::EffectSyntax { .. }
             | SimulateError::UnknownEffect { .. }
             | SimulateError::UnknownKey { .. }
-            | SimulateError::UnknownJoint { .. } => Exit::Usage,
+            | SimulateError::UnknownJoint { .. }
+            | SimulateError::EffectPlace { .. }
+            | SimulateError::EffectNumber { .. } => Exit::Usage,
             _ => Exit::BadInput,
         };
         Self::from_room(exit, &error)

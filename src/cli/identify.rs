@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use super::machine::Machine;
-use super::{CliError, Context, Outcome, campaign, friction, lsq, validate};
+use super::{CliError, Context, Outcome, campaign, friction, lsq, simulate, validate};
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
@@ -283,5 +283,5 @@ fn comparison(model: &ModelFile, truth: &TruthFile) -> Value {
             }))
         })
         .collect();
-    json!({ "parameters": rows, "effects": truth.effects })
+    json!({ "parameters": rows, "effects": simulate::effects(truth) })
 }

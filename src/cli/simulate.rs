@@ -14,7 +14,7 @@ use crate::output::{LogWriter, write_whole};
 use crate::report::json::Document;
 use crate::report::number;
 use crate::report::table::{Align, Table};
-use crate::simulate::{self, EffectSpec, Ending, Motion, Order, SimulatedLog};
+use crate::simulate::{self, EffectSpec, Ending, Motion, Order, SimulatedLog, TruthFile};
 
 const EXAMPLE: &str = "\
 Example:
@@ -46,7 +46,7 @@ pub struct Args {
     /// Duration [s] [default: that of the motion, else 20]
     #[arg(long, value_name = "S", value_parser = arguments::positive)]
     pub seconds: Option<f64>,
-    /// Effect that the plant has beyond the model; may be given more than once
+    /// Effect that the plant has beyond the model, or fault of its log; may be given more than once
     #[arg(long = "effect", value_name = "NAME[:JOINT][:key=value,...]")]
     pub effects: Vec<EffectSpec>,
     /// Seed of every random number
@@ -198,6 +198,18 @@ fn duration(robot: &RobotFile, simulated: &SimulatedLog) -> f64 {
     }
 }
 
+/// The effects of a truth; the joint is null for what concerns all joints.
+pub(super) fn effects(truth: &TruthFile) -> Vec<Value> {
+    let list = truth.effects.iter();
+    list.map(|effect| {
+        json!({
+            "effect": effect.effect, "family": effect.family, "joint": effect.joint,
+            "parameters": effect.parameters,
+        })
+    })
+    .collect()
+}
+
 fn document(
     simulated: &SimulatedLog,
     seed: u64,
@@ -215,7 +227,7 @@ fn document(
         .iter()
         .map(|(name, share)| json!({"coordinate": name, "share": share}));
     json!({
-        "effects": simulated.truth.effects,
+        "effects": effects(&simulated.truth),
         "parameters": simulated.truth.parameters,
         "seed": seed,
         "samples": simulated.rows().len(),

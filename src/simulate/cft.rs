@@ -168,12 +168,13 @@ impl Plant<4> for CftPlant {
     }
 
     #[inline]
-    fn dynamics(&self, q: &[f64; 4], v: &[f64; 4]) -> ([[f64; 4]; 4], [f64; 4]) {
-        let (mass, mut bias) = inertia_and_bias(q, v, &self.coefficients);
-        for i in 0..4 {
-            bias[i] += self.friction[i].torque(v[i]);
-        }
-        (mass, bias)
+    fn rigid(&self, q: &[f64; 4], v: &[f64; 4]) -> ([[f64; 4]; 4], [f64; 4]) {
+        inertia_and_bias(q, v, &self.coefficients)
+    }
+
+    #[inline]
+    fn friction(&self, v: &[f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|i| self.friction[i].torque(v[i]))
     }
 
     #[inline]

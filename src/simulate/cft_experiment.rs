@@ -7,13 +7,12 @@
 use super::SimulateError;
 use super::cft::{CftPlant, CftTruth};
 use super::controller::Control;
-use super::effects::{EffectSpec, EffectValue, Effects, Site};
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::plant::Plant;
 use super::recording::Recording;
 use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, TURN, Travel, travel};
 use super::run::{Drive, Start, run};
 use super::settings::Settings;
-use crate::robot::JointKind;
 use crate::robot::cft::actuation::{Limits, Setup};
 use crate::robot::cft::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, joints};
 use crate::robot::cft::{COORDINATES, JOINTS};
@@ -237,26 +236,15 @@ fn excitation_of(setup: Setup, mut series: Fourier<4>) -> Reference<4> {
     }
 }
 
-/// What the effects on a CFT robot are scaled with: the friction of each joint at a middling speed.
+/// The effects on a CFT robot.
+///
+/// # Errors
+/// As [`Effects::build`].
 pub fn effects(
     truth: &CftTruth,
     specs: &[EffectSpec],
 ) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
-    const SPEEDS: [f64; 4] = [0.2, 0.5, 0.5, 0.5];
-    let sites: [Site; 4] = std::array::from_fn(|joint| {
-        let kind = if joint == 0 {
-            JointKind::Prismatic
-        } else {
-            JointKind::Revolute
-        };
-        Site {
-            joint,
-            turns: kind == JointKind::Revolute,
-            scale: truth.friction[joint].torque(SPEEDS[joint]).abs(),
-            unit: kind.torque_unit(),
-        }
-    });
-    Effects::build(specs, &JOINTS.map(str::to_owned), &sites)
+    Effects::build(specs, &Sites::cft(truth)?)
 }
 
 /// Runs a reference with the default gains, from the settled start.

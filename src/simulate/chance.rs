@@ -21,11 +21,23 @@ pub enum Purpose {
     Volts = 5,
     /// Noise of the logged joint torques.
     Torque = 6,
+    /// Torques that wander.
+    Drift = 7,
 }
+
+/// Purposes leave this many streams to the things of one kind that each have their own.
+const APART: u64 = 1 << 32;
 
 /// Generator of the given purpose.
 pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(purpose as u64);
+    generator
+}
+
+/// Generator of the given purpose for one of several things, such as joints.
+pub fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    generator.set_stream(purpose as u64 + APART * (number as u64 + 1));
     generator
 }

@@ -69,6 +69,33 @@ pub enum SimulateError {
     /// A joint that the robot does not have.
     #[error("the robot has no joint `{name}`; its joints are {known}")]
     UnknownJoint { name: String, known: String },
+    /// An effect that has nothing to sit on.
+    #[error("effect `{effect}` has no place at {place}: {why}")]
+    EffectPlace {
+        effect: String,
+        place: String,
+        why: String,
+    },
+    /// A number that the effect cannot have.
+    #[error("effect `{effect}`: {key} is {value}, but {rule}")]
+    EffectNumber {
+        effect: String,
+        key: String,
+        value: f64,
+        rule: String,
+    },
+    /// An effect of a model file that cannot be run.
+    #[error(
+        "{file}, [[effect]] {number} (`{name}`): {source}; correct that table, or leave it out to simulate \
+         without it"
+    )]
+    ModelEffect {
+        file: String,
+        /// Counted from one.
+        number: usize,
+        name: String,
+        source: Box<SimulateError>,
+    },
     /// More extra states than the integrator is compiled for.
     #[error(
         "the effects need {states} states of their own and at most {most} are possible; use fewer effects"

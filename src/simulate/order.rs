@@ -1,9 +1,10 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
+use super::SimulateError;
 use super::cft::CftPlant;
 use super::cft_experiment;
 use super::controller::Control;
-use super::effects::{EffectSpec, EffectValue, Effects};
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::from_files;
 use super::plant::Plant;
 use super::recording::{Ending, LimitEvent, Recording, Status};
@@ -12,7 +13,6 @@ use super::run::{Drive, Start, run};
 use super::settings::Settings;
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
-use super::{SimulateError, single_joint};
 use crate::config::robot_file::{ModelKind, RobotFile};
 use crate::config::{ModelFile, Trajectory};
 use crate::log::{Channel, Channels};
@@ -125,8 +125,7 @@ fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLo
     let setup = truth.setup;
     let limits = from_files::cft_limits(order.robot, setup);
     let plant = CftPlant::new(&truth).with_limits(limits);
-    let asked = asked_effects(order);
-    let (effects, values) = cft_experiment::effects(&truth, &asked)?;
+    let (effects, values) = built_effects(order, &Sites::cft(&truth)?)?;
     let reference = match order.motion {
         Motion::Usual => Some(cft_experiment::excitation(setup)),
         Motion::Trajectory(trajectory) => Some(from_files::cft_reference(
@@ -171,7 +170,7 @@ fn single(
 ) -> Result<SimulatedLog, SimulateError> {
     let truth = from_files::single_joint_truth(order.robot, order.model)?;
     truth.check()?;
-    let (effects, values) = single_joint::effects(&truth, &asked_effects(order))?;
+    let (effects, values) = built_effects(order, &Sites::single_joint(&truth))?;
     let seconds = order.seconds.unwrap_or(SECONDS);
     let reference = match order.motion {
         Motion::Usual => Some(from_files::single_joint_ladder(
@@ -224,24 +223,45 @@ fn single(
     Ok(outcome)
 }
 
-/// Effects of the model, then those of the order.
-fn asked_effects(order: &Order) -> Vec<EffectSpec> {
-    let modelled = order.model.map(|(_, model)| model.effects.as_slice());
-    let mut asked: Vec<EffectSpec> = modelled
-        .unwrap_or_default()
-        .iter()
-        .map(|effect| EffectSpec {
-            name: effect.name.clone(),
-            joint: effect.joint.clone(),
-            values: effect
-                .parameters
-                .iter()
-                .map(|(key, p)| (key.clone(), p.value))
-                .collect(),
-        })
-        .collect();
+/// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
+fn built_effects(
+    order: &Order,
+    sites: &Sites,
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    let mut asked = Vec::new();
+    if let Some((file, model)) = order.model {
+        for (place, effect) in model.effects.iter().enumerate() {
+            let values = effect.parameters.iter();
+            let spec = EffectSpec {
+                name: effect.name.clone(),
+                joint: effect.joint.clone(),
+                values: values.map(|(key, p)| (key.clone(), p.value)).collect(),
+            };
+            // Tried alone, so that what is wrong with it is said of the file and not of the command line.
+            Effects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
+                SimulateError::ModelEffect {
+                    file: file.to_owned(),
+                    number: place + 1,
+                    name: effect.name.clone(),
+                    source: Box::new(source),
+                }
+            })?;
+            asked.push(spec);
+        }
+    }
     asked.extend(order.effects.iter().cloned());
-    asked
+    let (effects, values) = Effects::build(&asked, sites)?;
+    let joint_channels = order.robot.layout().channels == Channels::Joint;
+    match effects.first_fault() {
+        Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
+            effect: fault.to_owned(),
+            place: "this log".to_owned(),
+            why: "the robot file's [log] has the motors' channels alone, and faults of the data sit in joint \
+                  channels; let [log] read those"
+                .to_owned(),
+        }),
+        _ => Ok((effects, values)),
+    }
 }
 
 /// What the plant is run with.

@@ -43,8 +43,22 @@ pub trait Plant<const J: usize> {
     /// [`SimulateError::Robot`] where the pose is singular.
     fn volts(&self, q: &[f64; J], torque: &[f64; J]) -> Result<[f64; J], SimulateError>;
 
+    /// Inertia matrix M(q), and C(q, v) v + G(q).
+    fn rigid(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]);
+
+    /// Friction F(v) of each joint.
+    fn friction(&self, v: &[f64; J]) -> [f64; J];
+
     /// Inertia matrix M(q), and C(q, v) v + G(q) + F(v).
-    fn dynamics(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]);
+    #[inline]
+    fn dynamics(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]) {
+        let (mass, mut bias) = self.rigid(q, v);
+        let friction = self.friction(v);
+        for i in 0..J {
+            bias[i] += friction[i];
+        }
+        (mass, bias)
+    }
 
     /// x with M x = b; `None` where M is not positive definite.
     fn solve(&self, mass: &[[f64; J]; J], b: &[f64; J]) -> Option<[f64; J]>;
@@ -67,65 +81,208 @@ pub struct Moving<'a, P, const J: usize> {
     pub volts: [f64; J],
 }
 
+/// The motor's side of the joints and what the balance of torques came to.
+struct Balance<const J: usize> {
+    q: [f64; J],
+    v: [f64; J],
+    friction: [f64; J],
+    /// Motor torque that acts, less friction and added torques.
+    net: [f64; J],
+    acceleration: [f64; J],
+}
+
 impl<P: Plant<J>, const J: usize> Moving<'_, P, J> {
-    /// Acceleration at the state y for the given joint torque; NaN where M is not positive definite.
-    #[inline]
-    pub fn acceleration<const N: usize>(
-        &self,
-        t: f64,
-        y: &[f64; N],
-        torque: &[f64; J],
-    ) -> [f64; J] {
-        let (q, v) = (part::<J, N>(y, 0), part::<J, N>(y, J));
-        let (mut mass, mut bias) = self.plant.dynamics(&q, &v);
-        if !self.effects.is_empty() {
-            let motion = Motion {
-                t,
-                q: &q,
-                v: &v,
-                z: &y[2 * J..],
-            };
-            self.effects.torque(&motion, &mut bias);
-            self.effects
-                .inertia(&motion, mass.as_flattened_mut(), &mut bias);
+    /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
+    /// the deflections of elastic joints.
+    pub fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
+        let (mut q, mut v) = (*q, *v);
+        for twist in self.effects.twists(z) {
+            q[twist.joint] += twist.deflection;
+            v[twist.joint] += twist.rate;
         }
-        let mut load = *torque;
+        (q, v)
+    }
+
+    /// Acceleration of the joints at the state y under the held volts; NaN where M is not invertible.
+    #[inline]
+    pub fn acceleration<const N: usize>(&self, t: f64, y: &[f64; N]) -> [f64; J] {
+        let (q, v) = (part::<J, N>(y, 0), part::<J, N>(y, J));
+        if self.effects.is_empty() {
+            let torque = self.plant.torque(&q, &self.volts);
+            let (mass, bias) = self.plant.dynamics(&q, &v);
+            let load = std::array::from_fn(|i| torque[i] - bias[i]);
+            return self.plant.solve(&mass, &load).unwrap_or([f64::NAN; J]);
+        }
+        self.balance(t, &q, &v, &y[2 * J..]).acceleration
+    }
+
+    /// The balance with effects: what the motors give, friction and added torques take; what is left is the
+    /// load tau_l with what depends on it, and where a joint is elastic the load is what the spring passes on.
+    fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
+        let (q, v) = self.motor_side(link, speed, z);
+        let friction = self.plant.friction(&v);
+        let motion = Motion {
+            t,
+            q: &q,
+            v: &v,
+            z,
+            friction: &friction,
+            ..Motion::default()
+        };
+        let mut acting = [1.0; J];
+        self.effects.drive(&mut acting);
+        let mut added = [0.0; J];
+        self.effects.torque(&motion, &mut added);
+        let mut share = [[0.0; 2]; J];
+        self.effects.load(&motion, &mut share);
+        let torque = self.plant.torque(&q, &self.volts);
+        let mut net: [f64; J] =
+            std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i]);
+        // tau_l (1 + share) = net is linear on each side of zero.
+        let mut load: [f64; J] = std::array::from_fn(|i| {
+            let [positive, negative] = share[i];
+            net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
+        });
+        for twist in self.effects.twists(z) {
+            let [positive, negative] = share[twist.joint];
+            load[twist.joint] = twist.torque;
+            net[twist.joint] -= twist.torque
+                * if twist.torque > 0.0 {
+                    positive
+                } else {
+                    negative
+                };
+        }
+        let (mut mass, mut bias) = self.plant.rigid(link, speed);
+        let motion = Motion {
+            q: link,
+            v: speed,
+            ..motion
+        };
+        self.effects
+            .inertia(&motion, mass.as_flattened_mut(), &mut bias);
         for i in 0..J {
             load[i] -= bias[i];
         }
-        self.plant.solve(&mass, &load).unwrap_or([f64::NAN; J])
+        let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
+        let solved = if symmetric {
+            self.plant.solve(&mass, &load)
+        } else {
+            eliminate(mass, load)
+        };
+        Balance {
+            q,
+            v,
+            friction,
+            net,
+            acceleration: solved.unwrap_or([f64::NAN; J]),
+        }
     }
 
-    /// Joint torque that keeps the state y without acceleration: C v + G + F + E.
-    pub fn holding_torque(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
-        let (mut mass, mut bias) = self.plant.dynamics(q, v);
-        let motion = Motion { t, q, v, z };
-        self.effects.torque(&motion, &mut bias);
+    /// Rigid-body torque C v + G with what effects add to it, at no acceleration.
+    pub fn load(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
+        let (mut mass, mut bias) = self.plant.rigid(q, v);
+        let motion = Motion {
+            t,
+            q,
+            v,
+            z,
+            ..Motion::default()
+        };
         self.effects
             .inertia(&motion, mass.as_flattened_mut(), &mut bias);
         bias
+    }
+
+    /// Logged joint torque that keeps the state without acceleration: C v + G + F + E.
+    pub fn holding_torque(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
+        let load = self.load(t, q, v, z);
+        let friction = self.plant.friction(v);
+        let motion = Motion {
+            t,
+            q,
+            v,
+            z,
+            friction: &friction,
+            ..Motion::default()
+        };
+        let mut torque = friction;
+        self.effects.torque(&motion, &mut torque);
+        let mut share = [[0.0; 2]; J];
+        self.effects.load(&motion, &mut share);
+        let mut acting = [1.0; J];
+        self.effects.drive(&mut acting);
+        std::array::from_fn(|i| {
+            let [positive, negative] = share[i];
+            let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
+            (load[i] + beside + torque[i]) / acting[i]
+        })
     }
 }
 
 impl<P: Plant<J>, const J: usize, const N: usize> System<N> for Moving<'_, P, J> {
     #[inline]
     fn rates(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
-        let q = part::<J, N>(y, 0);
-        let a = self.acceleration(t, y, &self.plant.torque(&q, &self.volts));
         dydt[..J].copy_from_slice(&y[J..2 * J]);
-        dydt[J..2 * J].copy_from_slice(&a);
-        if N > 2 * J {
-            dydt[2 * J..].fill(0.0);
-            let (q, v, z) = (&y[..J], &y[J..2 * J], &y[2 * J..]);
-            self.effects
-                .rates(&Motion { t, q, v, z }, &mut dydt[2 * J..]);
+        if N == 2 * J {
+            dydt[J..2 * J].copy_from_slice(&self.acceleration(t, y));
+            return;
         }
+        let z = &y[2 * J..];
+        let balance = self.balance(t, &part::<J, N>(y, 0), &part::<J, N>(y, J), z);
+        dydt[J..2 * J].copy_from_slice(&balance.acceleration);
+        dydt[2 * J..].fill(0.0);
+        let motion = Motion {
+            t,
+            q: &balance.q,
+            v: &balance.v,
+            z,
+            friction: &balance.friction,
+            a: &balance.acceleration,
+            net: &balance.net,
+        };
+        self.effects.rates(&motion, &mut dydt[2 * J..]);
     }
 
     fn accepted(&mut self, t: f64, y: &[f64; N]) -> bool {
-        let (q, v, z) = (&y[..J], &y[J..2 * J], &y[2 * J..]);
-        self.effects.moved(&Motion { t, q, v, z })
+        if self.effects.is_empty() {
+            return false;
+        }
+        let z = &y[2 * J..];
+        let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
+        self.effects.moved(&Motion {
+            t,
+            q: &q,
+            v: &v,
+            z,
+            ..Motion::default()
+        })
     }
+}
+
+/// x with M x = b for any invertible M, by elimination with row exchange; `None` where M is not invertible.
+fn eliminate<const J: usize>(mut m: [[f64; J]; J], mut b: [f64; J]) -> Option<[f64; J]> {
+    for k in 0..J {
+        let largest = (k..J).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
+        m.swap(k, largest);
+        b.swap(k, largest);
+        let pivot = m[k];
+        if pivot[k] == 0.0 || !pivot[k].is_finite() {
+            return None;
+        }
+        for i in k + 1..J {
+            let share = m[i][k] / pivot[k];
+            for (own, from) in m[i].iter_mut().zip(pivot).skip(k) {
+                *own -= share * from;
+            }
+            b[i] -= share * b[k];
+        }
+    }
+    for k in (0..J).rev() {
+        let known: f64 = (k + 1..J).map(|j| m[k][j] * b[j]).sum();
+        b[k] = (b[k] - known) / m[k][k];
+    }
+    Some(b)
 }
 
 /// J numbers of the state from index `first` on.

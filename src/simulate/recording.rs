@@ -1,6 +1,7 @@
 //! What a simulation gives: the log as a laboratory would have it, and beside it what was true.
 
 use super::chance::Purpose;
+use super::effects::{Effects, Log};
 use super::integrate::Effort;
 use super::plant::Plant;
 use super::sensors::{Sensors, disturb};
@@ -47,12 +48,14 @@ pub enum Ending {
 /// What was true at each row, and what the controller wanted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Actual<const J: usize> {
-    /// Joint positions, m or rad.
+    /// Joint positions, m or rad; those of the links where a joint is elastic.
     pub q: Vec<[f64; J]>,
     /// Joint speeds, m/s or rad/s.
     pub v: Vec<[f64; J]>,
     /// Joint torques that act from this sample on, N or N m.
     pub torque: Vec<[f64; J]>,
+    /// Joint accelerations from this sample on, m/s^2 or rad/s^2.
+    pub a: Vec<[f64; J]>,
     /// Wanted motor coordinates, m or rad; the actual ones where nothing is followed.
     pub target: Vec<[f64; J]>,
 }
@@ -100,6 +103,7 @@ impl<const J: usize> Recording<J> {
                 q: Vec::with_capacity(rows),
                 v: Vec::with_capacity(rows),
                 torque: Vec::with_capacity(rows),
+                a: Vec::with_capacity(rows),
                 target: Vec::with_capacity(rows),
             },
             limits: Vec::new(),
@@ -115,9 +119,15 @@ impl<const J: usize> Recording<J> {
         self.t.len()
     }
 
-    /// Turns the clean rows into what is logged: noise on volts, torques by (66), noise on torques, lost
-    /// rows.
-    pub(super) fn measure<P: Plant<J>>(&mut self, plant: &P, sensors: &Sensors<J>, seed: u64) {
+    /// Turns the clean rows into what is logged: noise on volts, torques by (66), noise on torques, faults of
+    /// the data, lost rows.
+    pub(super) fn measure<P: Plant<J>>(
+        &mut self,
+        plant: &P,
+        effects: &Effects,
+        sensors: &Sensors<J>,
+        seed: u64,
+    ) {
         self.volt_noise = sensors.volt_noise.deviation(&self.volts);
         // The torque's own noise is sized by the torque without any.
         self.torque_noise = sensors.torque_noise.deviation(&self.torque);
@@ -125,7 +135,9 @@ impl<const J: usize> Recording<J> {
         for ((torque, q), volts) in self.torque.iter_mut().zip(&self.q).zip(&self.volts) {
             *torque = plant.torque(q, volts);
         }
+        effects.spoil(&mut self.joint_channels(), true);
         disturb(&mut self.torque, &self.torque_noise, seed, Purpose::Torque);
+        effects.spoil(&mut self.joint_channels(), false);
         if sensors.dropouts > 0.0 {
             let kept = sensors.kept(self.rows(), seed);
             retain(&mut self.t, &kept);
@@ -138,11 +150,22 @@ impl<const J: usize> Recording<J> {
                 &mut self.actual.q,
                 &mut self.actual.v,
                 &mut self.actual.torque,
+                &mut self.actual.a,
                 &mut self.actual.target,
             ];
             for column in columns {
                 retain(column, &kept);
             }
+        }
+    }
+
+    /// The joint channels as faults of the data see them.
+    fn joint_channels(&mut self) -> Log<'_> {
+        Log {
+            t: &self.t,
+            q: self.q.as_flattened_mut(),
+            torque: self.torque.as_flattened_mut(),
+            joints: J,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::SimulateError;
 use super::controller::{Control, Controller};
-use super::effects::Effects;
+use super::effects::{Beginning, Effects};
 use super::integrate::DormandPrince;
 use super::plant::{Moving, Plant, part};
 use super::recording::{Ending, LimitEvent, Recording, Status};
@@ -91,7 +91,7 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         .instants(samples, settings.rate_hz, settings.seed);
     let mut recording = Recording::empty(plant, samples);
     let mut integrator = DormandPrince::new(settings.tolerance);
-    let mut y = initial_state::<P, J, N>(&moving, start, drive)?;
+    let mut y = initial_state::<P, J, N>(&mut moving, start, drive, settings)?;
     let mut drive = match drive {
         Drive::Follow { reference, control } => {
             Running::Follow(reference, Controller::new(*control))
@@ -102,7 +102,8 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         let t = instants[k];
         let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
         let (q, v) = (part::<J, N>(&y, 0), part::<J, N>(&y, J));
-        let coordinates = plant.coordinates(&q);
+        let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
+        let coordinates = plant.coordinates(&motors);
         let seen = settings.sensors.encoders(&coordinates, &resolution);
         let (wanted, asked) = match &mut drive {
             Running::Follow(reference, controller) => {
@@ -117,7 +118,7 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         recording.t.push(t);
         recording.x.push(seen);
         recording.volts.push(moving.volts);
-        let measured = plant.joints(&seen).unwrap_or(q);
+        let measured = plant.joints(&seen).unwrap_or(motors);
         recording.q.push(measured);
         recording
             .torque
@@ -136,7 +137,8 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         recording
             .actual
             .torque
-            .push(plant.torque(&q, &moving.volts));
+            .push(plant.torque(&motors, &moving.volts));
+        recording.actual.a.push(moving.acceleration(t, &y));
         recording.actual.target.push(wanted);
         if beyond.contains(&true) && settings.on_limit == OnLimit::Stop {
             recording.ending = Ending::StoppedAtLimit;
@@ -147,7 +149,7 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         }
     }
     recording.effort = integrator.effort();
-    recording.measure(plant, &settings.sensors, settings.seed);
+    recording.measure(plant, &moving.effects, &settings.sensors, settings.seed);
     Ok(recording)
 }
 
@@ -237,9 +239,10 @@ fn limits_reached<P: Plant<J>, const J: usize, const N: usize>(
 
 /// Joint positions, speeds and effect states at t = 0.
 fn initial_state<P: Plant<J>, const J: usize, const N: usize>(
-    moving: &Moving<P, J>,
+    moving: &mut Moving<P, J>,
     start: &Start<J>,
     drive: &Drive<J>,
+    settings: &Settings<J>,
 ) -> Result<[f64; N], SimulateError> {
     let plant = moving.plant;
     let (lower, upper) = plant.limits();
@@ -273,6 +276,21 @@ fn initial_state<P: Plant<J>, const J: usize, const N: usize>(
     let mut y = [0.0; N];
     y[..J].copy_from_slice(&q);
     y[J..2 * J].copy_from_slice(&v);
+    if !moving.effects.is_empty() {
+        let load = moving.load(0.0, &q, &v, &y[2 * J..]);
+        let beginning = Beginning {
+            q: &q,
+            load: &load,
+            seconds: settings.seconds,
+            seed: settings.seed,
+        };
+        moving.effects.begin(&beginning, &mut y[2 * J..]);
+        // The pose is that of the motors; elastic links hang beside it.
+        let hanging: [f64; J] = moving.motor_side(&[0.0; J], &[0.0; J], &y[2 * J..]).0;
+        for (q, beyond) in y.iter_mut().zip(hanging) {
+            *q -= beyond;
+        }
+    }
     Ok(y)
 }
 

@@ -2,7 +2,7 @@
 
 use super::SimulateError;
 use super::controller::Control;
-use super::effects::{EffectSpec, EffectValue, Effects, Site};
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::plant::Plant;
 use crate::robot::JointKind;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -35,7 +35,7 @@ pub struct SingleJointTruth {
     pub limits: (f64, f64),
 }
 
-/// The effects on a single joint, scaled with its friction at one m/s or rad/s.
+/// The effects on a single joint.
 ///
 /// # Errors
 /// As [`Effects::build`].
@@ -43,13 +43,7 @@ pub fn effects(
     truth: &SingleJointTruth,
     specs: &[EffectSpec],
 ) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
-    let site = Site {
-        joint: 0,
-        turns: truth.kind == JointKind::Revolute,
-        scale: truth.friction.torque(1.0).abs(),
-        unit: truth.kind.torque_unit(),
-    };
-    Effects::build(specs, std::slice::from_ref(&truth.name), &[site])
+    Effects::build(specs, &Sites::single_joint(truth))
 }
 
 impl SingleJointTruth {
@@ -176,8 +170,13 @@ impl Plant<1> for SingleJointTruth {
     }
 
     #[inline]
-    fn dynamics(&self, _q: &[f64; 1], v: &[f64; 1]) -> ([[f64; 1]; 1], [f64; 1]) {
-        ([[self.inertia]], [self.friction.torque(v[0]) + self.offset])
+    fn rigid(&self, _q: &[f64; 1], _v: &[f64; 1]) -> ([[f64; 1]; 1], [f64; 1]) {
+        ([[self.inertia]], [self.offset])
+    }
+
+    #[inline]
+    fn friction(&self, v: &[f64; 1]) -> [f64; 1] {
+        [self.friction.torque(v[0])]
     }
 
     #[inline]

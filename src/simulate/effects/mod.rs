@@ -1,19 +1,57 @@
 //! Effects that a declared model may lack, integrated by the plant in its own code.
 //!
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
-//! every joint, and a key that is left out takes a default that scales with the joint's own friction.
-//! A new effect is one file here and one line in [`KINDS`].
+//! every joint, and a key that is left out takes a default that scales with the joint (docs/effects.md).
+//! Most effects are torques or states of the plant ([`Effect`]); delays and faults of the data are put
+//! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`KINDS`].
+//!
+//! A jump in speed would leave the differential equation without a solution at rest. Signs and steps of
+//! the speed are therefore tanh(w v) and (1 + tanh(w v))/2, with w as steep as the joint's inertia lets an
+//! explicit integrator follow ([`Site::slope`]).
 
+mod actuator_friction;
+mod asymmetric_friction;
+mod backlash;
+mod counterbalance;
+mod coupling;
+mod delay;
+mod disturbance;
+mod drift;
+mod drive_efficiency;
+mod elasticity;
+mod fault;
+mod filter;
+mod gain;
+mod gravity_tilt;
+mod kind;
+mod load_friction;
+mod nonlinear_viscous;
+mod payload;
+mod position_friction;
+mod presliding;
+mod quantisation;
+mod rigid_body_terms;
 mod ripple;
+mod rotor_inertia;
+mod saturation;
+mod site;
 mod spec;
+mod spring;
+mod stribeck;
+mod stuck_channel;
 mod torque_offset;
+mod warm_up;
+mod wrong_sign_or_order;
 
-pub use spec::{EffectSpec, EffectValue};
+pub use fault::{Fault, Log};
+pub use kind::{Built, Key, Kind, Places, Unit};
+pub use site::{Machine, Place, Site, Sites};
+pub use spec::{EffectParameter, EffectSpec, EffectValue};
 
 use super::SimulateError;
 
-/// State of the plant as an effect sees it.
-#[derive(Debug, Clone, Copy)]
+/// State of the plant as an effect sees it: the motor's side of every joint.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Motion<'a> {
     /// Time \[s\].
     pub t: f64,
@@ -23,12 +61,41 @@ pub struct Motion<'a> {
     pub v: &'a [f64],
     /// The effect's own states.
     pub z: &'a [f64],
+    /// The plant's own friction F(v), N or N m per joint.
+    pub friction: &'a [f64],
+    /// Joint accelerations of the links, m/s^2 or rad/s^2; known to [`Effect::rates`] only.
+    pub a: &'a [f64],
+    /// Motor torque less friction and added torques, N or N m; known to [`Effect::rates`] only.
+    pub net: &'a [f64],
 }
 
-/// One effect on the plant. Everything but the torque has a default: most effects are static.
+/// What an effect is told before the first step.
+#[derive(Debug, Clone, Copy)]
+pub struct Beginning<'a> {
+    /// Joint positions, m or rad.
+    pub q: &'a [f64],
+    /// Rigid-body torque of the joints at the start, N or N m.
+    pub load: &'a [f64],
+    /// Duration of the run \[s\].
+    pub seconds: f64,
+    pub seed: u64,
+}
+
+/// A joint whose motor and link are joined by a spring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Twist {
+    pub joint: usize,
+    /// Position of the motor beyond the link, m or rad, and its rate.
+    pub deflection: f64,
+    pub rate: f64,
+    /// What the spring passes on to the link, N or N m.
+    pub torque: f64,
+}
+
+/// One effect on the plant. Everything has a default: most effects are static torques.
 pub trait Effect: std::fmt::Debug + Send {
     /// Adds to `torque` what the motors must supply because of the effect, in N or N m per joint.
-    fn torque(&self, motion: &Motion, torque: &mut [f64]);
+    fn torque(&self, _motion: &Motion, _torque: &mut [f64]) {}
 
     /// How many states of its own the effect integrates.
     fn states(&self) -> usize {
@@ -38,8 +105,23 @@ pub trait Effect: std::fmt::Debug + Send {
     /// Time derivatives of its own states.
     fn rates(&self, _motion: &Motion, _dz: &mut [f64]) {}
 
-    /// Adds to the inertia matrix (row-major) and to the torque without acceleration.
+    /// Adds to the inertia matrix (row-major) and to the rigid-body torque without acceleration.
     fn inertia(&self, _motion: &Motion, _mass: &mut [f64], _torque: &mut [f64]) {}
+
+    /// Adds, per joint, the torque that the effect takes per unit of a positive and of a negative load
+    /// tau_l = M a + C v + G.
+    fn load(&self, _motion: &Motion, _share: &mut [[f64; 2]]) {}
+
+    /// Multiplies, per joint, the torque that acts per unit of logged torque.
+    fn drive(&self, _acting: &mut [f64]) {}
+
+    /// The spring that the effect puts between a motor and its link.
+    fn twist(&self, _z: &[f64]) -> Option<Twist> {
+        None
+    }
+
+    /// Readies memory and states before the first step.
+    fn begin(&mut self, _beginning: &Beginning, _z: &mut [f64]) {}
 
     /// Takes an accepted step into its memory; `true` when that changes its torque at this point.
     fn moved(&mut self, _motion: &Motion) -> bool {
@@ -47,63 +129,68 @@ pub trait Effect: std::fmt::Debug + Send {
     }
 }
 
-/// What an effect is built for.
-#[derive(Debug, Clone, Copy)]
-pub struct Site<'a> {
-    /// Joint that the effect acts on.
-    pub joint: usize,
-    /// Whether that joint turns (orders are then per revolution) or slides (per metre).
-    pub turns: bool,
-    /// Typical torque of the joint, N or N m: what default sizes are a fraction of.
-    pub scale: f64,
-    /// Unit of the joint's torque.
-    pub unit: &'a str,
-}
+/// All effects that the simulator knows, in the order of docs/effects.md.
+pub const KINDS: &[&Kind] = &[
+    &torque_offset::KIND,
+    &asymmetric_friction::KIND,
+    &gravity_tilt::KIND,
+    &stribeck::KIND,
+    &nonlinear_viscous::KIND,
+    &actuator_friction::KIND,
+    &load_friction::KIND,
+    &drive_efficiency::KIND,
+    &gain::KIND,
+    &position_friction::KIND,
+    &ripple::KIND,
+    &spring::KIND,
+    &counterbalance::KIND,
+    &backlash::KIND,
+    &presliding::KIND,
+    &delay::KIND,
+    &elasticity::KIND,
+    &rotor_inertia::KIND,
+    &rigid_body_terms::KIND,
+    &payload::KIND,
+    &coupling::KIND,
+    &warm_up::KIND,
+    &drift::KIND,
+    &disturbance::KIND,
+    &saturation::KIND,
+    &quantisation::KIND,
+    &stuck_channel::KIND,
+    &wrong_sign_or_order::KIND,
+    &filter::KIND,
+];
 
-/// One value of an effect's definition: key, unit (`torque` stands for the joint's), default as a
-/// function of the site.
-pub struct Key {
-    pub name: &'static str,
-    pub unit: &'static str,
-    pub default: fn(&Site) -> f64,
-}
-
-/// A kind of effect: its name, its keys, and how it is built from one value per key.
-pub struct Kind {
-    pub name: &'static str,
-    pub family: &'static str,
-    pub keys: &'static [Key],
-    pub build: fn(&Site, &[f64]) -> Box<dyn Effect>,
-}
-
-/// All effects that the simulator knows.
-pub const KINDS: &[&Kind] = &[&torque_offset::KIND, &ripple::KIND];
-
-/// The effects of one plant, each with its slice of the extra states.
+/// The effects of one plant, each with its slice of the extra states, and the faults of its log.
 #[derive(Debug, Default)]
 pub struct Effects {
     list: Vec<(Box<dyn Effect>, std::ops::Range<usize>)>,
+    /// By name.
+    faults: Vec<(&'static str, Box<dyn Fault>)>,
 }
 
 impl Effects {
     /// Builds the effects; the second result is what they came out as, one entry per joint.
     ///
     /// # Errors
-    /// [`SimulateError::UnknownEffect`], [`SimulateError::UnknownKey`],
-    /// [`SimulateError::UnknownJoint`].
+    /// [`SimulateError::UnknownEffect`], [`SimulateError::UnknownKey`], [`SimulateError::UnknownJoint`],
+    /// [`SimulateError::EffectPlace`], [`SimulateError::EffectNumber`].
     pub fn build(
         specs: &[EffectSpec],
-        joints: &[String],
-        sites: &[Site],
+        sites: &Sites,
     ) -> Result<(Self, Vec<EffectValue>), SimulateError> {
         let mut effects = Self::default();
         let mut values = Vec::new();
         for spec in specs {
             let kind = spec.kind()?;
-            for site in spec.sites(joints, sites)? {
+            for site in spec.sites(kind, sites)? {
                 let numbers = spec.numbers(kind, site)?;
-                effects.push((kind.build)(site, &numbers));
-                values.push(EffectValue::new(kind, &joints[site.joint], site, &numbers));
+                match (kind.build)(site, &sites.machine, &numbers)? {
+                    Built::Plant(effect) => effects.push(effect),
+                    Built::Log(fault) => effects.faults.push((kind.name, fault)),
+                }
+                values.push(EffectValue::new(kind, site, &sites.machine, &numbers));
             }
         }
         Ok((effects, values))
@@ -121,10 +208,15 @@ impl Effects {
         self.list.last().map_or(0, |(_, states)| states.end)
     }
 
-    /// Whether there are none.
+    /// Whether the plant has none.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
+    }
+
+    /// Name of the first fault of the log.
+    pub fn first_fault(&self) -> Option<&'static str> {
+        self.faults.first().map(|(name, _)| *name)
     }
 
     /// Adds every effect's torque.
@@ -141,10 +233,39 @@ impl Effects {
         }
     }
 
+    /// Adds every effect's share of the load.
+    pub fn load(&self, motion: &Motion, share: &mut [[f64; 2]]) {
+        for (effect, states) in &self.list {
+            effect.load(&own(motion, states), share);
+        }
+    }
+
+    /// Multiplies what acts per unit of logged torque.
+    pub fn drive(&self, acting: &mut [f64]) {
+        for (effect, _) in &self.list {
+            effect.drive(acting);
+        }
+    }
+
+    /// The springs between motors and links, for the states z of all effects.
+    pub fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
+        let own = |(effect, states): &'a (Box<dyn Effect>, std::ops::Range<usize>)| {
+            effect.twist(&z[states.clone()])
+        };
+        self.list.iter().filter_map(own)
+    }
+
     /// Writes the rates of every effect's states.
     pub fn rates(&self, motion: &Motion, dz: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.rates(&own(motion, states), &mut dz[states.clone()]);
+        }
+    }
+
+    /// Readies every effect before the first step.
+    pub fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+        for (effect, states) in &mut self.list {
+            effect.begin(beginning, &mut z[states.clone()]);
         }
     }
 
@@ -156,6 +277,15 @@ impl Effects {
         }
         changed
     }
+
+    /// Puts the faults into a log: those that come before the noise of the torque, or those after.
+    pub fn spoil(&self, log: &mut Log, before_noise: bool) {
+        for (_, fault) in &self.faults {
+            if fault.before_noise() == before_noise {
+                fault.apply(log);
+            }
+        }
+    }
 }
 
 /// The motion with the states of one effect.
@@ -164,4 +294,16 @@ fn own<'a>(motion: &Motion<'a>, states: &std::ops::Range<usize>) -> Motion<'a> {
         z: &motion.z[states.clone()],
         ..*motion
     }
+}
+
+/// Sign of the speed as steep as w, s/m or s/rad.
+#[inline]
+fn sign(w: f64, v: f64) -> f64 {
+    (w * v).tanh()
+}
+
+/// One for a positive speed and zero for a negative one, as steep as w.
+#[inline]
+fn step(w: f64, v: f64) -> f64 {
+    0.5 * (1.0 + (w * v).tanh())
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{KINDS, Kind, Site};
+use super::{KINDS, Key, Kind, Machine, Place, Places, Site, Sites};
 use crate::simulate::SimulateError;
 
 /// An effect as it is asked for.
@@ -23,7 +23,9 @@ pub struct EffectSpec {
 pub struct EffectValue {
     pub effect: String,
     pub family: String,
-    pub joint: String,
+    /// The joint or screw; absent for the robot as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
     /// By key, in alphabetical order.
     pub parameters: BTreeMap<String, EffectParameter>,
 }
@@ -90,22 +92,54 @@ impl EffectSpec {
         })
     }
 
-    /// The sites that the effect acts on: one joint, or all.
+    /// The sites that the effect acts on: the one that is named, or all that the kind may sit at.
     pub(super) fn sites<'a>(
         &self,
-        joints: &[String],
-        sites: &'a [Site<'a>],
-    ) -> Result<&'a [Site<'a>], SimulateError> {
-        let Some(name) = &self.joint else {
-            return Ok(sites);
+        kind: &Kind,
+        sites: &'a Sites,
+    ) -> Result<&'a [Site], SimulateError> {
+        let whole = sites.whole.as_slice();
+        let refuse = |why: &str| {
+            let first = whole.first().or(sites.joints.first());
+            first.map_or_else(
+                || SimulateError::UnknownJoint {
+                    name: String::new(),
+                    known: String::new(),
+                },
+                |site| site.refuse(kind.name, why),
+            )
         };
-        match joints.iter().position(|joint| joint == name) {
-            Some(i) => Ok(&sites[i..=i]),
-            None => Err(SimulateError::UnknownJoint {
+        let (joints, screws): (&[Site], &[Site]) = match kind.places {
+            Places::Joints => (&sites.joints, &[]),
+            Places::Screws if sites.screws.is_empty() => {
+                return Err(refuse(
+                    "it sits at the screws of the CFT robot, x_r and y_r; a single joint's own \
+                     friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`",
+                ));
+            }
+            Places::Screws => (&[], &sites.screws),
+            Places::JointsAndScrews => (&sites.joints, &sites.screws),
+            Places::Whole if self.joint.is_some() => {
+                return Err(refuse(
+                    "it concerns all joints together; leave the joint out",
+                ));
+            }
+            Places::Whole => (whole, &[]),
+        };
+        let Some(name) = &self.joint else {
+            return Ok(if screws.is_empty() { joints } else { screws });
+        };
+        let named = |list: &'a [Site]| {
+            let place = list.iter().position(|site| site.name == *name)?;
+            list.get(place..=place)
+        };
+        named(joints).or_else(|| named(screws)).ok_or_else(|| {
+            let known = joints.iter().chain(screws).map(|site| site.name.as_str());
+            SimulateError::UnknownJoint {
                 name: name.clone(),
-                known: joints.join(", "),
-            }),
-        }
+                known: known.collect::<Vec<_>>().join(", "),
+            }
+        })
     }
 
     /// One number per key of the kind.
@@ -124,32 +158,35 @@ impl EffectSpec {
                 });
             }
         }
-        let given = |key: &str| self.values.iter().find(|(k, _)| k == key).map(|(_, x)| *x);
-        let number = |key: &super::Key| given(key.name).unwrap_or_else(|| (key.default)(site));
+        let given = |key: &Key| self.values.iter().find(|(k, _)| k == key.name);
+        let sized = kind.keys.iter().any(|key| key.size && given(key).is_some());
+        let number = |key: &Key| match given(key) {
+            Some((_, number)) => *number,
+            None if key.size && sized => 0.0,
+            None => (key.default)(site),
+        };
         Ok(kind.keys.iter().map(number).collect())
     }
 }
 
 impl EffectValue {
-    pub(super) fn new(kind: &Kind, joint: &str, site: &Site, numbers: &[f64]) -> Self {
-        let parameter = |(key, &value): (&super::Key, &f64)| {
-            let unit = match key.unit {
-                "torque" => site.unit,
-                "order" if site.turns => "1/rev",
-                "order" => "1/m",
-                other => other,
-            };
+    pub(super) fn new(kind: &Kind, site: &Site, machine: &Machine, numbers: &[f64]) -> Self {
+        let pairs = || kind.keys.iter().zip(numbers);
+        let from = pairs().find(|(key, _)| key.name == "from");
+        // Joints are counted from one.
+        let from = from.is_some_and(|(_, number)| machine.turns((*number - 1.0).max(0.0) as usize));
+        let parameter = |(key, &value): (&Key, &f64)| {
             let parameter = EffectParameter {
                 value,
-                unit: unit.to_owned(),
+                unit: key.unit.text(site.turns, from).to_owned(),
             };
             (key.name.to_owned(), parameter)
         };
         Self {
             effect: kind.name.to_owned(),
             family: kind.family.to_owned(),
-            joint: joint.to_owned(),
-            parameters: kind.keys.iter().zip(numbers).map(parameter).collect(),
+            joint: (site.place != Place::Whole).then(|| site.name.clone()),
+            parameters: pairs().map(parameter).collect(),
         }
     }
 }

@@ -1,18 +1,15 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Effect, Key, Kind, Motion};
+use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
 
 pub const KIND: Kind = Kind {
     name: "torque-offset",
     family: "offset",
-    keys: &[Key {
-        name: "c",
-        unit: "torque",
-        default: |site| 0.1 * site.scale,
-    }],
-    build: |site, values| {
-        Box::new(TorqueOffset {
-            joint: site.joint,
+    places: Places::Joints,
+    keys: &[Key::size("c", Unit::Torque, |site| 0.1 * site.scale)],
+    build: |site, _, values| {
+        Built::plant(TorqueOffset {
+            joint: site.joint(),
             c: values[0],
         })
     },

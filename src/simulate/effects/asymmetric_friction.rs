@@ -1,0 +1,40 @@
+//! `asymmetric-friction`: Coulomb and viscous friction that the positive direction has beyond the negative.
+//!
+//! E(v) = (coulomb + viscous v) H(v), with H a step as steep as the joint allows.
+
+use super::{Built, Effect, Key, Kind, Motion, Places, Unit, step};
+
+pub const KIND: Kind = Kind {
+    name: "asymmetric-friction",
+    family: "velocity",
+    places: Places::Joints,
+    keys: &[
+        Key::size("coulomb", Unit::Torque, |site| 0.1 * site.scale),
+        Key::size("viscous", Unit::Viscous, |site| {
+            0.1 * site.scale / site.speed
+        }),
+    ],
+    build: |site, _, values| {
+        Built::plant(AsymmetricFriction {
+            joint: site.joint(),
+            coulomb: values[0],
+            viscous: values[1],
+            slope: site.slope(),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct AsymmetricFriction {
+    joint: usize,
+    coulomb: f64,
+    viscous: f64,
+    slope: f64,
+}
+
+impl Effect for AsymmetricFriction {
+    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+        let v = motion.v[self.joint];
+        torque[self.joint] += (self.coulomb + self.viscous * v) * step(self.slope, v);
+    }
+}

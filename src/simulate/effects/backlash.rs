@@ -1,0 +1,74 @@
+//! `backlash`: after a reversal the joint crosses a gap, and what lies behind it is missing.
+//!
+//! A play operator of width `gap` follows the position. While the joint is inside the play the torque
+//! c sgn(v) of what lies behind is missing, so that -c sgn(v) is added. The play is memory: it moves with
+//! each accepted step ([`Effect::moved`]), and while it is pushed it adds no torque, so that a step never
+//! sees it jump. Where the gap closes the missing torque ends within the last [`CONTACT`] of it, a stiff but
+//! continuous contact that the error control steps through.
+
+use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Unit, sign};
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "backlash",
+    family: "memory",
+    places: Places::Joints,
+    keys: &[
+        Key::shape("gap", Unit::Position, |site| 0.01 * site.half_travel()),
+        Key::size("c", Unit::Torque, |site| 0.3 * site.scale),
+    ],
+    build: |site, _, values| {
+        if values[0] <= 0.0 {
+            return Err(SimulateError::EffectNumber {
+                effect: KIND.name.to_owned(),
+                key: "gap".to_owned(),
+                value: values[0],
+                rule: "must be above 0".to_owned(),
+            });
+        }
+        Built::plant(Backlash {
+            joint: site.joint(),
+            half: 0.5 * values[0],
+            c: values[1],
+            slope: site.slope(),
+            centre: None,
+        })
+    },
+};
+
+/// Share of the gap within which contact comes about.
+const CONTACT: f64 = 0.02;
+
+#[derive(Debug)]
+struct Backlash {
+    joint: usize,
+    half: f64,
+    c: f64,
+    slope: f64,
+    /// What lies behind the gap, in the middle of which the motion begins; m or rad.
+    centre: Option<f64>,
+}
+
+impl Effect for Backlash {
+    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+        let Some(centre) = self.centre else {
+            return;
+        };
+        let to_contact = self.half - (motion.q[self.joint] - centre).abs();
+        let missing = (to_contact / (2.0 * CONTACT * self.half)).clamp(0.0, 1.0);
+        torque[self.joint] -= self.c * missing * sign(self.slope, motion.v[self.joint]);
+    }
+
+    fn begin(&mut self, beginning: &Beginning, _z: &mut [f64]) {
+        self.centre = beginning.q.get(self.joint).copied();
+    }
+
+    fn moved(&mut self, motion: &Motion) -> bool {
+        let q = motion.q[self.joint];
+        if let Some(centre) = &mut self.centre {
+            *centre = centre.clamp(q - self.half, q + self.half);
+        }
+        // Contact adds no torque before and after the play is pushed.
+        false
+    }
+}

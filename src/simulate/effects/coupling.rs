@@ -1,0 +1,76 @@
+//! `coupling`: a torque that follows another joint j, viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j.
+//!
+//! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
+//! symmetric, and the plant solves it by elimination.
+
+use super::{Built, Effect, Key, Kind, Motion, Places, Unit, sign};
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "coupling",
+    family: "cross",
+    places: Places::Joints,
+    keys: &[
+        // The neighbour towards the base, and of the first joint the next.
+        Key::shape("from", Unit::Fixed("1"), |site| match site.joint() {
+            0 => 2.0,
+            joint => joint as f64,
+        }),
+        Key::size("viscous", Unit::CoupledViscous, |site| {
+            0.2 * site.scale / site.speed
+        }),
+        Key::size("coulomb", Unit::Torque, |_| 0.0),
+        Key::size("inertia", Unit::CoupledInertia, |_| 0.0),
+        Key::shape("r", Unit::CoupledRatio, |_| 1.0),
+    ],
+    build: |site, machine, values| {
+        if machine.joints() < 2 {
+            return Err(site.refuse(KIND.name, "there is no other joint to follow"));
+        }
+        let from = values[0];
+        let known = (1..=machine.joints()).any(|number| number as f64 == from);
+        if !known || from == (site.joint() + 1) as f64 {
+            return Err(SimulateError::EffectNumber {
+                effect: KIND.name.to_owned(),
+                key: "from".to_owned(),
+                value: from,
+                rule: format!(
+                    "must be the number of another joint, 1 to {}",
+                    machine.joints()
+                ),
+            });
+        }
+        Built::plant(Coupling {
+            joint: site.joint(),
+            from: from as usize - 1,
+            viscous: values[1],
+            coulomb: values[2],
+            inertia: values[3],
+            ratio: values[4],
+            slope: site.slope(),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct Coupling {
+    joint: usize,
+    from: usize,
+    viscous: f64,
+    coulomb: f64,
+    inertia: f64,
+    ratio: f64,
+    slope: f64,
+}
+
+impl Effect for Coupling {
+    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+        let other = motion.v[self.from];
+        let together = motion.v[self.joint] + self.ratio * other;
+        torque[self.joint] += self.viscous * other + self.coulomb * sign(self.slope, together);
+    }
+
+    fn inertia(&self, motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+        mass[self.joint * motion.q.len() + self.from] += self.inertia;
+    }
+}

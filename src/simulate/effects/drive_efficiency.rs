@@ -1,0 +1,45 @@
+//! `drive-efficiency`: a drive that loses part of the load's power, but only while it drives the load.
+//!
+//! E = k tau_l H(tau_l v) with tau_l = M a + C v + G, solved with the balance as in `load-friction`; the step
+//! is as steep in v as the joint allows and exact in tau_l, where the torque is continuous.
+
+use super::{Built, Effect, Key, Kind, Motion, Places, Unit, step};
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "drive-efficiency",
+    family: "load",
+    places: Places::Joints,
+    keys: &[Key::size("k", Unit::Fixed("1"), |_| 0.1)],
+    build: |site, _, values| {
+        if !(-0.9..=9.0).contains(&values[0]) {
+            return Err(SimulateError::EffectNumber {
+                effect: KIND.name.to_owned(),
+                key: "k".to_owned(),
+                value: values[0],
+                rule: "must lie in -0.9..9 (k = 1/efficiency - 1)".to_owned(),
+            });
+        }
+        Built::plant(DriveEfficiency {
+            joint: site.joint(),
+            k: values[0],
+            slope: site.slope(),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct DriveEfficiency {
+    joint: usize,
+    k: f64,
+    slope: f64,
+}
+
+impl Effect for DriveEfficiency {
+    fn load(&self, motion: &Motion, share: &mut [[f64; 2]]) {
+        let forward = step(self.slope, motion.v[self.joint]);
+        let [positive, negative] = &mut share[self.joint];
+        *positive += self.k * forward;
+        *negative += self.k * (1.0 - forward);
+    }
+}

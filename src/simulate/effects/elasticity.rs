@@ -1,0 +1,88 @@
+//! `elasticity`: a spring between the motor, where the encoder sits, and the link.
+//!
+//! The motor's side has the share [`ROTOR`] of the least inertia that the joint has in any pose (what is left
+//! to the link stays positive), all its friction and every torque that is not a load; the link's side the rest, so that a stiff spring gives the rigid joint back. With the
+//! deflection z = q_motor - q_link the spring passes on T = stiffness z + damping dz/dt, and
+//! B (a + d2z/dt2) = tau - F - E - T on the motor's side. Both sides are integrated.
+
+use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Twist, Unit};
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "elasticity",
+    family: "timing",
+    places: Places::Joints,
+    keys: &[Key::size("stiffness", Unit::Stiffness, |site| {
+        (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia
+    })],
+    build: |site, _, values| {
+        let stiffness = values[0];
+        if stiffness <= 0.0 {
+            return Err(SimulateError::EffectNumber {
+                effect: KIND.name.to_owned(),
+                key: "stiffness".to_owned(),
+                value: stiffness,
+                rule: "must be above 0".to_owned(),
+            });
+        }
+        let rotor = ROTOR * site.least_inertia;
+        Built::plant(Elasticity {
+            joint: site.joint(),
+            stiffness,
+            damping: 2.0 * DAMPING * (stiffness * rotor).sqrt(),
+            rotor,
+        })
+    },
+};
+
+/// Default frequency of the joint's whole inertia on its spring \[Hz\].
+const FREQUENCY: f64 = 20.0;
+/// Share of the joint's least inertia that is on the motor's side.
+const ROTOR: f64 = 0.3;
+/// Damping ratio of the motor on its spring.
+const DAMPING: f64 = 0.05;
+
+#[derive(Debug)]
+struct Elasticity {
+    joint: usize,
+    stiffness: f64,
+    damping: f64,
+    rotor: f64,
+}
+
+impl Effect for Elasticity {
+    fn states(&self) -> usize {
+        2
+    }
+
+    fn inertia(&self, motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+        mass[self.joint * (motion.q.len() + 1)] -= self.rotor;
+    }
+
+    fn twist(&self, z: &[f64]) -> Option<Twist> {
+        let &[deflection, rate] = z else {
+            return None;
+        };
+        Some(Twist {
+            joint: self.joint,
+            deflection,
+            rate,
+            torque: self.stiffness * deflection + self.damping * rate,
+        })
+    }
+
+    fn rates(&self, motion: &Motion, dz: &mut [f64]) {
+        let (&[deflection, rate], [speed, acceleration]) = (motion.z, dz) else {
+            return;
+        };
+        let passed = self.stiffness * deflection + self.damping * rate;
+        *speed = rate;
+        *acceleration = (motion.net[self.joint] - passed) / self.rotor - motion.a[self.joint];
+    }
+
+    fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+        if let ([deflection, _], Some(load)) = (z, beginning.load.get(self.joint)) {
+            *deflection = load / self.stiffness;
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! `gravity-tilt`: gravity has components along the base's x and y that the model does not know.
+//!
+//! Masses m_i at p_i have the potential -sum m_i (gx p_x + gy p_y), and the motors supply its gradient. Of
+//! the CFT robot's chain the kinetic energy gives the first moments: the momentum along y is
+//! (theta_1 + Mr) v1 + d/dt(O sin q2 + H cos q2), so that sum m p_y = (theta_1 + Mr) q1 + O sin q2 + H cos q2
+//! and, a quarter turn on, sum m p_x = O cos q2 - H sin q2, both up to constants.
+
+use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use crate::robot::JointKind;
+use crate::robot::cft::dynamics::Coefficients;
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "gravity-tilt",
+    family: "offset",
+    places: Places::Whole,
+    keys: &[
+        Key::size("gx", Unit::Fixed("m/s^2"), |_| 0.1),
+        Key::size("gy", Unit::Fixed("m/s^2"), |_| 0.1),
+    ],
+    build,
+};
+
+fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+    let [gx, gy] = [values[0], values[1]];
+    match machine {
+        Machine::Cft(truth) => Built::plant(Tilt {
+            gx,
+            gy,
+            chain: Coefficients::from_theta22(&truth.theta),
+        }),
+        // The base's x lies along the axis; y is across it and does no work.
+        Machine::SingleJoint(truth) if truth.kind == JointKind::Prismatic => {
+            Built::plant(Constant {
+                force: -truth.inertia * gx,
+            })
+        }
+        Machine::SingleJoint(_) => Err(site.refuse(
+            KIND.name,
+            "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
+             `ripple` with order 1",
+        )),
+    }
+}
+
+#[derive(Debug)]
+struct Tilt {
+    gx: f64,
+    gy: f64,
+    chain: Coefficients,
+}
+
+impl Effect for Tilt {
+    fn inertia(&self, motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+        let (Some(&[_, q2, q4, q5]), [tau1, tau2, tau4, tau5]) = (motion.q.first_chunk(), torque)
+        else {
+            return;
+        };
+        let (s2, c2) = q2.sin_cos();
+        let (s4, c4) = q4.sin_cos();
+        let (s, c) = (q4 + q5).sin_cos();
+        let [a, b, cc, e] = self.chain.h;
+        let radial = self.chain.h0 + a * s4 + b * s + cc * c4 + e * c;
+        let by_psi = b * c - e * s;
+        let by_q4 = a * c4 - cc * s4 + by_psi;
+        let o = self.chain.o;
+        // Along the arm and across it.
+        let (along, across) = (self.gx * s2 - self.gy * c2, self.gx * c2 + self.gy * s2);
+        *tau1 -= self.gy * (self.chain.t1 + self.chain.mr);
+        *tau2 += o * along + radial * across;
+        *tau4 += by_q4 * along;
+        *tau5 += by_psi * along;
+    }
+}
+
+#[derive(Debug)]
+struct Constant {
+    force: f64,
+}
+
+impl Effect for Constant {
+    fn inertia(&self, _motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+        if let Some(torque) = torque.first_mut() {
+            *torque += self.force;
+        }
+    }
+}

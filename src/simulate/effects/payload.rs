@@ -1,0 +1,110 @@
+//! `payload`: a point mass on the last link, at (mx, my, mz)/mass in that link's frame.
+//!
+//! On the CFT robot the last link is link 8, its frame's x outward, y up, z to the side, its origin at the
+//! wrist under the arm; the mass's path p(q) gives m J^T J, m J^T dJ/dt v and m g dp_z/dq. A single joint
+//! carries it as mass, or as (mx^2 + my^2)/mass where it turns, and its axis is taken as vertical there.
+
+use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use crate::robot::JointKind;
+use crate::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
+use crate::simulate::SimulateError;
+
+pub const KIND: Kind = Kind {
+    name: "payload",
+    family: "inertia",
+    places: Places::Whole,
+    keys: &[
+        Key::size("mass", Unit::Fixed("kg"), |_| 1.0),
+        Key::size("mx", Unit::Fixed("kg m"), |_| L8),
+        Key::size("my", Unit::Fixed("kg m"), |_| 0.0),
+        Key::size("mz", Unit::Fixed("kg m"), |_| 0.0),
+    ],
+    build,
+};
+
+fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+    let [mass, mx, my, mz] = [values[0], values[1], values[2], values[3]];
+    if mass <= 0.0 {
+        return Err(SimulateError::EffectNumber {
+            effect: KIND.name.to_owned(),
+            key: "mass".to_owned(),
+            value: mass,
+            rule: "must be above 0".to_owned(),
+        });
+    }
+    match machine {
+        Machine::Cft(_) => Built::plant(Carried {
+            mass,
+            outward: mx / mass,
+            sideways: mz / mass,
+        }),
+        Machine::SingleJoint(truth) => Built::plant(Added {
+            inertia: match truth.kind {
+                JointKind::Prismatic => mass,
+                JointKind::Revolute => (mx * mx + my * my) / mass,
+            },
+        }),
+    }
+}
+
+#[derive(Debug)]
+struct Carried {
+    mass: f64,
+    /// Place in the frame of link 8 \[m\]; its height does not matter, for the tool stays level.
+    outward: f64,
+    sideways: f64,
+}
+
+impl Effect for Carried {
+    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+        let (Some(&[_, q2, q4, q5]), Some(&[v1, v2, v4, v5])) =
+            (motion.q.first_chunk(), motion.v.first_chunk())
+        else {
+            return;
+        };
+        let v = [v1, v2, v4, v5];
+        let (s2, c2) = q2.sin_cos();
+        let (s4, c4) = q4.sin_cos();
+        let (s, c) = (q4 + q5).sin_cos();
+        let w = v4 + v5;
+        // Reach from the axis of q2, its rate, and the acceleration that the speeds alone give it.
+        let reach = self.outward + D - L6 * s4 - U * s;
+        let rate = -L6 * c4 * v4 - U * c * w;
+        let bend = L6 * s4 * v4 * v4 + U * s * w * w;
+        let (by_q4, by_q5) = (-L6 * c4 - U * c, -U * c);
+        let side = self.sideways;
+        // p = (-reach s2 + side c2, q1 + reach c2 + side s2, (L4 + L6) c4 + L5 c) up to constants.
+        let jacobian = [
+            [0.0, -reach * c2 - side * s2, -s2 * by_q4, -s2 * by_q5],
+            [1.0, -reach * s2 + side * c2, c2 * by_q4, c2 * by_q5],
+            [0.0, 0.0, -(L4 + L6) * s4 - L5 * s, -L5 * s],
+        ];
+        let (along, across) = (bend - reach * v2 * v2, 2.0 * rate * v2 + side * v2 * v2);
+        let turned = [
+            -along * s2 - across * c2,
+            along * c2 - across * s2,
+            -(L4 + L6) * c4 * v4 * v4 - L5 * c * w * w + GRAVITY,
+        ];
+        for i in 0..v.len() {
+            for (row, bias) in jacobian.iter().zip(turned) {
+                torque[i] += self.mass * row[i] * bias;
+                for j in 0..v.len() {
+                    mass[4 * i + j] += self.mass * row[i] * row[j];
+                }
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Added {
+    inertia: f64,
+}
+
+impl Effect for Added {
+    fn inertia(&self, _motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+        if let Some(mass) = mass.first_mut() {
+            *mass += self.inertia;
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! `rigid-body-terms`: the ten base parameters of the full chain that the twelve of the report leave out.
+//!
+//! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
+
+use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use crate::robot::cft::dynamics::{Coefficients, inertia_and_bias};
+use crate::simulate::SimulateError;
+
+/// One of the ten, with its value on a chain of eight tubes and plates.
+macro_rules! term {
+    ($name:literal, $value:literal) => {
+        Key::size($name, Unit::Fixed("kg m^2"), |_| $value)
+    };
+}
+
+pub const KIND: Kind = Kind {
+    name: "rigid-body-terms",
+    family: "inertia",
+    places: Places::Whole,
+    keys: &[
+        term!("BB", -0.25),
+        term!("EE", 0.002),
+        term!("CC", 0.003),
+        term!("AC", 0.0005),
+        term!("BE", -0.001),
+        term!("S", -0.12),
+        term!("OC", 0.002),
+        term!("OE", -0.002),
+        term!("OA", -0.02),
+        term!("OB", 0.03),
+    ],
+    build,
+};
+
+fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+    let Machine::Cft(_) = machine else {
+        return Err(site.refuse(
+            KIND.name,
+            "a single joint has one inertia and nothing that its structure drops",
+        ));
+    };
+    let mut theta = [0.0; 22];
+    for (own, value) in theta[12..].iter_mut().zip(values) {
+        *own = *value;
+    }
+    Built::plant(RigidBodyTerms(Coefficients::from_theta22(&theta)))
+}
+
+#[derive(Debug)]
+struct RigidBodyTerms(Coefficients);
+
+impl Effect for RigidBodyTerms {
+    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+        let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
+            return;
+        };
+        let (own, bias) = inertia_and_bias(q, v, &self.0);
+        for (mass, own) in mass.iter_mut().zip(own.as_flattened()) {
+            *mass += own;
+        }
+        for (torque, own) in torque.iter_mut().zip(bias) {
+            *torque += own;
+        }
+    }
+}

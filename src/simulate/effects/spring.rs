@@ -1,0 +1,39 @@
+//! `spring`: k (q - q0) + k3 (q - q0)^3, a cable or a return spring.
+
+use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
+
+pub const KIND: Kind = Kind {
+    name: "spring",
+    family: "position",
+    places: Places::Joints,
+    keys: &[
+        Key::size("k", Unit::Stiffness, |site| {
+            0.3 * site.scale / site.half_travel()
+        }),
+        Key::shape("q0", Unit::Position, |site| site.middle()),
+        Key::size("k3", Unit::Cubic, |_| 0.0),
+    ],
+    build: |site, _, values| {
+        Built::plant(Spring {
+            joint: site.joint(),
+            k: values[0],
+            rest: values[1],
+            cubic: values[2],
+        })
+    },
+};
+
+#[derive(Debug)]
+struct Spring {
+    joint: usize,
+    k: f64,
+    rest: f64,
+    cubic: f64,
+}
+
+impl Effect for Spring {
+    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+        let x = motion.q[self.joint] - self.rest;
+        torque[self.joint] += x * (self.k + self.cubic * x * x);
+    }
+}
