@@ -16,6 +16,7 @@ pub mod model_file;
 mod model_text;
 pub mod robot_file;
 pub mod trajectory;
+mod trajectory_text;
 
 pub use campaign::Campaign;
 pub use embedded::{EMBEDDED, embedded, text};

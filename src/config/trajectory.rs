@@ -39,6 +39,13 @@ pub struct Fourier {
     pub coordinates: Coordinates,
     /// Fundamental frequency [Hz]; omega_f = 2 pi times it.
     pub fundamental_hz: f64,
+    /// Where in its period the motion begins [s]; 0 where absent.
+    pub start_s: Option<f64>,
+    /// Time within which the motion goes from rest to full speed, and back [s]; the simulator's own
+    /// where absent.
+    pub blend_s: Option<f64>,
+    /// Whole periods between the blends; the motion does not end by itself where absent.
+    pub periods: Option<u32>,
     /// One series per coordinate, in the file's order.
     pub series: Vec<FourierCoordinate>,
 }
@@ -54,6 +61,9 @@ pub struct SingleJointMove {
     pub range: Option<[f64; 2]>,
     /// Acceleration at the reversals [m/s^2 or rad/s^2]; chosen from the range where absent.
     pub acceleration: Option<f64>,
+    /// Time from zero speed to a slow plateau [s]: long ones pass slowly where friction bends; the
+    /// simulator's own where absent.
+    pub turn_s: Option<f64>,
 }
 
 /// A pose at a time.
@@ -104,6 +114,9 @@ struct TrajectoryToml {
     kind: Kind,
     coordinates: Option<Coordinates>,
     fundamental_hz: Option<f64>,
+    start_s: Option<f64>,
+    blend_s: Option<f64>,
+    periods: Option<u32>,
     #[serde(default)]
     coordinate: Vec<FourierCoordinate>,
     joint: Option<String>,
@@ -111,6 +124,7 @@ struct TrajectoryToml {
     speeds: Vec<f64>,
     range: Option<[f64; 2]>,
     acceleration: Option<f64>,
+    turn_s: Option<f64>,
     #[serde(default)]
     point: Vec<Point>,
 }
@@ -132,14 +146,18 @@ impl Trajectory {
 /// Refuses a key of another kind of trajectory, which would silently do nothing.
 fn foreign_keys(document: &Document, raw: &TrajectoryToml) -> Result<(), ConfigError> {
     use Kind::{Fourier, Points, SingleJoint};
-    let keys: [(&str, bool, &[Kind]); 8] = [
+    let keys: [(&str, bool, &[Kind]); 12] = [
         ("coordinates", raw.coordinates.is_some(), &[Fourier, Points]),
         ("fundamental_hz", raw.fundamental_hz.is_some(), &[Fourier]),
+        ("start_s", raw.start_s.is_some(), &[Fourier]),
+        ("blend_s", raw.blend_s.is_some(), &[Fourier]),
+        ("periods", raw.periods.is_some(), &[Fourier]),
         ("coordinate", !raw.coordinate.is_empty(), &[Fourier]),
         ("joint", raw.joint.is_some(), &[SingleJoint]),
         ("speeds", !raw.speeds.is_empty(), &[SingleJoint]),
         ("range", raw.range.is_some(), &[SingleJoint]),
         ("acceleration", raw.acceleration.is_some(), &[SingleJoint]),
+        ("turn_s", raw.turn_s.is_some(), &[SingleJoint]),
         ("point", !raw.point.is_empty(), &[Points]),
     ];
     match keys
@@ -170,6 +188,8 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigEr
         .fundamental_hz
         .ok_or_else(|| document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"))?;
     document.positive(&["fundamental_hz"], fundamental_hz)?;
+    document.finite(&["start_s"], raw.start_s.as_slice())?;
+    document.not_negative(&["blend_s"], raw.blend_s)?;
     if raw.coordinate.is_empty() {
         return Err(document.missing(
             &["coordinate"],
@@ -209,6 +229,9 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigEr
     Ok(Fourier {
         coordinates,
         fundamental_hz,
+        start_s: raw.start_s,
+        blend_s: raw.blend_s,
+        periods: raw.periods,
         series: raw.coordinate,
     })
 }
@@ -235,11 +258,15 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
     if let Some(acceleration) = raw.acceleration {
         document.positive(&["acceleration"], acceleration)?;
     }
+    if let Some(turn) = raw.turn_s {
+        document.positive(&["turn_s"], turn)?;
+    }
     Ok(SingleJointMove {
         joint,
         speeds: raw.speeds,
         range: raw.range,
         acceleration: raw.acceleration,
+        turn_s: raw.turn_s,
     })
 }
 

@@ -110,6 +110,8 @@ pub struct OneJointMove {
     pub speeds: Option<Vec<f64>>,
     /// Largest acceleration, m/s^2 or rad/s^2; by mover and set-up where absent.
     pub acceleration: Option<f64>,
+    /// Time from zero speed to a slow plateau \[s\]; that of the usual ladder where absent.
+    pub turn: Option<f64>,
     /// Duration \[s\].
     pub seconds: f64,
     /// Shuffles the order of the speeds and the end at which the motion starts.
@@ -126,6 +128,7 @@ impl OneJointMove {
             range: None,
             speeds: None,
             acceleration: None,
+            turn: None,
             seconds,
             seed,
         }
@@ -191,7 +194,7 @@ impl OneJointMove {
                 range,
                 speeds: speeds.clone(),
                 acceleration,
-                turn: TURN,
+                turn: self.turn.unwrap_or(TURN),
                 seconds: self.seconds,
             }
             .build_seeded(self.seed)?,

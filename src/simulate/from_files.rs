@@ -16,7 +16,7 @@ use crate::robot::JointKind;
 use crate::robot::cft::pantograph::joints;
 use crate::robot::cft::{COORDINATES, JOINTS, Limits, Setup};
 
-/// Time within which a Fourier series reaches full speed \[s\].
+/// Time within which a Fourier series reaches full speed, where its file does not say \[s\].
 const BLEND: f64 = 2.0;
 /// Duration of a ladder where none is given \[s\].
 const SECONDS: f64 = 20.0;
@@ -211,6 +211,7 @@ pub fn cft_reference(
             range: file.range.map(|[low, high]| (low, high)),
             speeds: Some(file.speeds.clone()),
             acceleration: file.acceleration,
+            turn: file.turn_s,
             mover: Mover::named(&file.joint)?,
             limits: Some(limits),
             ..OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed))
@@ -283,7 +284,7 @@ pub fn single_joint_ladder(
             range,
             speeds: file.speeds.clone(),
             acceleration,
-            turn: TURN,
+            turn: file.turn_s.unwrap_or(TURN),
             seconds,
         }
         .build_seeded(Some(seed))?,
@@ -326,8 +327,9 @@ fn fourier<const J: usize>(
         a: vec![[0.0; J]; terms],
         b: vec![[0.0; J]; terms],
         fundamental: std::f64::consts::TAU * file.fundamental_hz,
-        start: 0.0,
-        blend: BLEND,
+        start: file.start_s.unwrap_or(0.0),
+        blend: file.blend_s.unwrap_or(BLEND),
+        periods: file.periods,
     };
     for coordinate in &file.series {
         let Some(i) = names.iter().position(|name| *name == coordinate.name) else {

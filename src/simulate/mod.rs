@@ -20,7 +20,7 @@ pub mod chance;
 pub mod controller;
 pub mod effects;
 mod error;
-mod from_files;
+pub(crate) mod from_files;
 pub mod integrate;
 pub mod order;
 pub mod plant;

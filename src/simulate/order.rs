@@ -293,6 +293,7 @@ fn execute<P: Plant<J>, const J: usize>(
             let seconds = match &reference.path {
                 // A ladder lasts as long as it was built for; a list may end before the next sample.
                 Path::Points(points) => Some(points.seconds()),
+                Path::Fourier(series) => series.seconds(),
                 _ => None,
             };
             (Drive::Follow { reference, control }, seconds)

@@ -1,10 +1,10 @@
-//! Finite Fourier series of eq. (43), entered smoothly from rest.
+//! Finite Fourier series of eq. (43), entered smoothly from rest and left to it.
 
 use std::f64::consts::TAU;
 
 use rand::RngExt;
 
-use super::Target;
+use super::{Clock, Target};
 use crate::simulate::SimulateError;
 use crate::simulate::chance::{Purpose, stream};
 
@@ -12,7 +12,7 @@ use crate::simulate::chance::{Purpose, stream};
 ///
 /// The series is entered by running its own clock slowly at first: during the first
 /// [`Fourier::blend`] seconds the phase accelerates from standstill to one second per second, so that
-/// the path is that of the series from the start and never leaves its range.
+/// the path is that of the series from the start and never leaves its range. It is left in the same way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fourier<const J: usize> {
     /// Offset per coordinate, m or rad.
@@ -25,8 +25,10 @@ pub struct Fourier<const J: usize> {
     pub fundamental: f64,
     /// Phase at which the motion begins, in seconds of the series' own time.
     pub start: f64,
-    /// Time within which the motion reaches full speed \[s\].
+    /// Time within which the motion reaches full speed, and comes to rest again \[s\].
     pub blend: f64,
+    /// Whole periods between the blends; for ever where absent.
+    pub periods: Option<u32>,
 }
 
 impl Fourier<4> {
@@ -51,6 +53,7 @@ impl Fourier<4> {
             fundamental: TAU * 0.4,
             start: 0.0,
             blend: 2.0,
+            periods: None,
         }
     }
 }
@@ -103,7 +106,7 @@ impl<const J: usize> Fourier<J> {
 
     /// Position and velocity at time t >= 0 \[s\].
     pub fn at(&self, t: f64) -> Target<J> {
-        let (phase, rate) = self.clock(t);
+        let [phase, rate, _] = self.clock().at(self.period(), t);
         let mut target = Target {
             position: self.offset,
             velocity: [0.0; J],
@@ -119,17 +122,17 @@ impl<const J: usize> Fourier<J> {
         target
     }
 
-    /// The series' own time and its rate: the rate rises as x^3 (10 - 15 x + 6 x^2).
-    fn clock(&self, t: f64) -> (f64, f64) {
-        if t >= self.blend {
-            return (self.start + t - 0.5 * self.blend, 1.0);
+    /// Duration of the motion \[s\], where it ends.
+    pub fn seconds(&self) -> Option<f64> {
+        self.clock().seconds(self.period())
+    }
+
+    fn clock(&self) -> Clock {
+        Clock {
+            start: self.start,
+            blend: self.blend,
+            periods: self.periods,
         }
-        let x = (t / self.blend).max(0.0);
-        let x3 = x * x * x;
-        (
-            self.start + self.blend * x3 * x * (2.5 - 3.0 * x + x * x),
-            x3 * (10.0 - 15.0 * x + 6.0 * x * x),
-        )
     }
 }
 
@@ -164,6 +167,20 @@ mod tests {
             assert!((one.position[i] - next.position[i]).abs() < 1e-12);
             assert!((one.velocity[i] - next.velocity[i]).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn motion_of_whole_periods_ends_at_rest() {
+        let series = Fourier {
+            periods: Some(3),
+            ..Fourier::table_3()
+        };
+        let end = series.seconds().expect("it ends");
+        assert!((end - 11.5).abs() < 1e-12);
+        assert_eq!(series.at(end).velocity, [0.0; 4]);
+        assert_eq!(series.at(end + 1.0), series.at(end));
+        assert_eq!(series.at(5.0), Fourier::table_3().at(5.0));
+        assert_eq!(Fourier::table_3().seconds(), None);
     }
 
     #[test]

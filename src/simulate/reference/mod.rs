@@ -1,11 +1,13 @@
 //! References that the controller follows: Fourier series (43), one-joint ladder, point list, hold.
 
+mod clock;
 mod fourier;
 mod ladder;
 mod points;
 mod stroke;
 mod travel;
 
+pub use clock::Clock;
 pub use fourier::Fourier;
 pub use ladder::{Ladder, LadderPlan, TURN};
 pub use points::Points;
@@ -83,7 +85,8 @@ impl<const J: usize> Path<J> {
     /// Duration that the path itself sets \[s\]; `None` where it goes on for ever.
     pub fn seconds(&self) -> Option<f64> {
         match self {
-            Self::Hold(_) | Self::Fourier(_) => None,
+            Self::Hold(_) => None,
+            Self::Fourier(series) => series.seconds(),
             Self::Ladder { ladder, .. } => Some(ladder.seconds()),
             Self::Points(points) => Some(points.seconds()),
         }
