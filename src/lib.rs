@@ -32,6 +32,8 @@ pub mod validate;
 
 pub mod simulate;
 
+pub mod excite;
+
 pub mod report;
 
 pub mod config;

@@ -20,6 +20,10 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("inspect", &["math", "log"]),
     ("simulate", &["math", "robot", "log", "config"]),
     (
+        "excite",
+        &["math", "robot", "config", "inertia", "simulate"],
+    ),
+    (
         "report",
         &["log", "verdict", "friction", "inertia", "validate"],
     ),
@@ -27,7 +31,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "robot", "log", "config", "output", "motion", "friction", "inertia",
-            "validate", "inspect", "simulate", "report",
+            "validate", "inspect", "simulate", "excite", "report",
         ],
     ),
 ];

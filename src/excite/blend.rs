@@ -1,0 +1,146 @@
+//! Rest at both ends: the series' own clock runs up before the whole periods and down behind them.
+//!
+//! The path in space is that of the period, so that the blend leaves no position limit; speeds are
+//! at most those of the period. Accelerations have the clock's own in them: a blend must be long
+//! enough, and begin where that costs least.
+
+use crate::simulate::reference::Clock;
+
+use super::ExciteError;
+use super::limits::Channel;
+use super::machine::Machine;
+use super::series::{Kinematics, Series};
+use super::usage::{along_blend, worst};
+
+/// A series from rest to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blend {
+    /// Time of the series' clock at which the motion begins \[s\].
+    pub start: f64,
+    /// Duration of either blend \[s\].
+    pub seconds: f64,
+    /// Whole periods at full rate; without a number the motion does not end by itself.
+    pub periods: Option<u32>,
+}
+
+/// Durations that are tried, in periods.
+const DURATIONS: [f64; 10] = [0.4, 0.5, 0.64, 0.8, 1.0, 1.2, 1.6, 2.0, 3.2, 6.4];
+/// Points of the period at which the motion may begin.
+const STARTS: u32 = 16;
+
+impl Blend {
+    /// Duration of the whole motion \[s\]; of the first blend and period where it does not end.
+    pub fn duration(&self, period: f64) -> f64 {
+        let end = self.clock().seconds(period);
+        end.unwrap_or(self.seconds + period)
+    }
+
+    fn clock(&self) -> Clock {
+        Clock {
+            start: self.start,
+            blend: self.seconds,
+            periods: self.periods,
+        }
+    }
+
+    /// All coordinates at the time t of the motion \[s\], at rest before and behind it.
+    pub fn at(&self, series: &Series, t: f64) -> Kinematics {
+        let [clock, rate, rise] = self.clock().at(series.period(), t);
+        let mut k = series.at(clock);
+        for i in 0..series.coordinates() {
+            k.xdd[i] = rate * rate * k.xdd[i] + rise * k.xd[i];
+            k.xd[i] *= rate;
+        }
+        k
+    }
+
+    /// The shortest blend of those tried along which every channel holds, begun where it stays
+    /// farthest from them.
+    ///
+    /// # Errors
+    /// [`ExciteError::NoBlend`] where even the longest breaks one.
+    pub fn within(
+        machine: &Machine,
+        channels: &[Channel],
+        series: &Series,
+        periods: u32,
+    ) -> Result<Self, ExciteError> {
+        let period = series.period();
+        let mut last = f64::INFINITY;
+        for duration in DURATIONS {
+            let tried = (0..STARTS).map(|k| {
+                let blend = Self {
+                    start: period * f64::from(k) / f64::from(STARTS),
+                    seconds: duration * period,
+                    periods: Some(periods),
+                };
+                let share = worst(&along_blend(machine, channels, series, &blend));
+                (share, blend)
+            });
+            let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((share, blend)) = best {
+                if share <= 1.0 {
+                    return Ok(blend);
+                }
+                last = share;
+            }
+        }
+        Err(ExciteError::NoBlend {
+            seconds: DURATIONS[DURATIONS.len() - 1] * period,
+            share: last,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn motion() -> (Series, Blend) {
+        let series = Series {
+            fundamental: TAU * 0.4,
+            offset: vec![0.1],
+            a: vec![vec![0.2, -0.1]],
+            b: vec![vec![-0.3, 0.1]],
+        };
+        let blend = Blend {
+            start: 0.7,
+            seconds: 1.5,
+            periods: Some(2),
+        };
+        (series, blend)
+    }
+
+    #[test]
+    fn motions_begin_and_end_at_rest_and_are_smooth_all_along() {
+        let (series, blend) = motion();
+        let end = blend.duration(series.period());
+        assert!((end - 8.0).abs() < 1e-12);
+        for t in [0.0, end, -1.0, end + 3.0] {
+            let k = blend.at(&series, t);
+            assert_eq!((k.xd[0], k.xdd[0]), (0.0, 0.0), "at {t} s");
+        }
+        let h = 1e-5;
+        for m in 1..800 {
+            let t = 0.01 * f64::from(m);
+            let [before, here, after] = [t - h, t, t + h].map(|t| blend.at(&series, t));
+            let speed = (after.x[0] - before.x[0]) / (2.0 * h);
+            let acceleration = (after.xd[0] - before.xd[0]) / (2.0 * h);
+            assert!((speed - here.xd[0]).abs() < 1e-8, "at {t} s");
+            assert!((acceleration - here.xdd[0]).abs() < 1e-4, "at {t} s");
+        }
+    }
+
+    #[test]
+    fn whole_periods_between_the_blends_are_those_of_the_series() {
+        let (series, blend) = motion();
+        for m in 0..50 {
+            let t = 1.5 + 0.1 * f64::from(m);
+            let there = series.at(0.7 + 0.75 + t - 1.5);
+            let here = blend.at(&series, t);
+            assert!((here.x[0] - there.x[0]).abs() < 1e-12);
+            assert!((here.xdd[0] - there.xdd[0]).abs() < 1e-10);
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! What a motion must keep, all along: one channel per bounded quantity.
+
+use serde::Serialize;
+
+/// What is bounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    /// Of a designed coordinate \[m or rad\].
+    Position,
+    /// \[m/s or rad/s\]
+    Speed,
+    /// \[m/s^2 or rad/s^2\]
+    Acceleration,
+    /// Volts, or the torque where the motors are at the joints.
+    Drive,
+    /// Of a joint \[N or N m\].
+    Torque,
+    /// \[m or rad\]
+    JointPosition,
+    /// \[m/s or rad/s\]
+    JointSpeed,
+    /// \[m/s^2 or rad/s^2\]
+    JointAcceleration,
+    /// sin q5 of the CFT robot, which vanishes where links 4 and 5 are in line; 1 elsewhere.
+    Clearance,
+}
+
+impl Quantity {
+    /// Whether it is linear in the coefficients of the series.
+    pub(super) fn is_linear(self) -> bool {
+        matches!(self, Self::Position | Self::Speed | Self::Acceleration)
+    }
+
+    /// The word in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Position | Self::JointPosition => "position",
+            Self::Speed | Self::JointSpeed => "speed",
+            Self::Acceleration | Self::JointAcceleration => "acceleration",
+            Self::Drive => "volts",
+            Self::Torque => "torque",
+            Self::Clearance => "sin q5",
+        }
+    }
+}
+
+/// One bounded quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    pub quantity: Quantity,
+    /// Coordinate or joint, from 0.
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    pub unit: String,
+    /// The least that is allowed; negative infinity where nothing bounds it.
+    pub lower: f64,
+    /// The most that is allowed.
+    pub upper: f64,
+}
+
+impl Channel {
+    /// A channel bounded to `-most..=most`.
+    pub fn symmetric(quantity: Quantity, index: usize, name: &str, unit: &str, most: f64) -> Self {
+        Self {
+            quantity,
+            index,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            lower: -most,
+            upper: most,
+        }
+    }
+
+    /// The same with `share` of the room taken away at each side: of half the span, or of the
+    /// least where nothing bounds it above.
+    pub fn reserved(&self, share: f64) -> Self {
+        let mut out = self.clone();
+        if self.upper.is_finite() {
+            let half = 0.5 * (self.upper - self.lower);
+            out.lower += share * half;
+            out.upper -= share * half;
+        } else {
+            out.lower *= 1.0 + share;
+        }
+        out
+    }
+
+    /// How much of what is allowed the value takes: 1 at a limit, above 1 beyond it.
+    #[inline]
+    pub fn used(&self, value: f64) -> f64 {
+        if self.upper.is_finite() {
+            let half = 0.5 * (self.upper - self.lower);
+            (value - 0.5 * (self.upper + self.lower)).abs() / half
+        } else if value > 0.0 {
+            self.lower / value
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// The constraints g <= 0 of a value as pairs (g, dg/dvalue): one for each bounded side.
+    #[inline]
+    pub(super) fn constraints(&self, value: f64) -> [(f64, f64); 2] {
+        if self.upper.is_finite() {
+            let half = 0.5 * (self.upper - self.lower);
+            let g = (value - 0.5 * (self.upper + self.lower)) / half;
+            [(g - 1.0, 1.0 / half), (-g - 1.0, -1.0 / half)]
+        } else {
+            let slope = 1.0 / self.lower;
+            [(1.0 - value * slope, -slope), (f64::NEG_INFINITY, 0.0)]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn position() -> Channel {
+        Channel {
+            lower: -0.1,
+            upper: 0.5,
+            ..Channel::symmetric(Quantity::Position, 0, "x_c4", "m", 1.0)
+        }
+    }
+
+    #[test]
+    fn use_of_a_limit_is_one_at_the_limit_on_either_side() {
+        let channel = position();
+        assert!((channel.used(-0.1) - 1.0).abs() < 1e-12);
+        assert!((channel.used(0.5) - 1.0).abs() < 1e-12);
+        assert!(channel.used(0.2) < 1e-12);
+        let reserved = channel.reserved(0.1);
+        assert!((reserved.lower + 0.07).abs() < 1e-12 && (reserved.upper - 0.47).abs() < 1e-12);
+        let clearance = Channel {
+            upper: f64::INFINITY,
+            lower: 0.2,
+            ..Channel::symmetric(Quantity::Clearance, 0, "q5", "", 1.0)
+        };
+        assert_eq!(clearance.used(0.2), 1.0);
+        assert_eq!(clearance.used(0.4), 0.5);
+        assert_eq!(clearance.used(-0.1), f64::INFINITY);
+        assert!(clearance.reserved(0.1).lower > 0.2);
+    }
+
+    #[test]
+    fn constraints_change_sign_at_the_limit_and_know_their_slope() {
+        for value in [-0.2, 0.1, 0.55] {
+            let here = position().constraints(value);
+            let there = position().constraints(value + 1e-6);
+            for (a, b) in here.iter().zip(there) {
+                assert!(((b.0 - a.0) / 1e-6 - a.1).abs() < 1e-6);
+            }
+            let most = here[0].0.max(here[1].0);
+            assert!((most - (position().used(value) - 1.0)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! A motion that is to be judged before the robot moves: a series with its blends, or any other
+//! reference that the simulator can follow.
+
+use std::f64::consts::TAU;
+
+use crate::config::trajectory::{Coordinates, Fourier, Trajectory};
+use crate::config::{ModelFile, RobotFile};
+use crate::robot::cft::pantograph::{cartesian, cartesian_accelerations, cartesian_velocities};
+use crate::simulate::from_files::{
+    cft_reference, cft_truth, single_joint_reference, single_joint_truth,
+};
+use crate::simulate::{Frame, Reference};
+
+use super::ExciteError;
+use super::blend::Blend;
+use super::from_files::series_of;
+use super::limits::Channel;
+use super::machine::{Machine, Motors};
+use super::series::{Kinematics, Series};
+use super::usage::{Path, Use, along, along_blend, along_period};
+
+/// Step of the differences that give the acceleration of a reference \[s\].
+const STEP: f64 = 1e-4;
+/// First parts per second of a reference, looked through for its nearest approach to a limit.
+const PARTS: f64 = 400.0;
+/// Blend of a series whose file names none, which is the simulator's \[s\].
+const BLEND: f64 = 2.0;
+
+/// Coordinates over time.
+type At = Box<dyn Fn(f64) -> Kinematics + Send + Sync>;
+
+/// A motion from rest to rest, or one that repeats itself.
+pub enum Motion {
+    /// A Fourier series in the designed coordinates.
+    Periodic { series: Series, blend: Blend },
+    /// Any other reference, over its duration \[s\].
+    Path { at: At, seconds: f64 },
+}
+
+impl Motion {
+    /// The motion of a trajectory file. `seconds` and `seed` are those of a one-joint ladder.
+    ///
+    /// # Errors
+    /// [`ExciteError`] where the trajectory names what the machine does not have, or does not fit.
+    pub fn of_file(
+        machine: &Machine,
+        robot: &RobotFile,
+        model: Option<(&str, &ModelFile)>,
+        file: &Trajectory,
+        seconds: f64,
+        seed: u64,
+    ) -> Result<Self, ExciteError> {
+        if let Trajectory::Fourier(fourier) = file
+            && fourier.coordinates == machine.designed()
+        {
+            return Ok(Self::Periodic {
+                series: series_of(machine, fourier)?,
+                blend: blend_of(fourier),
+            });
+        }
+        let length = |own: Option<f64>| match file {
+            // a period that repeats itself
+            Trajectory::Fourier(fourier) => own.unwrap_or(1.0 / fourier.fundamental_hz),
+            _ => own.unwrap_or(seconds),
+        };
+        match machine.motors {
+            Motors::Cft(setup) => {
+                let truth = cft_truth(robot, model)?;
+                let reference = cft_reference(robot, file, truth.setup, Some(seconds), seed)?;
+                reference.path.check()?;
+                debug_assert_eq!(truth.setup, setup);
+                let seconds = length(reference.path.seconds());
+                Ok(Self::Path {
+                    at: Box::new(move |t| cft_kinematics(&reference, t)),
+                    seconds,
+                })
+            }
+            Motors::Joints => {
+                let truth = single_joint_truth(robot, model)?;
+                let reference = single_joint_reference(robot, &truth, file, Some(seconds), seed)?;
+                reference.path.check()?;
+                let seconds = length(reference.path.seconds());
+                Ok(Self::Path {
+                    at: Box::new(move |t| {
+                        let (x, xd, xdd) = differentiated(&reference, t);
+                        spread(&x, &xd, &xdd)
+                    }),
+                    seconds,
+                })
+            }
+        }
+    }
+
+    /// All coordinates at the time t of the motion \[s\].
+    pub fn at(&self, t: f64) -> Kinematics {
+        match self {
+            Self::Periodic { series, blend } => blend.at(series, t),
+            Self::Path { at, .. } => at(t),
+        }
+    }
+
+    /// Duration of the motion \[s\].
+    pub fn seconds(&self) -> f64 {
+        match self {
+            Self::Periodic { series, blend } => blend.duration(series.period()),
+            Self::Path { seconds, .. } => *seconds,
+        }
+    }
+
+    /// How near the motion comes to every channel, blends and what lies between samples included.
+    pub fn usage(&self, machine: &Machine, channels: &[Channel]) -> Vec<Use> {
+        match self {
+            Self::Periodic { series, blend } => {
+                let whole = along_period(machine, channels, series);
+                let ends = along_blend(machine, channels, series, blend);
+                let pairs = whole.into_iter().zip(ends);
+                pairs.map(|(whole, ends)| whole.joined(ends)).collect()
+            }
+            Self::Path { at, seconds } => {
+                let path = Path {
+                    at,
+                    interval: [0.0, *seconds],
+                    parts: (PARTS * seconds).ceil().max(64.0) as usize,
+                };
+                along(machine, channels, &path)
+            }
+        }
+    }
+}
+
+impl Machine {
+    /// The coordinates in which motions of this machine are designed.
+    pub fn designed(&self) -> Coordinates {
+        match self.motors {
+            Motors::Cft(_) => Coordinates::Cartesian,
+            Motors::Joints => Coordinates::Joint,
+        }
+    }
+}
+
+/// Start, blend and periods of a file, blended as the simulator does where it does not say.
+fn blend_of(file: &Fourier) -> Blend {
+    Blend {
+        start: file.start_s.unwrap_or(0.0),
+        seconds: file.blend_s.unwrap_or(BLEND),
+        periods: file.periods,
+    }
+}
+
+fn differentiated<const J: usize>(
+    reference: &Reference<J>,
+    t: f64,
+) -> ([f64; J], [f64; J], [f64; J]) {
+    let here = reference.path.at(t);
+    let (before, after) = (
+        reference.path.at(t - STEP).velocity,
+        reference.path.at(t + STEP).velocity,
+    );
+    let acceleration = std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * STEP));
+    (here.position, here.velocity, acceleration)
+}
+
+fn spread(x: &[f64], xd: &[f64], xdd: &[f64]) -> Kinematics {
+    let mut k = Kinematics::REST;
+    k.x[..x.len()].copy_from_slice(x);
+    k.xd[..x.len()].copy_from_slice(xd);
+    k.xdd[..x.len()].copy_from_slice(xdd);
+    k
+}
+
+fn cft_kinematics(reference: &Reference<4>, t: f64) -> Kinematics {
+    let (x, xd, xdd) = differentiated(reference, t);
+    match reference.frame {
+        Frame::Motors => spread(&x, &xd, &xdd),
+        Frame::Joints => spread(
+            &cartesian(&x),
+            &cartesian_velocities(&x, &xd),
+            &cartesian_accelerations(&x, &xd, &xdd),
+        ),
+    }
+}
+
+/// Amplitudes of the speed per harmonic of a series, coordinate after coordinate \[m/s or rad/s\].
+pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
+    let pairs = series.a.iter().zip(&series.b);
+    pairs
+        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.hypot(*b)).collect())
+        .collect()
+}
+
+/// Frequency \[Hz\] below which a share of the torque's power along the period lies, per joint; the
+/// constant part is left out. What lies above a log's filter is lost to the fit.
+///
+/// # Errors
+/// [`ExciteError::Robot`] where the machine cannot follow.
+pub fn torque_band(
+    machine: &Machine,
+    series: &Series,
+    share: f64,
+) -> Result<Vec<f64>, ExciteError> {
+    const SAMPLES: usize = 1024;
+    const LINES: usize = 256;
+    let n = machine.coordinates();
+    let mut tau = vec![0.0; SAMPLES * n];
+    for m in 0..SAMPLES {
+        let t = series.period() * m as f64 / SAMPLES as f64;
+        let state = machine.state(&series.at(t))?;
+        tau[m * n..(m + 1) * n].copy_from_slice(&state.tau[..n]);
+    }
+    let power = |j: usize, l: usize| {
+        let (mut c, mut s) = (0.0, 0.0);
+        for m in 0..SAMPLES {
+            let (sin, cos) = (TAU * (m * l % SAMPLES) as f64 / SAMPLES as f64).sin_cos();
+            c += cos * tau[m * n + j];
+            s += sin * tau[m * n + j];
+        }
+        c * c + s * s
+    };
+    Ok((0..n)
+        .map(|j| {
+            let lines: Vec<f64> = (1..=LINES).map(|l| power(j, l)).collect();
+            let whole: f64 = lines.iter().sum();
+            let mut below = 0.0;
+            let first = lines.iter().position(|line| {
+                below += line;
+                below >= share * whole
+            });
+            (first.unwrap_or(LINES) + 1) as f64 / series.period()
+        })
+        .collect())
+}

@@ -1,0 +1,346 @@
+//! Many starts, repaired, searched in parallel, the best kept: the design of one motion.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::ExciteError;
+use super::criterion::Criterion;
+use super::information::Information;
+use super::lagrangian::{Round, Search};
+use super::limits::{Channel, Quantity};
+use super::machine::Machine;
+use super::objective::{Objective, Prior};
+use super::repair::{Care, repaired};
+use super::series::Series;
+use super::start::random_motion;
+use super::usage::{along_period, worst};
+use super::variables::Variables;
+
+/// What is to be designed, and how hard to look.
+#[derive(Debug, Clone)]
+pub struct Task {
+    pub criterion: Criterion,
+    /// Fundamental frequency \[Hz\].
+    pub fundamental_hz: f64,
+    /// Harmonics N.
+    pub harmonics: usize,
+    /// Offset per coordinate that must be kept; the search chooses the others.
+    pub offsets: Vec<Option<f64>>,
+    /// Share of every limit that is kept free, for what a controller strays from the path.
+    pub reserve: f64,
+    /// Information that is there already.
+    pub prior: Option<Prior>,
+    /// Random starts.
+    pub starts: usize,
+    /// Evaluations that each start may take; as many as its rounds have where absent.
+    pub evaluations: Option<u64>,
+    pub seed: u64,
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    pub series: Series,
+    /// Evaluations of the criterion with its derivative, over all starts.
+    pub evaluations: u64,
+    /// Start that it came from, counted from 0.
+    pub start: usize,
+    /// Starts that gave a motion within the limits.
+    pub usable: usize,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
+/// What a start has given: the criterion and the motion within the limits.
+type Best = Option<(f64, Series)>;
+
+/// Rounds that every start gets.
+const FIRST: [Round; 3] = [
+    Round {
+        sharpness: 6.0,
+        evaluations: 60,
+    },
+    Round {
+        sharpness: 8.0,
+        evaluations: 40,
+    },
+    Round {
+        sharpness: 12.0,
+        evaluations: 40,
+    },
+];
+/// Rounds that the best of them get on top.
+const SECOND: [Round; 8] = [
+    Round {
+        sharpness: 16.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 24.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 32.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 48.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 64.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 96.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 128.0,
+        evaluations: 100,
+    },
+    Round {
+        sharpness: 192.0,
+        evaluations: 100,
+    },
+];
+/// Rounds after torques and volts have been looked at between the samples.
+const LAST: [Round; 3] = [
+    Round {
+        sharpness: 128.0,
+        evaluations: 80,
+    },
+    Round {
+        sharpness: 192.0,
+        evaluations: 80,
+    },
+    Round {
+        sharpness: 256.0,
+        evaluations: 80,
+    },
+];
+/// Excess between samples, as a share of the limit, that is left to the repair.
+const EXCESS: f64 = 2e-3;
+/// One start in so many gets the second part.
+const FINALISTS: usize = 4;
+/// Samples of the period per harmonic in the search.
+const SAMPLES: usize = 12;
+
+impl Task {
+    /// Evaluations that the search will take at most.
+    pub fn most_evaluations(&self) -> u64 {
+        let sum = |rounds: &[Round]| rounds.iter().map(|r| r.evaluations).sum::<u64>();
+        let most = self.evaluations.unwrap_or(u64::MAX);
+        let first = sum(&FIRST).min(most);
+        let last = (sum(&SECOND) + sum(&LAST)).min(most - first);
+        self.starts as u64 * first + self.finalists() as u64 * last
+    }
+
+    fn finalists(&self) -> usize {
+        self.starts.div_ceil(FINALISTS).max(2).min(self.starts)
+    }
+}
+
+/// Designs one motion of the machine.
+///
+/// `progress` is told the evaluations of each step; when `stop` becomes true the search ends with
+/// the best motion that it has. The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`ExciteError`] where limits are missing or contradict each other, and where no start could be
+/// repaired.
+pub fn design(
+    machine: &Machine,
+    task: &Task,
+    progress: &(dyn Fn(u64) + Sync),
+    stop: &AtomicBool,
+) -> Result<Found, ExciteError> {
+    let channels: Vec<Channel> = machine
+        .channels
+        .iter()
+        .map(|c| c.reserved(task.reserve))
+        .collect();
+    check(machine, task, &channels)?;
+    let n = machine.coordinates();
+    let variables = Variables::new(
+        &channels,
+        n,
+        TAU * task.fundamental_hz,
+        task.harmonics,
+        task.offsets.clone(),
+    );
+    let samples = (SAMPLES * task.harmonics).max(25);
+    let objective = Objective::new(
+        machine,
+        &task.criterion,
+        &channels,
+        variables,
+        task.prior.as_ref(),
+        samples,
+    );
+    let spent = AtomicU64::new(0);
+    let stopped = || stop.load(Ordering::Relaxed);
+    let step = |objective: &Objective, search: &mut Search, rounds: &[Round]| {
+        let mut work = objective.work();
+        let before = search.evaluations;
+        let most = task.evaluations.unwrap_or(u64::MAX);
+        search.run(objective, rounds, most, &mut work, &stopped);
+        let more = search.evaluations - before;
+        spent.fetch_add(more, Ordering::Relaxed);
+        progress(more);
+    };
+    let finish = |search: &Search| {
+        let mut series = objective.work().series;
+        objective.variables.series(&search.z, &mut series);
+        let series = repaired(machine, &channels, &series, &task.offsets, Care::Thorough)?;
+        let series = rounded(machine, &channels, series);
+        let value = value(machine, task, &series)?;
+        Some((value, series))
+    };
+    let mut searches: Vec<(usize, Search, Best)> = (0..task.starts)
+        .into_par_iter()
+        .filter_map(|start| {
+            // one start is looked through whatever happens
+            if start > 0 && stopped() {
+                return None;
+            }
+            let motion = random_motion(machine, &channels, &objective.variables, task.seed, start);
+            let z = objective.variables.of(&motion);
+            let mut search = Search::new(&objective, z);
+            step(&objective, &mut search, &FIRST);
+            let found = finish(&search);
+            Some((start, search, found))
+        })
+        .collect();
+    let order = |a: &Best, b: &Best| {
+        let of = |x: &Best| x.as_ref().map_or(f64::INFINITY, |x| x.0);
+        of(a).total_cmp(&of(b))
+    };
+    searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
+    let usable = searches.iter().filter(|s| s.2.is_some()).count();
+    let last = task.finalists().min(searches.len());
+    searches[..last]
+        .par_iter_mut()
+        .for_each(|(_, search, found)| {
+            let mut keep_better = |search: &Search| {
+                let after = finish(search);
+                if order(&after, found).is_lt() {
+                    *found = after;
+                }
+            };
+            step(&objective, search, &SECOND);
+            keep_better(search);
+            if let Some(tightened) = objective.tightened(&search.z, EXCESS) {
+                step(&tightened, search, &LAST);
+                keep_better(search);
+            }
+        });
+    searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
+    let evaluations = spent.into_inner();
+    let best = searches.into_iter().next();
+    match best {
+        Some((start, _, Some((_, series)))) => Ok(Found {
+            series,
+            evaluations,
+            start,
+            usable,
+            stopped: stopped(),
+        }),
+        _ => Err(nothing_fits(machine, &channels, &objective.variables, task)),
+    }
+}
+
+/// The criterion as it is, smaller is better.
+fn value(machine: &Machine, task: &Task, series: &Series) -> Option<f64> {
+    let information = Information::of_period(machine, series, 40 * task.harmonics).ok()?;
+    let value = information.value(machine, &task.criterion, task.prior.as_ref());
+    value.ok().filter(|value| value.is_finite())
+}
+
+/// The series with its coefficients at six decimals, where it keeps the channels so too.
+fn rounded(machine: &Machine, channels: &[Channel], series: Series) -> Series {
+    const DECIMALS: f64 = 1e6;
+    // what rounding moves, taken off the amplitudes first
+    let mut out = series.scaled(1.0 - 1e-5);
+    let numbers = out.a.iter_mut().chain(&mut out.b).flatten();
+    for x in numbers.chain(&mut out.offset) {
+        // adding 0 takes the sign of a zero away
+        *x = (*x * DECIMALS).round() / DECIMALS + 0.0;
+    }
+    if worst(&along_period(machine, channels, &out)) <= 1.0 {
+        out
+    } else {
+        series
+    }
+}
+
+/// Refuses what no search can mend.
+fn check(machine: &Machine, task: &Task, channels: &[Channel]) -> Result<(), ExciteError> {
+    let names = machine.coordinate_names();
+    for (i, name) in names.iter().enumerate() {
+        let of = |quantity| {
+            channels
+                .iter()
+                .find(|c| c.quantity == quantity && c.index == i)
+        };
+        let Some(position) = of(Quantity::Position) else {
+            return Err(ExciteError::NoTravel {
+                coordinate: name.clone(),
+            });
+        };
+        let bounded = machine.channels.iter().any(|c| {
+            c.index == i && c.quantity != Quantity::Position && c.quantity != Quantity::Clearance
+        });
+        if !bounded {
+            return Err(ExciteError::NoSpeed {
+                coordinate: name.clone(),
+            });
+        }
+        if let Some(offset) = task.offsets[i]
+            && !(position.lower..=position.upper).contains(&offset)
+        {
+            return Err(ExciteError::OffsetOutside {
+                coordinate: name.clone(),
+                offset,
+                lower: position.lower,
+                upper: position.upper,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Names the limit that standing still breaks, or says that nothing is excited.
+fn nothing_fits(
+    machine: &Machine,
+    channels: &[Channel],
+    variables: &Variables,
+    task: &Task,
+) -> ExciteError {
+    let rest = random_motion(machine, channels, variables, task.seed, 0).scaled(0.0);
+    let uses = along_period(machine, channels, &rest);
+    match uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
+        Some(u) if u.share > 1.0 => ExciteError::CannotRest {
+            channel: u.channel.name.clone(),
+            quantity: u.channel.quantity.name(),
+            value: if u.range[1].abs() > u.range[0].abs() {
+                u.range[1]
+            } else {
+                u.range[0]
+            },
+            lower: u.channel.lower,
+            upper: u.channel.upper,
+        },
+        _ => ExciteError::NothingExcited {
+            unknowns: machine.unknowns(),
+            starts: task.starts,
+        },
+    }
+}
+
+/// Whether a series keeps every limit of the machine along its period.
+pub fn keeps_limits(machine: &Machine, series: &Series) -> bool {
+    worst(&along_period(machine, &machine.channels, series)) <= 1.0
+}

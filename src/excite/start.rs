@@ -1,0 +1,72 @@
+//! Random motions that fill the limits: where searches start, and what stands for a usual motion.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::limits::Channel;
+use super::machine::Machine;
+use super::repair::{Care, repaired};
+use super::series::Series;
+use super::variables::Variables;
+
+/// Standard deviation of the offsets about the middle, in half spans.
+const SPREAD: f64 = 0.2;
+/// A motion is drawn this many times too large, so that its repair lets it fill the limits.
+const BEYOND: f64 = 10.0;
+/// Random motions whose torques stand for usual ones, their seed and the samples of each.
+const USUAL: usize = 16;
+const USUAL_SEED: u64 = 0;
+const SAMPLES: usize = 64;
+
+/// Random motion number `number` of a seed, within the channels; one that stands still at its
+/// offsets where none could be made to fit.
+pub(super) fn random_motion(
+    machine: &Machine,
+    channels: &[Channel],
+    variables: &Variables,
+    seed: u64,
+    number: usize,
+) -> Series {
+    let mut chance = ChaCha8Rng::seed_from_u64(seed);
+    chance.set_stream(number as u64 + 1);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut chance) };
+    let n = variables.coordinates();
+    let mut series = Series::still(variables.fundamental, n, variables.harmonics);
+    for i in 0..n {
+        let (middle, half) = variables.span[i];
+        let shift = SPREAD * half * normal().clamp(-2.0, 2.0);
+        series.offset[i] = variables.fixed[i].unwrap_or(middle + shift);
+        for l in 0..variables.harmonics {
+            series.a[i][l] = variables.speed[i] * normal();
+            series.b[i][l] = variables.speed[i] * normal();
+        }
+    }
+    let large = series.scaled(BEYOND);
+    repaired(machine, channels, &large, &variables.fixed, Care::Rough)
+        .unwrap_or_else(|| series.scaled(0.0))
+}
+
+/// Root mean square of every joint's torque over random motions that fill the limits \[N or N m\]:
+/// what a share of the torque refers to before there is a motion.
+pub fn usual_torque(machine: &Machine, fundamental: f64, harmonics: usize) -> Vec<f64> {
+    let n = machine.coordinates();
+    let free = vec![None; n];
+    let channels = &machine.channels;
+    let variables = Variables::new(channels, n, fundamental, harmonics, free);
+    let (mut squares, mut count) = (vec![0.0; n], 0usize);
+    for number in 0..USUAL {
+        let series = random_motion(machine, channels, &variables, USUAL_SEED, number);
+        for m in 0..SAMPLES {
+            let t = series.period() * m as f64 / SAMPLES as f64;
+            if let Ok(state) = machine.state(&series.at(t)) {
+                for (sum, tau) in squares.iter_mut().zip(state.tau) {
+                    *sum += tau * tau;
+                }
+                count += 1;
+            }
+        }
+    }
+    let size = |sum: &f64| (sum / count.max(1) as f64).sqrt();
+    squares.iter().map(size).collect()
+}

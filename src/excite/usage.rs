@@ -1,0 +1,239 @@
+//! How near a motion comes to each limit, between samples too.
+
+use std::f64::consts::TAU;
+
+use super::blend::Blend;
+use super::limits::{Channel, Quantity};
+use super::machine::{Machine, State};
+use super::peak::{Peak, highest, highest_from};
+use super::series::{Kinematics, Series};
+
+/// How far a highest share may be off the one found.
+const TOLERANCE: f64 = 1e-7;
+/// First parts of a period for what is not a trigonometric polynomial: friction turns round within
+/// milliseconds.
+const PARTS: usize = 1024;
+/// The same where a motion is only prepared.
+const ROUGH_PARTS: usize = 96;
+/// The same as [`TOLERANCE`] in a search.
+const CLOSE: f64 = 1e-5;
+const ROUGH: f64 = 1e-3;
+
+/// A channel along a motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Use {
+    pub channel: Channel,
+    /// Least and most of the quantity.
+    pub range: [f64; 2],
+    /// Share of the limit: 1 at it, above 1 beyond it; infinite where the machine cannot follow.
+    pub share: f64,
+    /// Time at which it comes nearest \[s\], on the clock of what was looked along.
+    pub t: f64,
+}
+
+/// All coordinates as a function of time, over an interval.
+pub struct Path<'a> {
+    pub at: &'a (dyn Fn(f64) -> Kinematics + Sync),
+    /// From and to \[s\].
+    pub interval: [f64; 2],
+    /// Equal parts to begin with.
+    pub parts: usize,
+}
+
+/// Channels along the whole period of a series: those that are trigonometric polynomials with a
+/// certain bound, the others with one from their measured curvature.
+pub fn along_period(machine: &Machine, channels: &[Channel], series: &Series) -> Vec<Use> {
+    period(machine, channels, series, PARTS, TOLERANCE)
+}
+
+/// [`along_period`] with bounds that lie a little higher, for searches.
+pub(super) fn closely_along_period(
+    machine: &Machine,
+    channels: &[Channel],
+    series: &Series,
+) -> Vec<Use> {
+    period(machine, channels, series, PARTS, CLOSE)
+}
+
+/// [`along_period`], to a thousandth.
+pub(super) fn roughly_along_period(
+    machine: &Machine,
+    channels: &[Channel],
+    series: &Series,
+) -> Vec<Use> {
+    period(machine, channels, series, ROUGH_PARTS, ROUGH)
+}
+
+fn period(
+    machine: &Machine,
+    channels: &[Channel],
+    series: &Series,
+    parts: usize,
+    tolerance: f64,
+) -> Vec<Use> {
+    let path = Path {
+        at: &|t| series.at(t),
+        interval: [0.0, series.period()],
+        parts,
+    };
+    let (linear, curved): (Vec<&Channel>, Vec<&Channel>) =
+        channels.iter().partition(|c| c.quantity.is_linear());
+    let mut curved = of_path(machine, &curved, &path, tolerance).into_iter();
+    let mut linear = linear.into_iter().map(|c| of_polynomial(c, series));
+    channels
+        .iter()
+        .filter_map(|c| match c.quantity.is_linear() {
+            true => linear.next(),
+            false => curved.next(),
+        })
+        .collect()
+}
+
+/// Channels along any path.
+pub fn along(machine: &Machine, channels: &[Channel], path: &Path) -> Vec<Use> {
+    let channels: Vec<&Channel> = channels.iter().collect();
+    of_path(machine, &channels, path, TOLERANCE)
+}
+
+/// Channels along the motion from rest to rest, outside the whole periods.
+pub fn along_blend(
+    machine: &Machine,
+    channels: &[Channel],
+    series: &Series,
+    blend: &Blend,
+) -> Vec<Use> {
+    let at = |t| blend.at(series, t);
+    let parts = (PARTS as f64 * (blend.seconds / series.period()).max(0.25)).ceil() as usize;
+    let over = |interval| {
+        let path = Path {
+            at: &at,
+            interval,
+            parts,
+        };
+        along(machine, channels, &path)
+    };
+    let into = over([0.0, blend.seconds]);
+    if blend.periods.is_none() {
+        return into;
+    }
+    let end = blend.duration(series.period());
+    let out = over([end - blend.seconds, end]);
+    into.into_iter()
+        .zip(out)
+        .map(|(a, b)| a.joined(b))
+        .collect()
+}
+
+impl Use {
+    /// The same channel along two motions.
+    pub fn joined(self, other: Self) -> Self {
+        let range = [
+            self.range[0].min(other.range[0]),
+            self.range[1].max(other.range[1]),
+        ];
+        let nearest = if other.share > self.share {
+            other
+        } else {
+            self
+        };
+        Self { range, ..nearest }
+    }
+}
+
+/// The largest share of several channels, 0 where there are none.
+pub fn worst(uses: &[Use]) -> f64 {
+    uses.iter().fold(0.0, |most, u| most.max(u.share))
+}
+
+fn gathered(channel: &Channel, most: Peak, least: Peak) -> Use {
+    // least is the peak of the negative
+    let upper = channel.used(most.bound);
+    let lower = channel.used(-least.bound);
+    let one_sided = channel.upper.is_infinite();
+    let broken = most.value == f64::INFINITY || least.value == f64::INFINITY;
+    let (share, t) = if broken {
+        let t = if most.value == f64::INFINITY {
+            most.t
+        } else {
+            least.t
+        };
+        (f64::INFINITY, t)
+    } else if upper > lower && !one_sided {
+        (upper, most.t)
+    } else {
+        (lower, least.t)
+    };
+    Use {
+        channel: channel.clone(),
+        range: [-least.value, most.value],
+        share,
+        t,
+    }
+}
+
+/// Size of a channel's room: what a share of 1 stands for.
+fn room(channel: &Channel) -> f64 {
+    if channel.upper.is_finite() {
+        0.5 * (channel.upper - channel.lower)
+    } else {
+        channel.lower
+    }
+}
+
+fn of_polynomial(channel: &Channel, series: &Series) -> Use {
+    let i = channel.index;
+    let order = match channel.quantity {
+        Quantity::Position => 0,
+        Quantity::Speed => 1,
+        _ => 2,
+    };
+    let curvature = series.derivative_bound(i, order + 2);
+    let interval = [0.0, TAU / series.fundamental];
+    let parts = 8 * series.harmonics().max(1);
+    let peak = |sign: f64| {
+        let mut f = |t| sign * series.one(i, t)[order as usize];
+        highest(
+            &mut f,
+            interval,
+            parts,
+            Some(curvature),
+            TOLERANCE * room(channel),
+        )
+    };
+    gathered(channel, peak(1.0), peak(-1.0))
+}
+
+fn of_path(machine: &Machine, channels: &[&Channel], path: &Path, tolerance: f64) -> Vec<Use> {
+    let [from, to] = path.interval;
+    let state = |t: f64| {
+        let k = (path.at)(t);
+        let state = machine.state(&k).ok();
+        (k, state)
+    };
+    let grid: Vec<(Kinematics, Option<State>)> = (0..=path.parts)
+        .map(|m| state(from + (to - from) * m as f64 / path.parts as f64))
+        .collect();
+    let value = |channel: &Channel, (k, state): &(Kinematics, Option<State>)| {
+        let i = channel.index;
+        match channel.quantity {
+            Quantity::Position => k.x[i],
+            Quantity::Speed => k.xd[i],
+            Quantity::Acceleration => k.xdd[i],
+            _ => state
+                .as_ref()
+                .map_or(f64::NAN, |state| machine.quantity(channel, state)),
+        }
+    };
+    channels
+        .iter()
+        .map(|channel| {
+            let peak = |sign: f64| {
+                let samples: Vec<f64> = grid.iter().map(|at| sign * value(channel, at)).collect();
+                let mut f = |t| sign * value(channel, &state(t));
+                let tolerance = tolerance * room(channel);
+                highest_from(&mut f, path.interval, &samples, None, tolerance)
+            };
+            gathered(channel, peak(1.0), peak(-1.0))
+        })
+        .collect()
+}

@@ -1,0 +1,119 @@
+//! The numbers that a search turns: offsets and coefficients, scaled to about 1.
+
+use super::limits::{Channel, Quantity};
+use super::series::Series;
+
+/// Length of one unit of a search variable, in half spans and speed limits: the first step of a search
+/// is one unit long at most.
+const UNIT: f64 = 0.05;
+
+/// A map from search variables to the coefficients of a series.
+///
+/// Per coordinate: the offset in half spans about the middle (left out where it is given), then the
+/// a and the b in speed limits. Scaled so, a step of 1 is a fair one in each of them.
+#[derive(Debug, Clone)]
+pub(super) struct Variables {
+    pub fundamental: f64,
+    pub harmonics: usize,
+    /// Offset per coordinate that the search must keep.
+    pub fixed: Vec<Option<f64>>,
+    /// Middle and half span of each coordinate.
+    pub span: Vec<(f64, f64)>,
+    /// Unit of the a and b of each coordinate.
+    pub speed: Vec<f64>,
+}
+
+impl Variables {
+    /// Scales from the limits of `n` coordinates; positions must be bounded. Where nothing bounds
+    /// the speed, that which crosses the span within a period of the highest harmonic stands in.
+    pub fn new(
+        channels: &[Channel],
+        n: usize,
+        fundamental: f64,
+        harmonics: usize,
+        fixed: Vec<Option<f64>>,
+    ) -> Self {
+        let of = |quantity: Quantity, i: usize| {
+            channels
+                .iter()
+                .find(|c| c.quantity == quantity && c.index == i)
+        };
+        let span: Vec<(f64, f64)> = (0..n)
+            .map(|i| {
+                of(Quantity::Position, i).map_or((0.0, 1.0), |c| {
+                    (0.5 * (c.lower + c.upper), 0.5 * (c.upper - c.lower))
+                })
+            })
+            .collect();
+        let speed = (0..n)
+            .map(|i| {
+                let natural = fundamental * harmonics as f64 * span[i].1;
+                of(Quantity::Speed, i).map_or(natural, |c| c.upper.min(natural))
+            })
+            .collect();
+        Self {
+            fundamental,
+            harmonics,
+            fixed,
+            span,
+            speed,
+        }
+    }
+
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.span.len()
+    }
+
+    /// Number of search variables.
+    pub fn len(&self) -> usize {
+        let free = self.fixed.iter().filter(|o| o.is_none()).count();
+        free + 2 * self.harmonics * self.coordinates()
+    }
+
+    /// Writes the series of z.
+    pub fn series(&self, z: &[f64], out: &mut Series) {
+        let mut z = z.iter();
+        let mut next = || z.next().copied().unwrap_or(0.0);
+        for i in 0..self.coordinates() {
+            let (middle, half) = self.span[i];
+            out.offset[i] = self.fixed[i].unwrap_or_else(|| middle + UNIT * half * next());
+            for a in &mut out.a[i] {
+                *a = UNIT * self.speed[i] * next();
+            }
+            for b in &mut out.b[i] {
+                *b = UNIT * self.speed[i] * next();
+            }
+        }
+    }
+
+    /// The z of a series: the inverse of [`Self::series`] but for offsets that are given.
+    pub fn of(&self, series: &Series) -> Vec<f64> {
+        let mut z = Vec::with_capacity(self.len());
+        for i in 0..self.coordinates() {
+            let (middle, half) = self.span[i];
+            if self.fixed[i].is_none() {
+                z.push((series.offset[i] - middle) / (UNIT * half));
+            }
+            let speed = UNIT * self.speed[i];
+            z.extend(series.a[i].iter().chain(&series.b[i]).map(|x| x / speed));
+        }
+        z
+    }
+
+    /// Derivatives by z from those by (offset, a, b), coordinate after coordinate.
+    pub fn pull_back(&self, by_coefficients: &[f64], out: &mut [f64]) {
+        let mut at = 0;
+        let rows = by_coefficients.chunks_exact(1 + 2 * self.harmonics);
+        for (i, row) in rows.enumerate() {
+            if self.fixed[i].is_none() {
+                out[at] = UNIT * row[0] * self.span[i].1;
+                at += 1;
+            }
+            for g in &row[1..] {
+                out[at] = UNIT * g * self.speed[i];
+                at += 1;
+            }
+        }
+    }
+}
