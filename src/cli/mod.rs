@@ -4,6 +4,7 @@
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
 mod campaign;
+pub mod excite;
 pub mod friction;
 pub mod identify;
 pub mod inspect;
@@ -75,6 +76,7 @@ enum Command {
     Validate(validate::Args),
     Torque(torque::Args),
     Simulate(simulate::Args),
+    Excite(excite::Args),
 }
 
 impl Command {
@@ -87,6 +89,7 @@ impl Command {
             Command::Validate(args) => validate::run(args, context),
             Command::Torque(args) => torque::run(args, context),
             Command::Simulate(args) => simulate::run(args, context),
+            Command::Excite(args) => excite::run(args, context),
         }
     }
 }
@@ -101,7 +104,10 @@ pub fn main() -> ExitCode {
         }
         let _ = writeln!(std::io::stderr(), "stopping; once more to stop at once");
         std::thread::spawn(|| {
-            std::thread::sleep(GRACE);
+            std::thread::sleep(match KEEPS.load(Ordering::Relaxed) {
+                true => KEEPING,
+                false => GRACE,
+            });
             stop();
         });
     };
@@ -114,6 +120,17 @@ pub fn main() -> ExitCode {
 
 /// Time that a command has to end by itself after Ctrl-C; some loops do not look up that often.
 const GRACE: Duration = Duration::from_secs(1);
+
+/// The same for a command that first writes the best that it has.
+const KEEPING: Duration = Duration::from_secs(30);
+
+/// Whether the command that runs is such a one.
+static KEEPS: AtomicBool = AtomicBool::new(false);
+
+/// From now on the command writes after Ctrl-C what it has, and is given the time for it.
+fn keep_what_there_is() {
+    KEEPS.store(true, Ordering::Relaxed);
+}
 
 /// Ends the process at once, without an unfinished file.
 fn stop() -> ! {

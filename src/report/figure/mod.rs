@@ -1,4 +1,4 @@
-//! Static figures as SVG: measured and reconstructed torque, and friction curves.
+//! Static figures as SVG: measured and reconstructed torque, friction curves, and designed motions.
 //!
 //! A small writer of our own instead of a plot library: panels of unequal height, dashes, bands and
 //! a legend outside the data are what these figures consist of, and the same data must give the same
@@ -8,11 +8,13 @@ mod axis;
 mod decimate;
 mod friction;
 mod legend;
+mod motion;
 mod panel;
 mod svg;
 mod torque;
 
 pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
+pub use motion::{MotionFigure, MotionPanel};
 pub use torque::{JointTorque, TorqueFigure};
 
 /// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).

@@ -1,0 +1,71 @@
+//! Noise levels, and what is used together with a design: logs and other trajectories.
+
+use std::path::Path;
+
+use super::Bench;
+use crate::cli::error::CliError;
+use crate::cli::files;
+use crate::cli::machine::{Machine as Logs, run_error, summary_warnings};
+use crate::config::RobotFile;
+use crate::excite::machine::Machine;
+use crate::excite::{Given, Motion, foresee};
+use crate::inertia::accumulate;
+use crate::log::LogSpec;
+
+/// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
+const NOISE_SHARE: f64 = 0.01;
+
+/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque.
+pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut Machine) {
+    let names = machine.model.robot.joint_names();
+    for ((noise, name), usual) in machine.noise.iter_mut().zip(names).zip(usual) {
+        let given = file.noise.joint.get(name).and_then(|n| n.torque_std);
+        let share = NOISE_SHARE * usual;
+        *noise = given.filter(|std| *std > 0.0).unwrap_or(share);
+        if *noise <= 0.0 {
+            *noise = 1.0;
+        }
+    }
+}
+
+/// Adds what a log or a trajectory tells.
+pub(super) fn add(
+    bench: &mut Bench,
+    name: &str,
+    given: &mut Given,
+    warnings: &mut Vec<String>,
+) -> Result<(), CliError> {
+    let args = bench.args;
+    if Path::new(name).extension().is_some_and(|e| e == "toml") {
+        let file = files::trajectory(Path::new(name))?;
+        bench.inputs.push(file.provenance);
+        let motion = Motion::of_file(
+            &bench.machine,
+            &bench.file,
+            bench.model(),
+            &file.value,
+            args.seconds,
+            args.seed,
+        )?;
+        let (information, rows) =
+            foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
+        given.add_motion(&information, rows);
+        return Ok(());
+    }
+    let spec: LogSpec = name
+        .parse()
+        .map_err(|error| CliError::usage(format!("--with {name}: {error}")))?;
+    let logs = Logs::new(name, bench.file.clone());
+    let mut log = logs.open_positions(&spec, bench.context)?;
+    let (sums, summary) = accumulate(
+        &logs.robot,
+        &bench.machine.columns,
+        &logs.settings(),
+        &mut |block| log.read(block),
+    )
+    .map_err(|error| run_error(&spec, error))?;
+    warnings.extend(summary_warnings(&spec, &summary));
+    bench.inputs.push(log.provenance()?);
+    given.add_log(&sums, summary.samples as f64);
+    Ok(())
+}

@@ -1,0 +1,577 @@
+//! `cft-ident excite`: a motion that makes the parameters as certain as the limits allow, judged
+//! before the robot moves; or the same judgement of a motion that is there.
+
+mod given;
+mod judge;
+mod samples;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::context::Context;
+use super::error::CliError;
+use super::exit::Exit;
+use super::outcome::Outcome;
+use super::outputs::write_text;
+use super::{arguments, files, keep_what_there_is};
+use crate::config::{ModelFile, RobotFile, Trajectory};
+use crate::excite::blend::Blend;
+use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
+use crate::excite::machine::Machine;
+use crate::excite::search::{Task, design};
+use crate::excite::{
+    Criterion, ExciteError, Given, Motion, Prior, foresee, machine, series_of, trajectory,
+    usual_torque,
+};
+use crate::log::Provenance;
+use crate::report::json::Document;
+
+use judge::{Friction, Judged, judge};
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
+  cft-ident excite -r configs/cft.toml --joint q4 -o q4.toml
+  cft-ident excite --check configs/table3.toml";
+
+/// Design a motion for identification that keeps every limit, or check one that is there.
+///
+/// The motion is a finite Fourier series, entered from rest and left to it. Printed before the
+/// robot moves: the expected standard deviation of every parameter, what the motion confounds, and
+/// how near it comes to each limit. Limits, motors and noise are those of the robot file; torques
+/// are foreseen with the model.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Robot file, or a built-in one
+    #[arg(
+        short,
+        long,
+        value_name = "ROBOT.toml",
+        default_value = "configs/cft.toml"
+    )]
+    pub robot: PathBuf,
+    /// Model file that torques and volts are foreseen with [default: the robot's nominal numbers]
+    #[arg(short, long, value_name = "MODEL.toml")]
+    pub model: Option<PathBuf>,
+    /// Trajectory to judge instead of a design; status 1 when it breaks a limit
+    #[arg(long, value_name = "TRAJECTORY.toml", conflicts_with_all = ["output", "with", "trajectories"])]
+    pub check: Option<PathBuf>,
+    /// Design the ladder of speeds of a one-joint experiment instead, for the friction of this joint
+    #[arg(long, value_name = "JOINT", conflicts_with_all = ["check", "with", "trajectories", "offsets"])]
+    pub joint: Option<String>,
+    /// What the motion is to make small
+    #[arg(long, value_enum, default_value_t = CriterionName::Condition)]
+    pub criterion: CriterionName,
+    /// With a-optimal: only this parameter, by its relative error; may be given more than once
+    #[arg(long = "parameter", value_name = "NAME")]
+    pub parameters: Vec<String>,
+    /// Fundamental frequency [Hz]
+    #[arg(long, value_name = "HZ", default_value_t = 0.4, value_parser = arguments::positive)]
+    pub frequency: f64,
+    /// Harmonics of each coordinate
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
+    pub harmonics: u16,
+    /// Whole periods between the ends
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub periods: u32,
+    /// Keep the offsets of this trajectory, such as configs/table3.toml
+    #[arg(long, value_name = "TRAJECTORY.toml")]
+    pub offsets: Option<PathBuf>,
+    /// Share of every limit that the design leaves free, for what a controller strays
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
+    pub margin: f64,
+    /// Log or trajectory (.toml) that is used together with the design; may be given more than once
+    #[arg(long, value_name = "LOG|TRAJECTORY.toml")]
+    pub with: Vec<String>,
+    /// Motions to design, each to complement those before it; written as TRAJECTORY-1.toml, ...
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub trajectories: u16,
+    /// Random starts of the search
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    pub starts: u16,
+    /// Evaluations that each start may take [default: up to 1180]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub evaluations: Option<u64>,
+    /// Seed of the starts
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Trajectory to write
+    #[arg(
+        short,
+        long,
+        value_name = "TRAJECTORY.toml",
+        required_unless_present = "check"
+    )]
+    pub output: Option<PathBuf>,
+    /// Write the motion sample by sample, positions, speeds and accelerations
+    #[arg(long, value_name = "FILE.csv", value_parser = arguments::csv_file)]
+    pub samples: Option<PathBuf>,
+    /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
+    /// [control], else 1000]
+    #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
+    pub rate: Option<f64>,
+    /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
+    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = arguments::positive)]
+    pub seconds: f64,
+    /// Draw positions, speeds and volts with their limits
+    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    pub plot: Option<PathBuf>,
+}
+
+/// What a design makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum CriterionName {
+    /// Condition number of the stacked regressor
+    Condition,
+    /// The same with its columns scaled to norm 1
+    ConditionNormalised,
+    /// -log det(F'F): the volume of the parameters' uncertainty
+    DOptimal,
+    /// Sum of the parameters' variances, given each joint's noise
+    AOptimal,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..0.9).contains(&value) => Ok(value),
+        Ok(_) => Err("must lie in 0..0.9".into()),
+        Err(_) => Err("is not a number".into()),
+    }
+}
+
+/// A search that the user ended.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted; the best motion so far is written to {file}")]
+struct Stopped {
+    file: String,
+}
+
+impl From<ExciteError> for CliError {
+    fn from(error: ExciteError) -> Self {
+        match error {
+            ExciteError::Config(error) => error.into(),
+            ExciteError::Reference(error) => error.into(),
+            error => Self::from_room(Exit::BadInput, &error),
+        }
+    }
+}
+
+/// What a run works on.
+struct Bench<'a> {
+    args: &'a Args,
+    context: &'a Context,
+    file: RobotFile,
+    model: Option<(String, ModelFile)>,
+    machine: Machine,
+    rate_hz: f64,
+    inputs: Vec<Provenance>,
+}
+
+impl Bench<'_> {
+    fn model(&self) -> Option<(&str, &ModelFile)> {
+        self.model
+            .as_ref()
+            .map(|(name, model)| (name.as_str(), model))
+    }
+}
+
+/// Designs or checks.
+///
+/// # Errors
+/// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let names = Names::of(args);
+    let mut read: Vec<&Path> = vec![&args.robot];
+    read.extend(args.model.as_deref());
+    read.extend(args.check.as_deref());
+    read.extend(args.offsets.as_deref());
+    read.extend(args.with.iter().map(Path::new));
+    let outputs: Vec<&Path> = names.iter().flat_map(Names::paths).collect();
+    context.check_outputs(&read, &outputs)?;
+
+    let robot = files::robot(&args.robot)?;
+    let mut inputs = vec![robot.provenance];
+    let model = match &args.model {
+        Some(path) => {
+            let given = files::model_of(path, &robot.value)?;
+            inputs.push(given.provenance);
+            Some((given.name, given.value))
+        }
+        None => None,
+    };
+    let named = model.as_ref().map(|(name, model)| (name.as_str(), model));
+    let mut machine = machine(&robot.value, named)?;
+    let usual = usual_torque(
+        &machine,
+        std::f64::consts::TAU * args.frequency,
+        usize::from(args.harmonics),
+    );
+    given::noise(&robot.value, &usual, &mut machine);
+    let mut bench = Bench {
+        args,
+        context,
+        rate_hz: args.rate.or(robot.value.control.rate_hz).unwrap_or(RATE_HZ),
+        file: robot.value,
+        model,
+        machine,
+        inputs,
+    };
+    match (&args.check, &args.joint) {
+        (Some(path), _) => check(&mut bench, path, &names[0]),
+        (None, Some(joint)) => ladder(&bench, joint, &names[0]),
+        (None, None) => designs(&mut bench, &names),
+    }
+}
+
+/// Rate of a log where nothing says [Hz].
+const RATE_HZ: f64 = 1000.0;
+
+/// Files of one motion.
+struct Names {
+    trajectory: Option<PathBuf>,
+    samples: Option<PathBuf>,
+    plot: Option<PathBuf>,
+}
+
+impl Names {
+    /// One set for each motion; several are numbered.
+    fn of(args: &Args) -> Vec<Self> {
+        (1..=args.trajectories)
+            .map(|k| {
+                let numbered = |path: &Option<PathBuf>| {
+                    path.as_ref().map(|path| match args.trajectories {
+                        1 => path.clone(),
+                        _ => with_number(path, k),
+                    })
+                };
+                Self {
+                    trajectory: numbered(&args.output),
+                    samples: numbered(&args.samples),
+                    plot: numbered(&args.plot),
+                }
+            })
+            .collect()
+    }
+
+    fn paths(&self) -> impl Iterator<Item = &Path> {
+        let all = [&self.trajectory, &self.samples, &self.plot];
+        all.into_iter().filter_map(|path| path.as_deref())
+    }
+}
+
+/// `a/b.toml` and 2 make `a/b-2.toml`.
+fn with_number(path: &Path, k: u16) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = match path.extension() {
+        Some(ending) => format!("{stem}-{k}.{}", ending.to_string_lossy()),
+        None => format!("{stem}-{k}"),
+    };
+    path.with_file_name(name)
+}
+
+/// Judges a trajectory that is there.
+fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliError> {
+    let args = bench.args;
+    let given = files::trajectory(path)?;
+    bench.inputs.push(given.provenance);
+    let motion = Motion::of_file(
+        &bench.machine,
+        &bench.file,
+        bench.model(),
+        &given.value,
+        args.seconds,
+        args.seed,
+    )?;
+    let channels = bench.machine.channels.clone();
+    let friction = match &given.value {
+        Trajectory::SingleJoint(file)
+            if bench
+                .machine
+                .model
+                .robot
+                .joint_names()
+                .contains(&file.joint) =>
+        {
+            let task = ladder_task(bench, &file.joint);
+            Some(Friction {
+                joint: file.joint.clone(),
+                expected: foresee_ladder(&bench.machine, &task, file)?,
+                usual: None,
+            })
+        }
+        _ => None,
+    };
+    let judged = judge(bench, &motion, &channels, None, friction)?;
+    let mut text = judged.text(bench, &given.name);
+    text += &extras(bench, &motion, &judged, names, &given.name)?;
+    let document = Document::new(
+        "excite",
+        &bench.inputs,
+        &judged.warnings,
+        &judged.json(bench),
+    )?;
+    Ok(Outcome {
+        text,
+        document,
+        missed: judged.broken(),
+    })
+}
+
+fn ladder_task<'a>(bench: &'a Bench, joint: &str) -> LadderTask<'a> {
+    LadderTask {
+        robot: &bench.file,
+        model: bench.model(),
+        joint: joint.to_owned(),
+        seconds: bench.args.seconds,
+        seed: bench.args.seed,
+        rate_hz: bench.rate_hz,
+        reserve: bench.args.margin,
+    }
+}
+
+/// Designs the one-joint experiment of a joint.
+fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError> {
+    let bar = bench.context.progress("designing", None);
+    let found = design_ladder(&bench.machine, &ladder_task(bench, joint))?;
+    drop(bar);
+    bench.context.check()?;
+    let trajectory = Trajectory::SingleJoint(found.file);
+    let args = bench.args;
+    let (model, seed) = (bench.model(), args.seed);
+    let motion = Motion::of_file(
+        &bench.machine,
+        &bench.file,
+        model,
+        &trajectory,
+        args.seconds,
+        seed,
+    )?;
+    let friction = Friction {
+        joint: joint.to_owned(),
+        expected: found.expected,
+        usual: Some(found.usual),
+    };
+    let mut judged = judge(
+        bench,
+        &motion,
+        &bench.machine.channels,
+        None,
+        Some(friction),
+    )?;
+    judged.evaluations = Some(found.evaluations);
+    judged.refuse_broken()?;
+    let file = names.trajectory.clone().unwrap_or_default();
+    let shown = file.display().to_string();
+    let mut text = judged.text(bench, &shown);
+    text += &extras(bench, &motion, &judged, names, &shown)?;
+    write_text(&file, &trajectory.to_toml(&judged.head(bench)))?;
+    text += &format!("written: {shown}\n");
+    let result = judged.json(bench);
+    Ok(Outcome {
+        text,
+        document: Document::new("excite", &bench.inputs, &judged.warnings, &result)?,
+        missed: Vec::new(),
+    })
+}
+
+/// Designs one motion after the other, each with those before it given.
+fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
+    let args = bench.args;
+    let criterion = criterion(bench)?;
+    let offsets = offsets(bench)?;
+    let mut given = Given::nothing(&bench.machine);
+    let mut warnings = Vec::new();
+    let mut any = false;
+    for name in &args.with {
+        given::add(bench, name, &mut given, &mut warnings)?;
+        any = true;
+    }
+    let mut text = String::new();
+    let mut documents = Vec::new();
+    let mut stopped = None;
+    keep_what_there_is();
+    for names in names {
+        let period = 1.0 / args.frequency;
+        let rows = bench.rate_hz * period * f64::from(args.periods);
+        let weights = weights(&bench.machine, &criterion);
+        let task = Task {
+            criterion: criterion.clone(),
+            fundamental_hz: args.frequency,
+            harmonics: usize::from(args.harmonics),
+            offsets: offsets.clone(),
+            reserve: args.margin,
+            prior: any.then(|| Prior {
+                information: given.weighted(&weights),
+                rows,
+            }),
+            starts: usize::from(args.starts),
+            evaluations: args.evaluations,
+            seed: args.seed,
+        };
+        let bar = bench
+            .context
+            .progress("designing", Some(task.most_evaluations()));
+        let found = design(
+            &bench.machine,
+            &task,
+            &|steps| bar.advance(steps),
+            bench.context.stop_flag(),
+        );
+        drop(bar);
+        let found = match found {
+            Ok(found) => found,
+            Err(_) if bench.context.interrupted() => return Err(CliError::interrupted()),
+            Err(error) => return Err(error.into()),
+        };
+        let reserved: Vec<_> = bench
+            .machine
+            .channels
+            .iter()
+            .map(|c| c.reserved(args.margin))
+            .collect();
+        let blend = Blend::within(&bench.machine, &reserved, &found.series, args.periods)?;
+        let motion = Motion::Periodic {
+            series: found.series,
+            blend,
+        };
+        let channels = bench.machine.channels.clone();
+        let mut judged = judge(bench, &motion, &channels, any.then_some(&given), None)?;
+        judged.evaluations = Some(found.evaluations);
+        judged.refuse_broken()?;
+        let file = names.trajectory.clone().unwrap_or_default();
+        let shown = file.display().to_string();
+        let Motion::Periodic { series, blend } = &motion else {
+            continue;
+        };
+        let mut fourier = trajectory(&bench.machine, series);
+        fourier.start_s = Some(blend.start);
+        fourier.blend_s = Some(blend.seconds);
+        fourier.periods = blend.periods;
+        let toml = Trajectory::Fourier(fourier).to_toml(&judged.head(bench));
+        text += &judged.text(bench, &shown);
+        text += &extras(bench, &motion, &judged, names, &shown)?;
+        write_text(&file, &toml)?;
+        text += &format!("written: {shown}\n");
+        warnings.append(&mut judged.warnings);
+        documents.push(judged.json(bench));
+        let (information, rows) =
+            foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
+        given.add_motion(&information, rows);
+        any = true;
+        if found.stopped {
+            stopped = Some(shown);
+            break;
+        }
+    }
+    if let Some(file) = stopped {
+        return Err(CliError::from_room(Exit::Interrupted, &Stopped { file }));
+    }
+    // The last motion's fields, with all of them in a list where there are several.
+    let mut result = documents.last().cloned().unwrap_or_else(|| json!({}));
+    if documents.len() > 1 {
+        result["trajectories"] = documents.into();
+    }
+    Ok(Outcome {
+        text,
+        document: Document::new("excite", &bench.inputs, &warnings, &result)?,
+        missed: Vec::new(),
+    })
+}
+
+/// Samples and picture, where they are asked for.
+fn extras(
+    bench: &Bench,
+    motion: &Motion,
+    judged: &Judged,
+    names: &Names,
+    title: &str,
+) -> Result<String, CliError> {
+    let mut text = String::new();
+    if let Some(path) = &names.plot {
+        let title = Path::new(title).file_name().unwrap_or_default();
+        let figure = judge::figure(bench, motion, judged, &title.to_string_lossy());
+        write_text(path, &figure.svg())?;
+        text += &format!("written: {}\n", path.display());
+    }
+    if let Some(path) = &names.samples {
+        samples::write(bench, motion, path)?;
+        text += &format!("written: {}\n", path.display());
+    }
+    Ok(text)
+}
+
+/// 1/noise per joint where the criterion weighs rows, else ones.
+fn weights(machine: &Machine, criterion: &Criterion) -> Vec<f64> {
+    if criterion.weighted() {
+        machine.noise.iter().map(|s| 1.0 / s).collect()
+    } else {
+        vec![1.0; machine.coordinates()]
+    }
+}
+
+fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
+    let args = bench.args;
+    let names = bench.machine.unknown_names();
+    let chosen: Vec<usize> = args
+        .parameters
+        .iter()
+        .map(|name| {
+            names.iter().position(|n| n == name).ok_or_else(|| {
+                CliError::usage(format!("no parameter is called {name}"))
+                    .hint(format!("the parameters are {}", names.join(", ")))
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    if !chosen.is_empty() && args.criterion != CriterionName::AOptimal {
+        return Err(CliError::usage(
+            "--parameter belongs to --criterion a-optimal",
+        ));
+    }
+    Ok(match args.criterion {
+        CriterionName::Condition => Criterion::Condition,
+        CriterionName::ConditionNormalised => Criterion::ConditionNormalised,
+        CriterionName::DOptimal => Criterion::DOptimal,
+        CriterionName::AOptimal if chosen.is_empty() => Criterion::AOptimal(vec![1.0; names.len()]),
+        CriterionName::AOptimal => {
+            let values = bench.machine.unknown_values();
+            let mut factors = vec![0.0; names.len()];
+            for k in chosen {
+                if values[k] == 0.0 {
+                    return Err(CliError::usage(format!(
+                        "{} is 0 in the model, so its relative error has no meaning",
+                        names[k]
+                    ))
+                    .hint("give a model with -m in which it is not"));
+                }
+                factors[k] = 1.0 / (values[k] * values[k]);
+            }
+            Criterion::AOptimal(factors)
+        }
+    })
+}
+
+/// Offsets that a file fixes.
+fn offsets(bench: &mut Bench) -> Result<Vec<Option<f64>>, CliError> {
+    let n = bench.machine.coordinates();
+    let Some(path) = &bench.args.offsets else {
+        return Ok(vec![None; n]);
+    };
+    let given = files::trajectory(path)?;
+    bench.inputs.push(given.provenance);
+    let Trajectory::Fourier(file) = &given.value else {
+        return Err(
+            CliError::input(format!("{} is no Fourier series", given.name))
+                .hint("give a trajectory of kind \"fourier\" for --offsets"),
+        );
+    };
+    let series = series_of(&bench.machine, file)?;
+    let names = bench.machine.coordinate_names();
+    Ok((0..n)
+        .map(|i| {
+            let named = file.series.iter().any(|c| c.name == names[i]);
+            named.then_some(series.offset[i])
+        })
+        .collect())
+}

@@ -1,0 +1,47 @@
+//! A motion sample by sample, ready for a controller.
+
+use std::path::Path;
+
+use super::Bench;
+use crate::cli::error::CliError;
+use crate::config::trajectory::Coordinates;
+use crate::excite::{ExciteError, Motion};
+use crate::output::LogWriter;
+
+/// Rows between two looks at Ctrl-C.
+const BLOCK: usize = 4096;
+
+/// Writes t, the joints' positions, speeds and accelerations, and those of the actuator coordinates
+/// where the robot has them.
+pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), CliError> {
+    let machine = &bench.machine;
+    let n = machine.coordinates();
+    let actuators = machine.designed() == Coordinates::Cartesian;
+    let mut header = vec!["t".to_owned()];
+    for prefix in ["q_", "dq_", "ddq_"] {
+        let joints = machine.model.robot.joint_names().iter();
+        header.extend(joints.map(|joint| format!("{prefix}{joint}")));
+    }
+    if actuators {
+        for prefix in ["", "d", "dd"] {
+            let names = machine.coordinate_names().into_iter();
+            header.extend(names.map(|name| format!("{prefix}{name}")));
+        }
+    }
+    let mut writer = LogWriter::create(path, &header)?;
+    let rows = (motion.seconds() * bench.rate_hz + 1e-6).floor() as usize + 1;
+    for k in 0..rows {
+        if k % BLOCK == 0 {
+            bench.context.check()?;
+        }
+        let t = k as f64 / bench.rate_hz;
+        let state = machine.joints(&motion.at(t)).map_err(ExciteError::Robot)?;
+        let joints = [state.q, state.v, state.a];
+        let coordinates = [state.k.x, state.k.xd, state.k.xdd];
+        let shown = if actuators { &coordinates[..] } else { &[] };
+        let values = joints.iter().chain(shown);
+        let values = values.flat_map(|values| values[..n].iter().copied());
+        writer.row(std::iter::once(t).chain(values))?;
+    }
+    Ok(writer.commit()?)
+}
