@@ -5,24 +5,18 @@
 //! target/study_campaign.jsonl as it goes (so that a stopped study goes on where it was) and, at
 //! the end, into FOLDER the summaries that docs/studies.md is generated from.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+mod study;
+
+use std::path::Path;
 
 use cft_ident::cli::machine::narrowed;
-use cft_ident::config::Trajectory;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
-use cft_ident::friction::motions::motions;
 use cft_ident::friction::passes::Ending;
-use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare, prepare_again};
-use cft_ident::friction::problem::Problem;
 use cft_ident::inertia::columns::{Columns, KnownFriction};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use cft_ident::inertia::solve::{Estimator, fit};
 use cft_ident::inertia::verdict::verdict;
 use cft_ident::inertia::{accumulate, add_processing};
-use cft_ident::log::Block;
 use cft_ident::motion::{HeldForces, Settings as Processing};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::dynamics::{Coefficients, inertia};
@@ -30,136 +24,24 @@ use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_phase, follow};
-use cft_ident::simulate::reference::Fourier;
-use cft_ident::simulate::{
-    CftTruth, Frame, Noise, Path as Motion, Recording, Reference, Sensors, Settings,
-};
+use cft_ident::simulate::{CftTruth, Sensors, Settings};
 use cft_ident::validate::Reconstruction;
 use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
-use rayon::prelude::*;
 use serde_json::{Value, json};
+use study::{
+    JOINTS, along, block, noisy, percent, prepared, processing, quantile, series, source, study,
+    write_summary,
+};
 
-const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
 /// Speeds per joint at which the curve's interval is looked at: every fifth point of the hundred.
 const EVERY: usize = 5;
 /// Fault of the starts: every parameter and the inertia times 3^U(-1, 1).
 const FAULT: f64 = 3.0;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let seeds: u64 = arguments.next().and_then(|s| s.parse().ok()).unwrap_or(200);
-    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "docs/results".into()));
-    std::fs::create_dir_all(&folder).expect("the folder can be made");
-    let log = Path::new("target").join("study_campaign.jsonl");
-    let mut rows = finished(&log);
-    let done: Vec<u64> = rows.iter().filter_map(|r| r["seed"].as_u64()).collect();
-    let file = OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(&log)
-        .expect("the log opens");
-    let file = Mutex::new(file);
-    let fresh: Vec<Value> = (0..seeds)
-        .into_par_iter()
-        .filter(|seed| !done.contains(seed))
-        .map(|seed| {
-            let row = campaign(seed);
-            let mut file = file.lock().expect("no thread panics");
-            writeln!(file, "{row}").expect("the log is written");
-            eprintln!("seed {seed} done");
-            row
-        })
-        .collect();
-    rows.extend(fresh);
-    rows.retain(|r| r["seed"].as_u64().is_some_and(|s| s < seeds));
-    rows.sort_by_key(|r| r["seed"].as_u64());
+    let (rows, folder) = study("study_campaign", 200, campaign);
     summarise(&rows, &folder);
-}
-
-fn finished(log: &Path) -> Vec<Value> {
-    let Ok(file) = File::open(log) else {
-        return Vec::new();
-    };
-    let lines = BufReader::new(file).lines().map_while(Result::ok);
-    lines
-        .filter_map(|l| serde_json::from_str(&l).ok())
-        .collect()
-}
-
-fn processing() -> Processing {
-    Processing {
-        q_cutoff_hz: Some(100.0),
-        ..Processing::default()
-    }
-}
-
-fn block(recording: &Recording<4>) -> Block {
-    Block {
-        t: recording.t.clone(),
-        q: recording.q.concat(),
-        tau: recording.torque.concat(),
-        ..Block::default()
-    }
-}
-
-/// A source of one block.
-fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, std::convert::Infallible> + '_ {
-    move |out| {
-        out.t.extend_from_slice(&block.t);
-        out.q.extend_from_slice(&block.q);
-        out.tau.extend_from_slice(&block.tau);
-        Ok(false)
-    }
-}
-
-fn noisy(seconds: f64, seed: u64) -> Settings<4> {
-    let mut settings = Settings::new(seconds);
-    settings.seed = seed;
-    settings.sensors.torque_noise = Noise::Relative(0.01);
-    settings
-}
-
-/// The unseen motion: the trajectory file that comes with the tool.
-fn unseen_motion() -> Reference<4> {
-    let Ok(Trajectory::Fourier(file)) = Trajectory::load(Path::new("configs/cft-validation.toml"))
-    else {
-        panic!("the validation trajectory comes with the tool");
-    };
-    let column = |pick: &dyn Fn(usize) -> Vec<f64>| -> Vec<[f64; 4]> {
-        let columns: Vec<Vec<f64>> = (0..4).map(pick).collect();
-        (0..columns[0].len())
-            .map(|l| std::array::from_fn(|i| columns[i][l]))
-            .collect()
-    };
-    let series = Fourier {
-        offset: std::array::from_fn(|i| file.series[i].offset),
-        a: column(&|i| file.series[i].a.clone()),
-        b: column(&|i| file.series[i].b.clone()),
-        fundamental: std::f64::consts::TAU * file.fundamental_hz,
-        ..Fourier::table_3()
-    };
-    Reference {
-        frame: Frame::Motors,
-        path: Motion::Fourier(series),
-    }
-}
-
-/// The one-joint problem, and the same with the narrower smoothing of its known inputs.
-fn prepared(robot: &Robot, joint: usize, log: &Block) -> (Prepared, Problem) {
-    let found = |settings: &Processing| {
-        motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
-    };
-    let variance = |q: &[f64]| robot.encoder_variance(joint, q).unwrap_or(f64::NAN);
-    let sensors = Read {
-        variance: &variance,
-        held: true,
-    };
-    let wide = found(&processing());
-    let first = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
-    let narrower = found(&narrowed(&processing(), 1000.0));
-    let again = prepare_again(robot, joint, &narrower, &sensors, &first).expect("it still moves");
-    (first, again)
 }
 
 /// Relative error of the curve over the speeds covered, and at how many speeds the 95 % interval
@@ -314,7 +196,13 @@ fn errors(
     settings: &Settings<4>,
     models: &[&Model],
 ) -> Vec<Vec<f64>> {
-    let recording = follow(truth, &[], unseen_motion(), settings).expect("a run");
+    let recording = follow(
+        truth,
+        &[],
+        along(series("configs/cft-validation.toml")),
+        settings,
+    )
+    .expect("a run");
     let mut log = block(&recording);
     HeldForces::new(4).centre(robot, &mut log);
     models
@@ -331,15 +219,6 @@ fn errors(
                 .collect()
         })
         .collect()
-}
-
-fn quantile(mut x: Vec<f64>, share: f64) -> f64 {
-    x.sort_by(f64::total_cmp);
-    x[((x.len() - 1) as f64 * share).round() as usize]
-}
-
-fn percent(x: f64) -> String {
-    format!("{:.3} %", 100.0 * x)
 }
 
 /// The numbers that the studies are asked for, as rows of tables.
@@ -433,14 +312,6 @@ fn summarise(rows: &[Value], folder: &Path) {
         ("study_inertia", "inertial parameters theta 1..12", thetas),
         ("study_torque", "torque error on an unseen log", torques),
     ] {
-        let document = json!({
-            "study": title,
-            "command": format!("cargo run --release --example study_campaign -- {n}"),
-            "seeds": n,
-            "rows": rows,
-        });
-        let path = folder.join(format!("{name}.json"));
-        std::fs::write(&path, format!("{document:#}\n")).expect("the summary is written");
-        println!("{document:#}");
+        write_summary(folder, name, title, "study_campaign", n, rows);
     }
 }

@@ -275,10 +275,13 @@ fn study(study: &Value) -> Rendered {
         .map(|column| format!("{}{column}", if left(column) { "<" } else { "" }))
         .collect();
     let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
+    let seeds = match study["seeds"].as_u64() {
+        Some(seeds) => format!(", {seeds} seeds"),
+        None => String::new(),
+    };
     Ok(format!(
-        "Table of {}, {} seeds: `{}`\n\n{}",
+        "Table of {}{seeds}: `{}`\n\n{}",
         text(&study["study"]),
-        study["seeds"],
         text(&study["command"]),
         table(&headers, &lines)
     ))

@@ -1,0 +1,122 @@
+//! Condition numbers that designs reach within each set-up's limits, beside Table 3 of the report:
+//! N = 4, 0.4 Hz, 4000 revolutions per minute of every motor, 10 V, what `excite` does by default.
+//!
+//! `cargo run --release --example study_designs -- [FOLDER]` writes into FOLDER the summary that
+//! docs/excitation.md is generated from. It takes a minute or two on two cores.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use cft_ident::config::{RobotFile, Trajectory};
+use cft_ident::excite::information::Information;
+use cft_ident::excite::machine::Machine;
+use cft_ident::excite::search::{Task, design};
+use cft_ident::excite::series::Series;
+use cft_ident::excite::usage::{along_period, worst};
+use cft_ident::excite::{Criterion, machine, series_of};
+use serde_json::{Value, json};
+
+/// Share of every limit that is left free, starts and seed: the defaults of `excite`.
+const RESERVE: f64 = 0.05;
+const STARTS: usize = 16;
+const SEED: u64 = 1;
+
+fn main() {
+    let folder = std::env::args().nth(1);
+    let folder = PathBuf::from(folder.unwrap_or_else(|| "docs/results".into()));
+    let mut rows = Vec::new();
+    for (name, file) in [
+        ("TUeDACS", "configs/cft.toml"),
+        ("dSPACE", "configs/cft-dspace.toml"),
+    ] {
+        let robot = RobotFile::load(Path::new(file)).expect("comes with the tool");
+        let machine = machine(&robot, None).expect("a machine");
+        let table_3 = table_3(&machine);
+        rows.push(row(
+            &machine,
+            &table_3,
+            json!({
+                "limits": name, "criterion": "none: Table 3", "offsets": "the report's",
+            }),
+        ));
+        for free in [true, false] {
+            for criterion in [Criterion::Condition, Criterion::ConditionNormalised] {
+                let begun = Instant::now();
+                let task = Task {
+                    criterion: criterion.clone(),
+                    fundamental_hz: 0.4,
+                    harmonics: 4,
+                    offsets: offsets(&machine, &table_3, free),
+                    reserve: RESERVE,
+                    prior: None,
+                    starts: STARTS,
+                    evaluations: None,
+                    seed: SEED,
+                };
+                let found = design(&machine, &task, &|_| {}, &AtomicBool::new(false));
+                let found = found.expect("a design");
+                let mut line = row(
+                    &machine,
+                    &found.series,
+                    json!({
+                        "limits": name,
+                        "criterion": match criterion {
+                            Criterion::Condition => "condition",
+                            _ => "condition-normalised",
+                        },
+                        "offsets": if free { "chosen" } else { "the report's" },
+                    }),
+                );
+                line["evaluations"] = found.evaluations.into();
+                line["seconds, two cores"] = format!("{:.1}", begun.elapsed().as_secs_f64()).into();
+                eprintln!("{line}");
+                rows.push(line);
+            }
+        }
+    }
+    let document = json!({
+        "study": "condition numbers of designs and of Table 3",
+        "command": "cargo run --release --example study_designs",
+        "rows": rows,
+    });
+    let path = folder.join("study_designs.json");
+    std::fs::write(&path, format!("{document:#}\n")).expect("the summary is written");
+}
+
+fn table_3(machine: &Machine) -> Series {
+    let file = Trajectory::load(Path::new("configs/table3.toml")).expect("comes with the tool");
+    let Trajectory::Fourier(file) = file else {
+        panic!("Table 3 is a Fourier series");
+    };
+    series_of(machine, &file).expect("fits the machine")
+}
+
+/// The printed offsets, where the limits allow them: that of x_c4 lies outside dSPACE's.
+fn offsets(machine: &Machine, table_3: &Series, free: bool) -> Vec<Option<f64>> {
+    let allowed = |i: usize, offset: f64| {
+        let mut all = machine.channels.iter();
+        let position = all.find(|c| c.quantity.name() == "position" && c.index == i);
+        position.is_none_or(|c| (c.lower..=c.upper).contains(&offset))
+    };
+    let printed = table_3.offset.iter().copied().enumerate();
+    printed
+        .map(|(i, offset)| (!free && allowed(i, offset)).then_some(offset))
+        .collect()
+}
+
+fn row(machine: &Machine, series: &Series, mut line: Value) -> Value {
+    let information = Information::of_period(machine, series, 250).expect("reachable");
+    for (name, criterion) in [
+        ("J_k raw", Criterion::Condition),
+        ("J_k normalised", Criterion::ConditionNormalised),
+    ] {
+        let value = information.value(machine, &criterion, None);
+        line[name] = format!("{:.2}", value.expect("finite")).into();
+    }
+    let used = worst(&along_period(machine, &machine.channels, series));
+    line["largest use of a limit"] = format!("{:.0} %", 100.0 * used).into();
+    line["evaluations"] = Value::Null;
+    line["seconds, two cores"] = Value::Null;
+    line
+}
