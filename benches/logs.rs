@@ -1,5 +1,7 @@
 //! Speed of reading logs, each beside a plain way that skips every check: text with short and with
 //! full-length numbers, recordings of joint states. `cargo bench --bench logs`.
+//!
+//! On Linux times are those of the processor, so that a busy machine changes them little.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -8,15 +10,58 @@ use std::fs::File;
 use std::hint::black_box;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+use std::time::{Duration, Instant};
 
 use cft_ident::log::{Block, Layout, LogSpec, Reader};
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mcap::{Channel, Compression, Message, MessageStream, WriteOptions};
 use tempfile::TempDir;
 
 const ROWS: usize = 50_000;
 const JOINTS: [&str; 6] = ["q1", "q2", "q3", "q4", "q5", "q6"];
+
+/// Time that this thread was on a processor; the wall clock where the system does not tell.
+struct ProcessorTime;
+
+impl ProcessorTime {
+    fn now() -> Duration {
+        static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+        let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+        let first = told.and_then(|text| text.split(' ').next()?.parse().ok());
+        first.map_or_else(|| START.elapsed(), Duration::from_nanos)
+    }
+}
+
+impl Measurement for ProcessorTime {
+    type Intermediate = Duration;
+    type Value = Duration;
+
+    fn start(&self) -> Duration {
+        Self::now()
+    }
+
+    fn end(&self, start: Duration) -> Duration {
+        Self::now().saturating_sub(start)
+    }
+
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn to_f64(&self, value: &Duration) -> f64 {
+        value.as_nanos() as f64
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        WallTime.formatter()
+    }
+}
 
 /// Time, positions and torques of one row.
 fn row(k: usize) -> (f64, [f64; 6], [f64; 6]) {
@@ -134,7 +179,7 @@ fn throughput(file: &Path) -> Throughput {
     }
 }
 
-fn text(c: &mut Criterion) {
+fn text(c: &mut Criterion<ProcessorTime>) {
     let layout = Layout::joint_columns(&JOINTS);
     for (name, decimals) in [
         ("text of 13 columns, 7 decimals", Some(7)),
@@ -184,7 +229,7 @@ fn plain_joint_state(data: &[u8], sum: &mut f64) {
     }
 }
 
-fn messages(c: &mut Criterion) {
+fn messages(c: &mut Criterion<ProcessorTime>) {
     let layout = Layout::joint_columns(&JOINTS);
     for (name, compression) in [
         ("recording of joint states, lz4", Some(Compression::Lz4)),
@@ -212,5 +257,9 @@ fn messages(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, text, messages);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(ProcessorTime);
+    targets = text, messages
+}
 criterion_main!(benches);

@@ -230,6 +230,25 @@ fn recordings_are_read_compressed_as_a_whole_too() {
 }
 
 #[test]
+fn a_compressed_recording_that_is_cut_off_is_used_up_to_the_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = std::fs::read(log("unindexed.mcap")).unwrap();
+    let path = folder.path().join("cut.mcap.zst");
+    // Two frames, the second one cut off.
+    let half = zstd::encode_all(&bytes[..bytes.len() / 2], 3).unwrap();
+    let rest = zstd::encode_all(&bytes[bytes.len() / 2..], 3).unwrap();
+    std::fs::write(&path, [&half[..], &rest[..rest.len() / 2]].concat()).unwrap();
+    let (block, reader) = read(&path.to_string_lossy(), &layout(""));
+    assert!((30..80).contains(&block.len()), "{}", block.len());
+    assert_eq!(block.q, expected().q[..4 * block.len()]);
+    let warnings = reader.warnings();
+    assert!(
+        warnings[0].contains("decompressed bytes") && warnings[0].contains("compression ends"),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn a_database_without_definitions_is_read_by_the_known_type() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("old.db3");

@@ -42,7 +42,7 @@ impl Content {
     /// Opens a log and looks at its first bytes.
     ///
     /// # Errors
-    /// A file that cannot be read; a compressed file that is cut off in its first bytes.
+    /// A file that cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let fail = |error| source::failed(path, error);
         let mut file = source::open(path)?;
@@ -59,10 +59,16 @@ impl Content {
         };
         let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
         let mut head = Vec::with_capacity(HEAD);
-        Read::by_ref(&mut rest)
+        // What comes before the end of a file that is cut off may be used: the error waits there.
+        let read = Read::by_ref(&mut rest)
             .take(HEAD as u64)
-            .read_to_end(&mut head)
-            .map_err(fail)?;
+            .read_to_end(&mut head);
+        if let Err(error) = read {
+            if head.is_empty() {
+                return Err(fail(error));
+            }
+            rest = Box::new(Failing(error.kind(), error.to_string()));
+        }
         let kind = if head.starts_with(b"\x89MCAP") {
             Kind::Mcap
         } else if head.starts_with(b"SQLite format 3\0") {
@@ -122,6 +128,15 @@ impl Unpacker {
         if inner.decompress_to_buffer(data, &mut self.plain).is_ok() {
             std::mem::swap(data, &mut self.plain);
         }
+    }
+}
+
+/// The end of a file that cannot be read any further.
+struct Failing(io::ErrorKind, String);
+
+impl Read for Failing {
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        Err(io::Error::new(self.0, self.1.clone()))
     }
 }
 

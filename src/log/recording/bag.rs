@@ -45,7 +45,6 @@ pub(super) struct BagFile {
     /// Time and number of the last message of the page.
     last: (i64, i64),
     ended: bool,
-    size: u64,
     broken: Option<Break>,
     messages: u64,
 }
@@ -62,7 +61,6 @@ impl BagFile {
             file: source::shown(path),
             reason: escape_whole(&reason.replace('\n', " ")),
         };
-        let size = content.size;
         let journal = match content.compression {
             Compression::None => journal_of(path),
             _ => None,
@@ -120,10 +118,9 @@ impl BagFile {
             page: Vec::new(),
             last: (i64::MIN, i64::MIN),
             ended: false,
-            size,
             broken: journal.map(|_| Break {
                 reason: UNCLOSED.to_owned(),
-                bytes: size,
+                place: "after its last commit".to_owned(),
             }),
             messages: 0,
         })
@@ -146,7 +143,7 @@ impl BagFile {
                 self.ended = true;
                 self.broken = Some(Break {
                     reason: error.to_string(),
-                    bytes: self.size,
+                    place: format!("after {} of its messages", self.messages),
                 });
             }
             self.page.reverse();

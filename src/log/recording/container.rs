@@ -49,8 +49,8 @@ pub(crate) struct Head {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Break {
     pub(crate) reason: String,
-    /// Bytes that were read.
-    pub(crate) bytes: u64,
+    /// How much of it was read, as it stands after "breaks off".
+    pub(crate) place: String,
 }
 
 enum Form {
@@ -61,7 +61,6 @@ enum Form {
 /// One file of a recording, one message ahead.
 struct Part {
     path: PathBuf,
-    size: u64,
     form: Form,
     head: Option<Head>,
     data: Vec<u8>,
@@ -71,7 +70,6 @@ struct Part {
 impl Part {
     fn open(path: &Path, wanted: &Wanted) -> Result<Self, LogError> {
         let content = Content::open(path)?;
-        let size = content.size;
         let form = match content.kind {
             Kind::Mcap => Form::Mcap(Box::new(McapFile::open(path, content, wanted.clone()))),
             Kind::Sqlite => Form::Bag(Box::new(BagFile::open(path, content, wanted)?)),
@@ -85,7 +83,6 @@ impl Part {
         };
         let mut part = Self {
             path: path.to_owned(),
-            size,
             form,
             head: None,
             data: Vec::new(),
@@ -132,7 +129,7 @@ pub(crate) struct Recording {
     /// The part whose message was handed out last.
     current: Option<usize>,
     /// What was said of files that broke off.
-    pub(crate) broken: Vec<(PathBuf, u64, Break)>,
+    pub(crate) broken: Vec<(PathBuf, Break)>,
     /// Every topic seen so far, wanted or not.
     pub(crate) seen: Vec<Topic>,
 }
@@ -190,7 +187,7 @@ impl Recording {
             let part = self.parts.remove(index);
             if let Some(broken) = part.broken() {
                 let broken = broken.clone();
-                self.broken.push((part.path, part.size, broken));
+                self.broken.push((part.path, broken));
             }
         }
         Ok(())

@@ -16,7 +16,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::container::{Break, Head, Topic, Wanted};
 use super::decode::Schema;
 use super::record::{CUT, ChannelRecord, MessageRecord, SchemaRecord};
-use crate::log::content::{Bytes, Content};
+use crate::log::content::{Bytes, Compression, Content};
 use crate::log::{LogError, source};
 
 /// Bytes that are asked of the disk at once.
@@ -41,6 +41,8 @@ pub(super) struct McapFile {
     schemas: BTreeMap<u16, Arc<SchemaText>>,
     schema_bytes: usize,
     bytes: u64,
+    /// Length of the file, where it is not compressed as a whole [bytes].
+    size: Option<u64>,
     messages: u64,
     ended: bool,
     broken: Option<Break>,
@@ -69,6 +71,7 @@ impl McapFile {
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(largest as usize);
+        let size = (content.compression == Compression::None).then_some(content.size);
         Self {
             path: path.to_owned(),
             input: content.into_bytes(),
@@ -79,6 +82,7 @@ impl McapFile {
             schemas: BTreeMap::new(),
             schema_bytes: 0,
             bytes: 0,
+            size,
             messages: 0,
             ended: false,
             broken: None,
@@ -208,7 +212,10 @@ impl McapFile {
         self.ended = true;
         self.broken = Some(Break {
             reason,
-            bytes: self.bytes,
+            place: match self.size {
+                Some(size) => format!("at byte {} of {size}", self.bytes),
+                None => format!("after {} decompressed bytes", self.bytes),
+            },
         });
     }
 

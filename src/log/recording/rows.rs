@@ -209,11 +209,11 @@ impl MessageRows {
     pub(in crate::log) fn warnings(&self) -> Vec<String> {
         let mut out = self.notes.clone();
         let reading = &self.reading;
-        for (path, size, broken) in &self.recording.broken {
+        for (path, broken) in &self.recording.broken {
             out.push(format!(
-                "{} breaks off at byte {} of {size} ({}): everything before is used, {} messages of the robot's topics",
+                "{} breaks off {} ({}): everything before is used, {} messages of the robot's topics",
                 escape(&source::file_name(path)),
-                broken.bytes.min(*size),
+                broken.place,
                 escape(&broken.reason),
                 self.messages
             ));

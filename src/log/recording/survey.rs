@@ -155,12 +155,12 @@ fn survey(paths: &[PathBuf], layout: &Layout, fields: &Fields) -> Result<Vec<Can
         }
     }
     if found.is_empty() {
-        if let Some((path, size, broken)) = recording.broken.first() {
+        if let Some((path, broken)) = recording.broken.first() {
             return Err(LogError::Topic {
                 file: source::shown(path),
                 problem: format!(
-                    "holds no message before it breaks off at byte {} of {size}: {}",
-                    broken.bytes,
+                    "holds no message before it breaks off {}: {}",
+                    broken.place,
                     escape(&broken.reason)
                 ),
                 remedy: "copy it again from where it was recorded, or record again".to_owned(),
