@@ -1,5 +1,7 @@
 //! Effects: what they add to the torque, and the mechanism for states, memory and inertia.
 
+#[path = "simulate_effects/accuracy.rs"]
+mod accuracy;
 #[path = "simulate_effects/data.rs"]
 mod data;
 #[path = "simulate_effects/load_and_memory.rs"]

@@ -49,13 +49,19 @@ pub trait Plant<const J: usize> {
     /// Friction F(v) of each joint.
     fn friction(&self, v: &[f64; J]) -> [f64; J];
 
-    /// Inertia matrix M(q), and C(q, v) v + G(q) + F(v).
+    /// Constant torque that the motors supply beside load and friction.
+    #[inline]
+    fn offset(&self) -> [f64; J] {
+        [0.0; J]
+    }
+
+    /// Inertia matrix M(q), and C(q, v) v + G(q) + F(v) with the offset.
     #[inline]
     fn dynamics(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]) {
         let (mass, mut bias) = self.rigid(q, v);
-        let friction = self.friction(v);
+        let (friction, offset) = (self.friction(v), self.offset());
         for i in 0..J {
-            bias[i] += friction[i];
+            bias[i] += friction[i] + offset[i];
         }
         (mass, bias)
     }
@@ -131,7 +137,7 @@ impl<P: Plant<J>, const J: usize> Moving<'_, P, J> {
         };
         let mut acting = [1.0; J];
         self.effects.drive(&mut acting);
-        let mut added = [0.0; J];
+        let mut added = self.plant.offset();
         self.effects.torque(&motion, &mut added);
         let mut share = [[0.0; 2]; J];
         self.effects.load(&motion, &mut share);
@@ -206,7 +212,7 @@ impl<P: Plant<J>, const J: usize> Moving<'_, P, J> {
             friction: &friction,
             ..Motion::default()
         };
-        let mut torque = friction;
+        let mut torque = self.plant.offset();
         self.effects.torque(&motion, &mut torque);
         let mut share = [[0.0; 2]; J];
         self.effects.load(&motion, &mut share);
@@ -215,7 +221,7 @@ impl<P: Plant<J>, const J: usize> Moving<'_, P, J> {
         std::array::from_fn(|i| {
             let [positive, negative] = share[i];
             let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
-            (load[i] + beside + torque[i]) / acting[i]
+            (load[i] + beside + friction[i] + torque[i]) / acting[i]
         })
     }
 }

@@ -171,7 +171,12 @@ impl Plant<1> for SingleJointTruth {
 
     #[inline]
     fn rigid(&self, _q: &[f64; 1], _v: &[f64; 1]) -> ([[f64; 1]; 1], [f64; 1]) {
-        ([[self.inertia]], [self.offset])
+        ([[self.inertia]], [0.0])
+    }
+
+    #[inline]
+    fn offset(&self) -> [f64; 1] {
+        [self.offset]
     }
 
     #[inline]

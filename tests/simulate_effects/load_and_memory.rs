@@ -159,19 +159,20 @@ fn elastic_joints_deflect_by_what_the_link_needs() {
     let recording = table_3(&["elasticity:q5:stiffness=9000"]);
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let sites = Sites::cft(&truth).expect("physical");
-    let rotor = 0.3 * sites.joints[3].least_inertia;
+    let site = &sites.joints[3];
+    let rotor = (0.2 * site.inertia).min(0.3 * site.least_inertia);
     let damping = 0.1 * (stiffness * rotor).sqrt();
     // The encoder sits on the motor.
     let deflection: Vec<f64> = (recording.q.iter().zip(&recording.actual.q))
         .map(|(motor, link)| motor[3] - link[3])
         .collect();
     let (mut squares, mut errors) = (0.0, 0.0);
-    for (before, around) in deflection.windows(3).enumerate() {
-        let state = row(&recording, before + 1);
+    for (before, around) in deflection.windows(5).enumerate() {
+        let state = row(&recording, before + 2);
         let needed = rigid(&state)[3] - rotor * state.2[3];
-        let rate = (around[2] - around[0]) / 2e-3;
+        let rate = (8.0 * (around[3] - around[1]) - (around[4] - around[0])) / 12e-3;
         squares += needed * needed;
-        errors += (needed - stiffness * around[1] - damping * rate).powi(2);
+        errors += (needed - stiffness * around[2] - damping * rate).powi(2);
     }
     let share: f64 = (errors / squares).sqrt();
     println!("elasticity: the spring carries the link but for {share:.1e}");
@@ -210,12 +211,12 @@ fn a_stiff_spring_gives_the_rigid_joint_back() {
 
 #[test]
 fn the_spring_of_a_single_joint_rings_at_its_own_frequency() {
-    // The motor's side 0.3 m and the link's 0.7 m on the spring: w^2 = K (1/0.3 + 1/0.7)/m.
-    let (recording, _) = pushed(&axis(), &["elasticity:q1:stiffness=4e6"]).expect("runs");
+    // The motor's side 0.2 m and the link's 0.8 m on the spring: w^2 = K (1/0.2 + 1/0.8)/m.
+    let (recording, _) = pushed(&axis(), &["elasticity:q1:stiffness=3e6"]).expect("runs");
     let deflection: Vec<f64> = (0..recording.rows())
         .map(|k| recording.q[k][0] - recording.actual.q[k][0])
         .collect();
-    let frequency = (4e6 / 95.0 * (1.0 / 0.3 + 1.0 / 0.7_f64)).sqrt();
+    let frequency = (3e6 / 95.0 * (1.0 / 0.2 + 1.0 / 0.8_f64)).sqrt();
     // After a jump of the volts: second differences leave the ringing, and its zeros tell the time.
     let bends: Vec<f64> = deflection[1201..1270]
         .windows(3)

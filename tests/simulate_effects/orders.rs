@@ -135,6 +135,8 @@ fn effects_without_a_place_are_refused_with_the_reason() {
         .expect_err("none")
         .to_string();
     assert!(text.contains("has none at speed"), "{text}");
+    assert!(effects(&smooth, &specs(&["presliding:q4:sigma0=2e3,fc=4"])).is_ok());
+    assert!(effects(&truth, &specs(&["counterbalance:q1:m_1=1,m_3=2"])).is_ok());
 }
 
 #[test]
@@ -147,6 +149,7 @@ fn numbers_that_an_effect_cannot_have_name_the_key() {
         ("drive-efficiency:q4:k=-2", "k is -2"),
         ("gain:q4:k=-1", "k is -1"),
         ("counterbalance:q4:a=0.1,b=0.1", "a - b is 0"),
+        ("counterbalance:q4:from=1,to=0", "to - from is -1"),
         ("backlash:q4:gap=0", "gap is 0"),
         ("presliding:q4:sigma0=-1", "sigma0 is -1"),
         ("elasticity:q4:stiffness=0", "stiffness is 0"),

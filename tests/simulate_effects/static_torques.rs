@@ -54,6 +54,23 @@ fn a_counterbalance_supplies_the_slope_of_its_spring_energy() {
 }
 
 #[test]
+fn a_found_moment_is_a_cubic_spline_over_the_travel() {
+    // A B-spline whose coefficients are those of q^2: c_i = x_i^2 - 1/3 at the knots' middles, in pieces.
+    let (from, piece) = (-1.4, 0.3);
+    let list: Vec<String> = (0..6)
+        .map(|i| {
+            let x = f64::from(i) - 1.0;
+            format!("m_{}={}", i + 1, x * x - 1.0 / 3.0)
+        })
+        .collect();
+    let text = format!("counterbalance:q4:from={from},to=-0.5,{}", list.join(","));
+    assert_missing(&text, 0.0, 1e-9, |_, (q, ..)| {
+        let x = ((q[2] - from) / piece).clamp(0.0, 3.0);
+        at(2, x * x)
+    });
+}
+
+#[test]
 fn friction_beyond_the_declared_law_follows_its_formula_where_the_joint_moves() {
     assert_missing(
         "asymmetric-friction:q1:coulomb=3,viscous=20",
@@ -322,7 +339,7 @@ fn a_single_joint_has_the_same_effects_where_they_have_a_place() {
         5.0 * v.signum() * (-(v / 0.05_f64).powi(2)).exp()
     });
     assert_axis("load-friction:q1:mu_c=0.1,w=5000", 1e-6, &|_, v, a| {
-        0.1 * (95.0 * a - 3.0).abs() * v.signum()
+        0.1 * (95.0 * a).abs() * v.signum()
     });
     assert_axis("gain:q1:k=0.1", 1e-9, &|_, v, a| {
         0.1 * (95.0 * a - 3.0 + truth.friction.torque(v))

@@ -1,7 +1,7 @@
 //! `elasticity`: a spring between the motor, where the encoder sits, and the link.
 //!
-//! The motor's side has the share [`ROTOR`] of the least inertia that the joint has in any pose (what is left
-//! to the link stays positive), all its friction and every torque that is not a load; the link's side the rest, so that a stiff spring gives the rigid joint back. With the
+//! The motor's side has a fifth of the joint's inertia ([`ROTOR`]; less where the least inertia of any pose asks
+//! for it, so that what is left to the link stays positive), all its friction and every torque that is no load; the link's side the rest, so that a stiff spring gives the rigid joint back. With the
 //! deflection z = q_motor - q_link the spring passes on T = stiffness z + damping dz/dt, and
 //! B (a + d2z/dt2) = tau - F - E - T on the motor's side. Both sides are integrated.
 
@@ -25,7 +25,7 @@ pub const KIND: Kind = Kind {
                 rule: "must be above 0".to_owned(),
             });
         }
-        let rotor = ROTOR * site.least_inertia;
+        let rotor = (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia);
         Built::plant(Elasticity {
             joint: site.joint(),
             stiffness,
@@ -37,8 +37,10 @@ pub const KIND: Kind = Kind {
 
 /// Default frequency of the joint's whole inertia on its spring \[Hz\].
 const FREQUENCY: f64 = 20.0;
-/// Share of the joint's least inertia that is on the motor's side.
-const ROTOR: f64 = 0.3;
+/// Share of the joint's inertia that is on the motor's side.
+const ROTOR: f64 = 0.2;
+/// The most that it may be of the joint's least inertia.
+const ROTOR_AT_MOST: f64 = 0.3;
 /// Damping ratio of the motor on its spring.
 const DAMPING: f64 = 0.05;
 

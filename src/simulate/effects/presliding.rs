@@ -1,7 +1,7 @@
 //! `presliding`: bristles that bend before they slip, in the place of the joint's Coulomb friction.
 //!
 //! dz/dt = v - sigma0 |v| z/Fc, torque sigma0 z + sigma1 dz/dt (Dahl 1968; Canudas de Wit et al. 1995 with a
-//! constant level), where Fc is the Coulomb level of the joint's law at speed. The law's own Coulomb part
+//! constant level), where the level Fc is `fc`, by default that of the joint's law at speed. The law's own Coulomb part
 //! F(v) - viscous v is taken out. The state is integrated with the plant; |v| has a kink and no jump.
 
 use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
@@ -18,12 +18,15 @@ pub const KIND: Kind = Kind {
         Key::size("sigma1", Unit::Viscous, |site| {
             0.002 * site.coulomb / bend(site.turns)
         }),
+        Key::shape("fc", Unit::Torque, |site| site.coulomb),
     ],
     build: |site, _, values| {
-        if site.coulomb <= 0.0 {
+        let level = values[2];
+        if level <= 0.0 {
             return Err(site.refuse(
                 KIND.name,
-                "it takes the place of Coulomb friction, and this joint's law has none at speed",
+                "it takes the place of Coulomb friction, and this joint's law has none at speed; give the \
+                 level fc above 0",
             ));
         }
         let refused = [
@@ -42,7 +45,7 @@ pub const KIND: Kind = Kind {
             joint: site.joint(),
             sigma0: values[0],
             sigma1: values[1],
-            per_level: values[0] / site.coulomb,
+            per_level: values[0] / level,
             viscous: site.viscous,
         })
     },

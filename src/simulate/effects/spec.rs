@@ -172,9 +172,11 @@ impl EffectSpec {
 impl EffectValue {
     pub(super) fn new(kind: &Kind, site: &Site, machine: &Machine, numbers: &[f64]) -> Self {
         let pairs = || kind.keys.iter().zip(numbers);
-        let from = pairs().find(|(key, _)| key.name == "from");
-        // Joints are counted from one.
-        let from = from.is_some_and(|(_, number)| machine.turns((*number - 1.0).max(0.0) as usize));
+        // Joints are counted from one; `from` is a joint where units follow it.
+        let joint = |(key, _): &(&Key, &f64)| key.name == "from" && kind.name == "coupling";
+        let from = pairs()
+            .find(joint)
+            .is_some_and(|(_, number)| machine.turns((*number - 1.0).max(0.0) as usize));
         let parameter = |(key, &value): (&Key, &f64)| {
             let parameter = EffectParameter {
                 value,
