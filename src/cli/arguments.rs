@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use crate::output::LogForm;
+
 /// Where a document goes: `-` is standard output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Destination {
@@ -51,8 +53,12 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// A log to be written: the ending chooses the format.
-pub(super) fn csv_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "csv")
+pub(super) fn log_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match LogForm::of(&path) {
+        Some(_) => Ok(path),
+        None => Err(format!("must end in {}", LogForm::ENDINGS)),
+    }
 }
 
 /// A picture to be written.
@@ -89,8 +95,10 @@ mod tests {
 
     #[test]
     fn the_ending_of_an_output_is_checked_while_parsing() {
-        assert!(csv_file("runs/a.CSV").is_ok());
-        assert_eq!(csv_file("a.txt"), Err("must end in .csv".into()));
+        assert!(log_file("runs/a.CSV").is_ok());
+        assert!(log_file("a.mcap").is_ok() && log_file("a.csv.zst").is_ok());
+        let error = log_file("a.txt").unwrap_err();
+        assert!(error.starts_with("must end in .csv or .mcap"), "{error}");
         assert!(svg_file("csv").is_err());
     }
 }

@@ -3,13 +3,34 @@
 use super::CliError;
 use super::machine::Machine;
 use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
-use crate::log::{self, Channels, Layout, LogError, Table};
+use crate::log::{self, Channels, Layout, Table};
+use crate::robot::Robot;
 
 /// Channels by their names alone.
 ///
 /// # Errors
 /// Where no column is a time.
 pub(super) fn guessed(table: &Table) -> Result<(Plan, Option<Fault>), CliError> {
+    let (time, seconds) = time_column(table)?;
+    let names = table.names();
+    let mut channels = Vec::new();
+    for column in 0..names.len() {
+        if column != time {
+            channels.push(other(table, column));
+        }
+    }
+    let plan = Plan {
+        time: Some((time, seconds)),
+        channels,
+    };
+    Ok((plan, None))
+}
+
+/// Place of the time, and seconds per unit of it.
+///
+/// # Errors
+/// Where no column is a time.
+pub(super) fn time_column(table: &Table) -> Result<(usize, f64), CliError> {
     let names = table.names();
     let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
         CliError::input(format!(
@@ -18,17 +39,7 @@ pub(super) fn guessed(table: &Table) -> Result<(Plan, Option<Fault>), CliError> 
         ))
         .hint("name the time column in the [log] section of a robot file and give it with -r")
     })?;
-    let mut channels = Vec::new();
-    for column in 0..names.len() {
-        if column != time {
-            channels.push(other(table, column));
-        }
-    }
-    let plan = Plan {
-        time: Some((time, seconds(table.unit(time)))),
-        channels,
-    };
-    Ok((plan, None))
+    Ok((time, seconds(table.unit(time))))
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
@@ -86,7 +97,7 @@ fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<
             };
             let name = &table.names()[column];
             let mut seen = Channel::new(name, role, Some(joint), Some(&unit));
-            (seen.limits, seen.saturates) = limits(machine, joint, role, raw);
+            (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
             known[column] = Some(Planned {
                 column,
                 factor: channel.factor,
@@ -109,6 +120,18 @@ fn other(table: &Table, column: usize) -> Planned {
     }
 }
 
+/// The unit that the name of a joint's column states, where it is none that a `JointState` has.
+pub(super) fn unit_of_joint(name: &str) -> Option<&str> {
+    let joint = ["q_", "dq_", "tau_"]
+        .iter()
+        .any(|kind| name.starts_with(kind));
+    let unit = log::unit_of(name).filter(|_| joint)?;
+    let known = [
+        "deg", "mm", "cm", "A", "V", "counts", "deg/s", "mm/s", "Nmm", "rpm",
+    ];
+    known.contains(&unit).then_some(unit)
+}
+
 /// Seconds per unit of a time column.
 fn seconds(unit: Option<&str>) -> f64 {
     match unit.map(str::to_lowercase).as_deref() {
@@ -120,9 +143,28 @@ fn seconds(unit: Option<&str>) -> f64 {
 }
 
 /// Limits of a channel, and whether a number at the limit is what was applied.
-fn limits(machine: &Machine, joint: &str, role: Role, raw: bool) -> (Option<[f64; 2]>, bool) {
+fn limits(
+    machine: &Machine,
+    (j, joint): (usize, &str),
+    role: Role,
+    raw: bool,
+) -> (Option<[f64; 2]>, bool) {
+    // Volts are logged as the amplifier gave them.
+    let applied = raw && role == Role::Torque;
     let Some(limits) = machine.file.limits.get(joint) else {
-        return (None, false);
+        // Table 5 of the report
+        let of_set_up = match (&machine.robot, role, raw) {
+            (Robot::Cft(robot), Role::Position, true) => {
+                let limits = robot.setup.limits();
+                limits
+                    .lower
+                    .get(j)
+                    .copied()
+                    .zip(limits.upper.get(j).copied())
+            }
+            _ => None,
+        };
+        return (of_set_up.map(|(low, high)| [low, high]), applied);
     };
     let both = |limit: Option<f64>| limit.map(|limit| [-limit, limit]);
     match role {
@@ -135,8 +177,7 @@ fn limits(machine: &Machine, joint: &str, role: Role, raw: bool) -> (Option<[f64
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(error: LogError) -> Fault {
-    let text = error.to_string();
+fn refusal(text: String) -> Fault {
     let (effect, remedy) = text
         .rsplit_once("; ")
         .unwrap_or((&text, "correct the file"));
@@ -149,5 +190,6 @@ fn refusal(error: LogError) -> Fault {
         rows: 0,
         effect: effect.to_owned(),
         remedy: remedy.to_owned(),
+        cut: false,
     }
 }

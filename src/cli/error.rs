@@ -78,6 +78,11 @@ impl CliError {
         self
     }
 
+    /// What is wrong, without place and way out.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
     /// The status that this error ends the process with.
     pub fn exit(&self) -> Exit {
         self.exit

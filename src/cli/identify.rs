@@ -165,7 +165,8 @@ fn execute(
     let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
     if !unseen.is_empty() {
         let numbers = model.model("model.toml")?;
-        let validated = validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_| {})?;
+        let validated =
+            validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_, _| {})?;
         let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
         let title = names.join(", ");
         let figure = validate::figure(&machine, &validated.validation, &title).svg();

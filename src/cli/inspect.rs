@@ -1,15 +1,20 @@
 //! `cft-ident inspect`: what logs hold and what is wrong with them.
 
+use std::path::PathBuf;
+
 use serde_json::{Value, json};
 
-use super::machine::Machine;
-use super::{CliError, Context, Outcome, columns};
-use crate::inspect::{Fault, Findings, Severity, look};
+use super::machine::{Machine, run_error};
+use super::{CliError, Context, Exit, Outcome, columns};
+use crate::config::ModelFile;
+use crate::inspect::{Comparison, Fault, Findings, Kind, Severity, look};
 use crate::log::{LogSpec, Provenance, Table, escape};
+use crate::motion;
 use crate::report::json::Document;
 use crate::report::number;
 use crate::report::table;
 use crate::report::table::Align;
+use crate::robot::model::Model;
 
 const EXAMPLE: &str = "\
 Example:
@@ -30,6 +35,34 @@ pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml: maps columns, knows units and limits
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: Option<String>,
+    /// Model file, which carries its robot: finds joints that are swapped or have the other sign
+    #[arg(short, long, value_name = "MODEL.toml", conflicts_with = "robot")]
+    pub model: Option<PathBuf>,
+}
+
+/// A robot as it was identified.
+struct Known {
+    machine: Machine,
+    model: Option<Model>,
+}
+
+impl Known {
+    fn load(args: &Args) -> Result<Option<Self>, CliError> {
+        if let Some(path) = &args.model {
+            let name = path.display().to_string();
+            let file = ModelFile::load(path)?;
+            let model = Some(file.model(&name)?);
+            let machine = Machine::new(&name, file.robot.clone());
+            return Ok(Some(Self { machine, model }));
+        }
+        let load = |robot: &str| {
+            Ok(Self {
+                machine: Machine::load(robot)?,
+                model: None,
+            })
+        };
+        args.robot.as_deref().map(load).transpose()
+    }
 }
 
 /// One log as it was found.
@@ -41,9 +74,11 @@ struct Inspected {
 /// Looks at one log.
 fn inspect(
     spec: &LogSpec,
-    machine: Option<&Machine>,
+    known: Option<&Known>,
     context: &Context,
+    warnings: &mut Vec<String>,
 ) -> Result<(Inspected, Provenance), CliError> {
+    let machine = known.map(|known| &known.machine);
     let layout = machine.map(|machine| machine.file.layout());
     let mut table = Table::open(spec, layout.as_ref())?;
     let (plan, refused) = match machine {
@@ -53,8 +88,87 @@ fn inspect(
     let found = look(&mut table, &plan, &|| context.interrupted())?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
     findings.faults.splice(0..0, refused);
+    warnings.extend(
+        table
+            .warnings()
+            .iter()
+            .map(|text| format!("{}: {text}", escape(&spec.name()))),
+    );
+    if let Some(Known {
+        machine,
+        model: Some(model),
+    }) = known
+    {
+        match compare(machine, model, spec, context) {
+            Ok(None) => {}
+            // A delay by the model is surer than one without it.
+            Ok(Some(found)) => {
+                findings.faults.retain(|fault| fault.kind != Kind::Delay);
+                findings.faults.push(found);
+                findings.sort();
+            }
+            Err(error) if error.exit() == Exit::Interrupted => return Err(error),
+            Err(error) => warnings.push(format!(
+                "{}: not compared with the model: {}",
+                escape(&spec.name()),
+                error.message()
+            )),
+        }
+    }
     let name = spec.name();
     Ok((Inspected { name, findings }, table.provenance()?))
+}
+
+/// Compares the torques of a log with those that a model gives, joints turned and exchanged.
+fn compare(
+    machine: &Machine,
+    model: &Model,
+    spec: &LogSpec,
+    context: &Context,
+) -> Result<Option<Fault>, CliError> {
+    let joints = machine.robot.joint_names();
+    let n = joints.len();
+    let mut comparison = Comparison::new(n);
+    let changes = comparison.changes().to_vec();
+    let mut log = machine.open(spec, context)?;
+    let summary = motion::run(
+        &mut |block| log.read(block),
+        n,
+        &machine.settings(),
+        None,
+        comparison.channels(),
+        &|s, out| {
+            let (modelled, logged) = out.split_at_mut(n * changes.len());
+            logged.copy_from_slice(s.tau);
+            CHANGED.with_borrow_mut(|changed| {
+                for (change, torque) in changes.iter().zip(modelled.chunks_exact_mut(n)) {
+                    for (to, x) in changed.iter_mut().zip([s.q, s.v, s.a]) {
+                        to.clear();
+                        to.extend_from_slice(x);
+                        change.apply(to);
+                    }
+                    let [q, v, a] = &*changed;
+                    model.torque(q, v, a, torque);
+                    // A pose that the robot cannot have explains nothing.
+                    if torque.iter().any(|x| !x.is_finite()) {
+                        torque.fill(0.0);
+                    }
+                }
+            });
+        },
+        &mut |row| comparison.add(row.segment, row.t, row.filtered),
+    )
+    .map_err(|error| run_error(spec, error))?;
+    let (rows, duration_s) = (summary.samples, summary.duration_s);
+    let order = comparison.fault(joints, rows, duration_s);
+    // With joints in the wrong order there is no delay to speak of.
+    let delay = || comparison.delay(summary.dt, rows, duration_s);
+    Ok(order.or_else(delay))
+}
+
+thread_local! {
+    /// Position, velocity and acceleration of one sample with joints changed.
+    static CHANGED: std::cell::RefCell<[Vec<f64>; 3]> = const { std::cell::RefCell::new([const { Vec::new() }; 3]) };
 }
 
 /// Runs the command.
@@ -64,11 +178,11 @@ fn inspect(
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
     context.check_outputs(&inputs, &[])?;
-    let machine = args.robot.as_deref().map(Machine::load).transpose()?;
+    let known = Known::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
-    let (mut logs, mut provenance) = (Vec::new(), Vec::new());
+    let (mut logs, mut provenance, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     for spec in &args.logs {
-        let (log, input) = inspect(spec, machine.as_ref(), context)?;
+        let (log, input) = inspect(spec, known.as_ref(), context, &mut warnings)?;
         logs.push(log);
         provenance.push(input);
         bar.advance(1);
@@ -77,7 +191,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check()?;
     Ok(Outcome {
         text: logs.iter().map(text).collect(),
-        document: Document::new("inspect", &provenance, &[], &document(&logs))?,
+        document: Document::new("inspect", &provenance, &warnings, &document(&logs))?,
         missed: Vec::new(),
     })
 }
@@ -182,7 +296,8 @@ fn joints(found: &Findings) -> table::Table {
         ("moves", Align::Left),
         ("travel", Align::Decimal),
         ("speed", Align::Decimal),
-        ("acceleration", Align::Decimal),
+        ("acc.", Align::Decimal),
+        ("unit", Align::Left),
         ("reversals", Align::Right),
         ("moving", Align::Decimal),
         ("condition", Align::Decimal),
@@ -194,6 +309,7 @@ fn joints(found: &Findings) -> table::Table {
             number::significant(joint.travel, 3),
             number::significant(joint.speed_max, 3),
             number::significant(joint.acceleration_max, 3),
+            joint.unit.clone().unwrap_or_default(),
             joint.reversals.to_string(),
             number::percent(joint.moving_share),
             joint
@@ -216,8 +332,10 @@ fn faults(found: &Findings) -> String {
         count(Severity::Warning),
         count(Severity::Info)
     );
+    // One channel at several times, or several channels with the same words.
     let alike = |a: &Fault, b: &Fault| {
-        (a.kind, a.severity, &a.channel, &a.remedy) == (b.kind, b.severity, &b.channel, &b.remedy)
+        (a.kind, a.severity, &a.remedy) == (b.kind, b.severity, &b.remedy)
+            && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span()))
     };
     let mut told: Vec<&Fault> = Vec::new();
     for fault in &found.faults {
@@ -226,18 +344,22 @@ fn faults(found: &Findings) -> String {
         }
         let all: Vec<&Fault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
         told.push(fault);
-        let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
-        let spans: Vec<String> = all
-            .iter()
-            .map(|fault| match fault.to_s > fault.from_s {
-                true => format!("{:.3}..{:.3}", fault.from_s, fault.to_s),
-                false => format!("{:.3}", fault.from_s),
-            })
-            .collect();
-        let head = [fault.severity.word(), fault.kind.word(), &channel].join(" ");
+        let distinct = |texts: Vec<String>| {
+            let mut out: Vec<String> = Vec::new();
+            for text in texts {
+                if !out.contains(&text) {
+                    out.push(text);
+                }
+            }
+            out.join(", ")
+        };
+        let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
+        let channels = distinct(channels.map(escape).collect());
+        let spans = distinct(all.iter().map(|fault| fault.span()).collect());
+        let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
         out += &format!(
             "\n{}{}{}",
-            table::paragraph(&format!("{}: {} s", head.trim_end(), spans.join(", ")), 0),
+            table::paragraph(&format!("{}: {spans} s", head.trim_end()), 0),
             table::paragraph(&fault.effect, 4),
             table::paragraph(&format!("-> {}", fault.remedy), 4)
         );

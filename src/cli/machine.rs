@@ -1,6 +1,8 @@
 //! What the commands that work on logs share: the robot with its processing, and its logs opened.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::context::Context;
 use super::error::CliError;
@@ -8,7 +10,8 @@ use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::motions::motions;
 use crate::friction::prepare::Motion;
-use crate::log::{Block, LogError, LogSpec, Provenance, Reader};
+use crate::inspect::{Cutter, Gate};
+use crate::log::{Block, Instant, Layout, LogError, LogSpec, Provenance, Reader, escape};
 use crate::motion::{
     Differences, HeldForces, ParallelFilter, RunError, Settings, Summary, TorqueTiming,
 };
@@ -50,6 +53,8 @@ pub struct Machine {
     pub name: String,
     pub file: RobotFile,
     pub robot: Robot,
+    /// What the first look at each log found: a log is opened several times.
+    gates: Arc<Mutex<BTreeMap<String, Arc<Gate>>>>,
 }
 
 /// Why a log could not be run through, decorated.
@@ -76,28 +81,52 @@ pub struct Open<'a> {
     context: &'a Context,
     /// Brings held motor forces to the rows' own time and pose.
     centre: Option<(&'a Robot, HeldForces)>,
+    name: String,
+    gate: Arc<Gate>,
+    cutter: Cutter,
 }
 
 impl Open<'_> {
-    /// The next block; false at the end.
+    /// The next block, without the rows that are marked bad; false at the end.
     pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
-        if self.context.interrupted() {
-            return Err(ReadError::Interrupted);
+        loop {
+            if self.context.interrupted() {
+                return Err(ReadError::Interrupted);
+            }
+            let more = self.reader.read(block)?;
+            if let Some((robot, held)) = &mut self.centre {
+                held.centre(robot, block);
+            }
+            if block.tau.is_empty() {
+                // a log without torques moves with none
+                block.tau.resize(block.q.len(), 0.0);
+            }
+            self.cutter.cut(block);
+            if !more || !block.is_empty() {
+                return Ok(more);
+            }
         }
-        let more = self.reader.read(block)?;
-        if let Some((robot, held)) = &mut self.centre {
-            held.centre(robot, block);
-        }
-        if block.tau.is_empty() {
-            // a log without torques moves with none
-            block.tau.resize(block.q.len(), 0.0);
-        }
-        Ok(more)
     }
 
-    /// What the reader left out, dropped or chose, once the last block is read.
+    /// The instant from which the times of the blocks are counted.
+    pub fn origin(&self) -> Instant {
+        self.gate.origin()
+    }
+
+    /// What was left out, dropped or chosen, once the last block is read.
     pub fn warnings(&self) -> Vec<String> {
-        self.reader.warnings()
+        let mut out = self.reader.warnings();
+        let found = self.gate.warnings().into_iter();
+        out.extend(found.map(|text| format!("{}: {text}", self.name)));
+        let removed = self.cutter.removed();
+        if removed > 0 {
+            out.push(format!(
+                "{}: {removed} of {} rows are left out in all, those next to bad ones included; `cft-ident inspect` tells more",
+                self.name,
+                self.reader.samples()
+            ));
+        }
+        out
     }
 
     /// Name, span, checksum and size of what was read.
@@ -119,7 +148,54 @@ impl Machine {
             name: name.to_owned(),
             file,
             robot,
+            gates: Arc::default(),
         }
+    }
+
+    /// Looks at a log before it is used, once.
+    fn gate(
+        &self,
+        spec: &LogSpec,
+        layout: &Layout,
+        context: &Context,
+    ) -> Result<Arc<Gate>, CliError> {
+        let key = format!("{} {spec}", layout.torques.len());
+        let known = || self.gates.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(gate) = known().get(&key) {
+            return Ok(Arc::clone(gate));
+        }
+        let mut reader = Reader::open(spec, &layout.clone().as_logged())?;
+        let gate = Gate::look(&mut reader, &|| context.interrupted())?;
+        let gate = Arc::new(gate.ok_or_else(CliError::interrupted)?);
+        if let Some(fault) = gate.refusal() {
+            let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
+            return Err(CliError::input(format!(
+                "{}: column `{channel}` {}",
+                escape(&spec.name()),
+                fault.effect
+            ))
+            .hint(&fault.remedy));
+        }
+        known().insert(key, Arc::clone(&gate));
+        Ok(gate)
+    }
+
+    /// Opens a log of this layout.
+    fn open_as<'a>(
+        &self,
+        spec: &LogSpec,
+        layout: &Layout,
+        context: &'a Context,
+    ) -> Result<Open<'a>, CliError> {
+        let gate = self.gate(spec, layout, context)?;
+        Ok(Open {
+            reader: Reader::open(spec, layout)?,
+            context,
+            centre: None,
+            name: escape(&spec.name()),
+            cutter: gate.cutter(self.settings().gap_factor),
+            gate,
+        })
     }
 
     /// Opens a log, its torques as logged, and says whether they are held from row to row.
@@ -128,14 +204,8 @@ impl Machine {
         spec: &LogSpec,
         context: &'a Context,
     ) -> Result<(Open<'a>, bool), CliError> {
-        let reader = Reader::open(spec, &self.file.layout())?;
-        let held = self.file.torque_held(reader.layout().channels);
-        let centre = None;
-        let open = Open {
-            reader,
-            context,
-            centre,
-        };
+        let open = self.open_as(spec, &self.file.layout(), context)?;
+        let held = self.file.torque_held(open.reader.layout().channels);
         Ok((open, held))
     }
 
@@ -145,11 +215,7 @@ impl Machine {
         spec: &LogSpec,
         context: &'a Context,
     ) -> Result<Open<'a>, CliError> {
-        Ok(Open {
-            reader: Reader::open(spec, &self.file.layout().without_torques())?,
-            context,
-            centre: None,
-        })
+        self.open_as(spec, &self.file.layout().without_torques(), context)
     }
 
     /// Opens a log with every torque at the time and pose of its row.

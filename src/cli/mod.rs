@@ -4,6 +4,7 @@
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
 mod campaign;
+pub mod convert;
 pub mod excite;
 pub mod friction;
 pub mod identify;
@@ -71,6 +72,7 @@ struct Common {
 enum Command {
     Identify(identify::Args),
     Inspect(inspect::Args),
+    Convert(convert::Args),
     Friction(friction::Args),
     Lsq(lsq::Args),
     Validate(validate::Args),
@@ -84,6 +86,7 @@ impl Command {
         match self {
             Command::Identify(args) => identify::run(args, context),
             Command::Inspect(args) => inspect::run(args, context),
+            Command::Convert(args) => convert::run(args, context),
             Command::Friction(args) => friction::run(args, context),
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
@@ -220,6 +223,8 @@ mod tests {
         assert_eq!(args.max_relative_error, Some(0.02));
         assert_eq!(args.plot.len(), 2);
         parse::<super::torque::Args>("v.csv -m m.toml -o t.csv").unwrap();
+        let args: super::convert::Args = parse("a.csv b.csv out.mcap").unwrap();
+        assert_eq!((args.logs.len(), args.output), (2, "out.mcap".into()));
         let args: super::identify::Args = parse("").unwrap();
         assert!(args.campaign.is_none());
         let args: super::simulate::Args = parse(
@@ -242,7 +247,7 @@ mod tests {
 
     #[test]
     fn every_help_fits_80_columns_and_has_an_example() {
-        use super::{friction, identify, inspect, lsq, simulate, torque, validate};
+        use super::{convert, friction, identify, inspect, lsq, simulate, torque, validate};
         let texts = [
             help::<friction::Args>(),
             help::<lsq::Args>(),
@@ -251,6 +256,7 @@ mod tests {
             help::<simulate::Args>(),
             help::<identify::Args>(),
             help::<inspect::Args>(),
+            help::<convert::Args>(),
         ];
         for text in texts {
             assert!(text.contains("Example:\n  cft-ident "), "{text}");

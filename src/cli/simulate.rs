@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Log to write
-    #[arg(short, long, value_name = "LOG.csv", value_parser = arguments::csv_file)]
+    #[arg(short, long, value_name = "LOG.csv|.mcap", value_parser = arguments::log_file)]
     pub output: PathBuf,
 }
 
@@ -62,7 +62,7 @@ const BLOCK: usize = 4096;
 
 /// Simulates, and writes the log and its truth.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let truth_path = args.output.with_extension("truth.toml");
+    let truth_path = truth_beside(&args.output);
     let mut read: Vec<&Path> = vec![&args.robot];
     read.extend(args.reference.as_deref());
     read.extend(args.model.as_deref());
@@ -121,6 +121,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     })
 }
 
+/// The log's stem with `.truth.toml`, beside it.
+fn truth_beside(log: &Path) -> PathBuf {
+    let packed = log
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("gz") || end.eq_ignore_ascii_case("zst"));
+    let log = if packed {
+        log.with_extension("")
+    } else {
+        log.to_owned()
+    };
+    log.with_extension("truth.toml")
+}
+
 /// Simulates one order and writes its log, with the truth beside it.
 pub(super) fn simulate_to(
     order: &Order,
@@ -131,7 +144,7 @@ pub(super) fn simulate_to(
     let simulated = simulate::simulate(order)?;
     // The log gets its name last: where it stands, its truth stands too.
     let log = write_log(path, &simulated, context)?;
-    write_truth(&path.with_extension("truth.toml"), &simulated)?;
+    write_truth(&truth_beside(path), &simulated)?;
     log.commit()?;
     Ok(simulated)
 }

@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// Log to write
-    #[arg(short, long, value_name = "OUT.csv", value_parser = arguments::csv_file)]
+    #[arg(short, long, value_name = "OUT.csv|.mcap", value_parser = arguments::log_file)]
     pub output: PathBuf,
 }
 
@@ -68,6 +68,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let bar = context.progress("torque", None);
     let mut log = machine.open_positions(&args.log, context)?;
+    out.set_origin(log.origin());
     let mut failed = None;
     let mut peak = vec![0.0f64; n];
     let mut square = vec![0.0f64; n];

@@ -8,7 +8,7 @@ use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
-use crate::log::{LogSpec, Provenance};
+use crate::log::{Instant, LogSpec, Provenance};
 use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long, value_name = "X", value_parser = arguments::positive)]
     pub max_relative_error: Option<f64>,
     /// Write measured and reconstructed torque and the residual
-    #[arg(short, long, value_name = "RESIDUAL.csv", value_parser = arguments::csv_file)]
+    #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
@@ -51,23 +51,27 @@ pub struct Validated {
     pub warnings: Vec<String>,
 }
 
-/// Reconstructs the torque of logs; `row` gets every raw sample as (t, measured, reconstructed).
+/// Reconstructs the torque of logs; `row` gets every raw sample, and the instant from which its time
+/// is counted.
 pub fn reconstruct(
     machine: &Machine,
     model: &Model,
     logs: &[LogSpec],
     context: &Context,
-    row: &mut dyn FnMut(&Reconstructed),
+    row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, CliError> {
     let bar = context.progress("reconstruction", Some(logs.len() as u64));
     let mut all: Option<Reconstruction> = None;
     let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
     for spec in logs {
         let mut log = machine.open(spec, context)?;
+        let origin = log.origin();
         let settings = machine.settings();
         let all = all.get_or_insert_with(|| Reconstruction::new(model));
         let summary = all
-            .add(&settings, &mut |block| log.read(block), row)
+            .add(&settings, &mut |block| log.read(block), &mut |r| {
+                row(r, origin)
+            })
             .map_err(|e| run_error(spec, e))?;
         warnings.extend(log.warnings());
         warnings.extend(summary_warnings(spec, &summary));
@@ -237,12 +241,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         )?),
     };
     let mut failed = None;
-    let found = reconstruct(&machine, &model, &args.logs, context, &mut |r| {
+    let found = reconstruct(&machine, &model, &args.logs, context, &mut |r, origin| {
         if let Some(file) = &mut residual
             && failed.is_none()
-            && let Err(error) = file.row(residual_row(r))
         {
-            failed = Some(error);
+            file.set_origin(origin);
+            failed = file.row(residual_row(r)).err();
         }
     })?;
     if let Some(error) = failed {

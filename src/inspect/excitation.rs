@@ -22,6 +22,8 @@ pub struct JointMotion {
     pub joint: String,
     /// Name of the channel that its position is in.
     pub channel: String,
+    /// Unit of the channel, where it is known.
+    pub unit: Option<String>,
     /// Whether the log moves it.
     pub moves: bool,
     /// Largest less smallest position [unit of the channel].
@@ -150,6 +152,7 @@ impl Excitation {
         JointMotion {
             joint: joint.to_owned(),
             channel: channel.to_owned(),
+            unit: None,
             moves,
             travel,
             speed_max,

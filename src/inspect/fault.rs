@@ -118,6 +118,19 @@ pub struct Fault {
     pub effect: String,
     /// What to do about it.
     pub remedy: String,
+    /// Whether a fit leaves these rows out.
+    #[serde(skip)]
+    pub cut: bool,
+}
+
+impl Fault {
+    /// Where it is, for a person: `5.000..5.399`, or `5.000` for a single row.
+    pub fn span(&self) -> String {
+        match self.to_s > self.from_s {
+            true => format!("{:.3}..{:.3}", self.from_s, self.to_s),
+            false => format!("{:.3}", self.from_s),
+        }
+    }
 }
 
 /// Stretches of a log, in the order of time, few enough to be listed.

@@ -62,6 +62,16 @@ pub struct ChannelFacts {
 }
 
 impl Findings {
+    /// Brings the faults into their order: the worst first, then by time.
+    pub fn sort(&mut self) {
+        self.faults.sort_by(|a, b| {
+            let severity = b.severity.cmp(&a.severity);
+            severity
+                .then(a.from_s.total_cmp(&b.from_s))
+                .then(a.kind.cmp(&b.kind))
+        });
+    }
+
     /// The faults of one severity.
     pub fn of(&self, severity: Severity) -> impl Iterator<Item = &Fault> {
         self.faults

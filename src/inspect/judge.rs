@@ -244,7 +244,8 @@ impl Judge {
     }
 
     fn watch_repeats(&mut self, times: &[f64], steps: &[Step], columns: &[&[f64]]) {
-        if self.positions.is_empty() {
+        // At the gate the reader has left them out already.
+        if self.positions.is_empty() || self.depth == Depth::Gate {
             return;
         }
         for (k, (&t, step)) in times.iter().zip(steps).enumerate() {

@@ -75,6 +75,23 @@ pub fn look(
                 rows,
                 effect: format!("{rows} rows have more or fewer fields than the header names: a fit refuses the log"),
                 remedy: "complete or delete these rows; write decimal points, not commas".to_owned(),
+                cut: false,
+            },
+        );
+    }
+    for effect in table.breaks() {
+        findings.faults.insert(
+            0,
+            Fault {
+                kind: Kind::IncompleteFile,
+                severity: Severity::Warning,
+                channel: None,
+                from_s: findings.duration_s,
+                to_s: findings.duration_s,
+                rows: 0,
+                effect,
+                remedy: "copy it again from where it was recorded; a recorder that is killed loses its last chunk".to_owned(),
+                cut: false,
             },
         );
     }

@@ -226,21 +226,39 @@ impl<'a> Flatness<'a> {
         } else {
             Kind::Clipping
         };
+        // What an amplifier gave at its limit is what acted.
+        let applied = track.channel.saturates;
         let effect = |rows: u64, times: usize| {
+            let then = match applied {
+                true => {
+                    "the amplifier gives no more; as what is logged is what was applied, a fit may use it"
+                }
+                false if used => {
+                    "the true values are beyond, so that these rows are left out of a fit"
+                }
+                false => "the true values are beyond; a fit does not read this channel",
+            };
             format!(
-                "{} flat at {} or {}, which is never exceeded: the true values are beyond, so that {then}",
+                "{} flat at {} or {}, which is never exceeded: {then}",
                 rows_text(rows, times),
                 track.low,
                 track.high
             )
         };
-        let remedy = "choose a slower motion or a wider measuring range; if the actuator itself saturates, what it gave is in the log and may be used";
+        let remedy = match applied {
+            true => "choose a slower motion where the robot should follow its reference",
+            false => "choose a slower motion or a wider measuring range",
+        };
         let severity = if used {
             Severity::Warning
         } else {
             Severity::Info
         };
-        draft.stretches(kind, severity, name, &tops, (&effect, remedy));
+        let of_tops = if applied { Severity::Info } else { severity };
+        // Told as reaching the limit of the robot file where that is known.
+        if track.at_limit.is_empty() {
+            draft.stretches(kind, of_tops, name, &tops, (&effect, remedy));
+        }
         let stuck = gathered(&self.stuck);
         let effect = |rows: u64, times: usize| {
             format!(
@@ -258,8 +276,10 @@ impl<'a> Flatness<'a> {
             (&effect, remedy),
         );
         if used {
-            draft.cut(&tops);
-            draft.cut(&stuck);
+            if !applied {
+                draft.cut(kind, &track.channel.name, &tops);
+            }
+            draft.cut(Kind::StuckChannel, &track.channel.name, &stuck);
         }
     }
 }
@@ -318,7 +338,7 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft)
         (&effect, remedy),
     );
     if used {
-        draft.cut(&episodes);
+        draft.cut(Kind::Spike, &track.channel.name, &episodes);
     }
 }
 

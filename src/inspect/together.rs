@@ -21,6 +21,7 @@ pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     copies(judge, draft);
     if judge.depth == Depth::Whole {
         velocities(judge, clock, draft);
+        super::lag::faults(judge, clock, draft);
         noiseless(judge, draft);
     }
 }
@@ -57,6 +58,7 @@ fn repeated_rows(judge: &Judge, draft: &mut Draft) {
         rows: stale.rows,
         effect,
         remedy: remedy.to_owned(),
+        cut: true,
     });
     draft.cuts.extend(stale.cuts);
 }

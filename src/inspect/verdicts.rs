@@ -39,6 +39,7 @@ impl Draft {
             rows,
             effect,
             remedy: remedy.to_owned(),
+            cut: false,
         });
     }
 
@@ -62,12 +63,16 @@ impl Draft {
                 rows: episode.rows,
                 effect: effect(episode.rows, count),
                 remedy: remedy.to_owned(),
+                cut: false,
             });
         }
     }
 
-    /// Marks the rows of some stretches as bad.
-    pub(super) fn cut(&mut self, episodes: &Episodes) {
+    /// Leaves the rows of some stretches out, which were told as this fault of this channel.
+    pub(super) fn cut(&mut self, kind: Kind, channel: &str, episodes: &Episodes) {
+        for fault in &mut self.faults {
+            fault.cut |= fault.kind == kind && fault.channel.as_deref() == Some(channel);
+        }
         self.cuts.extend(episodes.iter().map(|e| [e.from, e.to]));
     }
 }
@@ -161,7 +166,10 @@ fn joints(judge: &Judge) -> Vec<super::JointMotion> {
             };
             let excitation = track.excitation.as_ref()?;
             let moves = judge.moves(track);
-            Some(excitation.facts(name, &track.channel.name, track.travel(), moves))
+            Some(super::JointMotion {
+                unit: track.channel.unit.clone(),
+                ..excitation.facts(name, &track.channel.name, track.travel(), moves)
+            })
         })
         .collect()
 }

@@ -56,6 +56,13 @@ impl Windows {
         });
     }
 
+    /// At most so many of them, evenly spread.
+    pub(super) fn spread(&self, most: usize) -> impl Iterator<Item = &Window> {
+        self.kept
+            .iter()
+            .step_by(self.kept.len().div_ceil(most).max(1))
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = &Window> + Clone {
         self.kept.iter()
     }

@@ -46,6 +46,29 @@ impl Block {
         self.line0 = 0;
     }
 
+    /// Keeps the rows of which `keep` says so by their times, asked in order.
+    pub fn retain(&mut self, mut keep: impl FnMut(f64) -> bool) {
+        let widths = self.widths();
+        let mut kept = 0;
+        for row in 0..self.len() {
+            if !keep(self.t[row]) {
+                continue;
+            }
+            if kept < row {
+                self.t[kept] = self.t[row];
+                let matrices = [&mut self.q, &mut self.tau, &mut self.dq];
+                for (x, width) in matrices.into_iter().zip(widths) {
+                    x.copy_within(row * width..(row + 1) * width, kept * width);
+                }
+            }
+            kept += 1;
+        }
+        self.t.truncate(kept);
+        self.q.truncate(kept * widths[0]);
+        self.tau.truncate(kept * widths[1]);
+        self.dq.truncate(kept * widths[2]);
+    }
+
     /// Width of each matrix: positions, torques, velocities.
     fn widths(&self) -> [usize; 3] {
         [&self.q, &self.tau, &self.dq].map(|x| x.len().checked_div(self.len()).unwrap_or(0))

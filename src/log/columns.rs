@@ -168,7 +168,7 @@ fn name_and_unit(name: &str) -> (&str, Option<&str>) {
 }
 
 /// The unit that a name states in brackets or as its ending.
-pub(super) fn unit_of(name: &str) -> Option<&str> {
+pub(crate) fn unit_of(name: &str) -> Option<&str> {
     name_and_unit(name).1.or_else(|| suffix_unit(name))
 }
 

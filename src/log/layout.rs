@@ -183,6 +183,13 @@ impl Layout {
         channels.any(|channel| column_number(&channel.column).is_some())
     }
 
+    /// The same layout without its conversions: blocks hold what was logged, in SI units.
+    pub fn as_logged(mut self) -> Self {
+        self.conversion = None;
+        self.otherwise = self.otherwise.map(|other| Box::new(other.as_logged()));
+        self
+    }
+
     /// The same layout for a log that need not hold torques: blocks then have an empty `tau`.
     ///
     /// For a trajectory of positions whose torque is asked for.

@@ -4,14 +4,11 @@
 use std::path::PathBuf;
 
 use super::columns::{Header, unit_of};
-use super::content::{Content, Kind};
-use super::csv::Rows;
 use super::layout::{Channel, Layout};
 use super::reader::seconds;
-use super::row::Stamped;
+use super::sheet::{Sheet, TimeColumn};
 use super::source::{self, Provenance};
-use super::text::power_of_ten;
-use super::time::{FAR_S, Instant};
+use super::time::Instant;
 use super::{LogError, LogSpec, Span};
 
 /// Consecutive rows of all columns.
@@ -39,23 +36,17 @@ impl TableBlock {
     }
 }
 
-/// The time of a text log.
-#[derive(Debug, Clone, Copy)]
-struct TimeColumn {
-    index: usize,
-    /// Seconds per unit.
-    seconds: f64,
-    /// Read exactly, in units of 10^power s; known from the first row that has a time.
-    exact: Option<Option<i32>>,
-}
-
 /// A log that is read as it stands.
 #[derive(Debug)]
 pub struct Table {
     spec: LogSpec,
     files: Vec<PathBuf>,
-    rows: Rows,
+    rows: Sheet,
     layout: Layout,
+    /// The layout is that of a robot.
+    robot: bool,
+    /// What keeps a recording from being read as the robot's.
+    refused: Option<String>,
     time: Option<TimeColumn>,
     /// The instant from which times are counted, once one was read.
     origin: Option<Instant>,
@@ -74,6 +65,7 @@ impl Table {
     /// A file that cannot be read, or is no log.
     pub fn open(spec: &LogSpec, layout: Option<&Layout>) -> Result<Self, LogError> {
         let files = spec.files()?;
+        let robot = layout.is_some();
         let layout = match layout {
             Some(layout) => layout.clone(),
             // A log without a header has columns #1, #2, ...
@@ -82,13 +74,15 @@ impl Table {
                 ..Layout::joint_columns(&[] as &[&str])
             },
         };
-        let rows = open_rows(&files, &layout)?;
-        let words = vec![0; rows.header().len()];
+        let (rows, refused) = Sheet::open(&files, &layout, robot)?;
+        let words = vec![0; rows.columns().len()];
         Ok(Self {
             spec: spec.clone(),
             files,
             rows,
             layout,
+            robot,
+            refused: refused.map(|error| error.to_string()),
             time: None,
             origin: None,
             span: None,
@@ -101,7 +95,7 @@ impl Table {
 
     /// Names of the columns.
     pub fn names(&self) -> &[String] {
-        self.rows.header()
+        self.rows.columns()
     }
 
     /// The unit that a column's name states.
@@ -111,14 +105,27 @@ impl Table {
 
     /// Which column a channel of a robot file is.
     pub fn find(&self, channel: &Channel) -> Option<usize> {
-        self.header().first(channel)
+        self.with_header(|header| header.first(channel))
     }
 
     /// The layout of those offered that this log has, and what keeps a strict reader from it.
-    pub fn layout(&self) -> (Layout, Option<LogError>) {
-        let layout = self.header().choose(&self.layout);
-        let error = self.header().columns(&layout).err();
-        (layout, error)
+    pub fn layout(&self) -> (Layout, Option<String>) {
+        if let Some(layout) = self.rows.layout() {
+            return (layout.clone(), None);
+        }
+        self.with_header(|header| {
+            let layout = header.choose(&self.layout);
+            let error = match &self.refused {
+                Some(refused) => Some(refused.clone()),
+                None => header.columns(&layout).err().map(|error| error.to_string()),
+            };
+            (layout, error)
+        })
+    }
+
+    /// Whether rows carry their own times, as those of recordings do.
+    pub fn is_recording(&self) -> bool {
+        !matches!(self.rows, Sheet::Text(_))
     }
 
     /// Says which column is the time, and how many seconds its unit has.
@@ -152,14 +159,15 @@ impl Table {
                 }
                 Err(error) => return Err(error),
             }
-            let t = time_of(&self.rows, &mut self.time, &mut self.origin);
+            let stamp = self.rows.stamp(&mut self.time);
+            let t = stamp.map(|stamp| seconds(stamp, &mut self.origin));
             if !self.is_in_span(t)? {
                 continue;
             }
             self.samples += 1;
             block.t.push(t.unwrap_or(f64::NAN));
             for (index, column) in block.columns.iter_mut().enumerate() {
-                column.push(match self.rows.lenient(index) {
+                column.push(match self.rows.number(index) {
                     Some(value) => value,
                     None => {
                         self.words[index] += 1;
@@ -174,6 +182,16 @@ impl Table {
     /// Rows with more or fewer fields than the header, so far; they are passed over.
     pub fn malformed(&self) -> u64 {
         self.malformed
+    }
+
+    /// What was left out, one sentence each; call it after the last block.
+    pub fn warnings(&self) -> Vec<String> {
+        self.rows.warnings()
+    }
+
+    /// Where files break off; call it after the last block.
+    pub fn breaks(&self) -> Vec<String> {
+        self.rows.breaks()
     }
 
     /// Fields of a column that hold words, so far.
@@ -195,12 +213,10 @@ impl Table {
         })
     }
 
-    fn header(&self) -> Header<'_> {
-        Header {
-            file: self.rows.file(),
-            line: self.rows.header_line(),
-            names: self.rows.header(),
-        }
+    fn with_header<T>(&self, ask: impl FnOnce(Header<'_>) -> T) -> T {
+        let (file, line) = self.rows.header_place(&self.files);
+        let names = self.rows.columns();
+        ask(Header { file, line, names })
     }
 
     /// Whether a row of this time belongs to the span; one without a time does.
@@ -235,66 +251,21 @@ impl Table {
     }
 
     fn last_time(&self) -> Result<Option<f64>, LogError> {
-        let mut rows = open_rows(&self.files, &self.layout)?;
+        let (mut rows, _) = Sheet::open(&self.files, &self.layout, self.robot)?;
         let (mut time, mut origin) = (self.time, self.origin);
         let mut last = None;
         loop {
             match rows.next() {
-                Ok(true) => last = time_of(&rows, &mut time, &mut origin).or(last),
+                Ok(true) => {
+                    let t = rows.stamp(&mut time);
+                    last = t.map(|stamp| seconds(stamp, &mut origin)).or(last);
+                }
                 Ok(false) => return Ok(last),
                 Err(LogError::Fields { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
     }
-}
-
-fn open_rows(files: &[PathBuf], layout: &Layout) -> Result<Rows, LogError> {
-    let [path] = files else {
-        return Err(LogError::Format {
-            file: source::shown_all(files),
-            kind: "several files",
-            remedy: "look at them one by one",
-        });
-    };
-    let content = Content::open(path)?;
-    match content.kind {
-        Kind::Text => Rows::new(path, content, layout),
-        Kind::Mcap | Kind::Sqlite => Err(LogError::Format {
-            file: source::shown(path),
-            kind: "a recording of messages, which is not looked at yet",
-            remedy: "convert it to CSV with a header line",
-        }),
-    }
-}
-
-/// Time of the current row, where it has one.
-fn time_of(
-    rows: &Rows,
-    time: &mut Option<TimeColumn>,
-    origin: &mut Option<Instant>,
-) -> Option<f64> {
-    let time = time.as_mut()?;
-    let plain = rows.lenient(time.index).map(|number| number * time.seconds);
-    let exact = match time.exact {
-        Some(exact) => exact,
-        None => {
-            let power = power_of_ten(time.seconds);
-            let exact = match plain {
-                None if rows.is_date(time.index) => Some(power.unwrap_or(0)),
-                Some(t) if t.abs() >= FAR_S => power,
-                Some(t) if t.is_finite() => None,
-                _ => return None,
-            };
-            time.exact = Some(exact);
-            exact
-        }
-    };
-    let stamp = match exact {
-        Some(power) => Stamped::Exact(rows.instant(time.index, power).ok()?),
-        None => Stamped::Seconds(plain.filter(|t| t.is_finite())?),
-    };
-    Some(seconds(stamp, origin))
 }
 
 #[cfg(test)]

@@ -60,6 +60,14 @@ impl Instant {
         }
     }
 
+    /// Later by `s` seconds, rounded to the nanosecond.
+    pub fn later(self, s: f64) -> Self {
+        let exact = self.plus(s).fs;
+        Self {
+            fs: (exact + NANOSECOND / 2).div_euclid(NANOSECOND) * NANOSECOND,
+        }
+    }
+
     /// Reads a decimal number in units of 10^`power` s, e.g. -9 for nanoseconds.
     pub(super) fn parse_decimal(field: &[u8], power: i32) -> Option<Self> {
         let text = unquoted(field);

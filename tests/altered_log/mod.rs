@@ -1,6 +1,7 @@
 //! Simulated logs that a test alters, and what `inspect` says of them.
 #![allow(dead_code)]
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -8,6 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::RobotFile;
+use cft_ident::config::model_file::{ModelFile, ModelProvenance};
 use cft_ident::simulate::{Motion, Order, simulate};
 use serde_json::Value;
 
@@ -70,6 +72,17 @@ impl Log {
         }
     }
 
+    /// What `inspect` says of it by a model.
+    pub fn inspected_by(&self, model: &Path) -> Value {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        self.write(&path);
+        inspect_with(
+            &path.to_string_lossy(),
+            Some(("-m", &model.to_string_lossy())),
+        )
+    }
+
     /// What `inspect` says of it, with the robot file or without.
     pub fn inspected(&self, robot: Option<&str>) -> Value {
         let folder = tempfile::tempdir().unwrap();
@@ -79,15 +92,41 @@ impl Log {
     }
 }
 
+/// Writes the model that the simulated logs are of.
+pub fn write_model(path: &Path) {
+    let robot = RobotFile::load(Path::new("configs/cft.toml")).unwrap();
+    let truth = simulate(&Order {
+        robot: &robot,
+        model: None,
+        motion: Motion::Usual,
+        seconds: Some(0.1),
+        effects: Vec::new(),
+        seed: 11,
+    });
+    let model = ModelFile {
+        robot: robot.clone(),
+        parameters: truth.unwrap().truth.parameters,
+        covariance: None,
+        residual_std: BTreeMap::new(),
+        effects: Vec::new(),
+        provenance: ModelProvenance::default(),
+    };
+    std::fs::write(path, model.to_toml().unwrap()).unwrap();
+}
+
 /// The JSON document of `inspect`.
 pub fn inspect(log: &str, robot: Option<&str>) -> Value {
+    inspect_with(log, robot.map(|robot| ("-r", robot)))
+}
+
+fn inspect_with(log: &str, known: Option<(&str, &str)>) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("found.json");
     let mut line = vec!["cft-ident", "inspect", log, "-q", "--json"];
     let json_text = json.to_string_lossy().into_owned();
     line.push(&json_text);
-    if let Some(robot) = robot {
-        line.extend(["-r", robot]);
+    if let Some((option, file)) = known {
+        line.extend([option, file]);
     }
     let exit = cft_ident::cli::run(
         line.into_iter().map(Into::into),

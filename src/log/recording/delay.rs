@@ -16,7 +16,7 @@ const EXPLAINED: f64 = 0.5;
 
 /// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
-pub(super) struct Delay {
+pub struct Delay {
     joints: usize,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -25,16 +25,16 @@ pub(super) struct Delay {
 
 /// An estimated delay of the torques behind the positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Estimate {
+pub struct Estimate {
     /// Delay [s], positive where torques lag.
-    pub(super) delay_s: f64,
+    pub delay_s: f64,
     /// Its standard deviation [s].
-    pub(super) std_s: f64,
+    pub std_s: f64,
 }
 
 impl Delay {
     /// Adds a row; those beyond the first some thousands are not needed.
-    pub(super) fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
+    pub fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
         if self.t.len() == ROWS || q.len() != tau.len() || q.is_empty() {
             return;
         }
@@ -67,7 +67,7 @@ impl Delay {
     }
 
     /// Estimates the delay; `None` where the motion explains too little of the torques.
-    pub(super) fn estimate(&self) -> Option<Estimate> {
+    pub fn estimate(&self) -> Option<Estimate> {
         let rows = self.t.len();
         if rows < 8 * TRIALS {
             return None;

@@ -11,6 +11,7 @@ mod decode;
 mod delay;
 mod descriptor;
 mod fields;
+mod joint_states;
 mod json;
 mod mcap;
 mod msg;
@@ -24,9 +25,11 @@ mod survey;
 mod value;
 mod wire;
 
+pub(super) use joint_states::JointStates;
 pub(super) use rows::MessageRows;
 
 pub use cdr::CdrReader;
 pub use cursor::Malformed;
+pub use delay::{Delay, Estimate as DelayEstimate};
 pub use msg::DefinitionError;
 pub use value::Value;

@@ -205,19 +205,33 @@ impl MessageRows {
         self.row.number
     }
 
+    /// A number of the current row as logged, not scaled: positions, then torques, then velocities.
+    pub(in crate::log) fn logged(&self, index: usize) -> f64 {
+        let mut numbers = (self.row.q.iter()).chain(&self.row.tau).chain(&self.row.dq);
+        numbers.nth(index).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Where files break off, once that is known.
+    pub(in crate::log) fn breaks(&self) -> Vec<String> {
+        let broken = self.recording.broken.iter();
+        broken
+            .map(|(path, broken)| {
+                format!(
+                    "{} breaks off {} ({}): everything before is used, {} messages of the robot's topics",
+                    escape(&source::file_name(path)),
+                    broken.place,
+                    escape(&broken.reason),
+                    self.messages
+                )
+            })
+            .collect()
+    }
+
     /// What was left out or chosen on the way.
     pub(in crate::log) fn warnings(&self) -> Vec<String> {
         let mut out = self.notes.clone();
         let reading = &self.reading;
-        for (path, broken) in &self.recording.broken {
-            out.push(format!(
-                "{} breaks off {} ({}): everything before is used, {} messages of the robot's topics",
-                escape(&source::file_name(path)),
-                broken.place,
-                escape(&broken.reason),
-                self.messages
-            ));
-        }
+        out.extend(self.breaks());
         let topic = escape(&reading.choice.topic);
         if reading.incomplete.count > 0 {
             out.push(format!(

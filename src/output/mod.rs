@@ -1,8 +1,15 @@
-//! Files that appear whole or not at all, and logs as CSV.
+//! Files that appear whole or not at all, and logs as CSV and MCAP.
 //!
 //! A file is written under another name in its own folder, brought to the disk, and renamed. Until
 //! then whatever had its name stays as it was. What is no regular file (a terminal, a pipe,
 //! `/dev/null`) is written directly: there is nothing that could be half.
+
+mod columns;
+mod log;
+mod mcap;
+mod text;
+
+pub use log::{LogForm, LogWriter};
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -238,81 +245,6 @@ pub fn write_whole(
     file.commit()
 }
 
-/// Writes a log as CSV: a header line, then rows of the shortest numbers that are read back bit for bit.
-#[derive(Debug)]
-pub struct LogWriter {
-    file: AtomicFile,
-    columns: usize,
-}
-
-impl LogWriter {
-    /// Begins a log with these column names.
-    ///
-    /// # Errors
-    /// A place that cannot be written.
-    pub fn create(path: &Path, columns: &[impl AsRef<str>]) -> Result<Self, OutputError> {
-        let mut writer = Self {
-            file: AtomicFile::create(path)?,
-            columns: columns.len(),
-        };
-        let names: Vec<String> = columns.iter().map(|name| quoted(name.as_ref())).collect();
-        let written = writeln!(writer.file, "{}", names.join(","));
-        writer.told(written)?;
-        Ok(writer)
-    }
-
-    /// Appends a row: as many numbers as there are columns; a number that is not finite is left empty.
-    ///
-    /// # Errors
-    /// A full disk, or another number of values than columns.
-    pub fn row(&mut self, values: impl IntoIterator<Item = f64>) -> Result<(), OutputError> {
-        let mut count = 0;
-        let mut written = Ok(());
-        for value in values {
-            let comma = if count == 0 { "" } else { "," };
-            written = if value.is_finite() {
-                write!(self.file, "{comma}{value:?}")
-            } else {
-                self.file.write_all(comma.as_bytes())
-            };
-            if written.is_err() {
-                break;
-            }
-            count += 1;
-        }
-        self.told(written)?;
-        if count != self.columns {
-            let problem = format!("a row of {count} numbers under {} names", self.columns);
-            return self.told(Err(io::Error::new(io::ErrorKind::InvalidInput, problem)));
-        }
-        let ended = self.file.write_all(b"\n");
-        self.told(ended)
-    }
-
-    /// Gives the log its name.
-    ///
-    /// # Errors
-    /// A full disk, a lost connection; then there is no file.
-    pub fn commit(self) -> Result<(), OutputError> {
-        self.file.commit()
-    }
-
-    fn told(&self, result: io::Result<()>) -> Result<(), OutputError> {
-        result.map_err(|error| OutputError::new(&self.file.path, error))
-    }
-}
-
-/// A name as a CSV field.
-fn quoted(name: &str) -> String {
-    let special = |c: char| c.is_control() || ",;\"#%".contains(c);
-    if name.is_empty() || name.starts_with(' ') || name.ends_with(' ') || name.chars().any(special)
-    {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_owned()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -413,18 +345,5 @@ mod tests {
         assert!(missing.contains("make the folder first"), "{missing}");
         let named = AtomicFile::create(folder.path()).unwrap_err().to_string();
         assert!(named.contains("name a file inside"), "{named}");
-    }
-
-    #[test]
-    fn a_row_of_the_wrong_width_is_refused() {
-        let folder = folder();
-        let mut log = LogWriter::create(&folder.path().join("a.csv"), &["t", "q_q1"]).unwrap();
-        log.row([0.0, 1.0]).unwrap();
-        assert!(
-            log.row([0.1])
-                .unwrap_err()
-                .to_string()
-                .contains("1 numbers under 2 names")
-        );
     }
 }

@@ -1,0 +1,276 @@
+//! `cft-ident convert`: a log in another form, every number as it was.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::machine::Machine;
+use super::{CliError, Context, Outcome, arguments, columns};
+use crate::log::{Block, Instant, LogSpec, Provenance, Reader, Table, TableBlock, escape};
+use crate::output::{LogForm, LogWriter};
+use crate::report::json::Document;
+use crate::report::number;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident convert run.csv run.mcap
+  cft-ident convert bag_0.mcap bag_1.mcap run.csv.zst
+  cft-ident convert drives.csv run.mcap -r configs/cft.toml";
+
+/// Write logs in another form: CSV or MCAP, each also compressed with gzip or zstd.
+///
+/// Numbers stay as they are, to the last bit; time becomes seconds. In MCAP the columns q_, dq_ and
+/// tau_ of the joints are sensor_msgs/msg/JointState on /joint_states; others are on topics of their
+/// own. Several logs become one, in the order of time. With a robot file the channels that it names
+/// are written, as joint positions and torques in SI units.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Logs, in the order of time; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(required = true, value_name = "IN")]
+    pub logs: Vec<LogSpec>,
+    /// Log to write: .csv or .mcap, and .gz or .zst after it
+    #[arg(value_name = "OUT", value_parser = arguments::log_file)]
+    pub output: PathBuf,
+    /// Robot file, or a built-in one such as configs/cft.toml: write its joint channels
+    #[arg(short, long, value_name = "ROBOT.toml")]
+    pub robot: Option<String>,
+}
+
+/// The log that is being written.
+struct Target<'a> {
+    path: &'a Path,
+    writer: Option<LogWriter>,
+    columns: Vec<String>,
+    origin: Instant,
+    last: f64,
+    rows: u64,
+    without_time: u64,
+}
+
+impl Target<'_> {
+    /// Begins the log, or goes on with it where it has the same columns.
+    fn begin(&mut self, spec: &LogSpec, columns: Vec<String>) -> Result<(), CliError> {
+        for (index, name) in columns.iter().enumerate() {
+            if columns[..index].contains(name) {
+                return Err(CliError::input(format!(
+                    "{}: two columns are called `{}`",
+                    escape(&spec.name()),
+                    escape(name)
+                ))
+                .hint("rename one of them: what is converted is found again by its name"));
+            }
+        }
+        if self.writer.is_none() {
+            self.writer = Some(LogWriter::create(self.path, &columns)?);
+            self.columns = columns;
+        } else if self.columns != columns {
+            return Err(CliError::input(format!(
+                "{}: its columns are not those of the logs before it",
+                escape(&spec.name())
+            ))
+            .hint("convert it by itself"));
+        }
+        Ok(())
+    }
+
+    /// Appends a row whose time is counted from `origin`.
+    fn row(
+        &mut self,
+        spec: &LogSpec,
+        origin: Instant,
+        first: bool,
+        t: f64,
+        values: impl Iterator<Item = f64>,
+    ) -> Result<(), CliError> {
+        let Some(writer) = &mut self.writer else {
+            return Ok(());
+        };
+        if !t.is_finite() {
+            self.without_time += 1;
+            return Ok(());
+        }
+        if self.rows == 0 {
+            self.origin = origin;
+            writer.set_origin(origin);
+        }
+        let t = match origin == self.origin {
+            true => t,
+            false => origin.later(t).since(self.origin),
+        };
+        if first && self.rows > 0 && t <= self.last {
+            return Err(CliError::input(format!(
+                "{}: it begins at {t} s, before the log ahead of it ends at {} s",
+                escape(&spec.name()),
+                self.last
+            ))
+            .hint("give the logs in the order of time, or convert them one by one"));
+        }
+        self.last = t;
+        self.rows += 1;
+        writer.row(std::iter::once(t).chain(values))?;
+        Ok(())
+    }
+}
+
+/// Converts one log as it stands.
+fn as_it_stands(
+    spec: &LogSpec,
+    target: &mut Target<'_>,
+    warnings: &mut Vec<String>,
+    context: &Context,
+) -> Result<Provenance, CliError> {
+    let mut table = Table::open(spec, None)?;
+    let name = escape(&spec.name());
+    let (time, seconds) = match table.is_recording() {
+        true => (0, 1.0),
+        false => columns::time_column(&table)?,
+    };
+    table.set_time(time, seconds);
+    let others: Vec<usize> = (0..table.names().len()).filter(|k| *k != time).collect();
+    let named = others.iter().map(|column| table.names()[*column].clone());
+    target.begin(spec, std::iter::once("t".to_owned()).chain(named).collect())?;
+    let mut block = TableBlock::default();
+    let mut first = true;
+    while table.read(&mut block)? {
+        context.check()?;
+        let origin = table.origin();
+        for (k, t) in block.t.iter().enumerate() {
+            let values = others.iter().map(|column| block.columns[*column][k]);
+            target.row(spec, origin, first, *t, values)?;
+            first = false;
+        }
+    }
+    if table.malformed() > 0 {
+        return Err(CliError::input(format!(
+            "{name}: {} rows have more or fewer fields than the header names",
+            table.malformed()
+        ))
+        .hint("complete or delete these rows; write decimal points, not commas"));
+    }
+    warnings.extend(
+        table
+            .warnings()
+            .iter()
+            .map(|text| format!("{name}: {text}")),
+    );
+    for column in others {
+        let words = table.words(column);
+        if words > 0 {
+            warnings.push(format!(
+                "{name}: {words} fields of `{}` are words and are left out: only numbers are kept",
+                escape(&table.names()[column])
+            ));
+        }
+    }
+    Ok(table.provenance()?)
+}
+
+/// Converts the channels of a robot.
+fn of_robot(
+    spec: &LogSpec,
+    machine: &Machine,
+    target: &mut Target<'_>,
+    warnings: &mut Vec<String>,
+    context: &Context,
+) -> Result<Provenance, CliError> {
+    let mut reader = Reader::open(spec, &machine.file.layout())?;
+    let joints = machine.robot.joint_names();
+    let n = joints.len();
+    let kinds: &[&str] = match reader.has_velocities() {
+        true => &["q", "tau", "dq"],
+        false => &["q", "tau"],
+    };
+    let named = kinds
+        .iter()
+        .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
+    target.begin(spec, std::iter::once("t".to_owned()).chain(named).collect())?;
+    let mut block = Block::default();
+    let mut first = true;
+    while reader.read(&mut block)? {
+        context.check()?;
+        let origin = reader.origin();
+        for (k, t) in block.t.iter().enumerate() {
+            let parts = [&block.q, &block.tau, &block.dq].map(|x| x.get(k * n..(k + 1) * n));
+            let values = parts.into_iter().flatten().flatten().copied();
+            target.row(spec, origin, first, *t, values)?;
+            first = false;
+        }
+    }
+    warnings.extend(reader.warnings());
+    Ok(reader.provenance()?)
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
+    context.check_outputs(&inputs, &[args.output.as_path()])?;
+    let machine = args.robot.as_deref().map(Machine::load).transpose()?;
+    let mut target = Target {
+        path: &args.output,
+        writer: None,
+        columns: Vec::new(),
+        origin: Instant::default(),
+        last: f64::NEG_INFINITY,
+        rows: 0,
+        without_time: 0,
+    };
+    let bar = context.progress("converting", Some(args.logs.len() as u64));
+    let (mut warnings, mut provenance) = (Vec::new(), Vec::new());
+    for spec in &args.logs {
+        provenance.push(match &machine {
+            None => as_it_stands(spec, &mut target, &mut warnings, context)?,
+            Some(machine) => of_robot(spec, machine, &mut target, &mut warnings, context)?,
+        });
+        bar.advance(1);
+    }
+    drop(bar);
+    if target.rows == 0 {
+        return Err(CliError::input("the logs hold no row with a time")
+            .hint("check the time column, and the span"));
+    }
+    if target.without_time > 0 {
+        warnings.push(format!(
+            "{} rows without a time are left out",
+            target.without_time
+        ));
+    }
+    let recording = LogForm::of(&args.output).is_some_and(LogForm::is_recording);
+    if recording && machine.is_none() {
+        for name in &target.columns {
+            let unit = columns::unit_of_joint(name);
+            if let Some(unit) = unit {
+                warnings.push(format!(
+                    "`{}` is in {unit}, but others who open the recording take positions for rad or m and torques for Nm or N: give a robot file with -r to write SI units",
+                    escape(name)
+                ));
+            }
+        }
+    }
+    context.check()?;
+    let duration: f64 = provenance.iter().map(|p| p.duration_s).sum();
+    let result = json!({
+        "columns": target.columns,
+        "samples": target.rows,
+        "duration_s": duration,
+        "file": args.output.file_name().map(|name| name.to_string_lossy()),
+    });
+    let document = Document::new("convert", &provenance, &warnings, &result)?;
+    if let Some(writer) = target.writer {
+        writer.commit()?;
+    }
+    Ok(Outcome {
+        text: format!(
+            "{} rows of {} columns, {} s\nwritten: {}\n",
+            target.rows,
+            target.columns.len(),
+            number::significant(duration, 5),
+            args.output.display()
+        ),
+        document,
+        missed: Vec::new(),
+    })
+}

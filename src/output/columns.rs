@@ -1,0 +1,181 @@
+//! Which columns of a log become which topic of a recording.
+//!
+//! | columns | topic | array |
+//! |---|---|---|
+//! | `q_<joint>`, `dq_<joint>`, `tau_<joint>` | `/joint_states` | position, velocity, effort |
+//! | `<kind>_<joint>` of every joint, e.g. `tau_hat_q1` | `/<kind>` | effort for torques, else position |
+//! | all others | `/columns`, the names of columns for those of joints | position |
+
+/// Array of a `JointState`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Array {
+    Position,
+    Velocity,
+    Effort,
+}
+
+/// A topic: names, and for each array the columns that it is filled from; none where it is empty.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Topic {
+    pub(super) name: String,
+    pub(super) names: Vec<String>,
+    pub(super) arrays: Vec<(Array, Vec<usize>)>,
+}
+
+/// Topic of the joints.
+pub(super) const JOINTS: &str = "/joint_states";
+/// Topic of the columns that belong to no joint.
+pub(super) const COLUMNS: &str = "/columns";
+
+/// The topics of a log with these columns, of which the first is the time.
+pub(super) fn topics(columns: &[String]) -> Vec<Topic> {
+    let joints = joints(columns);
+    let mut left: Vec<usize> = (1..columns.len()).collect();
+    let mut out = Vec::new();
+    let mut kinds: Vec<&str> = Vec::new();
+    for column in columns {
+        for joint in &joints {
+            if let Some(kind) = kind_of(column, joint)
+                && !kinds.contains(&kind)
+            {
+                kinds.push(kind);
+            }
+        }
+    }
+    let mut take = |kind: &str| -> Option<Vec<usize>> {
+        let find = |joint: &String| {
+            let name = format!("{kind}_{joint}");
+            left.iter().copied().find(|index| columns[*index] == name)
+        };
+        let found: Option<Vec<usize>> = joints.iter().map(find).collect();
+        let found = found.filter(|found| !found.is_empty())?;
+        left.retain(|index| !found.contains(index));
+        Some(found)
+    };
+    let main = [
+        ("q", Array::Position),
+        ("dq", Array::Velocity),
+        ("tau", Array::Effort),
+    ];
+    let arrays = main.map(|(kind, array)| Some((array, take(kind)?)));
+    let arrays: Vec<_> = arrays.into_iter().flatten().collect();
+    if !arrays.is_empty() {
+        out.push(Topic {
+            name: JOINTS.to_owned(),
+            names: joints.clone(),
+            arrays,
+        });
+    }
+    for kind in kinds {
+        if matches!(kind, "q" | "dq" | "tau" | "columns" | "joint_states" | "t") {
+            continue;
+        }
+        let Some(found) = take(kind) else { continue };
+        let torque = kind.starts_with("tau") || kind.starts_with("residual");
+        let array = if torque {
+            Array::Effort
+        } else {
+            Array::Position
+        };
+        out.push(Topic {
+            name: format!("/{kind}"),
+            names: joints.clone(),
+            arrays: vec![(array, found)],
+        });
+    }
+    if !left.is_empty() {
+        out.push(Topic {
+            name: COLUMNS.to_owned(),
+            names: left.iter().map(|index| columns[*index].clone()).collect(),
+            arrays: vec![(Array::Position, left)],
+        });
+    }
+    out
+}
+
+/// What stands before `_<joint>` in a column's name, where that may be the name of a topic.
+fn kind_of<'c>(column: &'c str, joint: &str) -> Option<&'c str> {
+    let kind = column.strip_suffix(joint)?.strip_suffix('_')?;
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let begins = kind.starts_with(|c: char| c.is_ascii_alphabetic());
+    (begins && kind.chars().all(plain)).then_some(kind)
+}
+
+/// The joints: those that have a position, else those that have a torque.
+fn joints(columns: &[String]) -> Vec<String> {
+    let with = |prefix: &str| -> Vec<String> {
+        let names = columns
+            .iter()
+            .skip(1)
+            .filter_map(|c| c.strip_prefix(prefix));
+        let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+        // `tau_hat_q1` is no torque of a joint `hat_q1` where there is a joint `q1`.
+        let of_another = |name: &str| {
+            let ends = |other: &&&str| name.strip_suffix(**other).is_some_and(|x| x.ends_with('_'));
+            names.iter().any(|other| ends(&other))
+        };
+        let mut out: Vec<String> = Vec::new();
+        for name in names.iter().filter(|name| !of_another(name)) {
+            if !out.iter().any(|known| known == name) {
+                out.push((*name).to_owned());
+            }
+        }
+        out
+    };
+    let joints = with("q_");
+    if joints.is_empty() {
+        with("tau_")
+    } else {
+        joints
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(columns: &str) -> Vec<Topic> {
+        let columns: Vec<String> = columns.split(',').map(str::to_owned).collect();
+        topics(&columns)
+    }
+
+    #[test]
+    fn joints_kinds_and_what_is_left_have_topics_of_their_own() {
+        use Array::*;
+        let topic = |name: &str, names: &[&str], arrays: &[(Array, &[usize])]| Topic {
+            name: name.to_owned(),
+            names: names.iter().map(|n| (*n).to_owned()).collect(),
+            arrays: arrays
+                .iter()
+                .map(|(array, k)| (*array, k.to_vec()))
+                .collect(),
+        };
+        let found = of("t,q_a,q_b_c,tau_a,tau_b_c,dq_a,u_1,ddq_b_c,ddq_a,q_ref_a");
+        let both: &[&str] = &["a", "b_c"];
+        let expected = [
+            topic(
+                "/joint_states",
+                both,
+                &[(Position, &[1, 2]), (Effort, &[3, 4])],
+            ),
+            topic("/ddq", both, &[(Position, &[8, 7])]),
+            topic(
+                "/columns",
+                &["dq_a", "u_1", "q_ref_a"],
+                &[(Position, &[5, 6, 9])],
+            ),
+        ];
+        assert_eq!(found, expected);
+        let residual = of("t,tau_q1,tau_q2,tau_hat_q1,tau_hat_q2,residual_q1,residual_q2");
+        let topics: Vec<&str> = residual.iter().map(|t| t.name.as_str()).collect();
+        assert_eq!(topics, ["/joint_states", "/tau_hat", "/residual"]);
+        assert!(
+            residual
+                .iter()
+                .all(|t| t.arrays[0].0 == Effort && t.names == ["q1", "q2"])
+        );
+        let other = of("time,Position,Iq");
+        assert_eq!(other[0].name, "/columns");
+        assert_eq!(other.len(), 1);
+    }
+}

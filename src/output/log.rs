@@ -1,0 +1,244 @@
+//! Logs in the form that the file's name asks for, compressed where it says so.
+
+use std::fmt;
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::mcap::Recording;
+use super::text::Text;
+use super::{AtomicFile, OutputError};
+use crate::log::Instant;
+
+/// What a log file is, by the end of its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogForm {
+    messages: bool,
+    packing: Packing,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Packing {
+    None,
+    Gzip,
+    Zstd,
+}
+
+impl LogForm {
+    /// Endings that a log to be written may have.
+    pub const ENDINGS: &str = ".csv or .mcap, and .gz or .zst after it";
+
+    /// Whether it is a recording of messages.
+    pub fn is_recording(self) -> bool {
+        self.messages
+    }
+
+    /// By the name of the file; `None` for any other ending.
+    pub fn of(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_lowercase();
+        let (name, packing) = if let Some(name) = name.strip_suffix(".gz") {
+            (name, Packing::Gzip)
+        } else if let Some(name) = name.strip_suffix(".zst") {
+            (name, Packing::Zstd)
+        } else {
+            (name.as_str(), Packing::None)
+        };
+        let messages = name.ends_with(".mcap");
+        (messages || name.ends_with(".csv")).then_some(Self { messages, packing })
+    }
+}
+
+/// A file, compressed on the way.
+pub(super) enum Packed {
+    Plain(AtomicFile),
+    Gzip(flate2::write::GzEncoder<AtomicFile>),
+    Zstd(zstd::stream::write::Encoder<'static, AtomicFile>),
+}
+
+impl Packed {
+    fn new(file: AtomicFile, packing: Packing) -> io::Result<Self> {
+        Ok(match packing {
+            Packing::None => Self::Plain(file),
+            // No clock time and no name of the file in its header.
+            Packing::Gzip => {
+                let level = flate2::Compression::default();
+                Self::Gzip(flate2::write::GzEncoder::new(file, level))
+            }
+            Packing::Zstd => {
+                let mut encoder = zstd::stream::write::Encoder::new(file, 0)?;
+                encoder.include_checksum(true)?;
+                Self::Zstd(encoder)
+            }
+        })
+    }
+
+    fn finish(self) -> io::Result<AtomicFile> {
+        match self {
+            Self::Plain(file) => Ok(file),
+            Self::Gzip(encoder) => encoder.finish(),
+            Self::Zstd(encoder) => encoder.finish(),
+        }
+    }
+}
+
+impl Write for Packed {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(file) => file.write(buffer),
+            Self::Gzip(encoder) => encoder.write(buffer),
+            Self::Zstd(encoder) => encoder.write(buffer),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Plain(file) => file.flush(),
+            Self::Gzip(encoder) => encoder.flush(),
+            Self::Zstd(encoder) => encoder.flush(),
+        }
+    }
+}
+
+enum Sink {
+    Text(Box<Text<io::BufWriter<Packed>>>),
+    Messages(Box<Recording<Packed>>),
+}
+
+/// Writes a log row by row: whole or not at all.
+///
+/// As CSV: a header line, then rows of the shortest numbers that are read back bit for bit. As MCAP:
+/// see [`super::mcap`]. The bytes depend on the rows alone.
+pub struct LogWriter {
+    path: std::path::PathBuf,
+    sink: Sink,
+    columns: usize,
+    origin: Instant,
+    row: Vec<f64>,
+}
+
+impl fmt::Debug for LogWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LogWriter")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}
+
+impl LogWriter {
+    /// Begins a log with these columns, of which the first is the time [s]. A name that ends like no
+    /// log becomes CSV.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn create(path: &Path, columns: &[impl AsRef<str>]) -> Result<Self, OutputError> {
+        let columns: Vec<String> = columns.iter().map(|c| c.as_ref().to_owned()).collect();
+        let form = LogForm::of(path).unwrap_or(LogForm {
+            messages: false,
+            packing: Packing::None,
+        });
+        let file = AtomicFile::create(path)?;
+        let begun = Packed::new(file, form.packing).and_then(|packed| {
+            Ok(if form.messages {
+                Sink::Messages(Box::new(Recording::new(packed, &columns)?))
+            } else {
+                let buffered = io::BufWriter::with_capacity(1 << 16, packed);
+                Sink::Text(Box::new(Text::new(buffered, &columns)?))
+            })
+        });
+        Ok(Self {
+            sink: begun.map_err(|error| OutputError::new(path, error))?,
+            path: path.to_owned(),
+            columns: columns.len(),
+            origin: Instant::default(),
+            row: Vec::with_capacity(columns.len()),
+        })
+    }
+
+    /// Says from which instant the times of all rows are counted, where that is not zero.
+    pub fn set_origin(&mut self, origin: Instant) {
+        self.origin = origin;
+    }
+
+    /// Appends a row: as many numbers as there are columns. NaN stands for no number.
+    ///
+    /// # Errors
+    /// A full disk, or another number of values than columns.
+    pub fn row(&mut self, values: impl IntoIterator<Item = f64>) -> Result<(), OutputError> {
+        self.row.clear();
+        self.row.extend(values);
+        let count = self.row.len();
+        let written = if count != self.columns {
+            let problem = format!("a row of {count} numbers under {} names", self.columns);
+            Err(io::Error::new(io::ErrorKind::InvalidInput, problem))
+        } else {
+            match &mut self.sink {
+                Sink::Text(text) => text.row(self.origin, &self.row),
+                Sink::Messages(recording) => recording.row(self.origin, &self.row),
+            }
+        };
+        written.map_err(|error| OutputError::new(&self.path, error))
+    }
+
+    /// Gives the log its name.
+    ///
+    /// # Errors
+    /// A full disk, a lost connection; then there is no file.
+    pub fn commit(self) -> Result<(), OutputError> {
+        let packed = match self.sink {
+            Sink::Text(text) => text.finish().and_then(|buffered| {
+                buffered
+                    .into_inner()
+                    .map_err(io::IntoInnerError::into_error)
+            }),
+            Sink::Messages(recording) => recording.finish(),
+        };
+        let file = packed.and_then(Packed::finish);
+        file.map_err(|error| OutputError::new(&self.path, error))?
+            .commit()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ending_tells_the_form_and_anything_else_is_none() {
+        let of = |name: &str| LogForm::of(Path::new(name));
+        let form = |messages, packing| Some(LogForm { messages, packing });
+        assert_eq!(of("a/b.csv"), form(false, Packing::None));
+        assert_eq!(of("a.CSV.gz"), form(false, Packing::Gzip));
+        assert_eq!(of("a.mcap"), form(true, Packing::None));
+        assert_eq!(of("a.mcap.zst"), form(true, Packing::Zstd));
+        for name in ["a.txt", "a.gz", "csv", "a.db3", ""] {
+            assert_eq!(of(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_row_of_the_wrong_width_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.csv", "a.mcap"] {
+            let mut log = LogWriter::create(&folder.path().join(name), &["t", "q_q1"]).unwrap();
+            log.row([0.0, 1.0]).unwrap();
+            let error = log.row([0.1]).unwrap_err().to_string();
+            assert!(error.contains("1 numbers under 2 names"), "{error}");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn times_far_from_zero_keep_their_nanoseconds() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut log = LogWriter::create(&path, &["t", "q_q1"]).unwrap();
+        log.set_origin(Instant::from_ns(1_714_566_896_123_456_789_i64));
+        log.row([0.0, 1.0]).unwrap();
+        log.row([0.001, f64::NAN]).unwrap();
+        log.commit().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            text,
+            "t,q_q1\n1714566896.123456789,1.0\n1714566896.124456789,\n"
+        );
+    }
+}

@@ -1,0 +1,204 @@
+//! A log as an MCAP recording of `sensor_msgs/msg/JointState`, as ROS 2, Foxglove and PlotJuggler
+//! open it: one message a row and topic (see [`super::columns`]), its time in the header's stamp.
+//!
+//! Stamps have nanoseconds. A row whose time is no whole number of them has a message more, on `/t`,
+//! with the time as it is, so that no digit is lost.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use mcap::{Compression, McapError, WriteOptions, Writer};
+
+use super::columns::{self, Array, Topic};
+use crate::log::Instant;
+
+/// Topic of the times that are no whole nanoseconds.
+const TIMES: &str = "/t";
+
+/// `sensor_msgs/msg/JointState` with what it is made of, as ROS 2 defines them.
+const JOINT_STATE: &str = "\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
+/// `std_msgs/msg/Float64`.
+const FLOAT: &str = "float64 data\n";
+
+/// Rows as messages.
+pub(super) struct Recording<W: Write> {
+    writer: Writer<NoSeek<W>>,
+    topics: Vec<(u16, Topic, Vec<u8>)>,
+    /// Channel of the times, once one is needed.
+    times: Option<u16>,
+    sequence: u32,
+    body: Vec<u8>,
+}
+
+impl<W: Write> Recording<W> {
+    /// Begins a recording of these columns, of which the first is the time.
+    pub(super) fn new(out: W, columns: &[String]) -> io::Result<Self> {
+        // One thread compresses: the number of threads shows in the bytes.
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            .profile("ros2")
+            .library(concat!("cft-ident ", env!("CARGO_PKG_VERSION")))
+            .disable_seeking(true);
+        let mut writer = options.create(NoSeek::new(out)).map_err(plain)?;
+        let schema = writer
+            .add_schema(
+                "sensor_msgs/msg/JointState",
+                "ros2msg",
+                JOINT_STATE.as_bytes(),
+            )
+            .map_err(plain)?;
+        let mut topics = Vec::new();
+        for topic in columns::topics(columns) {
+            let channel = writer
+                .add_channel(schema, &topic.name, "cdr", &quality())
+                .map_err(plain)?;
+            let names = names(&topic.names);
+            topics.push((channel, topic, names));
+        }
+        Ok(Self {
+            writer,
+            topics,
+            times: None,
+            sequence: 0,
+            body: Vec::new(),
+        })
+    }
+
+    /// Writes the messages of a row.
+    pub(super) fn row(&mut self, origin: Instant, row: &[f64]) -> io::Result<()> {
+        let t = row.first().copied().unwrap_or(f64::NAN);
+        let (stamp, exact) = stamp(origin, t)?;
+        let log_time = u64::try_from(stamp).unwrap_or(0);
+        self.sequence = self.sequence.wrapping_add(1);
+        let header = |channel_id: u16, sequence: u32| MessageHeader {
+            channel_id,
+            sequence,
+            log_time,
+            publish_time: log_time,
+        };
+        if !exact {
+            let channel = match self.times {
+                Some(channel) => channel,
+                None => {
+                    let schema = self
+                        .writer
+                        .add_schema("std_msgs/msg/Float64", "ros2msg", FLOAT.as_bytes())
+                        .map_err(plain)?;
+                    let added = self.writer.add_channel(schema, TIMES, "cdr", &quality());
+                    *self.times.insert(added.map_err(plain)?)
+                }
+            };
+            self.body.clear();
+            self.body.extend([0, 1, 0, 0]);
+            self.body.extend(t.to_le_bytes());
+            self.writer
+                .write_to_known_channel(&header(channel, self.sequence), &self.body)
+                .map_err(plain)?;
+        }
+        for (channel, topic, names) in &self.topics {
+            message(&mut self.body, stamp, topic, names, row);
+            self.writer
+                .write_to_known_channel(&header(*channel, self.sequence), &self.body)
+                .map_err(plain)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the recording.
+    pub(super) fn finish(mut self) -> io::Result<W> {
+        self.writer.finish().map_err(plain)?;
+        Ok(self.writer.into_inner().into_inner())
+    }
+}
+
+/// What a recorder of ROS 2 notes of each topic.
+fn quality() -> BTreeMap<String, String> {
+    BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())])
+}
+
+/// Whole nanoseconds of a time, and whether they give it back bit for bit.
+fn stamp(origin: Instant, t: f64) -> io::Result<(i128, bool)> {
+    if !t.is_finite() {
+        let problem = "a row without a time cannot become a message";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
+    let ns = origin.later(t).nanoseconds();
+    let exact = Instant::from_ns(ns).since(origin) == t;
+    Ok((ns, exact))
+}
+
+/// A list of names as CDR, without alignment before it.
+fn names(names: &[String]) -> Vec<u8> {
+    let mut out = Vec::new();
+    out.extend((names.len() as u32).to_le_bytes());
+    for name in names {
+        text(&mut out, name);
+    }
+    out
+}
+
+/// Appends a text, aligned to four bytes before and after it.
+fn text(out: &mut Vec<u8>, text: &str) {
+    out.extend((text.len() as u32 + 1).to_le_bytes());
+    out.extend(text.as_bytes());
+    out.push(0);
+    while !out.len().is_multiple_of(4) {
+        out.push(0);
+    }
+}
+
+/// A `JointState` as little-endian CDR.
+fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &Topic, names: &[u8], row: &[f64]) {
+    out.clear();
+    out.extend([0, 1, 0, 0]);
+    let (sec, nanosec) = (
+        stamp_ns.div_euclid(1_000_000_000),
+        stamp_ns.rem_euclid(1_000_000_000),
+    );
+    let sec = i32::try_from(sec).unwrap_or(if sec < 0 { i32::MIN } else { i32::MAX });
+    out.extend(sec.to_le_bytes());
+    out.extend((nanosec as u32).to_le_bytes());
+    // an empty frame_id, padded
+    out.extend([1, 0, 0, 0, 0, 0, 0, 0]);
+    out.extend(names);
+    for array in [Array::Position, Array::Velocity, Array::Effort] {
+        let columns = topic.arrays.iter().find(|(kind, _)| *kind == array);
+        let columns = columns.map_or(&[][..], |(_, columns)| columns);
+        out.extend((columns.len() as u32).to_le_bytes());
+        if columns.is_empty() {
+            continue;
+        }
+        // Alignment counts from after the first four bytes.
+        while !(out.len() - 4).is_multiple_of(8) {
+            out.push(0);
+        }
+        for column in columns {
+            out.extend(row[*column].to_le_bytes());
+        }
+    }
+}
+
+/// The error of the system, or that of the format.
+fn plain(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}
