@@ -103,6 +103,9 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "torque no.csv -m no.toml -o t.csv",
         "simulate -r configs/cft.toml --seconds 1 -o a.csv",
         "identify -o run",
+        "inspect no.csv",
+        "convert no.csv a.mcap",
+        "excite -r configs/cft.toml -o e.toml",
     ];
     assert_eq!(
         lines.len(),

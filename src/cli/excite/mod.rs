@@ -106,7 +106,7 @@ pub struct Args {
     )]
     pub output: Option<PathBuf>,
     /// Write the motion sample by sample, positions, speeds and accelerations
-    #[arg(long, value_name = "FILE.csv", value_parser = arguments::csv_file)]
+    #[arg(long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
