@@ -99,6 +99,41 @@ fn time_that_stands_still_or_runs_back_is_an_error_at_its_row() {
 }
 
 #[test]
+fn a_channel_without_any_number_and_a_log_without_rows_are_errors() {
+    one_fault(
+        |log| log.column("tau_q4").fill(f64::NAN),
+        ("error", "nan", "tau_q4", 0.0, 19.999),
+    );
+    let mut log = all_move();
+    log.drain(1..20_000);
+    let found = faults(&log.inspected(CFT));
+    assert!(
+        found
+            .iter()
+            .any(|f| f.0 == "error" && f.1 == "incomplete-file"),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn raw_channels_are_held_against_the_limits_of_the_set_up() {
+    let mut log = Log::simulated_raw(2.0);
+    let found = log.inspected(CFT);
+    assert_faults(&found, &[]);
+    let channels = found["channels"].as_array().unwrap();
+    let slide = channels.iter().find(|c| c["name"] == "x_c4").unwrap();
+    assert_eq!(slide["limits"], serde_json::json!([-0.0606, 0.5344]));
+    log.column("x_c4")[700..710].fill(0.6);
+    let found = faults(&log.inspected(CFT));
+    assert!(
+        found
+            .iter()
+            .any(|f| f.1 == "beyond-limits" && f.2 == "x_c4" && (f.3 - 0.7).abs() < 2e-3),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn lost_rows_are_a_gap() {
     for mut log in both() {
         log.drain(8000..8200);

@@ -79,6 +79,23 @@ pub fn look(
             },
         );
     }
+    if findings.rows < 2 {
+        let rows = findings.rows;
+        findings.faults.insert(
+            0,
+            Fault {
+                kind: Kind::IncompleteFile,
+                severity: Severity::Error,
+                channel: None,
+                from_s: 0.0,
+                to_s: 0.0,
+                rows,
+                effect: format!("{rows} row(s): nothing can be said, and a fit refuses the log"),
+                remedy: "record again, or check the span".to_owned(),
+                cut: false,
+            },
+        );
+    }
     for effect in table.breaks() {
         findings.faults.insert(
             0,

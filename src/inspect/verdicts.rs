@@ -287,7 +287,7 @@ pub(super) fn seconds(s: f64) -> String {
 fn number_faults(track: &Track, draft: &mut Draft) {
     let name = Some(track.channel.name.as_str());
     let used = matches!(track.channel.role, Role::Position | Role::Torque);
-    if track.rows == 0 {
+    if track.rows == 0 && !used {
         // A column of words is no channel.
         return;
     }

@@ -23,6 +23,17 @@ pub struct Log {
 impl Log {
     /// The CFT robot, with what its robot file says of encoders and noise: joint channels alone.
     pub fn simulated(motion: Motion, seconds: f64) -> Self {
+        let joint = |name: &str| name.contains("q_") || name.contains("tau_");
+        Self::with(motion, seconds, &joint)
+    }
+
+    /// The same with its motors' positions and volts alone.
+    pub fn simulated_raw(seconds: f64) -> Self {
+        let raw = |name: &str| name.starts_with("x_c") || name.starts_with("u_");
+        Self::with(Motion::Usual, seconds, &raw)
+    }
+
+    fn with(motion: Motion, seconds: f64, wanted: &dyn Fn(&str) -> bool) -> Self {
         let robot = RobotFile::load(Path::new("configs/cft.toml")).unwrap();
         let log = simulate(&Order {
             robot: &robot,
@@ -33,9 +44,8 @@ impl Log {
             seed: 11,
         })
         .unwrap();
-        let wanted = |name: &String| name == "t" || name.contains("q_") || name.contains("tau_");
         let kept: Vec<usize> = (0..log.header.len())
-            .filter(|j| wanted(&log.header[*j]))
+            .filter(|j| log.header[*j] == "t" || wanted(&log.header[*j]))
             .collect();
         Self {
             names: kept.iter().map(|j| log.header[*j].clone()).collect(),
