@@ -129,3 +129,15 @@ fn a_run_that_computes_for_long_ends_within_seconds() {
     interrupt(run, "INT", || begun.elapsed() > Duration::from_millis(700));
     assert!(names(path).is_empty());
 }
+
+#[test]
+fn a_design_that_is_interrupted_leaves_the_best_motion_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let run = tool(path, "excite --starts 10000 -o best.toml --json out.json");
+    let begun = Instant::now();
+    interrupt(run, "INT", || begun.elapsed() > Duration::from_secs(2));
+    assert_eq!(names(path), ["best.toml"]);
+    let check = tool(path, "excite --check best.toml").wait();
+    assert!(check.unwrap().success());
+}

@@ -12,12 +12,13 @@ use crate::config::{self, Campaign, RobotFile, Trajectory};
 use crate::output::write_whole;
 use crate::simulate::{Motion, Order};
 
-/// Robot file and validation motion of the campaign, as they come with the tool.
+/// Robot file and motions of the campaign, as they come with the tool.
 const ROBOT: &str = "configs/cft.toml";
+/// Designed by `excite` for all parameters; it ends by itself, after about 40 s.
+const EXCITATION: &str = "configs/cft-excitation.toml";
 const UNSEEN: &str = "configs/cft-validation.toml";
-/// Length of a one-joint experiment, of the identification run and of the unseen one [s].
+/// Length of a one-joint experiment and of the unseen motion [s].
 const ONE_JOINT_S: f64 = 20.0;
-const IDENTIFICATION_S: f64 = 40.0;
 const UNSEEN_S: f64 = 20.0;
 
 /// Simulates the campaign into `folder` and writes its campaign file; returns the warnings of the
@@ -31,16 +32,25 @@ pub(super) fn simulate(
     context: &Context,
 ) -> Result<Vec<String>, CliError> {
     let robot = RobotFile::load(Path::new(ROBOT))?;
+    let excitation = Trajectory::load(Path::new(EXCITATION))?;
     let unseen = Trajectory::load(Path::new(UNSEEN))?;
     let joints = robot.joint_names();
     let moves: Vec<String> = joints.iter().map(|j| format!("{j}.csv")).collect();
-    let mut orders: Vec<(String, Motion, f64)> = joints
+    let mut orders: Vec<(String, Motion, Option<f64>)> = joints
         .iter()
         .zip(&moves)
-        .map(|(joint, log)| (log.clone(), Motion::Move(joint), ONE_JOINT_S))
+        .map(|(joint, log)| (log.clone(), Motion::Move(joint), Some(ONE_JOINT_S)))
         .collect();
-    orders.push(("identification.csv".into(), Motion::Usual, IDENTIFICATION_S));
-    orders.push(("unseen.csv".into(), Motion::Trajectory(&unseen), UNSEEN_S));
+    orders.push((
+        "identification.csv".into(),
+        Motion::Trajectory(&excitation),
+        None,
+    ));
+    orders.push((
+        "unseen.csv".into(),
+        Motion::Trajectory(&unseen),
+        Some(UNSEEN_S),
+    ));
     let bar = context.progress("simulating the campaign", Some(orders.len() as u64));
     let said: Vec<Result<Vec<String>, CliError>> = orders
         .par_iter()
@@ -50,7 +60,7 @@ pub(super) fn simulate(
                 robot: &robot,
                 model: None,
                 motion: *motion,
-                seconds: Some(*seconds),
+                seconds: *seconds,
                 effects: Vec::new(),
                 // every experiment has noise of its own
                 seed: seed.wrapping_mul(1000).wrapping_add(i as u64),

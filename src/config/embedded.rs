@@ -11,11 +11,15 @@ use super::{ConfigError, check};
 use crate::log::{list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
-pub const EMBEDDED: [(&str, &str); 7] = [
+pub const EMBEDDED: [(&str, &str); 8] = [
     ("configs/cft.toml", include_str!("../../configs/cft.toml")),
     (
         "configs/cft-validation.toml",
         include_str!("../../configs/cft-validation.toml"),
+    ),
+    (
+        "configs/cft-excitation.toml",
+        include_str!("../../configs/cft-excitation.toml"),
     ),
     (
         "configs/cft-dspace.toml",
