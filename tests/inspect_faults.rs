@@ -463,3 +463,17 @@ fn identified() -> tempfile::TempDir {
     altered_log::write_model(&folder.path().join("model.toml"));
     folder
 }
+
+#[test]
+fn a_very_wide_log_is_looked_at_in_bounded_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wide.csv");
+    let names: String = (0..3000).map(|k| format!(",q_{k}")).collect();
+    let row = |t: u32| format!("{t}{}\n", format!(",{t}").repeat(3000));
+    let rows: String = (0..300).map(row).collect();
+    std::fs::write(&path, format!("t{names}\n{rows}")).unwrap();
+    let found = altered_log::inspect(&path.to_string_lossy(), None);
+    assert_eq!(found["channels"].as_array().unwrap().len(), 3000);
+    let joints = found["joints"].as_array().unwrap().len();
+    assert!((1..=512).contains(&joints), "{joints}");
+}

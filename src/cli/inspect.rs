@@ -291,17 +291,20 @@ fn channels(found: &Findings) -> table::Table {
 }
 
 fn joints(found: &Findings) -> table::Table {
-    let mut table = table::Table::new(&[
+    let mut columns = vec![
         ("joint", Align::Left),
         ("moves", Align::Left),
         ("travel", Align::Decimal),
         ("speed", Align::Decimal),
         ("acc.", Align::Decimal),
-        ("unit", Align::Left),
         ("reversals", Align::Right),
         ("moving", Align::Decimal),
         ("condition", Align::Decimal),
-    ]);
+    ];
+    if found.joints.iter().any(|joint| joint.unit.is_some()) {
+        columns.push(("unit", Align::Left));
+    }
+    let mut table = table::Table::new(&columns);
     for joint in &found.joints {
         table.row([
             escape(&joint.joint),
@@ -309,13 +312,14 @@ fn joints(found: &Findings) -> table::Table {
             number::significant(joint.travel, 3),
             number::significant(joint.speed_max, 3),
             number::significant(joint.acceleration_max, 3),
-            joint.unit.clone().unwrap_or_default(),
             joint.reversals.to_string(),
             number::percent(joint.moving_share),
             joint
                 .condition
                 .map(|condition| number::significant(condition, 3))
                 .unwrap_or_default(),
+            // Left off where there is no column for it.
+            joint.unit.clone().unwrap_or_default(),
         ]);
     }
     table

@@ -10,23 +10,13 @@ const SHIFT: u32 = 52 - PER_OCTAVE.trailing_zeros();
 
 /// Counts of magnitudes in bins that are 1/32 of an octave wide, so that a quantile is right to
 /// about 1 %.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Histogram {
+    // Taken when the first number comes: most channels of a wide log have none.
     counts: Vec<u64>,
     sums: Vec<f64>,
     zeros: u64,
     total: u64,
-}
-
-impl Default for Histogram {
-    fn default() -> Self {
-        Self {
-            counts: vec![0; PER_OCTAVE * OCTAVES],
-            sums: vec![0.0; PER_OCTAVE * OCTAVES],
-            zeros: 0,
-            total: 0,
-        }
-    }
 }
 
 impl Histogram {
@@ -40,6 +30,10 @@ impl Histogram {
             self.zeros += 1;
             return;
         };
+        if self.counts.is_empty() {
+            self.counts.resize(PER_OCTAVE * OCTAVES, 0);
+            self.sums.resize(PER_OCTAVE * OCTAVES, 0.0);
+        }
         let bin = ((above >> SHIFT) as usize).min(self.counts.len() - 1);
         self.counts[bin] += 1;
         self.sums[bin] += magnitude;

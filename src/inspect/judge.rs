@@ -15,6 +15,11 @@ use super::windows::Windows;
 /// A joint moves where it travels further than this share of what the farthest joint does.
 const TRAVELS: f64 = 0.02;
 
+/// Channels whose shape is looked at; of more only the numbers are.
+const SHAPED: usize = 512;
+/// Channels that are compared with each other.
+const COMPARED: usize = 64;
+
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Depth {
@@ -157,7 +162,13 @@ pub struct Judge {
 
 impl Judge {
     /// For a log of these channels, time aside.
-    pub fn new(channels: Vec<Channel>, depth: Depth) -> Self {
+    pub fn new(mut channels: Vec<Channel>, depth: Depth) -> Self {
+        let of_motion = channels.iter_mut().filter(|channel| {
+            matches!(channel.role, Role::Position | Role::Velocity | Role::Torque)
+        });
+        for channel in of_motion.skip(SHAPED) {
+            channel.role = Role::Other;
+        }
         let of_role = |role: Role| -> Vec<usize> {
             let all = channels.iter().enumerate();
             all.filter(|(_, channel)| channel.role == role)
@@ -187,6 +198,7 @@ impl Judge {
             }
         }
         compared.sort_unstable();
+        compared.truncate(COMPARED);
         let mut others = of_role(Role::Torque);
         others.extend(of_role(Role::Velocity));
         Self {

@@ -2,6 +2,8 @@
 
 /// Stretches that are kept at most.
 const MOST: usize = 16;
+/// Numbers that they hold together at most.
+const NUMBERS: usize = 1 << 23;
 
 /// Consecutive rows without a gap.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -38,7 +40,15 @@ impl Windows {
         if !number.is_multiple_of(self.stride) {
             return;
         }
-        if self.kept.len() == MOST {
+        let most = (NUMBERS / (t.len() * (columns.len() + 1)).max(1)).min(MOST);
+        if most < 2 {
+            // Too wide to keep more than the first rows.
+            if self.kept.is_empty() && most == 1 {
+                self.keep(t, columns);
+            }
+            return;
+        }
+        if self.kept.len() >= most {
             // Every other one goes, so that what is kept stays evenly spread.
             let mut index = 0;
             self.kept.retain(|_| {
@@ -50,6 +60,10 @@ impl Windows {
                 return;
             }
         }
+        self.keep(t, columns);
+    }
+
+    fn keep(&mut self, t: &[f64], columns: &[&[f64]]) {
         self.kept.push(Window {
             t: t.to_vec(),
             columns: columns.iter().map(|column| column.to_vec()).collect(),

@@ -21,8 +21,10 @@ pub struct TableBlock {
 }
 
 impl TableBlock {
-    /// Rows that a table puts into one block.
+    /// Rows that a table puts into one block, fewer where it is very wide.
     pub const ROWS: usize = 4096;
+    /// Numbers that a block holds at most, where that is more than a few rows.
+    const NUMBERS: usize = 1 << 21;
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
@@ -149,7 +151,9 @@ impl Table {
     /// A file that can no longer be read, or a line without an end.
     pub fn read(&mut self, block: &mut TableBlock) -> Result<bool, LogError> {
         block.clear(self.names().len());
-        while block.rows() < TableBlock::ROWS {
+        let wide = TableBlock::NUMBERS / self.names().len().max(1);
+        let most = wide.clamp(16, TableBlock::ROWS);
+        while block.rows() < most {
             match self.rows.next() {
                 Ok(true) => {}
                 Ok(false) => break,

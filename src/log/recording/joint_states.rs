@@ -19,6 +19,10 @@ use crate::log::{LogError, source};
 const LOOKED_AT: u64 = 20_000;
 /// Messages of one topic that are looked at for its names.
 const OF_TOPIC: u32 = 200;
+/// Names of one topic that become columns, the first ones.
+const NAMES: usize = 1024;
+/// Topics of joint states that are read, the first ones.
+const TOPICS: usize = 32;
 /// Topic of joints, by the convention of ROS.
 const JOINTS: &str = "joint_states";
 /// Topic whose names are those of columns, not of joints.
@@ -346,7 +350,7 @@ fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
             .position(|f| f.topic == *topic && f.schema == *schema);
         let at = match known {
             Some(at) => at,
-            None if schema.name.ends_with("JointState") => {
+            None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
                 let Ok(probe) = Decoder::new(schema, &probes()) else {
                     continue;
                 };
@@ -415,7 +419,7 @@ impl Found {
             .iter()
             .any(|v| v.integer().is_some_and(|x| x != 0));
         for name in self.probe.names(data) {
-            if !self.names.contains(&name) {
+            if self.names.len() < NAMES && !self.names.contains(&name) {
                 self.names.push(name);
             }
         }
