@@ -20,8 +20,17 @@ fn write_log(path: &Path, bytes: u64) -> std::io::Result<u64> {
     let rows: Vec<String> = (0..PATTERN)
         .map(|k| {
             let phase = std::f64::consts::TAU * k as f64 / PATTERN as f64;
-            let q = (0..6).map(|j| 0.1 * (phase * (7 + j) as f64).sin());
-            let tau = (0..6).map(|j| 20.0 * (phase * (9 + j) as f64).cos());
+            // About one turn a second, with inertia and friction.
+            let cycles = (0..6).map(|j| (50 + 7 * j) as f64);
+            let q = cycles.clone().map(|n| 0.1 * (phase * n).sin());
+            let tau = cycles.map(|n| {
+                let speed = std::f64::consts::TAU * n * 1000.0 / PATTERN as f64;
+                let (v, a) = (
+                    speed * (phase * n).cos(),
+                    -speed * speed * (phase * n).sin(),
+                );
+                9.5 * a + 20.0 * v + 20.0 * v.signum()
+            });
             q.chain(tau).map(|x| format!(",{x}")).collect()
         })
         .collect();
