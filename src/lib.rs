@@ -9,6 +9,7 @@
 //! | [`motion`] | blocks | filtered, decimated rows of q, v, a, tau | |
 //! | [`friction`] | one-joint logs | theta 13..32 with covariance | eq. (30)-(38) |
 //! | [`inertia`] | rows, friction | theta 1..12 with covariance | eq. (39)-(42) |
+//! | [`diagnose`] | model, logs | effects that the model lacks, refined model | |
 //! | [`validate`] | a log that was not used, model | torque errors | Figures 7 and 8 |
 //! | [`report`] | results | tables, figures | |
 //!
@@ -23,11 +24,13 @@ pub mod log;
 
 pub mod motion;
 
+pub mod effect;
 pub mod inspect;
 
 pub mod friction;
 pub mod inertia;
 
+pub mod diagnose;
 pub mod validate;
 
 pub mod simulate;

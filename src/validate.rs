@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use crate::log::Block;
-use crate::motion::{self, Settings, Summary};
+use crate::motion::{self, Parallel, Settings, Stretch, Summary};
 use crate::robot::model::Model;
 
 /// Errors of one joint.
@@ -102,6 +102,27 @@ pub struct Reconstructed<'a> {
     pub reconstructed: &'a [f64],
 }
 
+/// Where the thinning of a log's rows stands.
+struct Taken {
+    declared: Option<usize>,
+    cutoff_hz: f64,
+    stretch: Option<usize>,
+    count: usize,
+    last_t: Option<f64>,
+}
+
+impl Taken {
+    fn new(settings: &Settings) -> Self {
+        Taken {
+            declared: settings.decimation,
+            cutoff_hz: settings.cutoff_hz,
+            stretch: None,
+            count: 0,
+            last_t: None,
+        }
+    }
+}
+
 /// Errors of several logs and joints, summed log after log.
 pub struct Reconstruction<'a> {
     model: &'a Model,
@@ -133,14 +154,9 @@ impl<'a> Reconstruction<'a> {
         let n = self.model.robot.joints();
         let model = self.model;
         let mut full = settings.clone();
-        let declared = full.decimation;
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
-        let mut stretch = None;
-        let mut count = 0usize;
-        let (sums, traces) = (&mut self.sums, &mut self.traces);
-        let cutoff = settings.cutoff_hz;
-        let mut last_t = None::<f64>;
+        let mut taken = Taken::new(settings);
         let summary = motion::run(
             source,
             n,
@@ -151,37 +167,88 @@ impl<'a> Reconstruction<'a> {
                 out[..n].copy_from_slice(sample.tau);
                 model.torque(sample.q, sample.v, sample.a, &mut out[n..]);
             },
-            &mut |r| {
-                if stretch != Some(r.segment) {
-                    stretch = Some(r.segment);
-                    count = 0;
-                    traces.breaks.push(traces.t.len());
-                    last_t = None;
-                }
-                for (j, s) in sums.iter_mut().enumerate() {
-                    s.add_raw(r.raw[j], r.raw[n + j]);
-                }
-                row(&Reconstructed {
-                    t: r.t,
-                    measured: &r.raw[..n],
-                    reconstructed: &r.raw[n..],
-                });
-                // without a declared decimation: ten rows a period of the cut-off
-                let keep = match declared {
-                    Some(every) => count.is_multiple_of(every.max(1)),
-                    None => last_t.is_none_or(|l| r.t - l >= 0.0999 / cutoff),
-                };
-                count += 1;
-                if keep {
-                    last_t = Some(r.t);
-                    for (j, s) in sums.iter_mut().enumerate() {
-                        s.add(r.filtered[j], r.filtered[n + j]);
-                    }
-                    append(traces, r.t, r.filtered, n);
-                }
-            },
+            &mut |r| self.take(&mut taken, r.segment, r.t, r.raw, r.filtered, row),
         )?;
         Ok(summary)
+    }
+
+    /// Adds one stretch of a log in memory with its reconstructed torque, `[joint][sample]`: for
+    /// models whose effects remember. `segment` counts the stretches of all logs.
+    ///
+    /// # Errors
+    /// [`MotionError`](motion::MotionError) of the filter.
+    pub fn add_stretch(
+        &mut self,
+        settings: &Settings,
+        segment: usize,
+        stretch: &Stretch,
+        reconstructed: &[Vec<f64>],
+        row: &mut dyn FnMut(&Reconstructed),
+    ) -> Result<(), motion::MotionError> {
+        let n = self.model.robot.joints();
+        let mut full = settings.clone();
+        full.decimation = Some(1);
+        let parallel = Parallel::design(&full, stretch.dt)?;
+        let channels: Vec<&[f64]> = stretch
+            .tau
+            .iter()
+            .chain(reconstructed)
+            .map(Vec::as_slice)
+            .collect();
+        let rows = parallel.run(&channels)?;
+        let mut taken = Taken::new(settings);
+        let (mut raw, mut filtered) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
+        let count = parallel.rows(stretch.len());
+        for (i, k) in (0..count).map(|i| (i, parallel.sample_of(i))) {
+            for c in 0..2 * n {
+                raw[c] = channels[c][k];
+                filtered[c] = rows[c][i];
+            }
+            self.take(&mut taken, segment, stretch.t[k], &raw, &filtered, row);
+        }
+        Ok(())
+    }
+
+    /// Takes one row at full rate.
+    fn take(
+        &mut self,
+        taken: &mut Taken,
+        segment: usize,
+        t: f64,
+        raw: &[f64],
+        filtered: &[f64],
+        row: &mut dyn FnMut(&Reconstructed),
+    ) {
+        let n = self.sums.len();
+        if taken.stretch != Some(segment) {
+            taken.stretch = Some(segment);
+            taken.count = 0;
+            taken.last_t = None;
+            self.traces.breaks.push(self.traces.t.len());
+        }
+        for (j, s) in self.sums.iter_mut().enumerate() {
+            s.add_raw(raw[j], raw[n + j]);
+        }
+        row(&Reconstructed {
+            t,
+            measured: &raw[..n],
+            reconstructed: &raw[n..],
+        });
+        // without a declared decimation: ten rows a period of the cut-off
+        let keep = match taken.declared {
+            Some(every) => taken.count.is_multiple_of(every.max(1)),
+            None => taken
+                .last_t
+                .is_none_or(|l| t - l >= 0.0999 / taken.cutoff_hz),
+        };
+        taken.count += 1;
+        if keep {
+            taken.last_t = Some(t);
+            for (j, s) in self.sums.iter_mut().enumerate() {
+                s.add(filtered[j], filtered[n + j]);
+            }
+            append(&mut self.traces, t, filtered, n);
+        }
     }
 
     /// Errors over all logs that were added, with the last log's summary.

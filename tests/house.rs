@@ -14,8 +14,10 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("config", &["robot", "log", "verdict"]),
     ("output", &["log"]),
     ("motion", &["math", "robot", "log"]),
+    ("effect", &["math", "robot", "motion"]),
     ("friction", &["math", "robot", "log", "motion", "verdict"]),
     ("inertia", &["math", "robot", "log", "motion", "verdict"]),
+    ("diagnose", &["math", "robot", "log", "motion", "effect"]),
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
     ("inspect", &["math", "log"]),
     ("simulate", &["math", "robot", "log", "config"]),
@@ -30,8 +32,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "math", "verdict", "robot", "log", "config", "output", "motion", "friction", "inertia",
-            "validate", "inspect", "simulate", "excite", "report",
+            "math", "verdict", "robot", "log", "config", "output", "motion", "effect", "friction",
+            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "report",
         ],
     ),
 ];

@@ -167,6 +167,7 @@ fn the_built_in_campaign_meets_its_limits_and_no_thread_count_changes_a_byte() {
         let off = p["standard_deviations_off"].as_f64().unwrap();
         assert!(off.abs() < 4.5, "{p}");
     }
+    assert_eq!(result["diagnose"]["verdict"], "nothing-missing");
     for joint in result["friction"]["joints"].as_array().unwrap() {
         assert_eq!(joint["converged"], true);
         assert_eq!(joint["curve"].as_array().unwrap().len(), 100);

@@ -6,7 +6,10 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use super::machine::Machine;
-use super::{CliError, Context, Outcome, campaign, friction, lsq, simulate, validate};
+use super::refined::refined;
+use super::{
+    CliError, Context, Exit, Outcome, campaign, diagnose, friction, lsq, simulate, validate,
+};
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
@@ -164,7 +167,7 @@ fn execute(
     let mut missed = Vec::new();
     let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
     if !unseen.is_empty() {
-        let numbers = model.model("model.toml")?;
+        let numbers = refined(&model, "model.toml")?;
         let validated =
             validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_, _| {})?;
         let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
@@ -182,18 +185,47 @@ fn execute(
         inputs.extend(validated.inputs);
     }
 
+    // what the declared model lacks; the validation logs decide nothing
+    let mut refined_model = None;
+    let mut diagnose_json = Value::Null;
+    let mut lacking = String::new();
+    let training = logs(base, &roles.identification)?;
+    let roles = diagnose::Logs {
+        train: &training,
+        veto: &[],
+        holdout: &unseen,
+    };
+    match diagnose::diagnose(&machine, &model, "model.toml", &roles, false, context) {
+        Ok(found) => {
+            diagnose_json = diagnose::json(&machine, &found);
+            lacking = diagnose::text(&machine, &found, "model.toml");
+            if !found.diagnosis.steps.is_empty() {
+                let refined = diagnose::into_model(&machine, &model, &found);
+                write(folder, "refined.toml", &refined.to_toml()?, &mut files)?;
+                refined_model = Some(refined);
+            }
+        }
+        // logs too short to look for effects are no reason to lose the fit
+        Err(error) if error.exit() == Exit::Undetermined => {
+            warnings.push(format!("no diagnosis: {error}"));
+        }
+        Err(error) => return Err(error),
+    }
+
     // only now, with everything decided, may the truth be looked at
     let truth = match &campaign.truth {
         None => None,
         Some(path) => Some(load_truth(&base.join(path))?),
     };
-    text += &parameters(&model, truth.as_ref());
+    text += &parameters(refined_model.as_ref().unwrap_or(&model), truth.as_ref());
     text += &lsq::quality(&machine, &fitted);
     text.push('\n');
     text += &errors;
+    text.push('\n');
+    text += &lacking;
     let truth_json = match &truth {
         None => Value::Null,
-        Some(truth) => comparison(&model, truth),
+        Some(truth) => comparison(refined_model.as_ref().unwrap_or(&model), truth),
     };
     context.check()?;
     write(folder, "summary.txt", &text, &mut files)?;
@@ -202,7 +234,7 @@ fn execute(
         "friction": friction_json,
         "lsq": lsq::json(&machine, &fitted),
         "validate": validate_json,
-        "diagnose": null,
+        "diagnose": diagnose_json,
         "truth": truth_json,
         "files": files,
     });

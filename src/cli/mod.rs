@@ -5,6 +5,7 @@
 
 mod campaign;
 pub mod convert;
+pub mod diagnose;
 pub mod excite;
 pub mod friction;
 pub mod identify;
@@ -23,6 +24,7 @@ mod files;
 pub mod machine;
 mod outcome;
 mod outputs;
+pub mod refined;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -76,6 +78,7 @@ enum Command {
     Friction(friction::Args),
     Lsq(lsq::Args),
     Validate(validate::Args),
+    Diagnose(diagnose::Args),
     Torque(torque::Args),
     Simulate(simulate::Args),
     Excite(excite::Args),
@@ -90,6 +93,7 @@ impl Command {
             Command::Friction(args) => friction::run(args, context),
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
+            Command::Diagnose(args) => diagnose::run(args, context),
             Command::Torque(args) => torque::run(args, context),
             Command::Simulate(args) => simulate::run(args, context),
             Command::Excite(args) => excite::run(args, context),

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
+use super::refined::refined;
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::log::LogSpec;
@@ -43,12 +44,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &[args.output.as_path()])?;
     let name = args.model.display().to_string();
     let file = ModelFile::load(&args.model)?;
-    let model = file.model(&name)?;
+    let refined = refined(&file, &name)?;
+    let model = &refined.model;
     let machine = Machine::new(&name, file.robot.clone());
     let joints = machine.robot.joint_names();
     let n = joints.len();
     let p = model.parameters();
-    let covariance = file.model_covariance(&model);
+    let covariance = file.model_covariance(model);
     let residual: Vec<f64> = joints
         .iter()
         .map(|j| file.residual_std.get(j).copied().unwrap_or(0.0))
@@ -72,34 +74,61 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut failed = None;
     let mut peak = vec![0.0f64; n];
     let mut square = vec![0.0f64; n];
-    let summary = motion::run(
-        &mut |block| log.read(block),
-        n,
-        &settings,
-        None,
-        2 * n,
-        &|s, out| {
-            model.torque(s.q, s.v, s.a, &mut out[..n]);
-            GRADIENT.with_borrow_mut(|g| {
-                g.resize(p, 0.0);
-                for j in 0..n {
-                    model.gradient(j, s.q, s.v, s.a, g);
-                    out[n + j] = (quadratic(&covariance, g) + residual[j] * residual[j]).sqrt();
+    let mut emit = |t: f64, values: &[f64]| {
+        for j in 0..n {
+            peak[j] = peak[j].max(values[j].abs());
+            square[j] += values[j] * values[j];
+        }
+        if failed.is_none() {
+            failed = out
+                .row(std::iter::once(t).chain(values.iter().copied()))
+                .err();
+        }
+    };
+    let band = |q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]| {
+        GRADIENT.with_borrow_mut(|g| {
+            g.resize(p, 0.0);
+            for (j, out) in out.iter_mut().enumerate() {
+                model.gradient(j, q, v, a, g);
+                *out = (quadratic(&covariance, g) + residual[j] * residual[j]).sqrt();
+            }
+        });
+    };
+    let mut read = |block: &mut _| log.read(block);
+    let summary = if refined.effects.is_empty() {
+        motion::run(
+            &mut read,
+            n,
+            &settings,
+            None,
+            2 * n,
+            &|s, out| {
+                let (tau, std) = out.split_at_mut(n);
+                model.torque(s.q, s.v, s.a, tau);
+                band(s.q, s.v, s.a, std);
+            },
+            &mut |row| emit(row.t, row.raw),
+        )
+        .map_err(|e| run_error(&args.log, e))?
+    } else {
+        // effects remember: they need a stretch from its begin
+        let (found, summary) =
+            motion::stretches(0, n, &settings, &mut read).map_err(|e| run_error(&args.log, e))?;
+        let mut values = vec![0.0; 2 * n];
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for stretch in &found {
+            let hat = refined.reconstruct(stretch);
+            for (k, t) in stretch.t.iter().enumerate() {
+                stretch.at(k, &mut q, &mut v, &mut a);
+                for (x, hat) in values.iter_mut().zip(&hat) {
+                    *x = hat[k];
                 }
-            });
-        },
-        &mut |row| {
-            for j in 0..n {
-                peak[j] = peak[j].max(row.raw[j].abs());
-                square[j] += row.raw[j] * row.raw[j];
+                band(&q, &v, &a, &mut values[n..]);
+                emit(*t, &values);
             }
-            if failed.is_none() {
-                let values = std::iter::once(row.t).chain(row.raw.iter().copied());
-                failed = out.row(values).err();
-            }
-        },
-    )
-    .map_err(|e| run_error(&args.log, e))?;
+        }
+        summary
+    };
     drop(bar);
     if let Some(error) = failed {
         return Err(error.into());

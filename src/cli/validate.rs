@@ -6,14 +6,15 @@ use serde_json::{Value, json};
 
 use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
+use super::refined::{hold, refined};
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
+use crate::effect::Refined;
 use crate::log::{Instant, LogSpec, Provenance};
 use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
 use crate::report::{number, summary};
-use crate::robot::model::Model;
 use crate::validate::{Reconstructed, Reconstruction, Validation};
 
 const EXAMPLE: &str = "\
@@ -55,31 +56,46 @@ pub struct Validated {
 /// is counted.
 pub fn reconstruct(
     machine: &Machine,
-    model: &Model,
+    refined: &Refined,
     logs: &[LogSpec],
     context: &Context,
     row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, CliError> {
     let bar = context.progress("reconstruction", Some(logs.len() as u64));
-    let mut all: Option<Reconstruction> = None;
+    let mut all = Reconstruction::new(&refined.model);
     let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
+    let settings = machine.settings();
+    let mut segments = 0;
     for spec in logs {
-        let mut log = machine.open(spec, context)?;
-        let origin = log.origin();
-        let settings = machine.settings();
-        let all = all.get_or_insert_with(|| Reconstruction::new(model));
-        let summary = all
-            .add(&settings, &mut |block| log.read(block), &mut |r| {
-                row(r, origin)
-            })
-            .map_err(|e| run_error(spec, e))?;
-        warnings.extend(log.warnings());
-        warnings.extend(summary_warnings(spec, &summary));
-        inputs.push(log.provenance()?);
-        last = Some(summary);
+        if refined.effects.is_empty() {
+            let mut log = machine.open(spec, context)?;
+            let origin = log.origin();
+            let summary = all
+                .add(&settings, &mut |block| log.read(block), &mut |r| {
+                    row(r, origin)
+                })
+                .map_err(|e| run_error(spec, e))?;
+            warnings.extend(log.warnings());
+            warnings.extend(summary_warnings(spec, &summary));
+            inputs.push(log.provenance()?);
+            last = Some(summary);
+        } else {
+            // effects remember: they need a stretch from its begin
+            let held = hold(machine, &[spec], context)?;
+            for stretch in &held.stretches {
+                let hat = refined.reconstruct(stretch);
+                let mut told = |r: &Reconstructed| row(r, held.origin);
+                all.add_stretch(&settings, segments, stretch, &hat, &mut told)
+                    .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))?;
+                segments += 1;
+            }
+            warnings.extend(held.warnings);
+            inputs.extend(held.inputs);
+            last = Some(held.summary);
+        }
         bar.advance(1);
     }
-    let (Some(all), Some(summary)) = (all, last) else {
+    let Some(summary) = last else {
         return Err(CliError::usage("no log is given"));
     };
     Ok(Validated {
@@ -231,7 +247,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let name = args.model.display().to_string();
     let file = ModelFile::load(&args.model)?;
-    let model = file.model(&name)?;
+    let model = refined(&file, &name)?;
     let machine = Machine::new(&name, file.robot.clone());
     let mut residual = match &args.output {
         None => None,

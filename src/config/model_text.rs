@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::document::Document;
 use super::log_section::LogSection;
 use super::model_file::{Covariance, Effect, ModelFile, ModelProvenance, Parameter};
+use super::robot_file::ModelKind;
 use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
     RobotSection, SensorsSection,
@@ -227,6 +228,9 @@ impl ModelFile {
             let index_text = index.to_string();
             if let Some(joint) = &effect.joint
                 && !self.robot.coordinate_names().contains(joint)
+                // the pantograph's references, where the CFT robot's screws are
+                && !(self.robot.robot.model == ModelKind::Cft
+                    && matches!(joint.as_str(), "x_r" | "y_r"))
             {
                 let remedy = format!("this robot has {}", joints.join(", "));
                 return Err(document.value(

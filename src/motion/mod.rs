@@ -24,6 +24,7 @@
 //! | [`run`](mod@run) | the windows of a streamed log |
 //! | [`held_force`] | motor forces held over a sample, where a linkage turns them |
 //! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
+//! | [`stretch`] | whole stretches in memory, for searches |
 
 mod cutter;
 pub mod differences;
@@ -31,6 +32,7 @@ pub mod full_rate;
 pub mod held_force;
 pub mod run;
 pub mod settings;
+pub mod stretch;
 pub mod time_base;
 mod window;
 
@@ -38,6 +40,7 @@ pub use full_rate::{Smooth, full_rate, segments};
 pub use held_force::HeldForces;
 pub use run::{RunError, Skipped, Summary, run};
 pub use settings::{Differences, ParallelFilter, Settings, TorqueTiming};
+pub use stretch::{Parallel, Stretch, stretches};
 
 use thiserror::Error;
 

@@ -1,0 +1,570 @@
+//! `cft-ident diagnose`: what the torque residual still holds, and the effect behind it.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::DMatrix;
+use serde_json::{Value, json};
+
+use super::friction::new_model;
+use super::lsq::processing;
+use super::machine::Machine;
+use super::refined::{Held, hold, in_file, refined};
+use super::{CliError, Context, Outcome};
+use crate::config::ModelFile;
+use crate::diagnose::{
+    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Open, Prior, Unknown,
+};
+use crate::effect::{Added, Refined, Told};
+use crate::log::LogSpec;
+use crate::motion::Parallel;
+use crate::report::json::Document;
+use crate::report::number;
+use crate::report::table::{Align, Table};
+use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
+use crate::robot::model::JointFriction;
+use crate::verdict::Verdict;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident diagnose id.csv -m model.toml --holdout unseen.csv -o refined.toml
+  cft-ident diagnose loaded.csv -m unloaded.toml --keep";
+
+/// Trace the torque residual to effects that the model lacks, add them, and refit.
+///
+/// Errors are reported before and after on data that decided nothing: the --holdout logs, or blocks
+/// that are set aside.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Model file
+    #[arg(short, long, value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Log that may veto a step, in place of blocks that are set aside; may be given more than once
+    #[arg(long, value_name = "LOG")]
+    pub veto: Vec<LogSpec>,
+    /// Log that is evaluated once, after everything is decided; may be given more than once
+    #[arg(long, value_name = "LOG")]
+    pub holdout: Vec<LogSpec>,
+    /// Hold the given model within its covariance: finds payload, gain and tilt
+    #[arg(long)]
+    pub keep: bool,
+    /// Refined model file to write
+    #[arg(short, long, value_name = "REFINED.toml")]
+    pub output: Option<PathBuf>,
+}
+
+/// Result of the stage.
+pub struct Diagnosed {
+    pub diagnosis: Diagnosis,
+    pub held: Held,
+    /// Names of the logs, in order.
+    pub logs: Vec<String>,
+}
+
+/// Logs by what they are for.
+pub struct Logs<'a> {
+    pub train: &'a [LogSpec],
+    pub veto: &'a [LogSpec],
+    pub holdout: &'a [LogSpec],
+}
+
+/// Diagnoses a model on logs.
+pub fn diagnose(
+    machine: &Machine,
+    file: &ModelFile,
+    name: &str,
+    logs: &Logs,
+    keep: bool,
+    context: &Context,
+) -> Result<Diagnosed, CliError> {
+    let given = refined(file, name)?;
+    let groups = [
+        (logs.train, LogRole::Train),
+        (logs.veto, LogRole::Veto),
+        (logs.holdout, LogRole::Holdout),
+    ];
+    let specs: Vec<&LogSpec> = groups.iter().flat_map(|(logs, _)| logs.iter()).collect();
+    let roles = groups
+        .iter()
+        .flat_map(|(logs, role)| logs.iter().map(|_| *role))
+        .collect();
+    let mut held = hold(machine, &specs, context)?;
+    let settings = machine.settings();
+    let parallel = Parallel::design(&settings, held.summary.dt)
+        .map_err(|e| CliError::input(format!("{name}: {e}")))?;
+    let open = open(machine, file, &given);
+    let rate = 1.0 / (held.summary.dt * parallel.decimation as f64);
+    let prior = Prior {
+        information: information(file, &given, &open, keep),
+        centre: given.clone(),
+        rows_per_independent: (rate / (2.0 * settings.cutoff_hz)).max(1.0),
+    };
+    let case = Case {
+        given,
+        prior,
+        open,
+        stretches: std::mem::take(&mut held.stretches),
+        roles,
+        parallel,
+        cutoff_hz: settings.cutoff_hz,
+        units: (0..machine.robot.joints())
+            .map(|j| machine.file.torque_unit(j).to_owned())
+            .collect(),
+        keep,
+        limits: Limits::default(),
+    };
+    let bar = context.progress("search", None);
+    let diagnosis = diagnose::diagnose(
+        &case,
+        &mut |step| context.note(&format!("added {step}")),
+        &|| context.interrupted(),
+    )
+    .map_err(|e| match e {
+        DiagnoseError::Interrupted => CliError::interrupted(),
+        DiagnoseError::Motion(e) => CliError::input(e),
+        DiagnoseError::TooFewRows { .. } | DiagnoseError::NoTorque { .. } => {
+            CliError::undetermined(e)
+        }
+    })?;
+    drop(bar);
+    held.stretches = case.stretches;
+    let logs: Vec<String> = specs.iter().map(|s| s.name()).collect();
+    for aside in &diagnosis.set_aside {
+        if aside.role == LogRole::Holdout {
+            let text = format!(
+                "{}: {:.2}..{:.2} s set aside as the holdout",
+                logs[aside.log], aside.from_s, aside.to_s
+            );
+            context.note(&text);
+        }
+    }
+    Ok(Diagnosed {
+        diagnosis,
+        held,
+        logs,
+    })
+}
+
+/// Which parameters the fit may move: all but those that the friction stage left open.
+fn open(machine: &Machine, file: &ModelFile, given: &Refined) -> Open {
+    let joints = machine.robot.joint_names();
+    let friction = joints
+        .iter()
+        .zip(&given.model.friction)
+        .map(|(joint, law)| {
+            let names: &[&str] = match law {
+                JointFriction::None => &[],
+                JointFriction::ViscousCoulomb(_) => return vec![true; ViscousCoulomb::NAMES.len()],
+                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
+            };
+            let known = |name: &&str| {
+                file.find(name, Some(joint)).is_some_and(|p| {
+                    p.std.is_some_and(|s| s > 0.0)
+                        && !matches!(
+                            p.verdict,
+                            Some(Verdict::LowerBound | Verdict::NotIdentifiable)
+                        )
+                })
+            };
+            let mut open: Vec<bool> = names.iter().map(known).collect();
+            if open.iter().all(|o| !o) {
+                // a law without any uncertainty: its linear part is fitted freely
+                for o in open.iter_mut().take(3) {
+                    *o = true;
+                }
+            }
+            open
+        })
+        .collect();
+    Open {
+        offset: joints
+            .iter()
+            .map(|joint| file.find("offset", Some(joint)).is_some())
+            .collect(),
+        friction,
+    }
+}
+
+/// Standard deviations of the friction stage are taken this many times as large: its model lacked
+/// what is looked for here, too.
+const FRICTION_DOUBT: f64 = 3.0;
+
+/// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it.
+fn information(file: &ModelFile, given: &Refined, open: &Open, keep: bool) -> DMatrix<f64> {
+    let model = &given.model;
+    let size = model.parameters();
+    let covariance = file.model_covariance(model);
+    let mut wanted = vec![keep; size];
+    let mut at = model.theta.len();
+    for (law, open) in model.friction.iter().zip(&open.friction) {
+        for (k, open) in open.iter().enumerate() {
+            if matches!(law, JointFriction::DoubleTanh(_)) {
+                wanted[at + k] = *open;
+            }
+        }
+        at += law.parameters();
+    }
+    let doubt = if keep { 1.0 } else { FRICTION_DOUBT };
+    let index: Vec<usize> = (0..size)
+        .filter(|i| wanted[*i] && covariance[i * size + i] > 0.0)
+        .collect();
+    let scale: Vec<f64> = index
+        .iter()
+        .map(|i| covariance[i * size + i].sqrt())
+        .collect();
+    let k = index.len();
+    let scaled = DMatrix::from_fn(k, k, |a, b| {
+        let ridge = if a == b { 1e-9 } else { 0.0 };
+        covariance[index[a] * size + index[b]] / (scale[a] * scale[b]) + ridge
+    });
+    let mut out = DMatrix::zeros(size, size);
+    let inverse = match scaled.cholesky() {
+        Some(c) => c.inverse(),
+        // a covariance edited by hand: its diagonal still says how firm each one is
+        None => DMatrix::identity(k, k),
+    };
+    for a in 0..k {
+        for b in 0..k {
+            out[(index[a], index[b])] = inverse[(a, b)] / (scale[a] * scale[b] * doubt * doubt);
+        }
+    }
+    if keep {
+        // what has no standard deviation is held firmly
+        let values = values(model);
+        for i in 0..size {
+            if covariance[i * size + i] <= 0.0 {
+                let scale = 1e-3 * values[i].abs().max(1e-6);
+                out[(i, i)] = 1.0 / (scale * scale);
+            }
+        }
+    }
+    out
+}
+
+/// Values in the order of the model's gradient.
+fn values(model: &crate::robot::model::Model) -> Vec<f64> {
+    let mut out = model.theta.clone();
+    for law in &model.friction {
+        match law {
+            JointFriction::None => {}
+            JointFriction::DoubleTanh(law) => out.extend(law.parameters()),
+            JointFriction::ViscousCoulomb(law) => out.extend([law.viscous, law.coulomb]),
+        }
+    }
+    out.extend(&model.offset);
+    out
+}
+
+/// Parameters of an accepted effect with their standard deviations.
+pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told> {
+    let added = &diagnosis.model.effects[effect];
+    let joint = added.place.joint().unwrap_or(0);
+    let covariance = diagnosis.covariance_of(effect);
+    added.told(
+        &machine.robot,
+        machine.file.torque_unit(joint),
+        Some(&covariance),
+    )
+}
+
+/// Whether there is a verdict of effects, of nothing, or of structure without a name.
+fn verdict(diagnosis: &Diagnosis) -> &'static str {
+    if !diagnosis.steps.is_empty() {
+        "effects-found"
+    } else if diagnosis.structured() {
+        "unexplained-residual"
+    } else {
+        "nothing-missing"
+    }
+}
+
+/// The refined model as a file.
+pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> ModelFile {
+    let diagnosis = &found.diagnosis;
+    let mut model = new_model(machine, "diagnose", &found.held.inputs);
+    model.parameters.clone_from(&file.parameters);
+    let robot = &machine.robot;
+    let fitted = &diagnosis.model.model;
+    let mut keys = Vec::new();
+    let mut places = Vec::new();
+    for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
+        let (name, joint, value) = match *unknown {
+            Unknown::Theta(k) => (robot.parameters()[k].name.to_owned(), None, fitted.theta[k]),
+            Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
+            Unknown::Friction { joint, k } => match &fitted.friction[joint] {
+                JointFriction::None => continue,
+                JointFriction::DoubleTanh(law) => (
+                    DoubleTanh::NAMES[k].to_owned(),
+                    Some(joint),
+                    law.parameters()[k],
+                ),
+                JointFriction::ViscousCoulomb(law) => (
+                    ViscousCoulomb::NAMES[k].to_owned(),
+                    Some(joint),
+                    [law.viscous, law.coulomb][k],
+                ),
+            },
+            Unknown::Linear { .. } | Unknown::Shape { .. } => continue,
+        };
+        let joint = joint.map(|j| robot.joint_names()[j].clone());
+        let there =
+            |p: &&mut crate::config::model_file::Parameter| p.name == name && p.joint == joint;
+        if let Some(p) = model.parameters.iter_mut().find(there) {
+            let std = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            p.value = value;
+            p.std = Some(std);
+            p.verdict = Some(crate::verdict::verdict_of(value, std));
+            keys.push(p.key());
+            places.push(i);
+        }
+    }
+    model.replace_covariance(&keys, &|a, b| diagnosis.covariance[(places[a], places[b])]);
+    for (joint, std) in robot.joint_names().iter().zip(&diagnosis.residual_std) {
+        model.residual_std.insert(joint.clone(), *std);
+    }
+    model.effects = (0..diagnosis.model.effects.len())
+        .map(|i| {
+            in_file(
+                &diagnosis.model.effects[i],
+                machine,
+                &told(machine, diagnosis, i),
+            )
+        })
+        .collect();
+    model
+}
+
+fn errors_json(errors: &Errors) -> Value {
+    json!({"joints": errors.joints, "overall": errors.overall})
+}
+
+fn candidate_json(machine: &Machine, c: &Candidate) -> Value {
+    json!({
+        "effect": c.effect.kind.name,
+        "joint": c.effect.place.name(&machine.robot),
+        "family": c.effect.family().name(),
+        "score": c.score.as_ref().map(|s| s.cv_gain),
+        "unique_share": c.score.as_ref().map(|s| s.unique_share),
+        "delta_bic": c.score.as_ref().map(|s| s.delta_bic),
+        "p_value": c.score.as_ref().map(|s| s.p_value),
+        "accepted": c.accepted,
+        "reason": c.reason,
+    })
+}
+
+/// The JSON fields of the command.
+pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    let steps: Vec<Value> = d
+        .steps
+        .iter()
+        .map(|step| {
+            let effect = &d.model.effects[step.effect];
+            let parameters: serde_json::Map<String, Value> = told(machine, d, step.effect)
+                .into_iter()
+                .map(|t| (t.key, json!({"value": t.value, "std": t.std, "unit": t.unit})))
+                .collect();
+            let alternatives: Vec<&str> =
+                step.alternatives.iter().map(|c| c.effect.kind.name).collect();
+            let score = step.candidate.score.as_ref();
+            json!({
+                "effect": effect.kind.name,
+                "family": effect.family().name(),
+                "joint": effect.place.name(robot),
+                "parameters": parameters,
+                "alternatives": alternatives,
+                "separate_by": if alternatives.is_empty() { Value::Null } else { effect.kind.separate_by.into() },
+                "unique_share": score.map(|s| s.unique_share),
+                "delta_bic": score.map(|s| s.delta_bic),
+                "cv_gain": score.map(|s| s.cv_gain),
+                "effective_samples": score.map(|s| s.effective_rows),
+                "holdout_before": step.holdout.map(|h| h[0]),
+                "holdout_after": step.holdout.map(|h| h[1]),
+                "holdout_worsened": step.holdout.is_some_and(|h| h[1] > h[0]),
+            })
+        })
+        .collect();
+    let pair = |p: &diagnose::Pair| {
+        json!({
+            "train": errors_json(&p.train),
+            "holdout": p.holdout.as_ref().map(errors_json),
+        })
+    };
+    let unexplained: Vec<Value> = d
+        .left
+        .iter()
+        .zip(robot.joint_names())
+        .map(|(l, joint)| json!({"joint": joint, "share": l.share, "over_floor": l.over_floor}))
+        .collect();
+    let mut candidates: Vec<Value> = d
+        .steps
+        .iter()
+        .map(|s| candidate_json(machine, &s.candidate))
+        .collect();
+    candidates.extend(d.candidates.iter().map(|c| candidate_json(machine, c)));
+    let set_aside: Vec<Value> = d
+        .set_aside
+        .iter()
+        .map(|a| {
+            json!({
+                "log": found.logs[a.log],
+                "use": if a.role == LogRole::Veto { "veto" } else { "holdout" },
+                "from_s": a.from_s,
+                "to_s": a.to_s,
+            })
+        })
+        .collect();
+    json!({
+        "verdict": verdict(d),
+        "steps": steps,
+        "before": pair(&d.before),
+        "after": pair(&d.after),
+        "unexplained": unexplained,
+        "candidates": candidates,
+        "set_aside": set_aside,
+        "processing": processing(&found.held.summary),
+    })
+}
+
+/// The tables for a person.
+pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    let mut out = match verdict(d) {
+        "effects-found" => format!("{name} lacks:\n"),
+        "nothing-missing" => {
+            format!("Nothing is missing in {name}: what is left of the torque is noise.\n")
+        }
+        _ => format!("{name} leaves a residual above the noise that no known effect explains.\n"),
+    };
+    for (i, step) in d.steps.iter().enumerate() {
+        let effect: &Added = &d.model.effects[step.effect];
+        let numbers: Vec<String> = told(machine, d, step.effect)
+            .iter()
+            .map(|t| {
+                let value = match t.std {
+                    Some(std) if std > 0.0 => number::plus_minus(t.value, std),
+                    _ => number::significant(t.value, 4),
+                };
+                format!("{} = {value} {}", t.key, t.unit)
+                    .trim_end()
+                    .to_owned()
+            })
+            .collect();
+        out += &format!(
+            "  {}. {} ({}): {}\n",
+            i + 1,
+            effect.title(robot),
+            effect.family().name(),
+            numbers.join(", ")
+        );
+        if let Some(s) = &step.candidate.score {
+            out += &format!(
+                "     removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows\n",
+                number::percent(s.cv_gain),
+                s.delta_bic,
+                s.effective_rows
+            );
+        }
+        if let Some([before, after]) = step.holdout {
+            let worse = if after > before {
+                ": it worsens them"
+            } else {
+                ""
+            };
+            out += &format!(
+                "     data that decided nothing: {} before, {} after{worse}\n",
+                number::percent(before),
+                number::percent(after)
+            );
+        }
+        if !step.alternatives.is_empty() {
+            let names: Vec<String> = step
+                .alternatives
+                .iter()
+                .map(|c| c.effect.title(robot))
+                .collect();
+            out += &format!(
+                "     these data do not separate it from {}; {} would\n",
+                names.join(", "),
+                effect.kind.separate_by
+            );
+        }
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("fitted before", Align::Decimal),
+        ("after", Align::Decimal),
+        ("unseen before", Align::Decimal),
+        ("after", Align::Decimal),
+        ("95 %", Align::Left),
+        ("above noise", Align::Decimal),
+    ])
+    .caption("relative torque error, before and after");
+    let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
+    for (j, joint) in robot.joint_names().iter().enumerate() {
+        let of = |errors: &Errors| errors.joints[j].relative_error;
+        let unseen = |p: &diagnose::Pair| p.holdout.as_ref().map(of);
+        let interval = d.after.holdout.as_ref().map_or(String::new(), |e| {
+            let [low, high] = e.joints[j].interval_95;
+            let low = number::percent(low);
+            format!("{}..{}", low.trim_end_matches(" %"), number::percent(high))
+                .replace(' ', "\u{a0}")
+        });
+        table.row([
+            joint.as_str(),
+            &number::percent(of(&d.before.train)),
+            &number::percent(of(&d.after.train)),
+            &percent(unseen(&d.before)),
+            &percent(unseen(&d.after)),
+            &interval,
+            &number::percent(d.left[j].share),
+        ]);
+    }
+    out += &format!("{table}");
+    out
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let logs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
+    let inputs: Vec<&Path> = logs
+        .map(|l| l.path.as_path())
+        .chain([args.model.as_path()])
+        .collect();
+    let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
+    context.check_outputs(&inputs, &outputs)?;
+    let name = args.model.display().to_string();
+    let file = ModelFile::load(&args.model)?;
+    let machine = Machine::new(&name, file.robot.clone());
+    let logs = Logs {
+        train: &args.logs,
+        veto: &args.veto,
+        holdout: &args.holdout,
+    };
+    let found = diagnose(&machine, &file, &name, &logs, args.keep, context)?;
+    let document = Document::new(
+        "diagnose",
+        &found.held.inputs,
+        &found.held.warnings,
+        &json(&machine, &found),
+    )?;
+    let mut text = text(&machine, &found, &name);
+    context.check()?;
+    if let Some(path) = &args.output {
+        super::outputs::write_text(path, &into_model(&machine, &file, &found).to_toml()?)?;
+        text += &format!("written: {}\n", path.display());
+    }
+    Ok(Outcome {
+        text,
+        document,
+        missed: Vec::new(),
+    })
+}

@@ -1,0 +1,403 @@
+//! One candidate effect against the fitted model: its columns projected off everything that is
+//! declared, its significance under correlated residuals, and cross-validation.
+//!
+//! All from sums over pieces. With A = X'WX + prior, c = X'WC and T = A^-1 c, the candidate's own
+//! part is C - X T; its coefficients solve S beta = C'We - T'X'We with S = C'WC - c'T.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::fit::{Fitted, Ground, Inverse};
+use super::plan::Role;
+use super::rows::{Total, dot};
+
+/// A candidate's filtered columns: `[stretch][joint][column][row]`; no columns where the joint is
+/// not touched.
+pub type Columns = Vec<Vec<Vec<Vec<f64>>>>;
+
+/// Sums of a candidate over one piece.
+struct Cross {
+    /// X'WC over all unknowns.
+    with_base: DMatrix<f64>,
+    /// C'WC.
+    own: DMatrix<f64>,
+    /// C'We.
+    score: DVector<f64>,
+}
+
+impl Cross {
+    fn none(u: usize, k: usize) -> Self {
+        Cross {
+            with_base: DMatrix::zeros(u, k),
+            own: DMatrix::zeros(k, k),
+            score: DVector::zeros(k),
+        }
+    }
+
+    fn add(&mut self, other: &Cross) {
+        self.with_base += &other.with_base;
+        self.own += &other.own;
+        self.score += &other.score;
+    }
+
+    fn without(&self, other: &Cross) -> Cross {
+        Cross {
+            with_base: &self.with_base - &other.with_base,
+            own: &self.own - &other.own,
+            score: &self.score - &other.score,
+        }
+    }
+}
+
+/// What the data say of a candidate.
+#[derive(Debug, Clone)]
+pub struct Score {
+    /// Coefficients of its columns.
+    pub beta: Vec<f64>,
+    /// Fraction of the weighted squared residual that it removes in the fit.
+    pub gain: f64,
+    /// Share of its torque that nothing declared can stand in for.
+    pub unique_share: f64,
+    /// Chance of a test value as large without the effect, one candidate alone.
+    pub p_value: f64,
+    /// Improvement of the Bayesian information criterion with the effective number of rows.
+    pub delta_bic: f64,
+    pub effective_rows: f64,
+    /// Fraction of the cross-validated squared error removed, and its standard error over folds.
+    pub cv_gain: f64,
+    pub cv_std: f64,
+    /// Squared error of each fold left out, with the candidate.
+    pub folds: Vec<f64>,
+    /// Squared error on the pieces that may veto, with the candidate over without.
+    pub veto_ratio: f64,
+}
+
+/// The fitted model, prepared for many candidates.
+pub struct Judge<'a> {
+    at: &'a Fitted,
+    ground: &'a Ground<'a>,
+    inverse: Inverse,
+    folds: Vec<Fold>,
+    veto: Total,
+    /// Squared error of each fold left out, without a candidate.
+    pub base_folds: Vec<f64>,
+    base_veto: f64,
+}
+
+/// One fold left out.
+struct Fold {
+    inverse: Inverse,
+    score: DVector<f64>,
+    held_out: Total,
+}
+
+impl<'a> Judge<'a> {
+    /// Prepares the folds.
+    pub fn new(at: &'a Fitted, ground: &'a Ground<'a>) -> Self {
+        let sum = |wanted: &dyn Fn(Role) -> bool| at.base.total(ground.plan, &at.weights, wanted);
+        let all = sum(&Role::fitted);
+        let prior_pull = &at.pull - &all.score;
+        let in_folds = sum(&|r| matches!(r, Role::Fold(_)));
+        let folds: Vec<Fold> = (0..ground.plan.folds)
+            .map(|f| {
+                let held_out = sum(&|r| r == Role::Fold(f));
+                let normal = &in_folds.normal - &held_out.normal + &at.information;
+                Fold {
+                    inverse: Inverse::of(&normal),
+                    score: &in_folds.score - &held_out.score + &prior_pull,
+                    held_out,
+                }
+            })
+            .collect();
+        let inverse = Inverse::of(&at.normal);
+        let rest = inverse.solve(&at.pull);
+        let veto = sum(&|r| r == Role::Veto);
+        let base_folds = folds
+            .iter()
+            .map(|f| square_after(&f.held_out, &f.inverse.solve(&f.score)))
+            .collect();
+        let base_veto = square_after(&veto, &rest);
+        Judge {
+            at,
+            ground,
+            inverse,
+            folds,
+            veto,
+            base_folds,
+            base_veto,
+        }
+    }
+
+    /// Sums of a candidate over every piece.
+    fn cross(&self, columns: &Columns, k: usize) -> Vec<Cross> {
+        let base = &self.at.base;
+        let u = base.unknowns.len();
+        let piece = |piece: &super::plan::Piece| {
+            let mut cross = Cross::none(u, k);
+            let rows = &base.stretches[piece.stretch];
+            for (j, own) in columns[piece.stretch].iter().enumerate() {
+                if own.is_empty() {
+                    continue;
+                }
+                let w = self.at.weights[j] * self.at.weights[j];
+                let range = piece.rows.clone();
+                for (b, c) in own.iter().enumerate() {
+                    let c = &c[range.clone()];
+                    for (x, &i) in rows.columns[j].iter().zip(&base.unknowns.columns[j]) {
+                        cross.with_base[(i, b)] += w * dot(&x[range.clone()], c);
+                    }
+                    for (a, d) in own.iter().enumerate().take(b + 1) {
+                        let x = w * dot(&d[range.clone()], c);
+                        cross.own[(a, b)] += x;
+                        if a != b {
+                            cross.own[(b, a)] += x;
+                        }
+                    }
+                    cross.score[b] += w * dot(&rows.residual[j][range.clone()], c);
+                }
+            }
+            cross
+        };
+        self.ground.plan.pieces.iter().map(piece).collect()
+    }
+
+    fn over(&self, cross: &[Cross], k: usize, wanted: &dyn Fn(Role) -> bool) -> Cross {
+        let mut total = Cross::none(self.at.base.unknowns.len(), k);
+        for (piece, c) in self.ground.plan.pieces.iter().zip(cross) {
+            if wanted(piece.role) {
+                total.add(c);
+            }
+        }
+        total
+    }
+
+    /// Fraction of the weighted squared residual that a candidate removes: all that a search over
+    /// shapes needs.
+    pub fn gain(&self, columns: &Columns, k: usize) -> f64 {
+        let total = self.over(&self.cross(columns, k), k, &Role::fitted);
+        let (solution, _) = partial(&total, &self.inverse, &self.at.pull, SHARE);
+        solution.map_or(0.0, |s| s.removed / self.at.square.max(f64::MIN_POSITIVE))
+    }
+
+    /// Everything; none where no column has a part of its own.
+    pub fn score(&self, columns: &Columns, k: usize, shapes: usize) -> Option<Score> {
+        let cross = self.cross(columns, k);
+        let total = self.over(&cross, k, &Role::fitted);
+        let (solution, share) = partial(&total, &self.inverse, &self.at.pull, SHARE);
+        let solution = solution?;
+        let (p_value, effective_rows) = self.significance(&cross, &solution, columns);
+        let (before, rows) = self.touched(columns);
+        let effective = effective_rows.min(rows);
+        let after = (before - solution.removed).max(1e-12 * before);
+        let delta_bic =
+            effective * (before / after).ln() - (k + shapes) as f64 * effective.max(2.0).ln();
+
+        let in_folds = self.over(&cross, k, &|r| matches!(r, Role::Fold(_)));
+        let mut folds = Vec::with_capacity(self.folds.len());
+        for (f, fold) in self.folds.iter().enumerate() {
+            let held_out = self.over(&cross, k, &|r| r == Role::Fold(f));
+            let train = in_folds.without(&held_out);
+            let (solved, _) = partial(&train, &fold.inverse, &fold.score, 0.0);
+            folds.push(match solved {
+                None => self.base_folds[f],
+                Some(s) => square_with(&fold.held_out, &held_out, &s),
+            });
+        }
+        let base: f64 = self.base_folds.iter().sum();
+        let with: f64 = folds.iter().sum();
+        let veto = self.over(&cross, k, &|r| r == Role::Veto);
+        let veto_ratio = if self.base_veto > 0.0 {
+            square_with(&self.veto, &veto, &solution) / self.base_veto
+        } else {
+            1.0
+        };
+        Some(Score {
+            beta: solution.beta.iter().copied().collect(),
+            gain: solution.removed / self.at.square.max(f64::MIN_POSITIVE),
+            unique_share: share,
+            p_value,
+            delta_bic,
+            effective_rows: effective,
+            cv_gain: (base - with) / base.max(f64::MIN_POSITIVE),
+            cv_std: spread(&self.base_folds, &folds) / base.max(f64::MIN_POSITIVE),
+            folds,
+            veto_ratio,
+        })
+    }
+
+    /// Weighted squared residual and rows of the joints that a candidate touches.
+    fn touched(&self, columns: &Columns) -> (f64, f64) {
+        let (mut square, mut rows) = (0.0, 0.0);
+        for (piece, sums) in self.ground.plan.pieces.iter().zip(&self.at.base.sums) {
+            if !piece.role.fitted() {
+                continue;
+            }
+            for (j, own) in columns[piece.stretch].iter().enumerate() {
+                if !own.is_empty() {
+                    square += self.at.weights[j].powi(2) * sums[j].square;
+                    rows += piece.rows.len() as f64;
+                }
+            }
+        }
+        (square, rows)
+    }
+
+    /// F test of the coefficients with a covariance that correlation from piece to piece does not
+    /// break (Newey and West 1987, Bartlett's weights), and the rows that independent ones of the
+    /// same certainty would number.
+    fn significance(&self, cross: &[Cross], s: &Solution, columns: &Columns) -> (f64, f64) {
+        let k = s.beta.len();
+        let mut scores: Vec<(usize, DVector<f64>)> = Vec::new();
+        let at = self.at;
+        for ((piece, c), sums) in self.ground.plan.pieces.iter().zip(cross).zip(&at.base.sums) {
+            if !piece.role.fitted() {
+                continue;
+            }
+            // X'W(e - X delta - C beta) of the piece
+            let mut base = DVector::zeros(at.base.unknowns.len());
+            for (j, sum) in sums.iter().enumerate() {
+                let w = at.weights[j] * at.weights[j];
+                let index = &at.base.unknowns.columns[j];
+                let own = DVector::from_iterator(index.len(), index.iter().map(|i| s.delta[*i]));
+                let left = &sum.score - &sum.normal * own;
+                for (x, &i) in left.iter().zip(index) {
+                    base[i] += w * x;
+                }
+            }
+            base -= &c.with_base * &s.beta;
+            let own = &c.score - c.with_base.tr_mul(&s.delta) - &c.own * &s.beta;
+            scores.push((piece.stretch, own - s.projection.tr_mul(&base)));
+        }
+        let count = scores.len() as f64;
+        let lag = LAG.min((count / 8.0) as usize);
+        let mut middle = DMatrix::zeros(k, k);
+        for l in 0..=lag {
+            let weight = 1.0 - l as f64 / (lag + 1) as f64;
+            for pair in scores.windows(l + 1) {
+                let (a, b) = (&pair[0], &pair[l]);
+                if a.0 != b.0 {
+                    continue;
+                }
+                if l == 0 {
+                    middle.ger(1.0, &a.1, &a.1, 1.0);
+                } else {
+                    middle.ger(weight, &a.1, &b.1, 1.0);
+                    middle.ger(weight, &b.1, &a.1, 1.0);
+                }
+            }
+        }
+        // as if rows were independent: weighted residuals have variance 1 by construction
+        let (square, rows) = self.touched(columns);
+        let variance = (square - s.removed).max(1e-12 * square) / rows.max(1.0);
+        let mut ratio = 0.0;
+        for i in 0..k {
+            ratio += middle[(i, i)] / (variance * s.own[(i, i)]).max(f64::MIN_POSITIVE) / k as f64;
+        }
+        // correlation only takes certainty away
+        let inflation = ratio.max(1.0);
+        for i in 0..k {
+            let least = variance * s.own[(i, i)];
+            if middle[(i, i)] < least {
+                middle[(i, i)] = least;
+            }
+        }
+        let score = &s.own * &s.beta;
+        let wald = score.dot(&Inverse::of(&middle).solve(&score)) / k as f64;
+        let freedom = (count / (lag + 1) as f64 - k as f64).max(3.0);
+        let p = match FisherSnedecor::new(k as f64, freedom) {
+            Ok(f) if wald.is_finite() && wald > 0.0 => f.sf(wald),
+            _ => 1.0,
+        };
+        (p, rows / inflation)
+    }
+}
+
+/// Pieces over which scores count as correlated; a piece is some correlation times long.
+const LAG: usize = 2;
+/// Least share of a column that must be its own.
+const SHARE: f64 = 0.003;
+
+/// Coefficients of a candidate and the base step that goes with them.
+struct Solution {
+    beta: DVector<f64>,
+    delta: DVector<f64>,
+    /// A^-1 X'WC.
+    projection: DMatrix<f64>,
+    /// S.
+    own: DMatrix<f64>,
+    /// Weighted squares removed.
+    removed: f64,
+}
+
+/// Solves for a candidate beside the base; the second result is its share of its own. None where
+/// no column keeps a share above `least`.
+fn partial(
+    total: &Cross,
+    inverse: &Inverse,
+    score: &DVector<f64>,
+    least: f64,
+) -> (Option<Solution>, f64) {
+    let projection = inverse.times(&total.with_base);
+    let own = &total.own - total.with_base.tr_mul(&projection);
+    let k = own.nrows();
+    let shares = (0..k).map(|i| own[(i, i)] / total.own[(i, i)].max(f64::MIN_POSITIVE));
+    let largest = shares.fold(0.0, f64::max);
+    if largest <= least || !largest.is_finite() {
+        return (None, largest.max(0.0));
+    }
+    // columns that are absorbed, or that stand for one another, stay at rest
+    let right = &total.score - projection.tr_mul(score);
+    let beta = absorbed(&own, &total.own, least.max(1e-6)).solve(&right);
+    let delta = inverse.solve(score) - &projection * &beta;
+    let removed = beta.dot(&right);
+    let whole = (beta.transpose() * &total.own * &beta)[(0, 0)];
+    let unique = (beta.transpose() * &own * &beta)[(0, 0)];
+    let share = if whole > 0.0 { unique / whole } else { 0.0 };
+    let solution = Solution {
+        beta,
+        delta,
+        projection,
+        own,
+        removed,
+    };
+    (Some(solution), share)
+}
+
+/// Inverse of S on its columns with a share above `least`; the others get none.
+fn absorbed(own: &DMatrix<f64>, whole: &DMatrix<f64>, least: f64) -> Inverse {
+    let k = own.nrows();
+    let mut cleared = own.clone();
+    for i in 0..k {
+        if own[(i, i)] <= least * whole[(i, i)] {
+            for l in 0..k {
+                cleared[(i, l)] = 0.0;
+                cleared[(l, i)] = 0.0;
+            }
+        }
+    }
+    Inverse::of(&cleared)
+}
+
+/// |e - X delta|^2 from sums.
+fn square_after(total: &Total, delta: &DVector<f64>) -> f64 {
+    total.square - 2.0 * delta.dot(&total.score) + delta.dot(&(&total.normal * delta))
+}
+
+/// |e - X delta - C beta|^2 from sums.
+fn square_with(total: &Total, cross: &Cross, s: &Solution) -> f64 {
+    square_after(total, &s.delta) - 2.0 * s.beta.dot(&cross.score)
+        + 2.0 * s.delta.dot(&(&cross.with_base * &s.beta))
+        + s.beta.dot(&(&cross.own * &s.beta))
+}
+
+/// Standard error of a sum of differences over folds.
+pub fn spread(base: &[f64], with: &[f64]) -> f64 {
+    let n = base.len() as f64;
+    if n < 2.0 {
+        return f64::INFINITY;
+    }
+    let differences: Vec<f64> = base.iter().zip(with).map(|(a, b)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / n;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (variance * n).sqrt()
+}

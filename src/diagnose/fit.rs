@@ -1,0 +1,286 @@
+//! The joint fit of everything: Gauss-Newton on the filtered rows, linear parameters exactly in one
+//! step, with the friction stage's covariance as a prior.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::plan::{Plan, Role};
+use super::rows::Base;
+use super::unknowns::{Open, Unknown, Unknowns, step};
+use crate::effect::{Cover, Refined};
+use crate::motion::{MotionError, Parallel, Stretch};
+
+/// Everything that a fit works on.
+pub struct Ground<'a> {
+    pub stretches: &'a [Stretch],
+    pub parallel: &'a Parallel,
+    pub plan: &'a Plan,
+    pub open: &'a Open,
+    pub prior: &'a Prior,
+    pub cover: Cover,
+}
+
+/// What is known of parameters before: their values and how firmly, in units of independent rows.
+#[derive(Debug, Clone)]
+pub struct Prior {
+    /// The model about which it is centred.
+    pub centre: Refined,
+    /// Information (inverse covariance) in the order of [`crate::robot::model::Model::gradient`],
+    /// row-major.
+    pub information: DMatrix<f64>,
+    /// Rows that count as one independent row.
+    pub rows_per_independent: f64,
+}
+
+impl Prior {
+    /// Index of an unknown in the model's own order; none for effects.
+    fn place(&self, unknown: Unknown) -> Option<usize> {
+        let model = &self.centre.model;
+        let theta = model.theta.len();
+        match unknown {
+            Unknown::Theta(i) => Some(i),
+            Unknown::Friction { joint, k } => {
+                let before: usize = model.friction[..joint].iter().map(|f| f.parameters()).sum();
+                Some(theta + before + k)
+            }
+            Unknown::Offset(j) => {
+                let all: usize = model.friction.iter().map(|f| f.parameters()).sum();
+                Some(theta + all + j)
+            }
+            Unknown::Linear { .. } | Unknown::Shape { .. } => None,
+        }
+    }
+
+    /// How far a model is from the centre; effects have none.
+    fn off(&self, unknowns: &Unknowns, model: &Refined) -> DVector<f64> {
+        let off = unknowns.list.iter().map(|x| match self.place(*x) {
+            Some(_) => value(&self.centre, *x) - value(model, *x),
+            None => 0.0,
+        });
+        DVector::from_iterator(unknowns.len(), off)
+    }
+
+    /// Information and its pull on the present model, over the unknowns.
+    fn over(&self, unknowns: &Unknowns, model: &Refined) -> (DMatrix<f64>, DVector<f64>) {
+        let u = unknowns.len();
+        let places: Vec<Option<usize>> = unknowns.list.iter().map(|x| self.place(*x)).collect();
+        let mut information = DMatrix::zeros(u, u);
+        for (a, pa) in places.iter().enumerate() {
+            for (b, pb) in places.iter().enumerate() {
+                if let (Some(pa), Some(pb)) = (pa, pb) {
+                    information[(a, b)] = self.rows_per_independent * self.information[(*pa, *pb)];
+                }
+            }
+        }
+        let pull = &information * self.off(unknowns, model);
+        (information, pull)
+    }
+}
+
+/// Value of an unknown in a model; 0 for an effect that it does not have.
+fn value(model: &Refined, unknown: Unknown) -> f64 {
+    match unknown {
+        Unknown::Theta(i) => model.model.theta[i],
+        Unknown::Offset(j) => model.model.offset[j],
+        Unknown::Friction { joint, k } => {
+            use crate::robot::model::JointFriction as F;
+            match &model.model.friction[joint] {
+                F::None => 0.0,
+                F::DoubleTanh(law) => law.parameters()[k],
+                F::ViscousCoulomb(law) => [law.viscous, law.coulomb][k],
+            }
+        }
+        Unknown::Linear { effect, k } => model.effects.get(effect).map_or(0.0, |e| e.linear[k]),
+        Unknown::Shape { effect, k } => model.effects.get(effect).map_or(0.0, |e| e.shape[k]),
+    }
+}
+
+/// A fitted model with the linear system at its solution.
+pub struct Fitted {
+    pub model: Refined,
+    pub base: Base,
+    /// 1 / residual rms of each joint.
+    pub weights: Vec<f64>,
+    /// Weighted normal matrix of the fitted rows, prior included.
+    pub normal: DMatrix<f64>,
+    /// Prior information over the unknowns.
+    pub information: DMatrix<f64>,
+    /// Pull of the prior at the solution.
+    pub pull: DVector<f64>,
+    /// Weighted squared residual of the fitted rows.
+    pub square: f64,
+}
+
+/// Most Gauss-Newton steps; nearly linear problems take two or three.
+const STEPS: usize = 12;
+/// Most halvings of one step.
+const HALVINGS: usize = 6;
+
+/// Fits all unknowns of a model from where it stands.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
+    let mut at = evaluate(start.clone(), ground, None)?;
+    for k in 0..STEPS {
+        let (delta, gain) = newton(&at);
+        let mut factor = 1.0;
+        let mut next = None;
+        for _ in 0..HALVINGS {
+            let mut model = at.model.clone();
+            let scaled: Vec<f64> = delta.iter().map(|d| factor * d).collect();
+            step(&mut model, &at.base.unknowns, &scaled, &ground.cover);
+            let tried = evaluate(model, ground, Some(&at.weights))?;
+            if objective(&tried, ground) <= objective(&at, ground) * (1.0 + 1e-12) {
+                next = Some(tried);
+                break;
+            }
+            factor *= 0.5;
+        }
+        let Some(next) = next else { break };
+        let done = gain <= 1e-9 * at.square.max(f64::MIN_POSITIVE);
+        at = next;
+        // weights follow the residual in the first steps, then stay so that the steps converge
+        if k < 2 {
+            at = reweighted(at, ground);
+        } else if done {
+            break;
+        }
+    }
+    Ok(at)
+}
+
+/// Weighted squares and the prior's share.
+fn objective(at: &Fitted, ground: &Ground) -> f64 {
+    let off = ground.prior.off(&at.base.unknowns, &at.model);
+    at.square + (off.transpose() * &at.information * &off)[(0, 0)]
+}
+
+/// The rows and sums of a model as it stands.
+fn evaluate(
+    model: Refined,
+    ground: &Ground,
+    weights: Option<&[f64]>,
+) -> Result<Fitted, MotionError> {
+    let unknowns = Unknowns::of(&model, ground.open, &ground.cover);
+    let base = Base::of(
+        &model,
+        unknowns,
+        ground.stretches,
+        ground.parallel,
+        ground.plan,
+    )?;
+    let weights = match weights {
+        Some(w) => w.to_vec(),
+        None => weights_of(&base, ground),
+    };
+    Ok(summed(model, base, weights, ground))
+}
+
+fn reweighted(at: Fitted, ground: &Ground) -> Fitted {
+    let weights = weights_of(&at.base, ground);
+    summed(at.model, at.base, weights, ground)
+}
+
+fn weights_of(base: &Base, ground: &Ground) -> Vec<f64> {
+    base.residual_rms(ground.plan)
+        .iter()
+        .map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 })
+        .collect()
+}
+
+fn summed(model: Refined, base: Base, weights: Vec<f64>, ground: &Ground) -> Fitted {
+    let total = base.total(ground.plan, &weights, &Role::fitted);
+    let (information, pull) = ground.prior.over(&base.unknowns, &model);
+    Fitted {
+        normal: total.normal + &information,
+        pull,
+        information,
+        square: total.square,
+        weights,
+        model,
+        base,
+    }
+    .with_score(total.score)
+}
+
+impl Fitted {
+    /// The pull of prior and data together.
+    fn with_score(mut self, score: DVector<f64>) -> Self {
+        self.pull += score;
+        self
+    }
+}
+
+/// The step to the minimum of the linearised problem, and the squares that it promises to remove.
+fn newton(at: &Fitted) -> (Vec<f64>, f64) {
+    let delta = Inverse::of(&at.normal).solve(&at.pull);
+    let gain = delta.dot(&at.pull);
+    (delta.iter().copied().collect(), gain)
+}
+
+/// Inverse of a positive semidefinite matrix with columns scaled to one; directions without
+/// information stay at rest by a ridge far below what the data say of any other.
+#[derive(Debug, Clone)]
+pub struct Inverse {
+    matrix: DMatrix<f64>,
+}
+
+/// Ridge on the scaled diagonal.
+const RIDGE: f64 = 1e-10;
+
+impl Inverse {
+    /// Inverts.
+    pub fn of(normal: &DMatrix<f64>) -> Self {
+        let u = normal.nrows();
+        let scale: Vec<f64> = (0..u)
+            .map(|i| {
+                let d = normal[(i, i)];
+                if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+            })
+            .collect();
+        let mut ridge = RIDGE;
+        loop {
+            let scaled = DMatrix::from_fn(u, u, |a, b| {
+                let x = scale[a] * normal[(a, b)] * scale[b];
+                if a != b {
+                    x
+                } else if scale[a] > 0.0 {
+                    x + ridge
+                } else {
+                    1.0
+                }
+            });
+            if let Some(cholesky) = scaled.cholesky() {
+                let mut inverse = cholesky.inverse();
+                for a in 0..u {
+                    for b in 0..u {
+                        inverse[(a, b)] *= scale[a] * scale[b];
+                    }
+                }
+                return Inverse { matrix: inverse };
+            }
+            if ridge > 1.0 {
+                // not a normal matrix at all: nothing moves
+                return Inverse {
+                    matrix: DMatrix::zeros(u, u),
+                };
+            }
+            ridge *= 100.0;
+        }
+    }
+
+    /// Inverse times a vector.
+    pub fn solve(&self, b: &DVector<f64>) -> DVector<f64> {
+        &self.matrix * b
+    }
+
+    /// Inverse times a matrix.
+    pub fn times(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.matrix * b
+    }
+
+    /// The inverse itself.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+}

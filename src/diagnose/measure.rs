@@ -1,0 +1,183 @@
+//! Errors of a model over the rows of one use, as `validate` counts them, with block-bootstrap
+//! intervals.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::plan::{Plan, Role};
+use crate::effect::Refined;
+use crate::motion::{MotionError, Parallel, Stretch};
+
+/// Errors of one joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct JointErrors {
+    pub joint: String,
+    pub unit: String,
+    pub rmse: f64,
+    pub relative_error: f64,
+    /// Bootstrap interval of the relative error.
+    pub interval_95: [f64; 2],
+    pub relative_error_raw: f64,
+    pub max_abs: f64,
+    pub r2: f64,
+    pub samples: u64,
+}
+
+/// Errors over all joints.
+#[derive(Debug, Clone, Serialize)]
+pub struct OverallErrors {
+    /// Stacked norms; none where the joints' units differ.
+    pub relative_error: Option<f64>,
+    /// Root mean square over joints of their relative errors.
+    pub mean_relative_error: f64,
+    /// Bootstrap interval of the mean relative error.
+    pub interval_95: [f64; 2],
+}
+
+/// Errors over the rows of one use.
+#[derive(Debug, Clone, Serialize)]
+pub struct Errors {
+    pub joints: Vec<JointErrors>,
+    pub overall: OverallErrors,
+}
+
+/// Sums of one joint over one piece.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    error: f64,
+    torque: f64,
+    mean: f64,
+    rows: f64,
+    largest: f64,
+    raw_error: f64,
+    raw_torque: f64,
+}
+
+/// Resamplings of the bootstrap.
+const DRAWS: usize = 1000;
+
+/// Errors of a model over the pieces whose role is wanted; none where there is no such piece.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn errors(
+    model: &Refined,
+    units: &[String],
+    stretches: &[Stretch],
+    parallel: &Parallel,
+    plan: &Plan,
+    wanted: &dyn Fn(Role) -> bool,
+) -> Result<Option<Errors>, MotionError> {
+    let n = model.model.robot.joints();
+    let mut pieces: Vec<Vec<Sums>> = Vec::new();
+    for (index, stretch) in stretches.iter().enumerate() {
+        let own = plan
+            .pieces
+            .iter()
+            .filter(|p| p.stretch == index && wanted(p.role));
+        let own: Vec<_> = own.collect();
+        if own.is_empty() {
+            continue;
+        }
+        let hat = model.reconstruct(stretch);
+        let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
+        let rows = parallel.run(&channels)?;
+        for piece in own {
+            let joint = |j: usize| {
+                let mut s = Sums::default();
+                for i in piece.rows.clone() {
+                    let (measured, e) = (rows[j][i], rows[j][i] - rows[n + j][i]);
+                    s.error += e * e;
+                    s.torque += measured * measured;
+                    s.mean += measured;
+                    s.rows += 1.0;
+                    s.largest = s.largest.max(e.abs());
+                }
+                let first = parallel.sample_of(piece.rows.start);
+                let last = parallel.sample_of(piece.rows.end).min(stretch.len());
+                for (measured, hat) in stretch.tau[j][first..last].iter().zip(&hat[j][first..last])
+                {
+                    s.raw_error += (measured - hat).powi(2);
+                    s.raw_torque += measured * measured;
+                }
+                s
+            };
+            pieces.push((0..n).map(joint).collect());
+        }
+    }
+    if pieces.is_empty() {
+        return Ok(None);
+    }
+    Ok(Some(summed(model, units, &pieces)))
+}
+
+fn summed(model: &Refined, units: &[String], pieces: &[Vec<Sums>]) -> Errors {
+    let n = units.len();
+    let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
+    let relative = |picked: &[usize]| -> Vec<f64> {
+        (0..n)
+            .map(|j| {
+                let sum = |of: fn(&Sums) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
+                ratio(sum(|s| s.error), sum(|s| s.torque))
+            })
+            .collect()
+    };
+    let mean = |errors: &[f64]| (errors.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
+    let all: Vec<usize> = (0..pieces.len()).collect();
+    let found = relative(&all);
+
+    // neighbours together: the residual's slow part reaches over some pieces
+    let block = (pieces.len() / 20).clamp(1, 4);
+    let mut chance = ChaCha8Rng::seed_from_u64(20_020_520);
+    let mut drawn: Vec<Vec<f64>> = vec![Vec::with_capacity(DRAWS); n + 1];
+    let mut picked = Vec::with_capacity(pieces.len() + block);
+    for _ in 0..DRAWS {
+        picked.clear();
+        while picked.len() < pieces.len() {
+            let first = chance.random_range(0..pieces.len());
+            picked.extend((0..block).map(|i| (first + i) % pieces.len()));
+        }
+        let errors = relative(&picked);
+        for (j, e) in errors.iter().enumerate() {
+            drawn[j].push(*e);
+        }
+        drawn[n].push(mean(&errors));
+    }
+    let interval = |draws: &mut Vec<f64>| {
+        draws.sort_by(f64::total_cmp);
+        [draws[DRAWS * 25 / 1000], draws[DRAWS * 975 / 1000 - 1]]
+    };
+    let joints: Vec<JointErrors> = (0..n)
+        .map(|j| {
+            let sum = |of: fn(&Sums) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
+            let rows = sum(|s| s.rows);
+            let scatter = sum(|s| s.torque) - sum(|s| s.mean).powi(2) / rows.max(1.0);
+            JointErrors {
+                joint: model.model.robot.joint_names()[j].clone(),
+                unit: units[j].clone(),
+                rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
+                relative_error: found[j],
+                interval_95: interval(&mut drawn[j]),
+                relative_error_raw: ratio(sum(|s| s.raw_error), sum(|s| s.raw_torque)),
+                max_abs: pieces.iter().map(|p| p[j].largest).fold(0.0, f64::max),
+                r2: if scatter > 0.0 {
+                    1.0 - sum(|s| s.error) / scatter
+                } else {
+                    f64::NAN
+                },
+                samples: rows as u64,
+            }
+        })
+        .collect();
+    let one_unit = units.iter().all(|u| *u == units[0]);
+    let total = |of: fn(&Sums) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
+    Errors {
+        overall: OverallErrors {
+            relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
+            mean_relative_error: mean(&found),
+            interval_95: interval(&mut drawn[n]),
+        },
+        joints,
+    }
+}

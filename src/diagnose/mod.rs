@@ -1,0 +1,30 @@
+//! From a residual to the effect that the model lacks.
+//!
+//! ```text
+//! logs -> stretches -> plan (fit, folds, veto, holdout)
+//!      fit -> orders -> search (candidates) -> choose -> add -> fit ..  -> removal -> measure
+//! ```
+//!
+//! Every candidate is tested beside everything that is declared, with its columns projected off it:
+//! a share of its own, an F test that correlated residuals do not break, a criterion with the
+//! effective number of rows, cross-validation over blocks with gaps, and data set aside that may
+//! veto. All must agree. The holdout decides nothing.
+
+mod candidate;
+mod fit;
+mod floor;
+mod measure;
+mod orders;
+mod plan;
+mod rows;
+mod run;
+mod search;
+mod unknowns;
+
+pub use candidate::Score;
+pub use fit::Prior;
+pub use measure::{Errors, JointErrors, OverallErrors};
+pub use plan::{LogRole, SetAside};
+pub use run::{Case, DiagnoseError, Diagnosis, Left, Pair, STRUCTURED, Step, diagnose};
+pub use search::{Candidate, Limits};
+pub use unknowns::{Open, Unknown};

@@ -1,0 +1,290 @@
+//! Filtered, decimated rows of every joint, and their sums over pieces.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::plan::{Plan, Role};
+use super::unknowns::{Unknown, Unknowns};
+use crate::effect::{Refined, Scene, Torques, shifted};
+use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::model::JointFriction;
+
+/// Derivative columns and residual of one stretch, `[joint][column][row]`.
+pub struct Filtered {
+    pub columns: Vec<Vec<Vec<f64>>>,
+    pub residual: Vec<Vec<f64>>,
+}
+
+/// Columns of all unknowns and the residual along one stretch.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn filtered(
+    model: &Refined,
+    unknowns: &Unknowns,
+    stretch: &Stretch,
+    parallel: &Parallel,
+) -> Result<Filtered, MotionError> {
+    let plain = &model.model;
+    let n = plain.robot.joints();
+    let p = plain.theta.len();
+    let samples = stretch.len();
+    let torques = model.torques(stretch);
+    let scene = scene(model, stretch, &torques);
+    // regressor rows of all joints, once
+    let mut regressor = vec![vec![vec![0.0; samples]; p]; n];
+    let mut y = vec![0.0; n * p];
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for k in 0..samples {
+        stretch.at(k, &mut q, &mut v, &mut a);
+        plain.robot.regressor(&q, &v, &a, &mut y);
+        for (j, columns) in regressor.iter_mut().enumerate() {
+            for (c, column) in columns.iter_mut().enumerate() {
+                column[k] = y[j * p + c];
+            }
+        }
+    }
+    let mut out = Filtered {
+        columns: Vec::with_capacity(n),
+        residual: Vec::with_capacity(n),
+    };
+    for (j, regressor) in regressor.iter_mut().enumerate() {
+        let late = model.shift(j) / stretch.dt;
+        let mut raw: Vec<Vec<f64>> = Vec::with_capacity(unknowns.columns[j].len() + 1);
+        let mut effect_columns: Vec<Option<Vec<Vec<f64>>>> = vec![None; model.effects.len()];
+        for &i in &unknowns.columns[j] {
+            let mut column = match unknowns.list[i] {
+                Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
+                Unknown::Friction { k, .. } => {
+                    let mut gradient = [0.0; 5];
+                    let mut of = |v: &f64| {
+                        plain.friction[j].gradient(*v, &mut gradient);
+                        gradient[k]
+                    };
+                    stretch.v[j].iter().map(&mut of).collect()
+                }
+                Unknown::Offset(_) => vec![1.0; samples],
+                Unknown::Linear { effect, k } => {
+                    let columns = effect_columns[effect]
+                        .get_or_insert_with(|| model.effects[effect].columns(&scene, j));
+                    std::mem::take(&mut columns[k])
+                }
+                Unknown::Shape { effect, k } => shape_derivative(model, &scene, effect, k, j),
+            };
+            shifted(&mut column, late);
+            raw.push(column);
+        }
+        let mut hat = torques.hat[j].clone();
+        shifted(&mut hat, late);
+        for (hat, tau) in hat.iter_mut().zip(&stretch.tau[j]) {
+            *hat = tau - *hat;
+        }
+        raw.push(hat);
+        let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
+        let mut rows = parallel.run(&channels)?;
+        let still = standing(model, stretch, parallel, j);
+        rows.iter_mut().for_each(|column| clear(column, &still));
+        out.residual.push(rows.pop().unwrap_or_default());
+        out.columns.push(rows);
+    }
+    Ok(out)
+}
+
+/// Speed below which a joint counts as standing, over its rms speed.
+const STANDING: f64 = 0.01;
+
+/// Rows in which a joint with a jump in its friction law stands still for as long as the filter
+/// remembers: static friction takes any torque up to its limit there, and no law of v says which.
+pub fn standing(model: &Refined, stretch: &Stretch, parallel: &Parallel, j: usize) -> Vec<usize> {
+    if !matches!(model.model.friction[j], JointFriction::ViscousCoulomb(_)) {
+        return Vec::new();
+    }
+    let v = &stretch.v[j];
+    let square = v.iter().map(|v| v * v).sum::<f64>() / v.len().max(1) as f64;
+    let slow = STANDING * square.sqrt();
+    // samples since the joint last moved, and until it moves again
+    let mut since = vec![0usize; v.len()];
+    let mut count = usize::MAX / 2;
+    for (k, v) in v.iter().enumerate() {
+        count = if v.abs() > slow { 0 } else { count + 1 };
+        since[k] = count;
+    }
+    count = usize::MAX / 2;
+    for (k, v) in v.iter().enumerate().rev() {
+        count = if v.abs() > slow { 0 } else { count + 1 };
+        since[k] = since[k].min(count);
+    }
+    (0..parallel.rows(stretch.len()))
+        .filter(|i| since[parallel.sample_of(*i)] > parallel.decimation)
+        .collect()
+}
+
+/// Takes rows out of a column.
+pub fn clear(column: &mut [f64], rows: &[usize]) {
+    for i in rows {
+        column[*i] = 0.0;
+    }
+}
+
+/// The scene of a model along a stretch.
+pub fn scene<'a>(model: &'a Refined, stretch: &'a Stretch, torques: &'a Torques) -> Scene<'a> {
+    Scene {
+        robot: &model.model.robot,
+        theta: &model.model.theta,
+        laws: &model.model.friction,
+        stretch,
+        hat: &torques.hat,
+        load: &torques.load,
+    }
+}
+
+/// d(torque of an effect)/d(shape k), by central differences.
+fn shape_derivative(model: &Refined, scene: &Scene, effect: usize, k: usize, j: usize) -> Vec<f64> {
+    let added = &model.effects[effect];
+    let step = 1e-4 * added.shape[k].abs().max(1e-6);
+    let torque = |by: f64| {
+        let mut moved = added.clone();
+        moved.shape[k] += by;
+        let mut out = vec![0.0; scene.len()];
+        moved.torque(scene, j, &mut out);
+        out
+    };
+    let (up, down) = (torque(step), torque(-step));
+    up.iter()
+        .zip(&down)
+        .map(|(u, d)| (u - d) / (2.0 * step))
+        .collect()
+}
+
+/// Sums of one joint over one piece: columns and residual.
+#[derive(Debug, Clone)]
+pub struct PieceSums {
+    /// X'X of the joint's own columns.
+    pub normal: DMatrix<f64>,
+    /// X'e.
+    pub score: DVector<f64>,
+    /// e'e.
+    pub square: f64,
+}
+
+/// All rows of the base model, reduced to pieces; the rows themselves stay for candidates.
+pub struct Base {
+    pub unknowns: Unknowns,
+    pub stretches: Vec<Filtered>,
+    /// `[piece][joint]`.
+    pub sums: Vec<Vec<PieceSums>>,
+}
+
+impl Base {
+    /// Filters every stretch and sums over the pieces.
+    ///
+    /// # Errors
+    /// [`MotionError`] of the filter.
+    pub fn of(
+        model: &Refined,
+        unknowns: Unknowns,
+        stretches: &[Stretch],
+        parallel: &Parallel,
+        plan: &Plan,
+    ) -> Result<Self, MotionError> {
+        let filtered = stretches
+            .par_iter()
+            .map(|s| filtered(model, &unknowns, s, parallel))
+            .collect::<Result<Vec<_>, _>>()?;
+        let sums = plan
+            .pieces
+            .par_iter()
+            .map(|piece| {
+                let rows = &filtered[piece.stretch];
+                let joints = rows.columns.iter().zip(&rows.residual);
+                let of_joint = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
+                    let range = piece.rows.clone();
+                    let e = &residual[range.clone()];
+                    let c = columns.len();
+                    let mut normal = DMatrix::zeros(c, c);
+                    for a in 0..c {
+                        for b in 0..=a {
+                            let x = dot(&columns[a][range.clone()], &columns[b][range.clone()]);
+                            normal[(a, b)] = x;
+                            normal[(b, a)] = x;
+                        }
+                    }
+                    let score = columns.iter().map(|x| dot(&x[range.clone()], e));
+                    PieceSums {
+                        normal,
+                        score: DVector::from_iterator(c, score),
+                        square: dot(e, e),
+                    }
+                };
+                joints.map(of_joint).collect()
+            })
+            .collect();
+        Ok(Base {
+            unknowns,
+            stretches: filtered,
+            sums,
+        })
+    }
+
+    /// Squared residual of each joint over the fitted rows.
+    pub fn residual_squares(&self, plan: &Plan) -> Vec<f64> {
+        let joints = self.unknowns.columns.len();
+        let of_joint = |j: usize| {
+            let pieces = plan.pieces.iter().zip(&self.sums);
+            let fitted = pieces.filter(|(p, _)| p.role.fitted());
+            fitted.map(|(_, s)| s[j].square).sum()
+        };
+        (0..joints).map(of_joint).collect()
+    }
+
+    /// Root mean square of each joint's residual over the fitted rows.
+    pub fn residual_rms(&self, plan: &Plan) -> Vec<f64> {
+        let rows = plan.fitted_rows().max(1) as f64;
+        let squares = self.residual_squares(plan);
+        squares.iter().map(|s| (s / rows).sqrt()).collect()
+    }
+
+    /// Weighted normal matrix, score and squared residual over the pieces whose role is wanted.
+    pub fn total(&self, plan: &Plan, weights: &[f64], wanted: &dyn Fn(Role) -> bool) -> Total {
+        let u = self.unknowns.len();
+        let mut total = Total {
+            normal: DMatrix::zeros(u, u),
+            score: DVector::zeros(u),
+            square: 0.0,
+        };
+        for (piece, sums) in plan.pieces.iter().zip(&self.sums) {
+            if wanted(piece.role) {
+                self.add(sums, weights, &mut total);
+            }
+        }
+        total
+    }
+
+    /// Adds one piece.
+    fn add(&self, sums: &[PieceSums], weights: &[f64], total: &mut Total) {
+        for (j, s) in sums.iter().enumerate() {
+            let w = weights[j] * weights[j];
+            let columns = &self.unknowns.columns[j];
+            for (a, &i) in columns.iter().enumerate() {
+                total.score[i] += w * s.score[a];
+                for (b, &l) in columns.iter().enumerate() {
+                    total.normal[(i, l)] += w * s.normal[(a, b)];
+                }
+            }
+            total.square += w * s.square;
+        }
+    }
+}
+
+/// Weighted sums over pieces.
+#[derive(Debug, Clone)]
+pub struct Total {
+    pub normal: DMatrix<f64>,
+    pub score: DVector<f64>,
+    pub square: f64,
+}
+
+/// Inner product, in a fixed order.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,478 @@
+//! The loop: fit, search, add the best, refit, until nothing is accepted; then every accepted effect
+//! is tested for removal, and only then is the holdout looked at.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidate::Judge;
+use super::fit::{Fitted, Ground, Inverse, Prior, fit};
+use super::floor::floor;
+use super::measure::{Errors, errors};
+use super::orders;
+use super::plan::{LogRole, Plan, Role, SetAside};
+use super::search::{Bar, Candidate, Limits, choose, search};
+use super::unknowns::{Open, Unknown};
+use crate::effect::{Added, Cover, Refined};
+use crate::motion::{MotionError, Parallel, Stretch};
+
+/// What a diagnosis works on.
+pub struct Case {
+    /// The declared model as it was given.
+    pub given: Refined,
+    pub prior: Prior,
+    pub open: Open,
+    pub stretches: Vec<Stretch>,
+    /// Role of each log.
+    pub roles: Vec<LogRole>,
+    pub parallel: Parallel,
+    pub cutoff_hz: f64,
+    /// Torque unit per joint.
+    pub units: Vec<String>,
+    /// The given model is held within its covariance.
+    pub keep: bool,
+    pub limits: Limits,
+}
+
+/// Why no diagnosis came out.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnoseError {
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    #[error(
+        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
+         unknowns: give a longer log, or logs of their own by --veto and --holdout"
+    )]
+    TooFewRows { rows: usize, unknowns: usize },
+    #[error("the torque of joint {joint} is zero throughout")]
+    NoTorque { joint: String },
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// One accepted effect.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Its place in the final model's effects.
+    pub effect: usize,
+    pub candidate: Candidate,
+    /// Candidates that these data do not separate from it, best first.
+    pub alternatives: Vec<Candidate>,
+    /// Mean relative error on the holdout before and after the step.
+    pub holdout: Option<[f64; 2]>,
+}
+
+/// What is left at the end on one joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Left {
+    /// Fraction of the torque's power that is residual above the noise floor.
+    pub share: f64,
+    /// Power of the residual over that of the floor.
+    pub over_floor: f64,
+}
+
+/// Errors before or after.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    pub train: Errors,
+    pub holdout: Option<Errors>,
+}
+
+/// The outcome.
+pub struct Diagnosis {
+    /// The refined model.
+    pub model: Refined,
+    /// Unknowns of the final fit and their covariance under correlated residuals.
+    pub unknowns: Vec<Unknown>,
+    pub covariance: DMatrix<f64>,
+    pub steps: Vec<Step>,
+    /// Candidates of the last round, in which none was accepted.
+    pub candidates: Vec<Candidate>,
+    pub before: Pair,
+    pub after: Pair,
+    pub left_before: Vec<Left>,
+    pub left: Vec<Left>,
+    pub set_aside: Vec<SetAside>,
+    /// Root mean square of the filtered residual per joint.
+    pub residual_std: Vec<f64>,
+    pub cover: Cover,
+    pub plan: Plan,
+}
+
+/// Most effects that are added.
+const MOST_STEPS: usize = 8;
+/// Residual power over the floor's from which on a residual is called structured.
+pub const STRUCTURED: f64 = 2.0;
+/// Share of the torque's power below which structure is not worth a name.
+pub const NEGLIGIBLE: f64 = 2e-5;
+
+/// Diagnoses. `told` hears of every step; `stop` is asked now and then.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn diagnose(
+    case: &Case,
+    told: &mut dyn FnMut(&str),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Diagnosis, DiagnoseError> {
+    let plan = Plan::of(&case.stretches, &case.roles, &case.parallel, case.cutoff_hz);
+    let robot = &case.given.model.robot;
+    let cover = Cover::of(robot, &fitted_stretches(case), case.cutoff_hz);
+    let mut ground = Ground {
+        stretches: &case.stretches,
+        parallel: &case.parallel,
+        plan: &plan,
+        open: &case.open,
+        prior: &case.prior,
+        cover,
+    };
+    let unknowns = super::unknowns::Unknowns::of(&case.given, &case.open, &ground.cover).len();
+    if plan.fitted_rows() < 10 * unknowns || plan.folds < 3 {
+        return Err(DiagnoseError::TooFewRows {
+            rows: plan.fitted_rows(),
+            unknowns,
+        });
+    }
+    for (j, joint) in robot.joint_names().iter().enumerate() {
+        if case
+            .stretches
+            .iter()
+            .all(|s| s.tau[j].iter().all(|x| *x == 0.0))
+        {
+            return Err(DiagnoseError::NoTorque {
+                joint: joint.clone(),
+            });
+        }
+    }
+    let mut at = fit(&case.given, &ground)?;
+    let declared = at.base.residual_squares(&plan);
+    let mut models = vec![at.model.clone()];
+    let mut steps: Vec<Step> = Vec::new();
+    let mut candidates;
+    loop {
+        if stop() {
+            return Err(DiagnoseError::Interrupted);
+        }
+        orders::find(
+            &mut ground.cover,
+            &at.model,
+            &fitted_stretches(case),
+            &case.parallel,
+        )?;
+        let noise = noise(&at.model, case)?;
+        let bar = Bar {
+            declared: &declared,
+            noise: &noise,
+        };
+        let mut found = search(&at, &ground, case.keep, &case.limits, &bar, stop)?;
+        if stop() {
+            return Err(DiagnoseError::Interrupted);
+        }
+        let mut skip = Vec::new();
+        let mut next = None;
+        if steps.len() < MOST_STEPS {
+            while let Some((chosen, others)) = choose(&found, &skip) {
+                let mut model = at.model.clone();
+                model.effects.push(found[chosen].effect.clone());
+                let fitted = fit(&model, &ground)?;
+                // the joint fit must keep what the linear tests promised
+                let kept = veto_square(&fitted, &plan)
+                    <= case.limits.veto_ratio * veto_square_with(&at, &fitted, &plan);
+                if kept && fitted.square_with(&at.weights, &plan) < at.square {
+                    next = Some((chosen, others, fitted));
+                    break;
+                }
+                found[chosen].accepted = false;
+                found[chosen].reason =
+                    "vetoed: the joint refit makes the error on data set aside larger".into();
+                skip.push(chosen);
+            }
+        }
+        let Some((chosen, others, fitted)) = next else {
+            candidates = found;
+            break;
+        };
+        told(&format!(
+            "{}: {:.1} % of the cross-validated squared error",
+            found[chosen].effect.title(robot),
+            100.0 * found[chosen].score.as_ref().map_or(0.0, |s| s.cv_gain)
+        ));
+        let mut alternatives: Vec<Candidate> = Vec::new();
+        for i in others {
+            let same = |c: &Candidate| c.effect.kind.name == found[i].effect.kind.name;
+            if !alternatives.iter().any(same) && !same(&found[chosen]) && alternatives.len() < 3 {
+                alternatives.push(found[i].clone());
+            }
+        }
+        steps.push(Step {
+            effect: fitted.model.effects.len() - 1,
+            candidate: found[chosen].clone(),
+            alternatives,
+            holdout: None,
+        });
+        models.push(fitted.model.clone());
+        at = fitted;
+    }
+    // what a later effect made superfluous goes
+    let mut dropped = Vec::new();
+    while let Some(effect) = superfluous(&at, &ground, case)? {
+        told(&format!(
+            "{} is not needed any more",
+            at.model.effects[effect].title(robot)
+        ));
+        let mut model = at.model.clone();
+        model.effects.remove(effect);
+        at = fit(&model, &ground)?;
+        if let Some(k) = steps.iter().position(|s| s.effect == effect) {
+            let mut gone = steps.remove(k).candidate;
+            models.remove(k + 1);
+            gone.accepted = false;
+            gone.reason = "a later effect made it superfluous".into();
+            dropped.push(gone);
+        }
+        for step in &mut steps {
+            if step.effect > effect {
+                step.effect -= 1;
+            }
+        }
+    }
+    candidates.extend(dropped);
+
+    // everything is decided: the holdout may be looked at
+    let wanted = |role: Role| role == Role::Holdout;
+    let measure = |model: &Refined, wanted: &dyn Fn(Role) -> bool| {
+        errors(
+            model,
+            &case.units,
+            &case.stretches,
+            &case.parallel,
+            &plan,
+            wanted,
+        )
+    };
+    let mut means = Vec::with_capacity(models.len());
+    for model in &models {
+        means.push(measure(model, &wanted)?.map(|e| e.overall.mean_relative_error));
+    }
+    for (k, step) in steps.iter_mut().enumerate() {
+        if let (Some(Some(before)), Some(Some(after))) = (means.get(k), means.get(k + 1)) {
+            step.holdout = Some([*before, *after]);
+        }
+    }
+    let pair = |model: &Refined| -> Result<Pair, DiagnoseError> {
+        let train = measure(model, &Role::fitted)?
+            .ok_or(DiagnoseError::TooFewRows { rows: 0, unknowns })?;
+        Ok(Pair {
+            train,
+            holdout: measure(model, &wanted)?,
+        })
+    };
+    let before = pair(&case.given)?;
+    let after = pair(&at.model)?;
+    let floor = noise(&at.model, case)?;
+    let left_before = left(&floor, &before.train);
+    let left = left(&floor, &after.train);
+    let covariance = covariance(&at, &ground);
+    Ok(Diagnosis {
+        unknowns: at.base.unknowns.list.clone(),
+        covariance,
+        residual_std: at.base.residual_rms(&plan),
+        model: at.model,
+        steps,
+        candidates,
+        before,
+        after,
+        left_before,
+        left,
+        set_aside: plan.set_aside.clone(),
+        cover: ground.cover,
+        plan,
+    })
+}
+
+/// The stretches of logs that are fitted.
+fn fitted_stretches(case: &Case) -> Vec<Stretch> {
+    let fitted = |s: &&Stretch| case.roles[s.log] == LogRole::Train;
+    case.stretches.iter().filter(fitted).cloned().collect()
+}
+
+/// Squared residual of the veto pieces in a fit's own weights.
+fn veto_square(at: &Fitted, plan: &Plan) -> f64 {
+    squares(at, &at.weights, plan, &|r| r == Role::Veto)
+}
+
+/// Squared residual of the veto pieces of one fit in the weights of another.
+fn veto_square_with(at: &Fitted, other: &Fitted, plan: &Plan) -> f64 {
+    squares(at, &other.weights, plan, &|r| r == Role::Veto)
+}
+
+fn squares(at: &Fitted, weights: &[f64], plan: &Plan, wanted: &dyn Fn(Role) -> bool) -> f64 {
+    let pieces = plan.pieces.iter().zip(&at.base.sums);
+    pieces
+        .filter(|(p, _)| wanted(p.role))
+        .flat_map(|(_, sums)| sums.iter().zip(weights).map(|(s, w)| w * w * s.square))
+        .sum()
+}
+
+impl Fitted {
+    /// Squared residual of the fitted rows in given weights.
+    pub fn square_with(&self, weights: &[f64], plan: &Plan) -> f64 {
+        squares(self, weights, plan, &Role::fitted)
+    }
+}
+
+/// An effect without which the model is as good: it no longer passes what let it in.
+fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize>, MotionError> {
+    if at.model.effects.len() < 2 {
+        return Ok(None);
+    }
+    let mut worst: Option<(usize, f64)> = None;
+    for (i, effect) in at.model.effects.iter().enumerate() {
+        let mut model = at.model.clone();
+        model.effects.remove(i);
+        let without = fit(&model, ground)?;
+        let judge = Judge::new(&without, ground);
+        let torques: Vec<_> = ground
+            .stretches
+            .iter()
+            .map(|s| without.model.torques(s))
+            .collect();
+        let columns = super::search::columns(&without.model, ground, &torques, effect)?;
+        let score = judge.score(&columns, effect.linear.len(), effect.shape.len());
+        let (gain, needed) = match score {
+            None => (0.0, false),
+            Some(s) => (
+                s.cv_gain,
+                s.cv_gain >= case.limits.cv_gain
+                    && s.delta_bic > 0.0
+                    && s.p_value <= case.limits.false_alarm,
+            ),
+        };
+        if !needed && worst.is_none_or(|(_, least)| gain < least) {
+            worst = Some((i, gain));
+        }
+    }
+    Ok(worst.map(|(i, _)| i))
+}
+
+/// Variance of the noise in each joint's filtered residual.
+fn noise(model: &Refined, case: &Case) -> Result<Vec<f64>, MotionError> {
+    let stretches = fitted_stretches(case);
+    let residual = |s: &Stretch| {
+        let mut hat = model.reconstruct(s);
+        for (hat, tau) in hat.iter_mut().zip(&s.tau) {
+            for (h, t) in hat.iter_mut().zip(tau) {
+                *h = t - *h;
+            }
+        }
+        hat
+    };
+    let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
+    floor(&residuals, &stretches, &case.parallel, case.cutoff_hz)
+}
+
+/// How much of each joint's residual is above the noise floor.
+fn left(noise: &[f64], found: &Errors) -> Vec<Left> {
+    found
+        .joints
+        .iter()
+        .zip(noise)
+        .map(|(e, noise)| {
+            let residual = e.rmse * e.rmse;
+            let torque = residual / (e.relative_error * e.relative_error);
+            Left {
+                share: ((residual - noise) / torque).max(0.0),
+                over_floor: residual / noise.max(f64::MIN_POSITIVE),
+            }
+        })
+        .collect()
+}
+
+/// Covariance of all unknowns under correlated residuals: the sandwich over pieces (Newey and West
+/// 1987), at least that of independent rows.
+fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
+    let base = &at.base;
+    let u = base.unknowns.len();
+    let inverse = Inverse::of(&at.normal);
+    let mut scores: Vec<(usize, DVector<f64>)> = Vec::new();
+    let mut rows = 0.0;
+    for (piece, sums) in ground.plan.pieces.iter().zip(&base.sums) {
+        if !piece.role.fitted() {
+            continue;
+        }
+        rows += piece.rows.len() as f64;
+        let mut g = DVector::zeros(u);
+        for (j, s) in sums.iter().enumerate() {
+            let w = at.weights[j] * at.weights[j];
+            for (x, &i) in s.score.iter().zip(&base.unknowns.columns[j]) {
+                g[i] += w * x;
+            }
+        }
+        scores.push((piece.stretch, g));
+    }
+    let lag = 2usize;
+    let mut middle = DMatrix::zeros(u, u);
+    for l in 0..=lag {
+        let weight = 1.0 - l as f64 / (lag + 1) as f64;
+        for pair in scores.windows(l + 1) {
+            let (a, b) = (&pair[0], &pair[l]);
+            if a.0 != b.0 {
+                continue;
+            }
+            if l == 0 {
+                middle.ger(1.0, &a.1, &a.1, 1.0);
+            } else {
+                middle.ger(weight, &a.1, &b.1, 1.0);
+                middle.ger(weight, &b.1, &a.1, 1.0);
+            }
+        }
+    }
+    // the prior is data too
+    middle += &at.information * ground.prior.rows_per_independent.max(1.0);
+    let total = base.total(ground.plan, &at.weights, &Role::fitted);
+    let joints = base.unknowns.columns.len() as f64;
+    let variance = total.square / (rows * joints).max(1.0);
+    for i in 0..u {
+        let least = variance * total.normal[(i, i)];
+        if middle[(i, i)] < least {
+            middle[(i, i)] = least;
+        }
+    }
+    inverse.times(&(middle * inverse.matrix()))
+}
+
+impl Diagnosis {
+    /// Whether some joint's residual still holds structure.
+    pub fn structured(&self) -> bool {
+        self.left
+            .iter()
+            .any(|l| l.over_floor > STRUCTURED && l.share > NEGLIGIBLE)
+    }
+
+    /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.
+    pub fn covariance_of(&self, effect: usize) -> Vec<f64> {
+        let added: &Added = &self.model.effects[effect];
+        let k = added.parameters();
+        let shapes = added.shape.len();
+        let place = |wanted: Unknown| self.unknowns.iter().position(|u| *u == wanted);
+        let places: Vec<Option<usize>> = (0..k)
+            .map(|i| {
+                if i < shapes {
+                    place(Unknown::Shape { effect, k: i })
+                } else {
+                    place(Unknown::Linear {
+                        effect,
+                        k: i - shapes,
+                    })
+                }
+            })
+            .collect();
+        let mut out = vec![0.0; k * k];
+        for (a, pa) in places.iter().enumerate() {
+            for (b, pb) in places.iter().enumerate() {
+                if let (Some(pa), Some(pb)) = (pa, pb) {
+                    out[a * k + b] = self.covariance[(*pa, *pb)];
+                }
+            }
+        }
+        out
+    }
+}

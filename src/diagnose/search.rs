@@ -1,0 +1,429 @@
+//! All candidates of one round: every effect at every place where it can sit, its shape searched.
+
+use rayon::prelude::*;
+
+use super::candidate::{Columns, Judge, Score, spread};
+use super::fit::{Fitted, Ground};
+use super::rows::{clear, scene, standing};
+use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, shifted};
+use crate::math::minimise::nelder_mead;
+use crate::motion::MotionError;
+
+/// Limits that a candidate must keep. All tests must agree.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Chance of one false effect or more among all candidates of a round.
+    pub false_alarm: f64,
+    /// Least share of the effect's torque that nothing declared can stand in for.
+    pub unique_share: f64,
+    /// Least fraction of cross-validated squared error removed.
+    pub cv_gain: f64,
+    /// Least cross-validated gain in its own standard errors.
+    pub cv_certainty: f64,
+    /// Largest squared error on the veto pieces, over that without the effect.
+    pub veto_ratio: f64,
+    /// Least part of the declared model's squared residual, on the joints concerned, that it
+    /// removes: below it an effect may be there and does not matter.
+    pub worth: f64,
+    /// Least power that it removes, over that of the noise.
+    pub over_noise: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            false_alarm: 0.005,
+            unique_share: 0.01,
+            cv_gain: 0.003,
+            cv_certainty: 1.0,
+            veto_ratio: 1.002,
+            worth: 0.01,
+            over_noise: 0.25,
+        }
+    }
+}
+
+/// One candidate with what became of it.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    pub effect: Added,
+    /// None where the data lack what it needs, or where nothing of it is its own.
+    pub score: Option<Score>,
+    pub accepted: bool,
+    /// Why not; empty where accepted.
+    pub reason: String,
+}
+
+/// What an effect's size is measured by, per joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Bar<'a> {
+    /// Squared residual of the declared model over the fitted rows.
+    pub declared: &'a [f64],
+    /// Variance of the noise in the filtered residual.
+    pub noise: &'a [f64],
+}
+
+/// Most evaluations of a shape's refinement, per shape parameter.
+const REFINEMENTS: u64 = 24;
+
+/// Tries everything once.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn search(
+    at: &Fitted,
+    ground: &Ground,
+    keep: bool,
+    limits: &Limits,
+    bar: &Bar,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Candidate>, MotionError> {
+    let torques: Vec<Torques> = ground
+        .stretches
+        .par_iter()
+        .map(|s| at.model.torques(s))
+        .collect();
+    let judge = Judge::new(at, ground);
+    let robot = &at.model.model.robot;
+    let laws = &at.model.model.friction;
+    let places: Vec<(&'static Kind, Place)> = KINDS
+        .iter()
+        .flat_map(|kind| (kind.places)(robot, laws).into_iter().map(|p| (*kind, p)))
+        .collect();
+    let tried: Vec<(Candidate, usize)> = places
+        .par_iter()
+        .map(|&(kind, place)| {
+            if stop() {
+                return Ok((refused(kind, place, "interrupted".into()), 0));
+            }
+            one(at, ground, &judge, &torques, kind, place, keep)
+        })
+        .collect::<Result<_, MotionError>>()?;
+    let shapes: usize = tried.iter().map(|(_, shapes)| shapes).sum();
+    let mut found: Vec<Candidate> = tried.into_iter().map(|(c, _)| c).collect();
+    for candidate in &mut found {
+        let over = |of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..robot.joints())
+                .filter(|j| candidate.effect.place.touches(*j))
+                .map(|j| at.weights[j].powi(2) * of(j))
+                .sum()
+        };
+        let rows = ground.plan.fitted_rows() as f64;
+        let whole = over(&|j| bar.declared[j]).max(f64::MIN_POSITIVE);
+        // where the noise is overrated, what is left counts
+        let least = |j: usize| (bar.noise[j] * rows).min(at.weights[j].powi(-2) * rows);
+        let floor = over(&least).max(f64::MIN_POSITIVE);
+        let worth = |gain: f64| Worth {
+            of_declared: gain * at.square / whole,
+            of_noise: gain * at.square / floor,
+        };
+        decide(candidate, shapes.max(1), limits, &worth);
+    }
+    Ok(found)
+}
+
+/// A candidate that was not tried.
+fn refused(kind: &'static Kind, place: Place, reason: String) -> Candidate {
+    Candidate {
+        effect: Added {
+            kind,
+            place,
+            shape: vec![f64::NAN; kind.shape.len()],
+            linear: vec![0.0; kind.linear.len()],
+        },
+        score: None,
+        accepted: false,
+        reason,
+    }
+}
+
+/// One effect at one place: the best of its shapes, refined; and how many shapes were tried.
+fn one(
+    at: &Fitted,
+    ground: &Ground,
+    judge: &Judge,
+    torques: &[Torques],
+    kind: &'static Kind,
+    place: Place,
+    keep: bool,
+) -> Result<(Candidate, usize), MotionError> {
+    if kind.role == Role::Kept && !keep {
+        let reason = "a fit that is free while carrying it absorbs it; give the model of logs \
+                      without it, and --keep";
+        return Ok((refused(kind, place, reason.into()), 0));
+    }
+    let there = |e: &Added| e.kind.name == kind.name && e.place == place;
+    let again = at.model.effects.iter().any(there);
+    let periodic = matches!(kind.name, "ripple" | "position-friction");
+    // only waves come more than once, each with an order of its own
+    if again && !periodic {
+        return Ok((refused(kind, place, "it is in the model".into()), 0));
+    }
+    let starts = match (kind.starts)(&ground.cover, place) {
+        Ok(starts) => starts,
+        Err(lacking) => return Ok((refused(kind, place, lacking), 0)),
+    };
+    let k = kind.linear.len();
+    let mut effect = Added {
+        kind,
+        place,
+        shape: Vec::new(),
+        linear: vec![0.0; k],
+    };
+    let mut best = (f64::NEG_INFINITY, Vec::new());
+    let count = starts.len();
+    for shape in starts {
+        effect.shape = shape;
+        if periodic && kept_by_filter(at, ground, torques, &effect)? < LEAST_KEPT {
+            continue;
+        }
+        let gain = judge.gain(&columns(&at.model, ground, torques, &effect)?, k);
+        if gain > best.0 {
+            best = (gain, effect.shape.clone());
+        }
+    }
+    if best.0 == f64::NEG_INFINITY {
+        let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
+                      [filter] to look for them";
+        return Ok((refused(kind, place, reason.into()), count));
+    }
+    effect.shape = best.1;
+    // a shape worth refining: positive, so that steps are ratios
+    let limits = (kind.limits)(&ground.cover, place);
+    let free = !effect.shape.is_empty()
+        && kind.name != "coupling"
+        && limits.iter().all(|[low, high]| low < high)
+        && best.0 > 1e-3;
+    if free {
+        let scale: Vec<f64> = effect.shape.iter().map(|s| s.abs().max(1e-9)).collect();
+        let mut failed = None;
+        let start = vec![0.0; scale.len()];
+        // an order's peak is as narrow as one wave over the travel
+        let steps: Vec<f64> = effect
+            .shape
+            .iter()
+            .map(|s| match kind.name {
+                "ripple" | "position-friction" => {
+                    0.15 / (s.abs() * ground.cover.travel(place)).max(0.5)
+                }
+                _ => 0.2,
+            })
+            .collect();
+        let centre = effect.shape.clone();
+        let mut cost = |x: &[f64]| {
+            let mut moved = effect.clone();
+            for (i, s) in moved.shape.iter_mut().enumerate() {
+                *s = (centre[i] + scale[i] * x[i]).clamp(limits[i][0], limits[i][1]);
+            }
+            match columns(&at.model, ground, torques, &moved) {
+                Ok(c) => -judge.gain(&c, k),
+                Err(e) => {
+                    failed = Some(e);
+                    f64::INFINITY
+                }
+            }
+        };
+        let budget = REFINEMENTS * scale.len() as u64;
+        let found = nelder_mead(&mut cost, &start, &steps, 1e-6, budget);
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        for (i, s) in effect.shape.iter_mut().enumerate() {
+            *s = (centre[i] + scale[i] * found.x[i]).clamp(limits[i][0], limits[i][1]);
+        }
+    }
+    if again
+        && at
+            .model
+            .effects
+            .iter()
+            .any(|e| there(e) && near(&e.shape, &effect.shape))
+    {
+        return Ok((refused(kind, place, "it is in the model".into()), count));
+    }
+    let columns = columns(&at.model, ground, torques, &effect)?;
+    let score = judge.score(&columns, k, effect.shape.len());
+    let reason = match &score {
+        None => "nothing of it is its own: what is declared stands in for it".to_owned(),
+        Some(s) => {
+            effect.linear.clone_from(&s.beta);
+            String::new()
+        }
+    };
+    let candidate = Candidate {
+        effect,
+        score,
+        accepted: false,
+        reason,
+    };
+    Ok((candidate, count))
+}
+
+/// Least part of a periodic column's power that the parallel filter must keep.
+const LEAST_KEPT: f64 = 0.2;
+
+/// Part of the columns' power that the parallel filter keeps, over the fitted stretches.
+fn kept_by_filter(
+    at: &Fitted,
+    ground: &Ground,
+    torques: &[Torques],
+    effect: &Added,
+) -> Result<f64, MotionError> {
+    let Some(j) = effect.place.joint() else {
+        return Ok(1.0);
+    };
+    let (mut before, mut after) = (0.0, 0.0);
+    for (stretch, torques) in ground.stretches.iter().zip(torques) {
+        let scene = scene(&at.model, stretch, torques);
+        for mut column in effect.columns(&scene, j) {
+            before += column.iter().map(|x| x * x).sum::<f64>();
+            ground.parallel.smooth(&mut column)?;
+            after += column.iter().map(|x| x * x).sum::<f64>();
+        }
+    }
+    Ok(after / before.max(f64::MIN_POSITIVE))
+}
+
+/// Whether two shapes are one and the same effect.
+fn near(a: &[f64], b: &[f64]) -> bool {
+    a.iter()
+        .zip(b)
+        .all(|(a, b)| (a - b).abs() <= 0.05 * a.abs().max(b.abs()))
+}
+
+/// Filtered columns of an effect over every stretch.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn columns(
+    model: &Refined,
+    ground: &Ground,
+    torques: &[Torques],
+    effect: &Added,
+) -> Result<Columns, MotionError> {
+    let joints = model.model.robot.joints();
+    let mut out = Vec::with_capacity(torques.len());
+    for (stretch, torques) in ground.stretches.iter().zip(torques) {
+        let scene = scene(model, stretch, torques);
+        let mut of_stretch = Vec::with_capacity(joints);
+        for j in 0..joints {
+            if !effect.place.touches(j) {
+                of_stretch.push(Vec::new());
+                continue;
+            }
+            let mut raw = effect.columns(&scene, j);
+            for column in &mut raw {
+                shifted(column, model.shift(j) / stretch.dt);
+            }
+            let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
+            let mut rows = ground.parallel.run(&channels)?;
+            let still = standing(model, stretch, ground.parallel, j);
+            rows.iter_mut().for_each(|column| clear(column, &still));
+            of_stretch.push(rows);
+        }
+        out.push(of_stretch);
+    }
+    Ok(out)
+}
+
+/// How much a candidate removes, over what there is.
+#[derive(Debug, Clone, Copy)]
+struct Worth {
+    of_declared: f64,
+    of_noise: f64,
+}
+
+/// Puts a candidate to every test.
+fn decide(candidate: &mut Candidate, tried: usize, limits: &Limits, worth: &dyn Fn(f64) -> Worth) {
+    let Some(s) = &candidate.score else { return };
+    let corrected = s.p_value * tried as f64;
+    let physical = match candidate.effect.kind.name {
+        // a drive cannot be stiffer than stiff
+        "elasticity" => candidate.effect.linear[0] > 0.0,
+        "presliding" => candidate.effect.linear[0] > 0.0,
+        _ => true,
+    };
+    let reason = if !s.beta.iter().all(|b| b.is_finite()) {
+        "its coefficients are not finite".to_owned()
+    } else if s.unique_share < limits.unique_share {
+        format!(
+            "only {:.2} % of it is its own: what is declared stands in for the rest",
+            100.0 * s.unique_share
+        )
+    } else if !physical {
+        "its coefficient has a sign that the effect cannot have".to_owned()
+    } else if corrected > limits.false_alarm {
+        format!("chance gives as much: p = {corrected:.2e} among all candidates")
+    } else if worth(s.gain).of_declared < limits.worth || worth(s.gain).of_noise < limits.over_noise
+    {
+        format!(
+            "too small to matter: {:.2} % of the declared model's squared residual, {:.2} of the \
+             noise's power",
+            100.0 * worth(s.gain).of_declared,
+            worth(s.gain).of_noise
+        )
+    } else if s.delta_bic <= 0.0 {
+        format!(
+            "not worth its parameters: BIC changes by {:.1} with {:.0} effective rows",
+            s.delta_bic, s.effective_rows
+        )
+    } else if s.cv_gain < limits.cv_gain {
+        format!(
+            "cross-validation: {:+.2} % of the squared error",
+            100.0 * s.cv_gain
+        )
+    } else if s.cv_gain < limits.cv_certainty * s.cv_std {
+        format!(
+            "cross-validation is not of one mind: {:+.2} +- {:.2} %",
+            100.0 * s.cv_gain,
+            100.0 * s.cv_std
+        )
+    } else if s.veto_ratio > limits.veto_ratio {
+        format!(
+            "vetoed: it makes the squared error on data set aside {:.3} times as large",
+            s.veto_ratio
+        )
+    } else {
+        candidate.accepted = true;
+        String::new()
+    };
+    candidate.reason = reason;
+}
+
+/// Of accepted candidates the one to add, and those that the data do not separate from it: within
+/// one standard error over the folds. Among these the one with the fewest parameters is taken, then
+/// the first in the order of [`KINDS`].
+pub fn choose(found: &[Candidate], skip: &[usize]) -> Option<(usize, Vec<usize>)> {
+    let scored = |i: usize| found[i].score.as_ref();
+    let open: Vec<usize> = (0..found.len())
+        .filter(|i| found[*i].accepted && !skip.contains(i) && scored(*i).is_some())
+        .collect();
+    let gain = |i: usize| scored(i).map_or(f64::NEG_INFINITY, |s| s.cv_gain);
+    let best = open
+        .iter()
+        .copied()
+        .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))?;
+    let top = &scored(best)?.folds;
+    let near: Vec<usize> = open
+        .iter()
+        .copied()
+        .filter(|&i| {
+            scored(i).is_some_and(|s| {
+                let worse: f64 = s.folds.iter().sum::<f64>() - top.iter().sum::<f64>();
+                i == best || worse <= spread(&s.folds, top)
+            })
+        })
+        .collect();
+    let order = |i: usize| {
+        KINDS
+            .iter()
+            .position(|k| k.name == found[i].effect.kind.name)
+    };
+    let chosen = near
+        .iter()
+        .copied()
+        .min_by_key(|&i| (found[i].effect.parameters(), order(i), i))?;
+    let mut others: Vec<usize> = near.into_iter().filter(|i| *i != chosen).collect();
+    others.sort_by(|a, b| gain(*b).total_cmp(&gain(*a)));
+    Some((chosen, others))
+}

@@ -1,0 +1,309 @@
+//! An effect with its numbers, as it stands in a model.
+
+use std::collections::BTreeMap;
+
+use super::{Family, Kind, Place, Role, Scene, Unit, kind};
+use crate::robot::Robot;
+
+/// Why an effect of a model file cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectError {
+    #[error("effect `{name}` is not known; known are {known}")]
+    Unknown { name: String, known: String },
+    #[error("effect `{name}`: this robot has no joint `{joint}`; it has {known}")]
+    Joint {
+        name: String,
+        joint: String,
+        known: String,
+    },
+    #[error("effect `{name}` cannot sit there on this robot")]
+    Place { name: String },
+    #[error("effect `{name}` lacks its parameter `{key}`; it takes {known}")]
+    Key {
+        name: String,
+        key: String,
+        known: String,
+    },
+    #[error("effect `{name}`: `{key}` = {value} is not a usable number")]
+    Value {
+        name: String,
+        key: String,
+        value: f64,
+    },
+}
+
+/// One parameter of an effect as it is told: key, value, standard deviation, unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    pub key: String,
+    pub value: f64,
+    pub std: Option<f64>,
+    pub unit: String,
+}
+
+/// An effect in a model.
+#[derive(Debug, Clone)]
+pub struct Added {
+    pub kind: &'static Kind,
+    pub place: Place,
+    pub shape: Vec<f64>,
+    pub linear: Vec<f64>,
+}
+
+impl PartialEq for Added {
+    fn eq(&self, other: &Self) -> bool {
+        self.kind.name == other.kind.name
+            && self.place == other.place
+            && self.shape == other.shape
+            && self.linear == other.linear
+    }
+}
+
+impl Added {
+    /// The effect of a model file.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a name, joint or key that does not fit.
+    pub fn of_keys(
+        robot: &Robot,
+        name: &str,
+        joint: Option<&str>,
+        values: &BTreeMap<String, f64>,
+    ) -> Result<Self, EffectError> {
+        let kind = kind(name).ok_or_else(|| EffectError::Unknown {
+            name: name.to_owned(),
+            known: list(super::KINDS.iter().map(|k| k.name)),
+        })?;
+        let keys = kind.shape.iter().chain(kind.linear).map(|k| k.name);
+        let get = |key: &str| -> Result<f64, EffectError> {
+            let value = values.get(key).copied().ok_or_else(|| EffectError::Key {
+                name: name.to_owned(),
+                key: key.to_owned(),
+                known: list(keys.clone()),
+            })?;
+            if value.is_finite() {
+                Ok(value)
+            } else {
+                Err(EffectError::Value {
+                    name: name.to_owned(),
+                    key: key.to_owned(),
+                    value,
+                })
+            }
+        };
+        let place = place(robot, name, joint, &get)?;
+        let numbers = |keys: &[super::Key]| {
+            keys.iter()
+                .map(|k| get(k.name))
+                .collect::<Result<Vec<f64>, _>>()
+        };
+        let (shape, linear): (Vec<f64>, Vec<f64>) = match name {
+            "presliding" => {
+                let (sigma0, fc) = (get("sigma0")?, get("fc")?);
+                if (sigma0 / fc).partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+                    return Err(EffectError::Value {
+                        name: name.to_owned(),
+                        key: "sigma0".to_owned(),
+                        value: sigma0,
+                    });
+                }
+                (vec![sigma0 / fc], vec![fc, get("sigma1")?])
+            }
+            "elasticity" => (Vec::new(), vec![1.0 / get("stiffness")?]),
+            _ => (numbers(kind.shape)?, numbers(kind.linear)?),
+        };
+        Ok(Added {
+            kind,
+            place,
+            shape,
+            linear,
+        })
+    }
+
+    /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for
+    /// effects that shift the torque.
+    pub fn torque(&self, scene: &Scene, joint: usize, out: &mut [f64]) {
+        out.fill(0.0);
+        if self.kind.role == Role::Shift || !self.place.touches(joint) {
+            return;
+        }
+        let columns = self.columns(scene, joint);
+        for (column, c) in columns.iter().zip(&self.linear) {
+            for (x, y) in out.iter_mut().zip(column) {
+                *x += c * y;
+            }
+        }
+    }
+
+    /// Its columns in the rows of joint `joint`.
+    pub fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; scene.len()]; self.kind.linear.len()];
+        if self.place.touches(joint) {
+            (self.kind.columns)(scene, self.place, &self.shape, joint, &mut out);
+        }
+        out
+    }
+
+    /// Time by which it shifts the torque of joint `joint` \[s\].
+    pub fn shift(&self, joint: usize) -> f64 {
+        if self.kind.role == Role::Shift && self.place.touches(joint) {
+            self.linear[0]
+        } else {
+            0.0
+        }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.shape.len() + self.linear.len()
+    }
+
+    /// Family.
+    pub fn family(&self) -> Family {
+        self.kind.family
+    }
+
+    /// Name, or name and place: `ripple of q4`.
+    pub fn title(&self, robot: &Robot) -> String {
+        match (self.place, self.place.name(robot)) {
+            (Place::Pair { of, .. }, Some(on)) => {
+                format!(
+                    "{} of {on} with {}",
+                    self.kind.name,
+                    robot.joint_names()[of]
+                )
+            }
+            (_, Some(place)) => format!("{} of {place}", self.kind.name),
+            (_, None) => self.kind.name.to_owned(),
+        }
+    }
+
+    /// Parameters as files and tables name them. `covariance` is that of (shape, linear), row-major;
+    /// a shape that these data leave open has infinite variance there. `torque` is the torque's unit.
+    pub fn told(&self, robot: &Robot, torque: &str, covariance: Option<&[f64]>) -> Vec<Told> {
+        let kind = self.place.kind(robot);
+        let k = self.parameters();
+        let std = |gradient: &[f64]| {
+            let c = covariance?;
+            let mut variance = 0.0;
+            for a in 0..k {
+                for b in 0..k {
+                    if gradient[a] != 0.0 && gradient[b] != 0.0 {
+                        variance += gradient[a] * gradient[b] * c[a * k + b];
+                    }
+                }
+            }
+            let std = variance.max(0.0).sqrt();
+            std.is_finite().then_some(std)
+        };
+        let unit_vector = |i: usize| {
+            let mut g = vec![0.0; k];
+            g[i] = 1.0;
+            g
+        };
+        let told = |key: &str, value: f64, gradient: Vec<f64>, unit: Unit| Told {
+            key: key.to_owned(),
+            value,
+            std: std(&gradient),
+            unit: unit.text(kind, torque),
+        };
+        let mut out = Vec::with_capacity(k + 1);
+        match self.kind.name {
+            "presliding" => {
+                let (rate, fc) = (self.shape[0], self.linear[0]);
+                out.push(told(
+                    "sigma0",
+                    fc * rate,
+                    vec![fc, rate, 0.0],
+                    Unit::Stiffness,
+                ));
+                out.push(told(
+                    "sigma1",
+                    self.linear[1],
+                    unit_vector(2),
+                    Unit::Viscous,
+                ));
+                out.push(told("fc", fc, unit_vector(1), Unit::Torque));
+            }
+            "elasticity" => {
+                let c = self.linear[0];
+                out.push(told(
+                    "stiffness",
+                    1.0 / c,
+                    vec![-1.0 / (c * c)],
+                    Unit::Stiffness,
+                ));
+            }
+            _ => {
+                let keys = self.kind.shape.iter().chain(self.kind.linear);
+                let values = self.shape.iter().chain(&self.linear);
+                for (i, (key, value)) in keys.zip(values).enumerate() {
+                    out.push(told(key.name, *value, unit_vector(i), key.unit));
+                }
+            }
+        }
+        if let Place::Pair { of, .. } = self.place {
+            out.push(Told {
+                key: "from".to_owned(),
+                value: (of + 1) as f64,
+                std: None,
+                unit: String::new(),
+            });
+        }
+        out
+    }
+}
+
+/// Where an effect of a file sits.
+fn place(
+    robot: &Robot,
+    name: &str,
+    joint: Option<&str>,
+    get: &dyn Fn(&str) -> Result<f64, EffectError>,
+) -> Result<Place, EffectError> {
+    let nowhere = || EffectError::Place {
+        name: name.to_owned(),
+    };
+    let Some(joint) = joint else {
+        return match name {
+            "delay" | "payload" | "rigid-body-terms" => Ok(Place::All),
+            _ => Err(nowhere()),
+        };
+    };
+    if matches!(robot, Robot::Cft(_)) && matches!(name, "actuator-friction" | "rotor-inertia") {
+        match joint {
+            "x_r" => return Ok(Place::Actuator(0)),
+            "y_r" => return Ok(Place::Actuator(1)),
+            _ => {}
+        }
+    }
+    let names = robot.joint_names();
+    let on = names
+        .iter()
+        .position(|n| n == joint)
+        .ok_or_else(|| EffectError::Joint {
+            name: name.to_owned(),
+            joint: joint.escape_debug().to_string(),
+            known: list(names.iter().map(String::as_str)),
+        })?;
+    match name {
+        "coupling" => {
+            let of = get("from")?;
+            let at = of as usize;
+            if of.fract() != 0.0 || at < 1 || at > names.len() || at - 1 == on {
+                return Err(EffectError::Value {
+                    name: name.to_owned(),
+                    key: "from".to_owned(),
+                    value: of,
+                });
+            }
+            Ok(Place::Pair { on, of: at - 1 })
+        }
+        "payload" | "rigid-body-terms" | "actuator-friction" => Err(nowhere()),
+        _ => Ok(Place::Joint(on)),
+    }
+}
+
+fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,145 @@
+//! What a set of logs covers: by this an effect is refused that the data cannot show.
+
+use super::Place;
+use crate::motion::Stretch;
+use crate::robot::{JointKind, Robot};
+
+/// What one joint did.
+#[derive(Debug, Clone, Default)]
+pub struct JointCover {
+    /// Least and greatest position [m or rad].
+    pub position: [f64; 2],
+    /// Greatest speed in each direction, backward and forward [m/s or rad/s].
+    pub speed: [f64; 2],
+    /// Root mean square of the speed.
+    pub speed_rms: f64,
+    /// Changes of direction with a travel of at least a thousandth of the range between them.
+    pub reversals: usize,
+    /// Orders with a peak in the angle-domain spectrum of the residual that keeps its sign.
+    pub ripple_orders: Vec<f64>,
+    /// The same of the residual times the sign of the speed.
+    pub friction_orders: Vec<f64>,
+}
+
+/// What the logs cover.
+#[derive(Debug, Clone, Default)]
+pub struct Cover {
+    pub joints: Vec<JointCover>,
+    pub kinds: Vec<JointKind>,
+    /// Longest log \[s\].
+    pub duration_s: f64,
+    /// Sampling step \[s\].
+    pub dt: f64,
+    /// Cut-off of the parallel filter \[Hz\].
+    pub cutoff_hz: f64,
+}
+
+impl Cover {
+    /// Looks over stretches.
+    pub fn of(robot: &Robot, stretches: &[Stretch], cutoff_hz: f64) -> Self {
+        let n = robot.joints();
+        let mut cover = Cover {
+            joints: vec![JointCover::default(); n],
+            kinds: (0..n).map(|j| robot.joint_kind(j)).collect(),
+            duration_s: 0.0,
+            dt: stretches.first().map_or(1.0, |s| s.dt),
+            cutoff_hz,
+        };
+        for (j, joint) in cover.joints.iter_mut().enumerate() {
+            let mut position = [f64::INFINITY, f64::NEG_INFINITY];
+            let (mut square, mut count) = (0.0, 0usize);
+            for s in stretches {
+                for (q, v) in s.q[j].iter().zip(&s.v[j]) {
+                    position = [position[0].min(*q), position[1].max(*q)];
+                    joint.speed = [joint.speed[0].min(*v), joint.speed[1].max(*v)];
+                    square += v * v;
+                    count += 1;
+                }
+            }
+            joint.speed_rms = (square / count.max(1) as f64).sqrt();
+            let least = 1e-3 * (position[1] - position[0]);
+            joint.reversals = stretches.iter().map(|s| reversals(&s.q[j], least)).sum();
+            joint.position = position;
+        }
+        for s in stretches {
+            let end = s.began + s.dt * s.len() as f64;
+            cover.duration_s = cover.duration_s.max(end);
+        }
+        cover
+    }
+
+    /// What the joint of a place did; the first joint's for all of them.
+    pub fn at(&self, place: Place) -> &JointCover {
+        &self.joints[place.joint().unwrap_or(0).min(self.joints.len() - 1)]
+    }
+
+    /// Travel of a place's joint in revolutions or metres.
+    pub fn travel(&self, place: Place) -> f64 {
+        let joint = place.joint().unwrap_or(0);
+        self.in_order_units(joint, self.joints[joint].range())
+    }
+
+    /// A distance of joint j in revolutions or metres.
+    pub fn in_order_units(&self, j: usize, distance: f64) -> f64 {
+        match self.kinds[j] {
+            JointKind::Revolute => distance / std::f64::consts::TAU,
+            JointKind::Prismatic => distance,
+        }
+    }
+}
+
+impl JointCover {
+    /// Travel [m or rad].
+    pub fn range(&self) -> f64 {
+        (self.position[1] - self.position[0]).max(0.0)
+    }
+
+    /// Greatest speed of both directions.
+    pub fn fastest(&self) -> f64 {
+        self.speed[1].max(-self.speed[0])
+    }
+
+    /// Whether the joint moved both ways with speeds worth the name.
+    pub fn both_ways(&self) -> bool {
+        self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
+    }
+}
+
+/// Turning points with at least `least` between them.
+fn reversals(q: &[f64], least: f64) -> usize {
+    let Some(&first) = q.first() else { return 0 };
+    let (mut extreme, mut direction, mut count) = (first, 0i8, 0);
+    for &x in q {
+        match direction {
+            0 if (x - first).abs() > least => {
+                direction = if x > first { 1 } else { -1 };
+                extreme = x;
+            }
+            0 => {}
+            1 if x > extreme => extreme = x,
+            -1 if x < extreme => extreme = x,
+            _ if (x - extreme).abs() > least => {
+                direction = -direction;
+                extreme = x;
+                count += 1;
+            }
+            _ => {}
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turning_points_are_counted_and_jitter_is_not() {
+        let q: Vec<f64> = (0..2000)
+            .map(|k| (f64::from(k) * 0.01).sin() + 1e-5 * f64::from(k % 2))
+            .collect();
+        // sin turns at pi/2, 3 pi/2, .. below 20: six times
+        assert_eq!(reversals(&q, 1e-3), 6);
+        assert_eq!(reversals(&[0.0; 50], 1e-3), 0);
+    }
+}

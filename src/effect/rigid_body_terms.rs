@@ -1,0 +1,50 @@
+//! `rigid-body-terms`: the base parameters of the full chain that the declared structure drops: for
+//! the CFT robot with 12 parameters the other ten of its 22.
+
+use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
+use crate::robot::Robot;
+use crate::robot::cft::regressor::regressor22;
+use crate::robot::cft::{EXTENDED, Structure};
+
+/// Name and unit of an extra parameter of the full chain.
+const fn extra(i: usize) -> Key {
+    Key::new(EXTENDED[12 + i].name, Unit::Text(EXTENDED[12 + i].unit))
+}
+
+pub const KIND: Kind = Kind {
+    name: "rigid-body-terms",
+    family: Family::Inertia,
+    role: Role::Columns,
+    shape: &[],
+    linear: &[
+        extra(0),
+        extra(1),
+        extra(2),
+        extra(3),
+        extra(4),
+        extra(5),
+        extra(6),
+        extra(7),
+        extra(8),
+        extra(9),
+    ],
+    places: |robot, _| match robot {
+        Robot::Cft(cft) if cft.structure == Structure::Printed12 => vec![Place::All],
+        _ => Vec::new(),
+    },
+    starts: no_shape,
+    limits: no_limits,
+    columns: |scene, _, _, joint, out| {
+        let s = scene.stretch;
+        let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        let mut y = [[0.0; 22]; 4];
+        for k in 0..s.len() {
+            s.at(k, &mut q, &mut v, &mut a);
+            regressor22(&q, &v, &a, &mut y);
+            for (column, x) in out.iter_mut().zip(&y[joint][12..]) {
+                column[k] = *x;
+            }
+        }
+    },
+    separate_by: "declare `parameters = 22` and excite all joints together, fast",
+};

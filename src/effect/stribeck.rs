@@ -1,0 +1,39 @@
+//! `stribeck`: friction that falls at low speed, c sgn(v) exp(-(v/vs)^2) (Armstrong-Helouvry,
+//! Dupont and Canudas de Wit 1994), where the declared law has no such term.
+
+use super::{Family, Key, Kind, Place, Role, Unit, sign};
+use crate::robot::model::JointFriction;
+
+pub const KIND: Kind = Kind {
+    name: "stribeck",
+    family: Family::Velocity,
+    role: Role::Columns,
+    shape: &[Key::new("vs", Unit::Speed)],
+    linear: &[Key::new("c", Unit::Torque)],
+    places: |robot, laws| {
+        (0..robot.joints())
+            .filter(|j| !matches!(laws[*j], JointFriction::DoubleTanh(_)))
+            .map(Place::Joint)
+            .collect()
+    },
+    starts: |cover, place| {
+        let joint = cover.at(place);
+        if joint.reversals < 2 {
+            return Err("fewer than two reversals: low speeds are passed too rarely".into());
+        }
+        // from half of the top speed down to a hundredth, seven steps
+        let shares = [0.5, 0.3, 0.2, 0.13, 0.08, 0.04, 0.02, 0.01];
+        Ok(shares.map(|s| vec![s * joint.fastest()]).to_vec())
+    },
+    limits: |cover, place| {
+        let top = cover.at(place).fastest();
+        vec![[0.003 * top, 0.8 * top]]
+    },
+    columns: |scene, place, shape, _, out| {
+        let Some(j) = place.joint() else { return };
+        for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
+            *x = sign(*v) * (-(v / shape[0]).powi(2)).exp();
+        }
+    },
+    separate_by: "a ladder of slow constant speeds, both ways, from a hundredth of the top speed up",
+};

@@ -1,0 +1,202 @@
+//! Uninterrupted stretches of a log at full rate, for searches that go over the same samples many
+//! times: whole in memory, 8 bytes x 4 channels x joints a sample.
+
+use super::MotionError;
+use super::run::{RunError, Summary, run};
+use super::settings::{Chain, Settings};
+use crate::log::Block;
+use crate::math::zero_phase::ZeroPhase;
+
+/// One uninterrupted stretch, smoothed and differentiated; every channel `[joint][sample]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Stretch {
+    /// Index of its log among those of one call.
+    pub log: usize,
+    /// Sampling step \[s\].
+    pub dt: f64,
+    /// Time of the first sample since the begin of its log \[s\].
+    pub began: f64,
+    /// Time stamps as logged \[s\].
+    pub t: Vec<f64>,
+    /// Positions [m or rad].
+    pub q: Vec<Vec<f64>>,
+    /// Velocities [m/s or rad/s].
+    pub v: Vec<Vec<f64>>,
+    /// Accelerations [m/s2 or rad/s2].
+    pub a: Vec<Vec<f64>>,
+    /// Torques, unfiltered [N or Nm].
+    pub tau: Vec<Vec<f64>>,
+}
+
+impl Stretch {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Position, velocity and acceleration of every joint at sample k.
+    pub fn at(&self, k: usize, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
+        for j in 0..self.q.len() {
+            q[j] = self.q[j][k];
+            v[j] = self.v[j][k];
+            a[j] = self.a[j][k];
+        }
+    }
+}
+
+/// Reads one log into stretches. They end where the parallel filter begins: what it leaves off at
+/// the ends is [`Parallel::trim`].
+///
+/// # Errors
+/// Those of the source and of [`run`].
+pub fn stretches<E>(
+    log: usize,
+    joints: usize,
+    settings: &Settings,
+    source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+) -> Result<(Vec<Stretch>, Summary), RunError<E>> {
+    let every = Settings {
+        decimation: Some(1),
+        trim_s: Some(0.0),
+        ..settings.clone()
+    };
+    let mut found: Vec<Stretch> = Vec::new();
+    let mut segment = None;
+    let mut first = None;
+    let mut read = |block: &mut Block| {
+        let more = source(block)?;
+        if first.is_none() {
+            first = block.t.first().copied();
+        }
+        Ok(more)
+    };
+    let summary = run(
+        &mut read,
+        joints,
+        &every,
+        None,
+        joints,
+        &|sample, out| out.copy_from_slice(sample.tau),
+        &mut |row| {
+            if segment != Some(row.segment) {
+                segment = Some(row.segment);
+                found.push(Stretch {
+                    log,
+                    began: row.t,
+                    q: vec![Vec::new(); joints],
+                    v: vec![Vec::new(); joints],
+                    a: vec![Vec::new(); joints],
+                    tau: vec![Vec::new(); joints],
+                    ..Stretch::default()
+                });
+            }
+            let Some(stretch) = found.last_mut() else {
+                return;
+            };
+            stretch.t.push(row.t);
+            for j in 0..joints {
+                stretch.q[j].push(row.q[j]);
+                stretch.v[j].push(row.v[j]);
+                stretch.a[j].push(row.a[j]);
+                stretch.tau[j].push(row.raw[j]);
+            }
+        },
+    )?;
+    for stretch in &mut found {
+        stretch.dt = summary.dt;
+        stretch.began -= first.unwrap_or(0.0);
+    }
+    // what was done to the log is told with its own decimation
+    let declared = Chain::design(settings, summary.dt)?;
+    Ok((
+        found,
+        Summary {
+            decimation: declared.decimation,
+            ..summary
+        },
+    ))
+}
+
+/// The declared parallel filter for whole stretches.
+#[derive(Debug, Clone)]
+pub struct Parallel {
+    filter: ZeroPhase,
+    /// Every how many samples a row is kept.
+    pub decimation: usize,
+    /// Samples left off at each end of a stretch.
+    pub trim: usize,
+}
+
+impl Parallel {
+    /// The filter for one sampling step.
+    ///
+    /// # Errors
+    /// [`MotionError`] for settings that the sampling rate does not carry.
+    pub fn design(settings: &Settings, dt: f64) -> Result<Self, MotionError> {
+        let chain = Chain::design(settings, dt)?;
+        Ok(Parallel {
+            filter: chain.parallel,
+            decimation: chain.decimation,
+            trim: chain.trim,
+        })
+    }
+
+    /// Rows that a stretch of `samples` gives.
+    pub fn rows(&self, samples: usize) -> usize {
+        if samples <= 2 * self.trim {
+            return 0;
+        }
+        (samples - 2 * self.trim).div_ceil(self.decimation)
+    }
+
+    /// Index within the stretch of row `i`.
+    pub fn sample_of(&self, i: usize) -> usize {
+        self.trim + i * self.decimation
+    }
+
+    /// Filters one channel of a stretch at full rate, in place.
+    ///
+    /// # Errors
+    /// [`MotionError`] where the stretch is too short for the filter.
+    pub fn smooth(&self, channel: &mut [f64]) -> Result<(), MotionError> {
+        Ok(self.filter.run(channel, 1)?)
+    }
+
+    /// Filters channels of a stretch and keeps every `decimation`-th sample.
+    ///
+    /// # Errors
+    /// [`MotionError`] where the stretch is too short for the filter.
+    pub fn run(&self, channels: &[&[f64]]) -> Result<Vec<Vec<f64>>, MotionError> {
+        let samples = channels.first().map_or(0, |c| c.len());
+        let rows = self.rows(samples);
+        let mut out = Vec::with_capacity(channels.len());
+        let mut lanes = Vec::new();
+        // eight channels side by side fill the vector registers
+        for group in channels.chunks(8) {
+            let width = group.len();
+            lanes.clear();
+            lanes.resize(samples * width, 0.0);
+            for (l, channel) in group.iter().enumerate() {
+                for (row, x) in lanes.chunks_exact_mut(width).zip(channel.iter()) {
+                    row[l] = *x;
+                }
+            }
+            self.filter.run(&mut lanes, width)?;
+            for l in 0..width {
+                let kept = (0..rows).map(|i| lanes[self.sample_of(i) * width + l]);
+                out.push(kept.collect());
+            }
+        }
+        Ok(out)
+    }
+}
