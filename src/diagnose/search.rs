@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::{Columns, Judge, Score, spread};
 use super::fit::{Fitted, Ground};
+use super::orders::SCANNED;
 use super::rows::{clear, scene, standing};
 use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, shifted};
 use crate::math::minimise::nelder_mead;
@@ -171,7 +172,8 @@ fn one(
         linear: vec![0.0; k],
     };
     let mut best = (f64::NEG_INFINITY, Vec::new());
-    let count = starts.len();
+    // a peak was picked out of all orders that were looked at
+    let count = if periodic { SCANNED } else { starts.len() };
     for shape in starts {
         effect.shape = shape;
         if periodic && kept_by_filter(at, ground, torques, &effect)? < LEAST_KEPT {
