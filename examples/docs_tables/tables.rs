@@ -17,6 +17,8 @@ pub fn render(words: &[&str]) -> Rendered {
         ["friction", result] => friction(&json(result)?),
         ["curve", result, published] => curve(&json(result)?, &json(published)?),
         ["study", study] => self::study(&json(study)?),
+        ["steps", diagnosis] => steps(&json(diagnosis)?),
+        ["before-after", diagnoses @ ..] => before_after(diagnoses),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))
@@ -104,6 +106,110 @@ fn parameters(fit: &Value, published: Option<&Value>) -> Rendered {
         significant(number(&fit["effective_samples"]).round(), 3)
     );
     Ok(out)
+}
+
+/// What `diagnose` added, step by step.
+fn steps(diagnosis: &Value) -> Rendered {
+    let mut lines = Vec::new();
+    for step in rows(&diagnosis["steps"]) {
+        let mut numbers = Vec::new();
+        for (key, p) in step["parameters"].as_object().into_iter().flatten() {
+            let (value, std) = value_and_std(number(&p["value"]), number(&p["std"]));
+            let known = p["std"].as_f64().is_some_and(|s| s > 0.0);
+            let std = if known {
+                format!(" \u{b1} {std}")
+            } else {
+                String::new()
+            };
+            numbers.push(
+                format!("{key} {value}{std} {}", text(&p["unit"]))
+                    .trim_end()
+                    .to_owned(),
+            );
+        }
+        let alike: Vec<&str> = rows(&step["alternatives"]).iter().map(text).collect();
+        lines.push(vec![
+            format!(
+                "{} of {}",
+                text(&step["effect"]),
+                step["joint"].as_str().unwrap_or("all")
+            ),
+            text(&step["family"]).to_owned(),
+            numbers.join(", "),
+            percent(number(&step["cv_gain"])),
+            significant(number(&step["delta_bic"]).round(), 3),
+            percent(number(&step["holdout_before"])),
+            percent(number(&step["holdout_after"])),
+            if alike.is_empty() {
+                "-".to_owned()
+            } else {
+                alike.join(", ")
+            },
+        ]);
+    }
+    let columns = [
+        "<effect",
+        "<family",
+        "<parameters of the last fit",
+        "cross-validated gain",
+        "BIC",
+        "unseen before",
+        "after",
+        "<not separated from",
+    ];
+    Ok(table(&columns, &lines))
+}
+
+/// Errors before and after, one row per diagnosis and joint.
+fn before_after(names: &[&str]) -> Rendered {
+    let mut lines = Vec::new();
+    for name in names {
+        let result = json(name)?;
+        let logs: Vec<String> = rows(&result["inputs"])
+            .iter()
+            .map(|i| match i["span"].as_str() {
+                None => text(&i["name"]).to_owned(),
+                Some(span) => format!("{}@{span}", text(&i["name"])),
+            })
+            .collect();
+        for (j, joint) in rows(&result["after"]["train"]["joints"]).iter().enumerate() {
+            let of = |when: &str, rows: &str| &result[when][rows]["joints"][j];
+            let after = of("after", "holdout");
+            let interval = rows(&after["interval_95"]);
+            let interval = match interval {
+                [low, high] => format!("{} to {}", percent(number(low)), percent(number(high))),
+                _ => "-".to_owned(),
+            };
+            lines.push(vec![
+                logs.join(", "),
+                text(&joint["joint"]).to_owned(),
+                text(&result["verdict"]).to_owned(),
+                percent(number(&of("before", "train")["relative_error"])),
+                percent(number(&joint["relative_error"])),
+                percent(number(&of("before", "holdout")["relative_error"])),
+                percent(number(&after["relative_error"])),
+                interval,
+                format!(
+                    "{} to {} {}",
+                    significant(number(&of("before", "holdout")["rmse"]), 3),
+                    significant(number(&after["rmse"]), 3),
+                    text(&after["unit"])
+                ),
+            ]);
+        }
+    }
+    let columns = [
+        "<logs, the unseen one last",
+        "<joint",
+        "<verdict",
+        "fitted before",
+        "after",
+        "unseen before",
+        "after",
+        "95 % of it",
+        "<unseen rms",
+    ];
+    Ok(table(&columns, &lines))
 }
 
 fn signed_percent(fraction: f64) -> String {

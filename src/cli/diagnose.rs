@@ -9,7 +9,7 @@ use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::refined::{Held, hold, in_file, refined};
-use super::{CliError, Context, Outcome};
+use super::{CliError, Context, Outcome, arguments, diagnose_report};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Open, Prior, Unknown,
@@ -54,6 +54,12 @@ pub struct Args {
     /// Refined model file to write
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
+    /// Draw the residual before and after; may be given more than once
+    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    pub plot: Vec<PathBuf>,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
 }
 
 /// Result of the stage.
@@ -62,6 +68,10 @@ pub struct Diagnosed {
     pub held: Held,
     /// Names of the logs, in order.
     pub logs: Vec<String>,
+    /// The model as it was given.
+    pub given: Refined,
+    pub parallel: Parallel,
+    pub cutoff_hz: f64,
 }
 
 /// Logs by what they are for.
@@ -131,6 +141,7 @@ pub fn diagnose(
     })?;
     drop(bar);
     held.stretches = case.stretches;
+    let (given, parallel) = (case.given, case.parallel);
     let logs: Vec<String> = specs.iter().map(|s| s.name()).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -145,6 +156,9 @@ pub fn diagnose(
         diagnosis,
         held,
         logs,
+        given,
+        parallel,
+        cutoff_hz: case.cutoff_hz,
     })
 }
 
@@ -271,7 +285,7 @@ pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told
 }
 
 /// Whether there is a verdict of effects, of nothing, or of structure without a name.
-fn verdict(diagnosis: &Diagnosis) -> &'static str {
+pub fn verdict(diagnosis: &Diagnosis) -> &'static str {
     if !diagnosis.steps.is_empty() {
         "effects-found"
     } else if diagnosis.structured() {
@@ -539,7 +553,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|l| l.path.as_path())
         .chain([args.model.as_path()])
         .collect();
-    let outputs: Vec<&Path> = args.output.iter().map(PathBuf::as_path).collect();
+    let outputs: Vec<&Path> = args
+        .output
+        .iter()
+        .chain(&args.plot)
+        .chain(&args.report)
+        .map(PathBuf::as_path)
+        .collect();
     context.check_outputs(&inputs, &outputs)?;
     let name = args.model.display().to_string();
     let file = ModelFile::load(&args.model)?;
@@ -558,6 +578,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     )?;
     let mut text = text(&machine, &found, &name);
     context.check()?;
+    if !args.plot.is_empty() || args.report.is_some() {
+        let figure = diagnose_report::figure(&machine, &found)?.svg();
+        for path in &args.plot {
+            super::outputs::write_text(path, &figure)?;
+        }
+        if let Some(path) = &args.report {
+            let page = diagnose_report::page(&machine, &found, &name, &figure);
+            super::outputs::write_text(path, &page)?;
+        }
+    }
     if let Some(path) = &args.output {
         super::outputs::write_text(path, &into_model(&machine, &file, &found).to_toml()?)?;
         text += &format!("written: {}\n", path.display());

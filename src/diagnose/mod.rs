@@ -11,6 +11,7 @@
 //! veto. All must agree. The holdout decides nothing.
 
 mod candidate;
+mod evidence;
 mod fit;
 mod floor;
 mod measure;
@@ -22,6 +23,7 @@ mod search;
 mod unknowns;
 
 pub use candidate::Score;
+pub use evidence::{JointEvidence, evidence};
 pub use fit::Prior;
 pub use measure::{Errors, JointErrors, OverallErrors};
 pub use plan::{LogRole, SetAside};

@@ -93,8 +93,8 @@ pub struct Diagnosis {
     pub set_aside: Vec<SetAside>,
     /// Root mean square of the filtered residual per joint.
     pub residual_std: Vec<f64>,
-    pub cover: Cover,
-    pub plan: Plan,
+    /// Logs that were fitted: the first ones.
+    pub fitted_logs: usize,
 }
 
 /// Most effects that are added.
@@ -283,8 +283,7 @@ pub fn diagnose(
         left_before,
         left,
         set_aside: plan.set_aside.clone(),
-        cover: ground.cover,
-        plan,
+        fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
     })
 }
 

@@ -6,5 +6,6 @@
 pub mod figure;
 pub mod json;
 pub mod number;
+pub mod page;
 pub mod summary;
 pub mod table;

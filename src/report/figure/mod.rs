@@ -10,11 +10,13 @@ mod friction;
 mod legend;
 mod motion;
 mod panel;
+mod residual;
 mod svg;
 mod torque;
 
 pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
 pub use motion::{MotionFigure, MotionPanel};
+pub use residual::{ResidualFigure, ResidualPanel, When};
 pub use torque::{JointTorque, TorqueFigure};
 
 /// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).

@@ -1,0 +1,219 @@
+//! What a person looks at: the filtered residual over position, velocity, load and time, forward and
+//! backward apart, and its spectra over order and frequency, for a model before and after.
+
+use crate::effect::Refined;
+use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::JointKind;
+
+/// Points of a line.
+pub type Line = Vec<[f64; 2]>;
+
+/// The residual of one joint by one model.
+#[derive(Debug, Clone, Default)]
+pub struct JointEvidence {
+    /// Mean residual over position, forward and backward.
+    pub position: [Line; 2],
+    /// Mean residual over velocity.
+    pub velocity: Line,
+    /// Mean residual over the load torque, forward and backward.
+    pub load: [Line; 2],
+    /// Residual over time; a gap in the lines is a row that is not finite.
+    pub time: Line,
+    /// Amplitude over order (1/rev or 1/m).
+    pub order: Line,
+    /// Amplitude over frequency \[Hz\].
+    pub frequency: Line,
+}
+
+/// Bins over a quantity.
+const BINS: usize = 60;
+/// Rows that a bin needs.
+const LEAST: usize = 5;
+/// Points of a spectrum.
+const SPECTRUM: usize = 240;
+/// Rows that a spectrum is made of, about.
+const ROWS: usize = 4000;
+
+/// Rows of one joint.
+#[derive(Default)]
+struct Rows {
+    t: Vec<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    load: Vec<f64>,
+    e: Vec<f64>,
+}
+
+/// Evidence of a model along stretches, joint by joint.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn evidence(
+    model: &Refined,
+    stretches: &[&Stretch],
+    parallel: &Parallel,
+    cutoff_hz: f64,
+) -> Result<Vec<JointEvidence>, MotionError> {
+    let robot = &model.model.robot;
+    let n = robot.joints();
+    let mut all: Vec<Rows> = (0..n).map(|_| Rows::default()).collect();
+    for stretch in stretches {
+        let load = model.torques(stretch).load;
+        let hat = model.reconstruct(stretch);
+        for (j, rows) in all.iter_mut().enumerate() {
+            let residual: Vec<f64> = stretch.tau[j]
+                .iter()
+                .zip(&hat[j])
+                .map(|(t, h)| t - h)
+                .collect();
+            let filtered = parallel.run(&[&residual])?;
+            // a break between stretches
+            rows.push([f64::NAN; 5]);
+            for (i, e) in filtered[0].iter().enumerate() {
+                let k = parallel.sample_of(i);
+                rows.push([
+                    stretch.t[k],
+                    stretch.q[j][k],
+                    stretch.v[j][k],
+                    load[j][k],
+                    *e,
+                ]);
+            }
+        }
+    }
+    Ok(all
+        .iter()
+        .enumerate()
+        .map(|(j, rows)| {
+            let direction = |forward: bool| {
+                let rms = mean_square(&rows.v).sqrt();
+                move |v: f64| {
+                    if forward {
+                        v > 0.02 * rms
+                    } else {
+                        v < -0.02 * rms
+                    }
+                }
+            };
+            let by = |x: &[f64]| {
+                let part = |forward| binned(x, &rows.e, &rows.v, &direction(forward));
+                [part(true), part(false)]
+            };
+            let per_unit = match robot.joint_kind(j) {
+                JointKind::Revolute => 1.0,
+                JointKind::Prismatic => std::f64::consts::TAU,
+            };
+            let [low, high] = range(&rows.q);
+            let waves = 40.0 / ((high - low) * per_unit / std::f64::consts::TAU).max(1e-9);
+            JointEvidence {
+                position: by(&rows.q),
+                velocity: binned(&rows.v, &rows.e, &rows.v, &|_| true),
+                load: by(&rows.load),
+                time: rows.t.iter().zip(&rows.e).map(|(t, e)| [*t, *e]).collect(),
+                order: spectrum(&rows.q, &rows.e, per_unit, waves),
+                frequency: spectrum(&rows.t, &rows.e, std::f64::consts::TAU, 1.5 * cutoff_hz),
+            }
+        })
+        .collect())
+}
+
+impl Rows {
+    fn push(&mut self, [t, q, v, load, e]: [f64; 5]) {
+        self.t.push(t);
+        self.q.push(q);
+        self.v.push(v);
+        self.load.push(load);
+        self.e.push(e);
+    }
+}
+
+fn mean_square(x: &[f64]) -> f64 {
+    let finite = x.iter().filter(|x| x.is_finite());
+    let (sum, count) = finite.fold((0.0, 0usize), |(s, c), x| (s + x * x, c + 1));
+    sum / count.max(1) as f64
+}
+
+fn range(x: &[f64]) -> [f64; 2] {
+    let finite = x.iter().filter(|x| x.is_finite());
+    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+        [a.min(*x), b.max(*x)]
+    })
+}
+
+/// Mean of e in bins of x, over the rows whose velocity is wanted; empty bins part the line.
+fn binned(x: &[f64], e: &[f64], v: &[f64], wanted: &dyn Fn(f64) -> bool) -> Line {
+    let [low, high] = range(x);
+    let width = (high - low) / BINS as f64;
+    if width <= 0.0 || !width.is_finite() {
+        return Vec::new();
+    }
+    let mut sums = vec![(0.0, 0usize); BINS];
+    for ((x, e), v) in x.iter().zip(e).zip(v) {
+        if x.is_finite() && wanted(*v) {
+            let bin = (((x - low) / width) as usize).min(BINS - 1);
+            sums[bin].0 += e;
+            sums[bin].1 += 1;
+        }
+    }
+    sums.iter()
+        .enumerate()
+        .map(|(i, (sum, count))| {
+            let y = if *count < LEAST {
+                f64::NAN
+            } else {
+                sum / *count as f64
+            };
+            [low + (i as f64 + 0.5) * width, y]
+        })
+        .collect()
+}
+
+/// Amplitude of e at waves of x, from 0 to `last` waves per unit.
+fn spectrum(x: &[f64], e: &[f64], per_unit: f64, last: f64) -> Line {
+    let stride = (x.len() / ROWS).max(1);
+    let rows: Vec<(f64, f64)> = x
+        .iter()
+        .zip(e)
+        .step_by(stride)
+        .filter(|(x, _)| x.is_finite())
+        .map(|(x, e)| (*x, *e))
+        .collect();
+    if rows.len() < 10 || !last.is_finite() {
+        return Vec::new();
+    }
+    let mean = rows.iter().map(|r| r.1).sum::<f64>() / rows.len() as f64;
+    (1..=SPECTRUM)
+        .map(|i| {
+            let wave = last * i as f64 / SPECTRUM as f64;
+            let (mut re, mut im) = (0.0, 0.0);
+            for (x, e) in &rows {
+                let (s, c) = (per_unit * wave * x).sin_cos();
+                re += (e - mean) * c;
+                im += (e - mean) * s;
+            }
+            [wave, 2.0 * re.hypot(im) / rows.len() as f64]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_hold_means_and_a_spectrum_peaks_where_the_wave_is() {
+        let x: Vec<f64> = (0..3000).map(|k| f64::from(k) / 3000.0).collect();
+        let e: Vec<f64> = x
+            .iter()
+            .map(|x| 0.7 * (std::f64::consts::TAU * 8.0 * x).sin())
+            .collect();
+        let line = spectrum(&x, &e, std::f64::consts::TAU, 40.0);
+        let peak = line.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        assert!(
+            (peak[0] - 8.0).abs() < 0.2 && (peak[1] - 0.7).abs() < 0.02,
+            "{peak:?}"
+        );
+        let flat = binned(&x, &vec![0.3; 3000], &vec![1.0; 3000], &|v| v > 0.0);
+        assert!(flat.len() == BINS && flat.iter().all(|p| (p[1] - 0.3).abs() < 1e-12));
+    }
+}
