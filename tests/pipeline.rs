@@ -167,7 +167,22 @@ fn the_built_in_campaign_meets_its_limits_and_no_thread_count_changes_a_byte() {
         let off = p["standard_deviations_off"].as_f64().unwrap();
         assert!(off.abs() < 4.5, "{p}");
     }
-    assert_eq!(result["diagnose"]["verdict"], "nothing-missing");
+    // the campaign carries a ripple that its declared model lacks: that, and nothing else, is found
+    let diagnosis = &result["diagnose"];
+    assert_eq!(diagnosis["verdict"], "effects-found");
+    assert_eq!(diagnosis["steps"].as_array().unwrap().len(), 1);
+    let step = &diagnosis["steps"][0];
+    assert_eq!(
+        (&step["effect"], &step["joint"]),
+        (&"ripple".into(), &"q1".into())
+    );
+    for (key, truth) in [("order", 14.0), ("sin", 1.2), ("cos", 0.6)] {
+        let number = |what: &str| step["parameters"][key][what].as_f64().unwrap();
+        let off = (number("value") - truth) / number("std");
+        assert!(off.abs() < 4.5, "{key}: {off} standard deviations");
+    }
+    let unseen = |when: &str| diagnosis[when]["holdout"]["joints"][0]["relative_error"].as_f64();
+    assert!(unseen("after").unwrap() < 0.5 * unseen("before").unwrap());
     for joint in result["friction"]["joints"].as_array().unwrap() {
         assert_eq!(joint["converged"], true);
         assert_eq!(joint["curve"].as_array().unwrap().len(), 100);

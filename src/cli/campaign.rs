@@ -10,7 +10,7 @@ use super::{CliError, Context};
 use crate::config::campaign::{CampaignLogs, CampaignSettings};
 use crate::config::{self, Campaign, RobotFile, Trajectory};
 use crate::output::write_whole;
-use crate::simulate::{Motion, Order};
+use crate::simulate::{EffectSpec, Motion, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
 const ROBOT: &str = "configs/cft.toml";
@@ -18,6 +18,10 @@ const ROBOT: &str = "configs/cft.toml";
 const EXCITATION: &str = "configs/cft-excitation.toml";
 const UNSEEN: &str = "configs/cft-validation.toml";
 /// Length of a one-joint experiment and of the unseen motion [s].
+/// What the plant of the campaign has and its declared model lacks: the ripple of a screw, some times
+/// as strong as the noise.
+const EFFECT: &str = "ripple:q1:order=14,sin=1.2,cos=0.6";
+/// Length of a one-joint experiment, of the identification run and of the unseen one [s].
 const ONE_JOINT_S: f64 = 20.0;
 const UNSEEN_S: f64 = 20.0;
 
@@ -51,6 +55,9 @@ pub(super) fn simulate(
         Motion::Trajectory(&unseen),
         Some(UNSEEN_S),
     ));
+    orders.push(("identification.csv".into(), Motion::Usual, IDENTIFICATION_S));
+    orders.push(("unseen.csv".into(), Motion::Trajectory(&unseen), UNSEEN_S));
+    let effects = vec![EFFECT.parse::<EffectSpec>().map_err(CliError::input)?];
     let bar = context.progress("simulating the campaign", Some(orders.len() as u64));
     let said: Vec<Result<Vec<String>, CliError>> = orders
         .par_iter()
@@ -62,6 +69,8 @@ pub(super) fn simulate(
                 motion: *motion,
                 seconds: *seconds,
                 effects: Vec::new(),
+                seconds: Some(*seconds),
+                effects: effects.clone(),
                 // every experiment has noise of its own
                 seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
             };

@@ -123,6 +123,7 @@ pub fn diagnose(
         units: (0..machine.robot.joints())
             .map(|j| machine.file.torque_unit(j).to_owned())
             .collect(),
+        averaged: held.averaged,
         keep,
         limits: Limits::default(),
     };

@@ -129,6 +129,11 @@ impl Open<'_> {
         out
     }
 
+    /// Whether torques are held from row to row and so are means of two rows here.
+    pub fn is_centred(&self) -> bool {
+        self.centre.is_some()
+    }
+
     /// Name, span, checksum and size of what was read.
     pub fn provenance(&self) -> Result<Provenance, CliError> {
         Ok(self.reader.provenance()?)

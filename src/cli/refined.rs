@@ -59,6 +59,8 @@ pub struct Held {
     pub summary: Summary,
     /// Instant from which the times of the first log are counted.
     pub origin: Instant,
+    /// Torques are means of two rows: they are held from row to row.
+    pub averaged: bool,
 }
 
 /// Reads logs whole, smoothed as the model declares.
@@ -70,9 +72,11 @@ pub fn hold(machine: &Machine, logs: &[&LogSpec], context: &Context) -> Result<H
     let mut last: Option<Summary> = None;
     let mut origin = None;
     let mut samples = 0;
+    let mut averaged = false;
     for (index, spec) in logs.iter().enumerate() {
         let mut log = machine.open(spec, context)?;
         origin = origin.or_else(|| Some(log.origin()));
+        averaged |= log.is_centred();
         let (found, summary) = stretches(index, n, &settings, &mut |block| log.read(block))
             .map_err(|e| run_error(spec, e))?;
         samples += found.iter().map(Stretch::len).sum::<usize>();
@@ -110,5 +114,6 @@ pub fn hold(machine: &Machine, logs: &[&LogSpec], context: &Context) -> Result<H
         warnings,
         summary,
         origin,
+        averaged,
     })
 }

@@ -14,7 +14,8 @@ use crate::motion::{MotionError, Parallel, Stretch};
 /// Borders of the band that is looked at, over the cut-off.
 const BAND: [f64; 2] = [1.5, 3.0];
 
-/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`.
+/// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
+/// where each torque is the mean of two rows, as of commands that are held.
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
@@ -23,6 +24,7 @@ pub fn floor(
     stretches: &[Stretch],
     parallel: &Parallel,
     cutoff_hz: f64,
+    averaged: bool,
 ) -> Result<Vec<f64>, MotionError> {
     let joints = stretches.first().map_or(0, Stretch::joints);
     let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
@@ -63,8 +65,10 @@ pub fn floor(
                 .collect();
             blocks(&differences, &mut top);
         }
-        // a white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance
-        floor.push(kept * (median(&mut near) / seen).min(median(&mut top) / 70.0));
+        // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the
+        // mean of two neighbours, (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7 times.
+        let gain = if averaged { 7.0 } else { 70.0 };
+        floor.push(kept * (median(&mut near) / seen).min(median(&mut top) / gain));
     }
     Ok(floor)
 }
@@ -108,6 +112,7 @@ mod tests {
                 std::slice::from_ref(&stretch),
                 &parallel,
                 10.0,
+                false,
             )
             .unwrap()[0];
             assert!((found / seen - 1.0).abs() < 0.15, "{found} {seen}");

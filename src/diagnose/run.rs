@@ -27,6 +27,8 @@ pub struct Case {
     pub cutoff_hz: f64,
     /// Torque unit per joint.
     pub units: Vec<String>,
+    /// Torques are means of two rows, as of commands that are held.
+    pub averaged: bool,
     /// The given model is held within its covariance.
     pub keep: bool,
     pub limits: Limits,
@@ -365,7 +367,13 @@ fn noise(model: &Refined, case: &Case) -> Result<Vec<f64>, MotionError> {
         hat
     };
     let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
-    floor(&residuals, &stretches, &case.parallel, case.cutoff_hz)
+    floor(
+        &residuals,
+        &stretches,
+        &case.parallel,
+        case.cutoff_hz,
+        case.averaged,
+    )
 }
 
 /// How much of each joint's residual is above the noise floor.

@@ -6,7 +6,7 @@ use super::candidate::{Columns, Judge, Score, spread};
 use super::fit::{Fitted, Ground};
 use super::orders::SCANNED;
 use super::rows::{clear, scene, standing};
-use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, shifted};
+use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, order_is_whole, shifted};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
 
@@ -242,6 +242,13 @@ fn one(
             .any(|e| there(e) && near(&e.shape, &effect.shape))
     {
         return Ok((refused(kind, place, "it is in the model".into()), count));
+    }
+    if periodic && !order_is_whole(&ground.cover, place, effect.shape[0]) {
+        let reason = format!(
+            "{:.3} waves a turn: after a full turn the joint is where it was, and orders are whole",
+            effect.shape[0]
+        );
+        return Ok((refused(kind, place, reason), count));
     }
     let columns = columns(&at.model, ground, torques, &effect)?;
     let score = judge.score(&columns, k, effect.shape.len());

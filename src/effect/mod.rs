@@ -291,6 +291,11 @@ fn sign(v: f64) -> f64 {
     f64::from(i8::from(v > 0.0) - i8::from(v < 0.0))
 }
 
+/// Whether a periodic effect's order can be that of its place; see `ripple`.
+pub fn order_is_whole(cover: &Cover, place: Place, order: f64) -> bool {
+    ripple::is_whole(cover, place, order)
+}
+
 /// Every joint.
 fn every_joint(robot: &Robot, _: &[JointFriction]) -> Vec<Place> {
     (0..robot.joints()).map(Place::Joint).collect()

@@ -43,7 +43,7 @@ pub fn orders(cover: &Cover, place: Place, peaks: &[f64]) -> Starts {
     let least = LEAST_WAVES / travel;
     let kept: Vec<Vec<f64>> = peaks
         .iter()
-        .filter(|o| **o >= least)
+        .filter(|o| **o >= least && is_whole(cover, place, **o))
         .map(|o| vec![*o])
         .collect();
     if kept.is_empty() {
@@ -54,6 +54,19 @@ pub fn orders(cover: &Cover, place: Place, peaks: &[f64]) -> Starts {
         Ok(kept)
     }
 }
+
+/// Whether an order can be that of the place: after a full turn a joint is where it was, so that on
+/// one which turns further its orders are whole, within half of 1/travel.
+pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
+    let turns = cover.travel(place);
+    let revolute = place
+        .joint()
+        .is_some_and(|j| cover.kinds[j] == JointKind::Revolute);
+    !revolute || turns < FULL_TURNS || (order - order.round()).abs() <= 0.5 / turns
+}
+
+/// Turns from which on an order must be whole.
+const FULL_TURNS: f64 = 1.5;
 
 /// Orders between what the travel covers and what the position filter lets through.
 pub fn order_limits(cover: &Cover, place: Place) -> Vec<[f64; 2]> {
