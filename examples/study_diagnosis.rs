@@ -32,7 +32,7 @@ use cft_ident::simulate::{CftTruth, EffectSpec, Recording, Reference};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 use study::{
-    JOINTS, along, block, noisy, prepared, processing, quantile, series, source, study,
+    JOINTS, along, block, noisy, percent, prepared, processing, quantile, series, source, study,
     write_summary,
 };
 
@@ -398,7 +398,7 @@ fn summarise(rows: &[Value], folder: &Path) {
                 if x.is_empty() {
                     "-".to_owned()
                 } else {
-                    format!("{:.3} %", 100.0 * quantile(x, 0.5))
+                    percent(quantile(x, 0.5))
                 }
             };
             lines.push(json!({
