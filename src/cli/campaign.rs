@@ -17,11 +17,10 @@ const ROBOT: &str = "configs/cft.toml";
 /// Designed by `excite` for all parameters; it ends by itself, after about 40 s.
 const EXCITATION: &str = "configs/cft-excitation.toml";
 const UNSEEN: &str = "configs/cft-validation.toml";
-/// Length of a one-joint experiment and of the unseen motion [s].
 /// What the plant of the campaign has and its declared model lacks: the ripple of a screw, some times
 /// as strong as the noise.
 const EFFECT: &str = "ripple:q1:order=14,sin=1.2,cos=0.6";
-/// Length of a one-joint experiment, of the identification run and of the unseen one [s].
+/// Length of a one-joint experiment and of the unseen motion [s].
 const ONE_JOINT_S: f64 = 20.0;
 const UNSEEN_S: f64 = 20.0;
 
@@ -55,8 +54,6 @@ pub(super) fn simulate(
         Motion::Trajectory(&unseen),
         Some(UNSEEN_S),
     ));
-    orders.push(("identification.csv".into(), Motion::Usual, IDENTIFICATION_S));
-    orders.push(("unseen.csv".into(), Motion::Trajectory(&unseen), UNSEEN_S));
     let effects = vec![EFFECT.parse::<EffectSpec>().map_err(CliError::input)?];
     let bar = context.progress("simulating the campaign", Some(orders.len() as u64));
     let said: Vec<Result<Vec<String>, CliError>> = orders
@@ -68,8 +65,6 @@ pub(super) fn simulate(
                 model: None,
                 motion: *motion,
                 seconds: *seconds,
-                effects: Vec::new(),
-                seconds: Some(*seconds),
                 effects: effects.clone(),
                 // every experiment has noise of its own
                 seed: seed.wrapping_mul(1000).wrapping_add(i as u64),

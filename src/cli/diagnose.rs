@@ -305,6 +305,7 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
     let fitted = &diagnosis.model.model;
     let mut keys = Vec::new();
     let mut places = Vec::new();
+    let mut widened = Vec::new();
     for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
         let (name, joint, value) = match *unknown {
             Unknown::Theta(k) => (robot.parameters()[k].name.to_owned(), None, fitted.theta[k]),
@@ -328,7 +329,10 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
         let there =
             |p: &&mut crate::config::model_file::Parameter| p.name == name && p.joint == joint;
         if let Some(p) = model.parameters.iter_mut().find(there) {
-            let std = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            // what smoothing and the encoders' steps did to the given model, they do to this one
+            let std = found.max(p.std.unwrap_or(0.0));
+            widened.push(if found > 0.0 { std / found } else { 1.0 });
             p.value = value;
             p.std = Some(std);
             p.verdict = Some(crate::verdict::verdict_of(value, std));
@@ -336,7 +340,9 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
             places.push(i);
         }
     }
-    model.replace_covariance(&keys, &|a, b| diagnosis.covariance[(places[a], places[b])]);
+    model.replace_covariance(&keys, &|a, b| {
+        widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
+    });
     for (joint, std) in robot.joint_names().iter().zip(&diagnosis.residual_std) {
         model.residual_std.insert(joint.clone(), *std);
     }

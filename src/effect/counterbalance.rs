@@ -1,7 +1,8 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
 //! points, as a cubic B-spline over the travel that was seen; held at its end values beyond it.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint};
+use super::{Family, Key, Kind, Place, Role, Unit};
+use crate::robot::JointKind;
 
 /// Coefficients of the spline.
 const COUNT: usize = 6;
@@ -22,7 +23,14 @@ pub const KIND: Kind = Kind {
         Key::new("m_5", Unit::Torque),
         Key::new("m_6", Unit::Torque),
     ],
-    places: every_joint,
+    // a lever that turns
+    places: |robot, _| {
+        let turns = |j: &usize| robot.joint_kind(*j) == JointKind::Revolute;
+        (0..robot.joints())
+            .filter(turns)
+            .map(Place::Joint)
+            .collect()
+    },
     starts: |cover, place| {
         let joint = cover.at(place);
         if joint.reversals < 4 {
