@@ -30,7 +30,7 @@ use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use study::{
-    JOINTS, along, block, noisy, percent, prepared, processing, quantile, series, source, study,
+    JOINTS, along, block, estimated, noisy, percent, processing, quantile, series, source, study,
     write_summary,
 };
 
@@ -80,9 +80,7 @@ fn campaign(seed: u64) -> Value {
         let recording =
             follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");
         let log = block(&recording);
-        let (prepared, again) = prepared(&robot, j, &log);
-        let e = estimate(name, &names, &prepared, Some(&again), &Options::default())
-            .expect("an estimate");
+        let (prepared, e) = estimated(&robot, j, &names, &log);
         let law = truth.friction[j];
         let (error, covered, total) = curve(&e, &law);
         // a start that is wrong by up to a factor of three in everything, alone

@@ -13,7 +13,6 @@ mod study;
 
 use std::path::Path;
 
-use cft_ident::friction::estimate::{Options, estimate};
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{Columns, KnownFriction};
 use cft_ident::inertia::solve::{Estimator, fit};
@@ -24,7 +23,7 @@ use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_pha
 use cft_ident::simulate::{CftTruth, Noise, Recording, Settings};
 use serde_json::{Value, json};
 use study::{
-    JOINTS, along, block, noisy, percent, prepared, processing, quantile, series, source, study,
+    JOINTS, along, block, estimated, noisy, percent, processing, quantile, series, source, study,
     write_summary,
 };
 
@@ -40,21 +39,19 @@ fn main() {
 fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFriction>> {
     let infos = robot.parameters();
     let names: Vec<String> = infos.iter().map(|p| p.name.to_owned()).collect();
-    let of = |(j, name): (usize, &&str)| {
+    let of = |j: usize| {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
             .reference(Setup::Tuedacs)
             .expect("a ladder");
         let settings = noisy(20.0, 10 * seed + j as u64);
         let log = block(&follow(truth, &[], motion, &settings).expect("a run"));
-        let (prepared, again) = prepared(robot, j, &log);
-        let e = estimate(name, &names, &prepared, Some(&again), &Options::default())
-            .expect("an estimate");
+        let (_, e) = estimated(robot, j, &names, &log);
         Some(KnownFriction {
             law: e.law,
             covariance: e.covariance,
         })
     };
-    JOINTS.iter().enumerate().map(of).collect()
+    (0..JOINTS.len()).map(of).collect()
 }
 
 fn campaigns(seed: u64) -> Value {

@@ -8,9 +8,10 @@ use std::sync::Mutex;
 
 use cft_ident::cli::machine::narrowed;
 use cft_ident::config::Trajectory;
+use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
+use cft_ident::friction::inputs::Inputs;
 use cft_ident::friction::motions::motions;
-use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare, prepare_again};
-use cft_ident::friction::problem::Problem;
+use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare};
 use cft_ident::log::Block;
 use cft_ident::motion::Settings as Processing;
 use cft_ident::robot::Robot;
@@ -154,8 +155,13 @@ pub fn along(series: Fourier<4>) -> Reference<4> {
     }
 }
 
-/// The one-joint problem, and the same with the narrower smoothing of its known inputs.
-pub fn prepared(robot: &Robot, joint: usize, log: &Block) -> (Prepared, Problem) {
+/// The one-joint problem of a log and its estimate, as the tool makes it.
+pub fn estimated(
+    robot: &Robot,
+    joint: usize,
+    names: &[String],
+    log: &Block,
+) -> (Prepared, JointEstimate) {
     let found = |settings: &Processing| {
         motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
     };
@@ -165,10 +171,19 @@ pub fn prepared(robot: &Robot, joint: usize, log: &Block) -> (Prepared, Problem)
         held: true,
     };
     let wide = found(&processing());
-    let first = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
     let narrower = found(&narrowed(&processing(), 1000.0));
-    let again = prepare_again(robot, joint, &narrower, &sensors, &first).expect("it still moves");
-    (first, again)
+    let prepared = prepare(robot, joint, &wide, &sensors).expect("the joint moves");
+    let inputs = Inputs {
+        robot,
+        joint,
+        motions: &wide,
+        narrower: &narrower,
+        sensors: &sensors,
+    };
+    let options = Options::default();
+    let e =
+        estimate(JOINTS[joint], names, &prepared, Some(&inputs), &options).expect("an estimate");
+    (prepared, e)
 }
 
 pub fn quantile(mut x: Vec<f64>, share: f64) -> f64 {

@@ -13,8 +13,9 @@ use crate::config::identified::{friction_meaning, friction_theta, friction_unit}
 use crate::config::model_file::{ModelProvenance, Parameter};
 use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
+use crate::friction::inputs::Inputs;
 use crate::friction::passes::{Ending, Given};
-use crate::friction::prepare::{Motion, Sensors, prepare, prepare_again, resolution};
+use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
 use crate::log::{LogSpec, Provenance};
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::report::json::Document;
@@ -173,8 +174,14 @@ fn one_joint(
         },
         ..Options::default()
     };
-    let again = prepare_again(&machine.robot, j, &group.narrower, &sensors, &prepared);
-    estimate(name, parameter_names, &prepared, again.as_ref(), &options).map_err(undetermined)
+    let inputs = Inputs {
+        robot: &machine.robot,
+        joint: j,
+        motions: &group.motions,
+        narrower: &group.narrower,
+        sensors: &sensors,
+    };
+    estimate(name, parameter_names, &prepared, Some(&inputs), &options).map_err(undetermined)
 }
 
 /// The user's starting values, where all five are given.
@@ -206,11 +213,11 @@ fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
     } = e.nis;
     if mean > upper_95 {
         out.push(format!(
-            "{joint}: mean NIS {mean:.3} is above its bounds {lower_95:.3}..{upper_95:.3}: the innovations are larger than the noise levels allow"
+            "{joint}: mean NIS {mean:.2} is above its bounds {lower_95:.2}..{upper_95:.2}: the innovations are alike for many samples, so something acts that the model lacks"
         ));
     } else if mean < lower_95 {
         out.push(format!(
-            "{joint}: mean NIS {mean:.3} is below its bounds {lower_95:.3}..{upper_95:.3}: the position noise is below the encoder's step^2/12, and the standard deviations err on the safe side"
+            "{joint}: mean NIS {mean:.2} is below its bounds {lower_95:.2}..{upper_95:.2}: innovations cancel over many samples, as where positions are finer than the encoder's step^2/12 or were filtered before they were logged"
         ));
     }
     if e.widening > 1.5 {

@@ -8,6 +8,7 @@ use super::context::Context;
 use super::error::CliError;
 use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
+use crate::friction::estimate::NARROWER;
 use crate::friction::motions::motions;
 use crate::friction::prepare::Motion;
 use crate::inspect::{Cutter, Gate};
@@ -42,9 +43,6 @@ pub fn narrowed(settings: &Settings, rate_hz: f64) -> Settings {
         ..settings.clone()
     }
 }
-
-/// Factor from the declared position cut-off to the narrower one.
-const NARROWER: f64 = 0.7;
 
 /// A robot as its file describes it.
 #[derive(Debug, Clone)]

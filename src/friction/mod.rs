@@ -1,13 +1,15 @@
 //! Friction parameters theta 13..32, joint by joint, by a continuous-discrete extended Kalman
 //! filter (eq. (29)-(38)).
 //!
-//! `prepare` turns the motion of all joints into the one-joint problem, `start` guesses from the
-//! log, `filter` is the filter, `score` the same filter at fixed parameters, `passes` the search,
-//! `propagate` the integrals that both share.
+//! `prepare` turns the motion of all joints into the one-joint problem, `inputs` smooths it anew,
+//! `start` guesses from the log, `filter` is the filter, `score` the same filter at fixed parameters, `passes` the search,
+//! `slope` the bounds of slopes that a log cannot determine, `propagate` the integrals that filter
+//! and score share.
 
 pub mod estimate;
 pub mod excitation;
 pub mod filter;
+pub mod inputs;
 pub mod motions;
 pub mod passes;
 pub mod plateau;
@@ -15,6 +17,7 @@ pub mod prepare;
 pub mod problem;
 pub mod propagate;
 pub mod score;
+pub mod slope;
 pub mod start;
 #[cfg(test)]
 mod trial;

@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::Filter;
+use super::inputs::Inputs;
 use super::prepare::Prepared;
 use super::problem::{FRICTION, Noise, Parameters, Problem};
 use super::score::{Score, log_likelihood, score};
@@ -35,6 +36,10 @@ const TUNE_EVALUATIONS: u64 = 24;
 const CHOICE_STEPS: usize = 6;
 /// Factor on the encoder's variance in the other weighting.
 const COARSER: f64 = 4.0;
+/// Cut-offs that an acceleration of another joint is tried at [Hz].
+const BANDS_HZ: [f64; 5] = [60.0, 36.0, 22.0, 13.0, 8.0];
+/// Log-likelihood that a narrower one has to gain: that of a parameter more (Akaike 1974).
+const LIKELIER: f64 = 1.0;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
 
@@ -145,21 +150,74 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
             best = Some((i, refined));
         }
     }
-    let (best_start, mut refined) = best?;
-    // noise levels and parameters in turn: each is little moved by the other
-    let mut noise = noise;
+    let (best_start, refined) = best?;
+    let counts = (starts.len(), best_start);
+    settle(problem, refined, noise, given, &spread, counts)
+}
+
+/// Noise levels and parameters in turn: each is little moved by the other.
+fn settle(
+    problem: &Problem,
+    mut refined: Refined,
+    mut noise: Noise,
+    given: &Given,
+    spread: &[f64],
+    counts: (usize, usize),
+) -> Option<Maximum> {
     for _ in 0..2 {
         noise = tune(problem, &refined.parameters, noise, given);
-        refined = refine(problem, refined.parameters, noise, &spread, MOST_STEPS);
+        refined = refine(problem, refined.parameters, noise, spread, MOST_STEPS);
     }
-    finish(problem, refined, noise, &spread, starts.len(), best_start)
+    finish(problem, refined, noise, spread, counts)
+}
+
+/// Narrows the accelerations of the other joints one after the other as long as the innovations
+/// grow likelier by it. Returns the cut-offs [Hz], one per joint, with the problem and its maximum;
+/// `None` where the motions as they are do best.
+pub fn bands(
+    prepared: &Prepared,
+    inputs: &Inputs,
+    maximum: &Maximum,
+    given: &Given,
+) -> Option<(Vec<f64>, Problem, Maximum)> {
+    let spread = spread(&prepared.problem);
+    let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
+    let mut best: Option<(Problem, Refined)> = None;
+    let mut top = maximum.score.log_likelihood;
+    for i in (0..cutoffs.len()).filter(|i| *i != inputs.joint) {
+        for band in BANDS_HZ {
+            let before = std::mem::replace(&mut cutoffs[i], band);
+            let start = best
+                .as_ref()
+                .map_or(&maximum.parameters, |b| &b.1.parameters);
+            let found = inputs.problem(prepared, &cutoffs).map(|problem| {
+                let p = start.clone();
+                let refined = refine(&problem, p, maximum.noise, &spread, CHOICE_STEPS);
+                (problem, refined)
+            });
+            match found {
+                Some((problem, refined)) if refined.score.log_likelihood > top + LIKELIER => {
+                    top = refined.score.log_likelihood;
+                    best = Some((problem, refined));
+                }
+                _ => {
+                    cutoffs[i] = before;
+                    break;
+                }
+            }
+        }
+    }
+    let (problem, refined) = best?;
+    let counts = (maximum.starts, maximum.best_start);
+    let settled = settle(&problem, refined, maximum.noise, given, &spread, counts)?;
+    Some((cutoffs, problem, settled))
 }
 
 /// Parameters at which a refinement ended.
-struct Refined {
-    parameters: Parameters,
-    score: Score,
-    ending: Ending,
+pub(super) struct Refined {
+    pub parameters: Parameters,
+    pub score: Score,
+    pub ending: Ending,
 }
 
 fn block(problem: &Problem) -> usize {
@@ -171,15 +229,10 @@ fn block(problem: &Problem) -> usize {
 
 /// Penalised information and its right side: prior around zero for the linear part would bias, so
 /// the prior only limits the step.
-fn damped(
-    score: &Score,
-    spread: &[f64],
-    damping: f64,
-    held: Option<usize>,
-) -> Option<DVector<f64>> {
+fn damped(score: &Score, spread: &[f64], damping: f64, held: &[usize]) -> Option<DVector<f64>> {
     let mut h = score.information.clone();
     let mut gradient = score.gradient.clone();
-    if let Some(j) = held {
+    for &j in held {
         h.row_mut(j).fill(0.0);
         h.column_mut(j).fill(0.0);
         h[(j, j)] = 1.0;
@@ -199,17 +252,17 @@ fn refine(
     spread: &[f64],
     most: usize,
 ) -> Refined {
-    refine_others(problem, start, noise, spread, most, None)
+    refine_others(problem, start, noise, spread, most, &[])
 }
 
-/// The same with one parameter held where it is.
-fn refine_others(
+/// The same with some parameters held where they are.
+pub(super) fn refine_others(
     problem: &Problem,
     start: Parameters,
     noise: Noise,
     spread: &[f64],
     most: usize,
-    held: Option<usize>,
+    held: &[usize],
 ) -> Refined {
     let block = block(problem);
     let mut p = start;
@@ -336,8 +389,7 @@ fn finish(
     refined: Refined,
     noise: Noise,
     spread: &[f64],
-    starts: usize,
-    best_start: usize,
+    (starts, best_start): (usize, usize),
 ) -> Option<Maximum> {
     let np = problem.parameters();
     let mut h = refined.score.information.clone();
@@ -373,32 +425,4 @@ fn finish(
         starts,
         best_start,
     })
-}
-
-/// Drop of the log-likelihood at a one-sided 95 % bound: half of 1.645 squared.
-const BOUND_DROP: f64 = 1.353;
-
-/// One-sided 95 % lower bound of the slope with index `i` (3 or 4) by its profile likelihood: the
-/// slope steps down while everything else is fitted anew. `None` where the whole range is as
-/// likely.
-pub fn profile_slope(problem: &Problem, maximum: &Maximum, i: usize) -> Option<f64> {
-    let spread = spread(problem);
-    let lowest = (problem.slope_range.0 * problem.velocity_scale).ln();
-    let top = maximum.score.log_likelihood / maximum.widening;
-    let mut p = maximum.parameters.clone();
-    let mut before = (p[i], 0.0);
-    while p[i] > lowest {
-        p[i] = (p[i] - 0.25).max(lowest);
-        let refined = refine_others(problem, p, maximum.noise, &spread, 8, Some(i));
-        p = refined.parameters;
-        // coloured innovations count for less, as in the covariance
-        let drop = top - refined.score.log_likelihood / maximum.widening;
-        if drop > BOUND_DROP {
-            let share = (BOUND_DROP - before.1) / (drop - before.1);
-            let at = before.0 + share.clamp(0.0, 1.0) * (p[i] - before.0);
-            return Some(at.exp() / problem.velocity_scale);
-        }
-        before = (p[i], drop);
-    }
-    None
 }

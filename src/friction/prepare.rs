@@ -239,11 +239,7 @@ fn build(
                 *hh = raw_h.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
             }
             record.y.push(motion.measured[k * n + joint]);
-            let dt = motion.t[(k + 1).min(samples - 1)] - motion.t[(k + 1).min(samples - 1) - 1];
-            let speed = motion.v[k * n + joint].abs();
-            record
-                .r
-                .push(slowed((sensors.variance)(&motion.measured[at]), speed * dt));
+            record.r.push((sensors.variance)(&motion.measured[at]));
             velocity.push(motion.v[k * n + joint]);
             acceleration.push(motion.a[k * n + joint]);
         }
@@ -274,17 +270,6 @@ fn build(
         velocity,
         acceleration,
     })
-}
-
-/// Most samples over which a quantisation error counts as one.
-const LONGEST_ERROR: f64 = 8.0;
-
-/// Variance of a quantised position that moves `travel` per sample. Below one step per sample the
-/// rounding error stays for step / travel samples: a white error of that many times the variance
-/// carries the same information.
-fn slowed(variance: f64, travel: f64) -> f64 {
-    let step = (12.0 * variance).sqrt();
-    variance * (step / travel).clamp(1.0, LONGEST_ERROR)
 }
 
 fn median_step(records: &[Record]) -> f64 {

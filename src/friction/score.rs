@@ -30,6 +30,9 @@ pub struct Score {
     pub mean_nis: f64,
     /// Share of innovations inside their 95 % bound.
     pub share_inside: f64,
+    /// Mean normalised square of innovations summed over windows, and the number of windows.
+    pub window_nis: f64,
+    pub windows: usize,
     /// Square root of the mean squared innovation.
     pub innovation_rms: f64,
 }
@@ -59,6 +62,58 @@ fn update(p: &mut [f64; 3], s: f64) -> (f64, f64) {
     (kq, kv)
 }
 
+/// Innovations in a window.
+const WINDOW: usize = 50;
+/// Fewest windows at speed that stand for a log.
+const FEWEST: usize = 30;
+
+/// Normalised innovations summed over windows. White ones of unit variance sum to a variance of
+/// their number; a model that lacks something leaves innovations that are alike for many samples,
+/// and that the noise levels, being estimated, cannot absorb. Where the joint moves by less than an
+/// encoder step per sample the rounding error is alike too: such windows count only in a log that
+/// has no others.
+#[derive(Debug, Clone, Copy, Default)]
+struct Windows {
+    sum: f64,
+    length: usize,
+    slow: bool,
+    /// Sum of squares and number of windows: at speed, and of all.
+    fast: (f64, usize),
+    all: (f64, usize),
+}
+
+impl Windows {
+    /// The record ends.
+    fn cut(&mut self) {
+        (self.sum, self.length, self.slow) = (0.0, 0, false);
+    }
+
+    #[inline(always)]
+    fn add(&mut self, normalised: f64, travel: f64, variance: f64) {
+        self.sum += normalised;
+        self.length += 1;
+        // the step of a rounded position is the root of twelve variances
+        self.slow |= travel * travel < 12.0 * variance;
+        if self.length == WINDOW {
+            let square = self.sum * self.sum / WINDOW as f64;
+            self.all = (self.all.0 + square, self.all.1 + 1);
+            if !self.slow {
+                self.fast = (self.fast.0 + square, self.fast.1 + 1);
+            }
+            self.cut();
+        }
+    }
+
+    fn mean(&self) -> (f64, usize) {
+        let (sum, count) = if self.fast.1 >= FEWEST {
+            self.fast
+        } else {
+            self.all
+        };
+        (sum / count as f64, count)
+    }
+}
+
 /// Likelihood, score and information of `parameters`. `block` is the number of samples over which
 /// the score is summed before its outer product is taken.
 pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) -> Score {
@@ -76,7 +131,10 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
         mean_nis: 0.0,
         share_inside: 0.0,
         innovation_rms: 0.0,
+        window_nis: f64::NAN,
+        windows: 0,
     };
+    let mut windows = Windows::default();
     let s2 = noise.torque * noise.torque;
     let mut info = vec![0.0; np * np];
     let (mut nis, mut inside, mut square) = (0.0, 0usize, 0.0);
@@ -92,6 +150,7 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
         ];
         w_q.fill(0.0);
         w_v.fill(0.0);
+        windows.cut();
         for k in 0..record.tau.len() {
             let interval = Interval {
                 dt: record.t[k + 1] - record.t[k],
@@ -122,6 +181,11 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
             let z = innovation * innovation / s;
             out.log_likelihood -= 0.5 * (z + s.ln());
             nis += z;
+            windows.add(
+                innovation / s.sqrt(),
+                v.abs() * interval.dt,
+                record.r[k + 1],
+            );
             inside += usize::from(z < CHI2_95);
             square += innovation * innovation;
             out.innovations += 1;
@@ -159,6 +223,7 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
     }
     let n = out.innovations.max(1) as f64;
     out.mean_nis = nis / n;
+    (out.window_nis, out.windows) = windows.mean();
     out.share_inside = inside as f64 / n;
     out.innovation_rms = (square / n).sqrt();
     out
