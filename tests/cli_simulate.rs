@@ -274,3 +274,42 @@ fn joints_of_effects_on_the_whole_robot_are_null_in_the_document_and_absent_in_t
     assert_eq!(truth.matches("[[effect]]").count(), 2);
     assert_eq!(truth.matches("joint = \"q5\"").count(), 1 + 5);
 }
+
+#[test]
+fn a_run_starts_at_the_positions_and_speeds_that_are_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = "--position -0.1,0.3,2.5,0.2 --speed 0.05,0,-0.4,0.1";
+    let line = format!("--seconds 0.1 {start} -o a.csv");
+    simulate(folder.path(), &line).assert().code(0);
+    let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(','));
+    let header: Vec<&str> = lines.next().unwrap().collect();
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.map(|x| x.parse().unwrap()).collect())
+        .collect();
+    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    for (name, position, speed) in [
+        ("x_c1", -0.1, 0.05),
+        ("x_c2", 0.3, 0.0),
+        ("x_c3", 2.5, -0.4),
+        ("x_c4", 0.2, 0.1),
+    ] {
+        let at = column(name);
+        // half a count of the coarsest encoder; a millisecond's travel
+        assert!((rows[0][at] - position).abs() < 8.5e-6, "{name}");
+        let travelled = rows[1][at] - rows[0][at];
+        assert!(
+            (travelled - 1e-3 * speed).abs() < 4e-5,
+            "{name}: {travelled}"
+        );
+    }
+    simulate(folder.path(), "--seconds 1 --position 0.1,0.3 -o b.csv")
+        .assert()
+        .failure()
+        .stderr(contains("one per motor"));
+    simulate(folder.path(), "--seconds 1 --speed 0,0,0,0 -o b.csv")
+        .assert()
+        .code(2)
+        .stderr(contains("--position"));
+    assert_eq!(names(folder.path()), ["a.csv", "a.truth.toml"]);
+}

@@ -52,6 +52,15 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A finite number (a position, a speed).
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err("must be a finite number".into()),
+        Err(_) => Err("is not a number".into()),
+    }
+}
+
 /// A log to be written: the ending chooses the format.
 pub(super) fn log_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);

@@ -23,6 +23,11 @@ use crate::robot::Robot;
 /// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
 const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
 
+/// Most rows of a one-joint log: half an hour at 1 kHz. A row takes 80 bytes per joint for its
+/// motion, smoothed twice, and 16 bytes per nuisance direction for each of at most three problems
+/// at a time: about 1 kB for a robot of four joints.
+const MOST_ROWS: usize = 2_000_000;
+
 /// A one-joint log, read and smoothed.
 pub struct OneJointLog {
     pub motions: Vec<Motion>,
@@ -289,6 +294,13 @@ impl Machine {
                 break;
             }
             whole.t.extend_from_slice(&block.t);
+            if whole.t.len() > MOST_ROWS {
+                return Err(CliError::input(format!(
+                    "{}: more than {MOST_ROWS} rows; the friction filter passes over a one-joint log many times and holds it in memory",
+                    spec.name()
+                ))
+                .hint("give a span of it, such as FILE@0..600s: minutes are enough for friction"));
+            }
             whole.q.extend_from_slice(&block.q);
             whole.tau.extend_from_slice(&block.tau);
         }

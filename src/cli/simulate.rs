@@ -14,7 +14,9 @@ use crate::output::{LogWriter, write_whole};
 use crate::report::json::Document;
 use crate::report::number;
 use crate::report::table::{Align, Table};
-use crate::simulate::{self, EffectSpec, Ending, Motion, Order, SimulatedLog, TruthFile};
+use crate::simulate::{
+    self, EffectSpec, Ending, InitialConditions, Motion, Order, SimulatedLog, TruthFile,
+};
 
 const EXAMPLE: &str = "\
 Example:
@@ -46,6 +48,26 @@ pub struct Args {
     /// Duration [s] [default: that of the motion, else 20]
     #[arg(long, value_name = "S", value_parser = arguments::positive)]
     pub seconds: Option<f64>,
+    /// Start of every motor coordinate: x_c1,x_c2,x_c3,x_c4 [m, m, rad, m], or the joint of a single
+    /// one [default: at rest on the motion]
+    #[arg(
+        long,
+        value_name = "X,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        value_parser = arguments::finite
+    )]
+    pub position: Vec<f64>,
+    /// Speeds of the same at the start [m/s, m/s, rad/s, m/s] [default: 0]
+    #[arg(
+        long,
+        value_name = "V,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        value_parser = arguments::finite,
+        requires = "position"
+    )]
+    pub speed: Vec<f64>,
     /// Effect that the plant has beyond the model, or fault of its log; may be given more than once
     #[arg(long = "effect", value_name = "NAME[:JOINT][:key=value,...]")]
     pub effects: Vec<EffectSpec>,
@@ -108,7 +130,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         seed: args.seed,
     };
     let bar = context.progress("simulating", None);
-    let simulated = simulate_to(&order, &args.output, context)?;
+    let initial = initial(args);
+    let simulated = simulate_to(&order, initial.as_ref(), &args.output, context)?;
     drop(bar);
 
     let names = (file_name(&args.output), file_name(&truth_path));
@@ -134,14 +157,30 @@ fn truth_beside(log: &Path) -> PathBuf {
     log.with_extension("truth.toml")
 }
 
+/// The initial conditions that are given; speeds that are not are 0.
+fn initial(args: &Args) -> Option<InitialConditions> {
+    if args.position.is_empty() {
+        return None;
+    }
+    let speed = match args.speed.as_slice() {
+        [] => vec![0.0; args.position.len()],
+        given => given.to_vec(),
+    };
+    Some(InitialConditions {
+        position: args.position.clone(),
+        speed,
+    })
+}
+
 /// Simulates one order and writes its log, with the truth beside it.
 pub(super) fn simulate_to(
     order: &Order,
+    initial: Option<&InitialConditions>,
     path: &Path,
     context: &Context,
 ) -> Result<SimulatedLog, CliError> {
     context.check()?;
-    let simulated = simulate::simulate(order)?;
+    let simulated = simulate::simulate_from(order, initial)?;
     // The log gets its name last: where it stands, its truth stands too.
     let log = write_log(path, &simulated, context)?;
     write_truth(&truth_beside(path), &simulated)?;

@@ -1,7 +1,7 @@
 //! A one-joint log in memory, smoothed: what `prepare` starts from.
 //!
-//! The filter passes over a log many times, so its samples are held; a one-joint experiment lasts
-//! seconds to minutes (80 bytes per joint and sample).
+//! The filter passes over a log many times, so its samples are held (40 bytes per joint and sample);
+//! a one-joint experiment lasts seconds to minutes. Commands refuse logs beyond their limit.
 
 use super::prepare::Motion;
 use crate::motion::{self, MotionError, Settings};
