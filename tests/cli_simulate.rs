@@ -278,16 +278,18 @@ fn joints_of_effects_on_the_whole_robot_are_null_in_the_document_and_absent_in_t
 #[test]
 fn a_run_starts_at_the_positions_and_speeds_that_are_given() {
     let folder = tempfile::tempdir().unwrap();
-    let start = "--position -0.1,0.3,2.5,0.2 --speed 0.05,0,-0.4,0.1";
-    let line = format!("--seconds 0.1 {start} -o a.csv");
-    simulate(folder.path(), &line).assert().code(0);
-    let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
-    let mut lines = text.lines().map(|line| line.split(','));
-    let header: Vec<&str> = lines.next().unwrap().collect();
-    let rows: Vec<Vec<f64>> = lines
-        .map(|line| line.map(|x| x.parse().unwrap()).collect())
-        .collect();
-    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let run = |speed: &str| -> (Vec<String>, Vec<Vec<f64>>) {
+        let line = format!("--seconds 0.1 --position -0.1,0.3,2.5,0.2 {speed} -o a.csv");
+        simulate(folder.path(), &line).assert().code(0);
+        let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+        let mut lines = text.lines().map(|line| line.split(','));
+        let header = lines.next().unwrap().map(str::to_owned).collect();
+        let rows = lines.map(|line| line.map(|x| x.parse().unwrap()).collect());
+        (header, rows.collect())
+    };
+    let (header, rest) = run("");
+    let (_, rows) = run("--speed 0.05,0,-0.4,0.1");
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     for (name, position, speed) in [
         ("x_c1", -0.1, 0.05),
         ("x_c2", 0.3, 0.0),
