@@ -18,7 +18,6 @@ use std::path::Path;
 
 use cft_ident::diagnose::{Case, Diagnosis, Limits, LogRole, Open, Prior, diagnose};
 use cft_ident::effect::{Added, Refined};
-use cft_ident::friction::estimate::{Options, estimate};
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{Columns, KnownFriction};
 use cft_ident::inertia::solve::{Estimator, fit};
@@ -32,7 +31,7 @@ use cft_ident::simulate::{CftTruth, EffectSpec, Recording, Reference};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 use study::{
-    JOINTS, along, block, noisy, percent, prepared, processing, quantile, series, source, study,
+    JOINTS, along, block, estimated, noisy, percent, processing, quantile, series, source, study,
     write_summary,
 };
 
@@ -221,7 +220,7 @@ fn case(number: u64) -> Value {
     let infos = robot.parameters();
     let names: Vec<String> = infos.iter().map(|p| p.name.to_owned()).collect();
     let mut known = Vec::new();
-    for (j, name) in JOINTS.iter().enumerate() {
+    for j in 0..JOINTS.len() {
         let motion = OneJointMove::new(j, SECONDS, Some(seed))
             .reference(Setup::Tuedacs)
             .expect("a ladder");
@@ -232,9 +231,7 @@ fn case(number: u64) -> Value {
             &noisy(SECONDS, 10 * seed + j as u64),
         )
         .expect("a run");
-        let (prepared, again) = prepared(&robot, j, &block(&recording));
-        let e = estimate(name, &names, &prepared, Some(&again), &Options::default())
-            .expect("an estimate");
+        let (_, e) = estimated(&robot, j, &names, &block(&recording));
         known.push(Some(KnownFriction {
             law: e.law,
             covariance: e.covariance,
