@@ -297,9 +297,10 @@ fn a_run_starts_at_the_positions_and_speeds_that_are_given() {
         ("x_c4", 0.2, 0.1),
     ] {
         let at = column(name);
-        // half a count of the coarsest encoder; a millisecond's travel
+        // half a count of the coarsest encoder
         assert!((rows[0][at] - position).abs() < 8.5e-6, "{name}");
-        let travelled = rows[1][at] - rows[0][at];
+        // a millisecond's travel beyond that from rest, which the controller's pull makes
+        let travelled = rows[1][at] - rest[1][at];
         assert!(
             (travelled - 1e-3 * speed).abs() < 4e-5,
             "{name}: {travelled}"

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
+use super::diagnose_prior::{information, open};
 use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
@@ -12,7 +12,7 @@ use super::refined::{Held, hold, in_file, refined};
 use super::{CliError, Context, Outcome, arguments, diagnose_report};
 use crate::config::ModelFile;
 use crate::diagnose::{
-    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Open, Prior, Unknown,
+    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
 };
 use crate::effect::{Added, Refined, Told};
 use crate::log::LogSpec;
@@ -22,7 +22,7 @@ use crate::report::number;
 use crate::report::table::{Align, Table};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
-use crate::verdict::Verdict;
+use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
 
 const EXAMPLE: &str = "\
 Example:
@@ -163,116 +163,6 @@ pub fn diagnose(
     })
 }
 
-/// Which parameters the fit may move: all but those that the friction stage left open.
-fn open(machine: &Machine, file: &ModelFile, given: &Refined) -> Open {
-    let joints = machine.robot.joint_names();
-    let friction = joints
-        .iter()
-        .zip(&given.model.friction)
-        .map(|(joint, law)| {
-            let names: &[&str] = match law {
-                JointFriction::None => &[],
-                JointFriction::ViscousCoulomb(_) => return vec![true; ViscousCoulomb::NAMES.len()],
-                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
-            };
-            let known = |name: &&str| {
-                file.find(name, Some(joint)).is_some_and(|p| {
-                    p.std.is_some_and(|s| s > 0.0)
-                        && !matches!(
-                            p.verdict,
-                            Some(Verdict::LowerBound | Verdict::NotIdentifiable)
-                        )
-                })
-            };
-            let mut open: Vec<bool> = names.iter().map(known).collect();
-            if open.iter().all(|o| !o) {
-                // a law without any uncertainty: its linear part is fitted freely
-                for o in open.iter_mut().take(3) {
-                    *o = true;
-                }
-            }
-            open
-        })
-        .collect();
-    Open {
-        offset: joints
-            .iter()
-            .map(|joint| file.find("offset", Some(joint)).is_some())
-            .collect(),
-        friction,
-    }
-}
-
-/// Standard deviations of the friction stage are taken this many times as large: its model lacked
-/// what is looked for here, too.
-const FRICTION_DOUBT: f64 = 3.0;
-
-/// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it.
-fn information(file: &ModelFile, given: &Refined, open: &Open, keep: bool) -> DMatrix<f64> {
-    let model = &given.model;
-    let size = model.parameters();
-    let covariance = file.model_covariance(model);
-    let mut wanted = vec![keep; size];
-    let mut at = model.theta.len();
-    for (law, open) in model.friction.iter().zip(&open.friction) {
-        for (k, open) in open.iter().enumerate() {
-            if matches!(law, JointFriction::DoubleTanh(_)) {
-                wanted[at + k] = *open;
-            }
-        }
-        at += law.parameters();
-    }
-    let doubt = if keep { 1.0 } else { FRICTION_DOUBT };
-    let index: Vec<usize> = (0..size)
-        .filter(|i| wanted[*i] && covariance[i * size + i] > 0.0)
-        .collect();
-    let scale: Vec<f64> = index
-        .iter()
-        .map(|i| covariance[i * size + i].sqrt())
-        .collect();
-    let k = index.len();
-    let scaled = DMatrix::from_fn(k, k, |a, b| {
-        let ridge = if a == b { 1e-9 } else { 0.0 };
-        covariance[index[a] * size + index[b]] / (scale[a] * scale[b]) + ridge
-    });
-    let mut out = DMatrix::zeros(size, size);
-    let inverse = match scaled.cholesky() {
-        Some(c) => c.inverse(),
-        // a covariance edited by hand: its diagonal still says how firm each one is
-        None => DMatrix::identity(k, k),
-    };
-    for a in 0..k {
-        for b in 0..k {
-            out[(index[a], index[b])] = inverse[(a, b)] / (scale[a] * scale[b] * doubt * doubt);
-        }
-    }
-    if keep {
-        // what has no standard deviation is held firmly
-        let values = values(model);
-        for i in 0..size {
-            if covariance[i * size + i] <= 0.0 {
-                let scale = 1e-3 * values[i].abs().max(1e-6);
-                out[(i, i)] = 1.0 / (scale * scale);
-            }
-        }
-    }
-    out
-}
-
-/// Values in the order of the model's gradient.
-fn values(model: &crate::robot::model::Model) -> Vec<f64> {
-    let mut out = model.theta.clone();
-    for law in &model.friction {
-        match law {
-            JointFriction::None => {}
-            JointFriction::DoubleTanh(law) => out.extend(law.parameters()),
-            JointFriction::ViscousCoulomb(law) => out.extend([law.viscous, law.coulomb]),
-        }
-    }
-    out.extend(&model.offset);
-    out
-}
-
 /// Parameters of an accepted effect with their standard deviations.
 pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told> {
     let added = &diagnosis.model.effects[effect];
@@ -332,10 +222,15 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
             let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
             // what smoothing and the encoders' steps did to the given model, they do to this one
             let std = found.max(p.std.unwrap_or(0.0));
+            // a parameter without a torque worth mentioning is known well enough as it is
+            let negligible = p.verdict == Some(Verdict::Identified)
+                && p.std.is_some_and(|s| s > IDENTIFIED * p.value.abs());
             widened.push(if found > 0.0 { std / found } else { 1.0 });
             p.value = value;
             p.std = Some(std);
-            p.verdict = Some(crate::verdict::verdict_of(value, std));
+            if !negligible {
+                p.verdict = Some(verdict_of(value, std));
+            }
             keys.push(p.key());
             places.push(i);
         }

@@ -6,6 +6,7 @@
 mod campaign;
 pub mod convert;
 pub mod diagnose;
+mod diagnose_prior;
 mod diagnose_report;
 pub mod excite;
 pub mod friction;
