@@ -250,3 +250,30 @@ fn effects_that_a_model_file_cannot_mean_are_refused_by_name() {
         assert!(said.contains(says) && said.contains("bad.toml"), "{said}");
     }
 }
+
+#[test]
+fn a_turned_torque_and_a_dead_one_are_faults_of_the_data_and_no_physics() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "good.csv", "12", "1", &[]);
+    run(at, &["lsq", "good.csv", "-r", ROBOT, "-o", "model.toml"]);
+    let text = std::fs::read_to_string(at.join("good.csv")).unwrap();
+    let with_torque = |torque: &dyn Fn(f64) -> f64| {
+        let mut lines = text.lines();
+        let mut out = lines.next().unwrap().to_owned() + "\n";
+        for line in lines {
+            let (rest, tau) = line.rsplit_once(',').unwrap();
+            out += &format!("{rest},{}\n", torque(tau.parse().unwrap()));
+        }
+        out
+    };
+    std::fs::write(at.join("turned.csv"), with_torque(&|tau| -tau)).unwrap();
+    let found = run(at, &["diagnose", "turned.csv", "-m", "model.toml"]);
+    assert_eq!(found["verdict"], "data-fault");
+    assert_eq!(found["faults"][0]["kind"], "wrong-sign-or-order");
+    assert_eq!(found["steps"].as_array().unwrap().len(), 0);
+    std::fs::write(at.join("dead.csv"), with_torque(&|_| 3.5)).unwrap();
+    let found = run(at, &["diagnose", "dead.csv", "-m", "model.toml"]);
+    assert_eq!(found["verdict"], "data-fault");
+    assert_eq!(found["faults"][0]["kind"], "stuck-channel");
+}

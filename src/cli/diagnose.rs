@@ -12,7 +12,8 @@ use super::refined::{Held, hold, in_file, refined};
 use super::{CliError, Context, Outcome, arguments, diagnose_report};
 use crate::config::ModelFile;
 use crate::diagnose::{
-    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
+    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Suspicion,
+    Unknown,
 };
 use crate::effect::{Added, Refined, Told};
 use crate::log::LogSpec;
@@ -62,6 +63,23 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
+/// What a stage ends with.
+pub enum Found {
+    /// A diagnosis.
+    Diagnosed(Box<Diagnosed>),
+    /// A fault of the data, which comes before any physics.
+    DataFault(DataFault),
+}
+
+/// A fault of the data.
+#[derive(Debug, Clone)]
+pub struct DataFault {
+    pub kind: String,
+    pub channel: Option<String>,
+    pub effect: String,
+    pub remedy: String,
+}
+
 /// Result of the stage.
 pub struct Diagnosed {
     pub diagnosis: Diagnosis,
@@ -89,8 +107,18 @@ pub fn diagnose(
     logs: &Logs,
     keep: bool,
     context: &Context,
-) -> Result<Diagnosed, CliError> {
+) -> Result<Found, CliError> {
     let given = refined(file, name)?;
+    for spec in logs.train {
+        if let Some(fault) = machine.fault(spec, context)? {
+            return Ok(Found::DataFault(DataFault {
+                kind: fault.kind.word().to_owned(),
+                channel: fault.channel,
+                effect: format!("{}: {}", spec.name(), fault.effect),
+                remedy: fault.remedy,
+            }));
+        }
+    }
     let groups = [
         (logs.train, LogRole::Train),
         (logs.veto, LogRole::Veto),
@@ -128,18 +156,19 @@ pub fn diagnose(
         limits: Limits::default(),
     };
     let bar = context.progress("search", None);
-    let diagnosis = diagnose::diagnose(
+    let diagnosis = match diagnose::diagnose(
         &case,
         &mut |step| context.note(&format!("added {step}")),
         &|| context.interrupted(),
-    )
-    .map_err(|e| match e {
-        DiagnoseError::Interrupted => CliError::interrupted(),
-        DiagnoseError::Motion(e) => CliError::input(e),
-        DiagnoseError::TooFewRows { .. } | DiagnoseError::NoTorque { .. } => {
-            CliError::undetermined(e)
+    ) {
+        Ok(diagnosis) => diagnosis,
+        Err(DiagnoseError::Channels(found)) => {
+            return Ok(Found::DataFault(wrong_channel(machine, found)));
         }
-    })?;
+        Err(DiagnoseError::Interrupted) => return Err(CliError::interrupted()),
+        Err(DiagnoseError::Motion(e)) => return Err(CliError::input(e)),
+        Err(e) => return Err(CliError::undetermined(e)),
+    };
     drop(bar);
     held.stretches = case.stretches;
     let (given, parallel) = (case.given, case.parallel);
@@ -153,14 +182,70 @@ pub fn diagnose(
             context.note(&text);
         }
     }
-    Ok(Diagnosed {
+    Ok(Found::Diagnosed(Box::new(Diagnosed {
         diagnosis,
         held,
         logs,
         given,
         parallel,
         cutoff_hz: case.cutoff_hz,
+    })))
+}
+
+/// A torque channel that the model knows otherwise, as a fault.
+fn wrong_channel(machine: &Machine, found: Suspicion) -> DataFault {
+    let names = machine.robot.joint_names();
+    let (joint, effect, remedy) = match found {
+        Suspicion::Turned { joint } => (
+            joint,
+            format!(
+                "the torque of {} has the other sign than the model's",
+                names[joint]
+            ),
+            "set `torque_scale` of the joint to its negative in [log], or correct the log",
+        ),
+        Suspicion::Exchanged { joint, with } => (
+            joint,
+            format!(
+                "the torques of {} and {} have changed places",
+                names[joint], names[with]
+            ),
+            "exchange the two torque columns in [log]",
+        ),
+    };
+    DataFault {
+        kind: "wrong-sign-or-order".to_owned(),
+        channel: Some(names[joint].clone()),
+        effect,
+        remedy: remedy.to_owned(),
+    }
+}
+
+/// The JSON fields of a command that ends with a fault of the data.
+pub fn fault_json(fault: &DataFault) -> Value {
+    json!({
+        "verdict": "data-fault",
+        "steps": [],
+        "before": null,
+        "after": null,
+        "unexplained": [],
+        "candidates": [],
+        "processing": null,
+        "faults": [{
+            "kind": fault.kind,
+            "channel": fault.channel,
+            "effect": fault.effect,
+            "remedy": fault.remedy,
+        }],
     })
+}
+
+/// The same for a person.
+pub fn fault_text(fault: &DataFault) -> String {
+    format!(
+        "The data are at fault ({}): {}.\n  {}\n",
+        fault.kind, fault.effect, fault.remedy
+    )
 }
 
 /// Parameters of an accepted effect with their standard deviations.
@@ -471,7 +556,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         veto: &args.veto,
         holdout: &args.holdout,
     };
-    let found = diagnose(&machine, &file, &name, &logs, args.keep, context)?;
+    let found = match diagnose(&machine, &file, &name, &logs, args.keep, context)? {
+        Found::Diagnosed(found) => *found,
+        Found::DataFault(fault) => {
+            return Ok(Outcome {
+                text: fault_text(&fault),
+                document: Document::new("diagnose", &[], &[], &fault_json(&fault))?,
+                missed: Vec::new(),
+            });
+        }
+    };
     let document = Document::new(
         "diagnose",
         &found.held.inputs,

@@ -196,7 +196,11 @@ fn execute(
         holdout: &unseen,
     };
     match diagnose::diagnose(&machine, &model, "model.toml", &roles, false, context) {
-        Ok(found) => {
+        Ok(diagnose::Found::DataFault(fault)) => {
+            diagnose_json = diagnose::fault_json(&fault);
+            lacking = diagnose::fault_text(&fault);
+        }
+        Ok(diagnose::Found::Diagnosed(found)) => {
             diagnose_json = diagnose::json(&machine, &found);
             lacking = diagnose::text(&machine, &found, "model.toml");
             if !found.diagnosis.steps.is_empty() {

@@ -11,7 +11,7 @@ use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
 use crate::friction::motions::motions;
 use crate::friction::prepare::Motion;
-use crate::inspect::{Cutter, Gate};
+use crate::inspect::{Cutter, Fault, Gate};
 use crate::log::{Block, Instant, Layout, LogError, LogSpec, Provenance, Reader, escape};
 use crate::motion::{
     Differences, HeldForces, ParallelFilter, RunError, Settings, Summary, TorqueTiming,
@@ -58,6 +58,17 @@ pub struct Machine {
     pub robot: Robot,
     /// What the first look at each log found: a log is opened several times.
     gates: Arc<Mutex<BTreeMap<String, Arc<Gate>>>>,
+}
+
+/// Why a fit refuses a log.
+fn refused(spec: &LogSpec, fault: &Fault) -> CliError {
+    let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
+    CliError::input(format!(
+        "{}: column `{channel}` {}",
+        escape(&spec.name()),
+        fault.effect
+    ))
+    .hint(&fault.remedy)
 }
 
 /// Why a log could not be run through, decorated.
@@ -176,16 +187,18 @@ impl Machine {
         let gate = Gate::look(&mut reader, &|| context.interrupted())?;
         let gate = Arc::new(gate.ok_or_else(CliError::interrupted)?);
         if let Some(fault) = gate.refusal() {
-            let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
-            return Err(CliError::input(format!(
-                "{}: column `{channel}` {}",
-                escape(&spec.name()),
-                fault.effect
-            ))
-            .hint(&fault.remedy));
+            return Err(refused(spec, fault));
         }
         known().insert(key, Arc::clone(&gate));
         Ok(gate)
+    }
+
+    /// The fault for which a fit refuses a log, where it has one.
+    pub fn fault(&self, spec: &LogSpec, context: &Context) -> Result<Option<Fault>, CliError> {
+        let mut reader = Reader::open(spec, &self.file.layout().as_logged())?;
+        let gate = Gate::look(&mut reader, &|| context.interrupted())?;
+        let gate = gate.ok_or_else(CliError::interrupted)?;
+        Ok(gate.refusal().cloned())
     }
 
     /// Opens a log of this layout.

@@ -20,6 +20,7 @@ mod plan;
 mod rows;
 mod run;
 mod search;
+mod suspect;
 mod unknowns;
 
 pub use candidate::Score;
@@ -29,4 +30,5 @@ pub use measure::{Errors, JointErrors, OverallErrors};
 pub use plan::{LogRole, SetAside};
 pub use run::{Case, DiagnoseError, Diagnosis, Left, Pair, STRUCTURED, Step, diagnose};
 pub use search::{Candidate, Limits};
+pub use suspect::Suspicion;
 pub use unknowns::{Open, Unknown};

@@ -10,6 +10,7 @@ use super::measure::{Errors, errors};
 use super::orders;
 use super::plan::{LogRole, Plan, Role, SetAside};
 use super::search::{Bar, Candidate, Limits, choose, search};
+use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
 use crate::effect::{Added, Cover, Refined};
 use crate::motion::{MotionError, Parallel, Stretch};
@@ -46,6 +47,8 @@ pub enum DiagnoseError {
     TooFewRows { rows: usize, unknowns: usize },
     #[error("the torque of joint {joint} is zero throughout")]
     NoTorque { joint: String },
+    #[error("a torque channel has another sign or place than the model knows")]
+    Channels(Suspicion),
     #[error("interrupted")]
     Interrupted,
 }
@@ -143,6 +146,10 @@ pub fn diagnose(
                 joint: joint.clone(),
             });
         }
+    }
+    // faults of the data come before any physics
+    if let Some(found) = suspicion(&case.given, &case.stretches, &case.parallel, &plan)? {
+        return Err(DiagnoseError::Channels(found));
     }
     let mut at = fit(&case.given, &ground)?;
     let declared = at.base.residual_squares(&plan);
