@@ -33,6 +33,7 @@ pub const KIND: Kind = Kind {
     },
     starts: |cover, place| {
         let joint = cover.at(place);
+        joint.is_wide()?;
         if joint.reversals < 4 {
             return Err("fewer than four sweeps over the travel".into());
         }

@@ -19,6 +19,8 @@ pub struct JointCover {
     pub ripple_orders: Vec<f64>,
     /// The same of the residual times the sign of the speed.
     pub friction_orders: Vec<f64>,
+    /// Full travel of the joint, where the robot's limits say it [m or rad].
+    pub full_range: Option<f64>,
 }
 
 /// What the logs cover.
@@ -60,6 +62,7 @@ impl Cover {
             let least = 1e-3 * (position[1] - position[0]);
             joint.reversals = stretches.iter().map(|s| reversals(&s.q[j], least)).sum();
             joint.position = position;
+            joint.full_range = full_range(robot, j);
         }
         for s in stretches {
             let end = s.began + s.dt * s.len() as f64;
@@ -94,6 +97,19 @@ impl JointCover {
         (self.position[1] - self.position[0]).max(0.0)
     }
 
+    /// Whether the travel is wide enough to tell a smooth function of position, which would be carried
+    /// on beyond it: half of the joint's range, where that is known.
+    pub fn is_wide(&self) -> Result<(), String> {
+        match self.full_range {
+            Some(full) if self.range() < WIDE * full => Err(format!(
+                "the travel covers {:.0} % of the joint's range, and a function of position fitted \
+                 there would be carried on beyond it: move the joint over half of its range",
+                100.0 * self.range() / full
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Greatest speed of both directions.
     pub fn fastest(&self) -> f64 {
         self.speed[1].max(-self.speed[0])
@@ -102,6 +118,20 @@ impl JointCover {
     /// Whether the joint moved both ways with speeds worth the name.
     pub fn both_ways(&self) -> bool {
         self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
+    }
+}
+
+/// Share of a joint's range that a smooth function of position must be seen over.
+const WIDE: f64 = 0.5;
+
+/// Full travel of a joint by Table 5: q1 by x_c4, q2 by x_c3, q4 and q5 as x_c1 and x_c2 leave them.
+fn full_range(robot: &Robot, j: usize) -> Option<f64> {
+    match robot {
+        Robot::Cft(robot) => {
+            let spans = robot.setup.limits().spans();
+            [spans[3], spans[2], 2.2, 1.7].get(j).copied()
+        }
+        Robot::SingleJoint(_) => None,
     }
 }
 

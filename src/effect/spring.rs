@@ -11,6 +11,7 @@ pub const KIND: Kind = Kind {
     places: every_joint,
     starts: |cover, place| {
         let joint = cover.at(place);
+        joint.is_wide()?;
         if joint.reversals < 2 {
             return Err("fewer than two reversals: a slope over position is not seen".into());
         }
