@@ -260,6 +260,20 @@ pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told
     )
 }
 
+/// The same in words: `order = 14.0 +- 0.1 1/m, ..`.
+pub fn in_words(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> String {
+    let words = told(machine, diagnosis, effect).into_iter().map(|t| {
+        let value = match t.std {
+            Some(std) if std > 0.0 => number::plus_minus(t.value, std),
+            _ => number::significant(t.value, 4),
+        };
+        format!("{} = {value} {}", t.key, t.unit)
+            .trim_end()
+            .to_owned()
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
 /// Whether there is a verdict of effects, of nothing, or of structure without a name.
 pub fn verdict(diagnosis: &Diagnosis) -> &'static str {
     if !diagnosis.steps.is_empty() {
@@ -444,24 +458,12 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
     };
     for (i, step) in d.steps.iter().enumerate() {
         let effect: &Added = &d.model.effects[step.effect];
-        let numbers: Vec<String> = told(machine, d, step.effect)
-            .iter()
-            .map(|t| {
-                let value = match t.std {
-                    Some(std) if std > 0.0 => number::plus_minus(t.value, std),
-                    _ => number::significant(t.value, 4),
-                };
-                format!("{} = {value} {}", t.key, t.unit)
-                    .trim_end()
-                    .to_owned()
-            })
-            .collect();
         out += &format!(
             "  {}. {} ({}): {}\n",
             i + 1,
             effect.title(robot),
             effect.family().name(),
-            numbers.join(", ")
+            in_words(machine, d, step.effect)
         );
         if let Some(s) = &step.candidate.score {
             out += &format!(

@@ -1,7 +1,7 @@
 //! Pictures and page of a diagnosis.
 
 use super::CliError;
-use super::diagnose::{Diagnosed, told, verdict};
+use super::diagnose::{Diagnosed, in_words, verdict};
 use super::machine::Machine;
 use crate::diagnose::{Errors, JointEvidence, Pair, evidence};
 use crate::motion::Stretch;
@@ -190,18 +190,6 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
     let mut rows = Vec::new();
     for step in &d.steps {
         let effect = &d.model.effects[step.effect];
-        let numbers: Vec<String> = told(machine, d, step.effect)
-            .iter()
-            .map(|t| {
-                let value = match t.std {
-                    Some(std) if std > 0.0 => number::plus_minus(t.value, std),
-                    _ => number::significant(t.value, 4),
-                };
-                format!("{} = {value} {}", t.key, t.unit)
-                    .trim_end()
-                    .to_owned()
-            })
-            .collect();
         let unseen = step.holdout.map_or("-".to_owned(), |[before, after]| {
             format!("{} to {}", number::percent(before), number::percent(after))
         });
@@ -213,7 +201,7 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
         let score = step.candidate.score.as_ref();
         rows.push(vec![
             effect.title(&machine.robot),
-            numbers.join(", "),
+            in_words(machine, d, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
             unseen,
             if alike.is_empty() {

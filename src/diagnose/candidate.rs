@@ -10,6 +10,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::fit::{Fitted, Ground, Inverse};
 use super::plan::Role;
 use super::rows::{Total, dot};
+use crate::math::long_run::long_run;
 
 /// A candidate's filtered columns: `[stretch][joint][column][row]`; no columns where the joint is
 /// not touched.
@@ -270,22 +271,7 @@ impl<'a> Judge<'a> {
         }
         let count = scores.len() as f64;
         let lag = LAG.min((count / 8.0) as usize);
-        let mut middle = DMatrix::zeros(k, k);
-        for l in 0..=lag {
-            let weight = 1.0 - l as f64 / (lag + 1) as f64;
-            for pair in scores.windows(l + 1) {
-                let (a, b) = (&pair[0], &pair[l]);
-                if a.0 != b.0 {
-                    continue;
-                }
-                if l == 0 {
-                    middle.ger(1.0, &a.1, &a.1, 1.0);
-                } else {
-                    middle.ger(weight, &a.1, &b.1, 1.0);
-                    middle.ger(weight, &b.1, &a.1, 1.0);
-                }
-            }
-        }
+        let mut middle = long_run(&scores, k, lag);
         // as if rows were independent: weighted residuals have variance 1 by construction
         let (square, rows) = self.touched(columns);
         let variance = (square - s.removed).max(1e-12 * square) / rows.max(1.0);
@@ -313,7 +299,7 @@ impl<'a> Judge<'a> {
 }
 
 /// Pieces over which scores count as correlated; a piece is some correlation times long.
-const LAG: usize = 2;
+pub(super) const LAG: usize = 2;
 /// Least share of a column that must be its own.
 const SHARE: f64 = 0.003;
 

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::candidate::Judge;
+use super::candidate::{Judge, LAG};
 use super::fit::{Fitted, Ground, Inverse, Prior, fit};
 use super::floor::floor;
 use super::measure::{Errors, errors};
@@ -13,6 +13,7 @@ use super::search::{Bar, Candidate, Limits, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
 use crate::effect::{Added, Cover, Refined};
+use crate::math::long_run::long_run;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// What a diagnosis works on.
@@ -120,7 +121,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let plan = Plan::of(&case.stretches, &case.roles, &case.parallel, case.cutoff_hz);
     let robot = &case.given.model.robot;
-    let cover = Cover::of(robot, &fitted_stretches(case), case.cutoff_hz);
+    let fitted = fitted_stretches(case);
+    let cover = Cover::of(robot, &fitted, case.cutoff_hz);
     let mut ground = Ground {
         stretches: &case.stretches,
         parallel: &case.parallel,
@@ -160,13 +162,8 @@ pub fn diagnose(
         if stop() {
             return Err(DiagnoseError::Interrupted);
         }
-        orders::find(
-            &mut ground.cover,
-            &at.model,
-            &fitted_stretches(case),
-            &case.parallel,
-        )?;
-        let noise = noise(&at.model, case)?;
+        orders::find(&mut ground.cover, &at.model, &fitted, &case.parallel)?;
+        let noise = noise(&at.model, case, &fitted)?;
         let bar = Bar {
             declared: &declared,
             noise: &noise,
@@ -276,7 +273,7 @@ pub fn diagnose(
     };
     let before = pair(&case.given)?;
     let after = pair(&at.model)?;
-    let floor = noise(&at.model, case)?;
+    let floor = noise(&at.model, case, &fitted)?;
     let left_before = left(&floor, &before.train);
     let left = left(&floor, &after.train);
     let covariance = covariance(&at, &ground);
@@ -362,8 +359,7 @@ fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize
 }
 
 /// Variance of the noise in each joint's filtered residual.
-fn noise(model: &Refined, case: &Case) -> Result<Vec<f64>, MotionError> {
-    let stretches = fitted_stretches(case);
+fn noise(model: &Refined, case: &Case, stretches: &[Stretch]) -> Result<Vec<f64>, MotionError> {
     let residual = |s: &Stretch| {
         let mut hat = model.reconstruct(s);
         for (hat, tau) in hat.iter_mut().zip(&s.tau) {
@@ -376,7 +372,7 @@ fn noise(model: &Refined, case: &Case) -> Result<Vec<f64>, MotionError> {
     let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
     floor(
         &residuals,
-        &stretches,
+        stretches,
         &case.parallel,
         case.cutoff_hz,
         case.averaged,
@@ -422,23 +418,7 @@ fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
         }
         scores.push((piece.stretch, g));
     }
-    let lag = 2usize;
-    let mut middle = DMatrix::zeros(u, u);
-    for l in 0..=lag {
-        let weight = 1.0 - l as f64 / (lag + 1) as f64;
-        for pair in scores.windows(l + 1) {
-            let (a, b) = (&pair[0], &pair[l]);
-            if a.0 != b.0 {
-                continue;
-            }
-            if l == 0 {
-                middle.ger(1.0, &a.1, &a.1, 1.0);
-            } else {
-                middle.ger(weight, &a.1, &b.1, 1.0);
-                middle.ger(weight, &b.1, &a.1, 1.0);
-            }
-        }
-    }
+    let mut middle = long_run(&scores, u, LAG);
     // the prior is data too
     middle += &at.information * ground.prior.rows_per_independent.max(1.0);
     let total = base.total(ground.plan, &at.weights, &Role::fitted);

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::accumulate::Sums;
 use super::columns::GRADIENT;
 use super::solve::{Solution, of_joint, parts};
+use crate::math::long_run::long_run;
 
 /// The two parts and their sum.
 pub(super) struct Covariances {
@@ -60,7 +61,10 @@ pub(super) fn covariance(
             (block.stretch, g)
         })
         .collect();
-    let sandwich = &solution.inverse * long_run(&scores, u) * &solution.inverse * freedom;
+    let sandwich = &solution.inverse
+        * long_run(&scores, u, bandwidth(&scores, u))
+        * &solution.inverse
+        * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
     // below the textbook's, the latter is the better one.
     let sandwich = at_least(sandwich, &textbook);
@@ -85,28 +89,6 @@ pub(super) fn covariance(
         sensitivity.push(Some(s));
     }
     (Covariances { sandwich, total }, textbook, sensitivity)
-}
-
-/// Long-run covariance of the block scores by Bartlett's weights; lags do not cross stretches.
-fn long_run(scores: &[(usize, DVector<f64>)], u: usize) -> DMatrix<f64> {
-    let lag = bandwidth(scores, u);
-    let mut s = DMatrix::zeros(u, u);
-    for l in 0..=lag {
-        let weight = 1.0 - l as f64 / (lag + 1) as f64;
-        for pair in scores.windows(l + 1) {
-            let (first, last) = (&pair[0], &pair[l]);
-            if first.0 != last.0 {
-                continue;
-            }
-            if l == 0 {
-                s.ger(1.0, &first.1, &first.1, 1.0);
-            } else {
-                s.ger(weight, &first.1, &last.1, 1.0);
-                s.ger(weight, &last.1, &first.1, 1.0);
-            }
-        }
-    }
-    s
 }
 
 /// Least number of neighbouring blocks whose scores count as correlated.

@@ -11,6 +11,7 @@
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
 pub mod jacobi;
+pub mod long_run;
 pub mod minimise;
 pub mod rank;
 pub mod rfactor;
