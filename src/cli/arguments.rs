@@ -75,6 +75,11 @@ pub(super) fn svg_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "svg")
 }
 
+/// A page to be written.
+pub(super) fn html_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "html")
+}
+
 fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension() {

@@ -1,6 +1,7 @@
 //! What every command is given beside its own arguments: where messages go, whether the user has
 //! asked to stop, and the progress bar.
 
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::error::{CliError, indented};
-use super::outputs;
+use super::{outputs, typed};
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]
@@ -18,6 +19,7 @@ pub struct Context {
     json: Option<PathBuf>,
     bars: bool,
     interrupted: Arc<AtomicBool>,
+    command: String,
 }
 
 impl Context {
@@ -30,7 +32,20 @@ impl Context {
             json: json.map(Path::to_path_buf),
             bars: !quiet && std::io::stderr().is_terminal(),
             interrupted,
+            command: String::new(),
         }
+    }
+
+    /// The same with the arguments that the command was called with, the program's name first.
+    pub fn called(mut self, arguments: &[OsString]) -> Self {
+        self.command = typed::line(arguments);
+        self
+    }
+
+    /// The command as it was typed, without folders from the root on and without what does not
+    /// change a result.
+    pub fn command(&self) -> &str {
+        &self.command
     }
 
     /// Whether the user has asked to stop; long loops look at it between blocks.

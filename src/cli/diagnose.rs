@@ -9,7 +9,7 @@ use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::refined::{Held, hold, in_file, refined};
-use super::{CliError, Context, Outcome, arguments, diagnose_report};
+use super::{CliError, Context, Outcome, arguments, files, pages};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Suspicion,
@@ -59,7 +59,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
 }
 
@@ -550,17 +550,32 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(PathBuf::as_path)
         .collect();
     context.check_outputs(&inputs, &outputs)?;
-    let name = args.model.display().to_string();
-    let file = ModelFile::load(&args.model)?;
+    let given = files::model(&args.model)?;
+    let (name, file) = (given.name, given.value);
     let machine = Machine::new(&name, file.robot.clone());
     let logs = Logs {
         train: &args.logs,
         veto: &args.veto,
         holdout: &args.holdout,
     };
+    let of = pages::Diagnose {
+        machine: &machine,
+        file: &file,
+        given: given.provenance,
+        logs: args
+            .logs
+            .iter()
+            .chain(&args.veto)
+            .chain(&args.holdout)
+            .collect(),
+    };
     let found = match diagnose(&machine, &file, &name, &logs, args.keep, context)? {
         Found::Diagnosed(found) => *found,
         Found::DataFault(fault) => {
+            if let Some(path) = &args.report {
+                let page = pages::data_fault(&of, &fault, context)?;
+                super::outputs::write_text(path, &page)?;
+            }
             return Ok(Outcome {
                 text: fault_text(&fault),
                 document: Document::new("diagnose", &[], &[], &fault_json(&fault))?,
@@ -577,12 +592,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut text = text(&machine, &found, &name);
     context.check()?;
     if !args.plot.is_empty() || args.report.is_some() {
-        let figure = diagnose_report::figure(&machine, &found)?.svg();
+        let figure = pages::diagnose_figure(&machine, &found)?.svg();
         for path in &args.plot {
             super::outputs::write_text(path, &figure)?;
         }
         if let Some(path) = &args.report {
-            let page = diagnose_report::page(&machine, &found, &name, &figure);
+            let page = pages::diagnose(&of, &found, &figure, context)?;
             super::outputs::write_text(path, &page)?;
         }
     }

@@ -119,6 +119,23 @@ fn inspect(
     Ok((Inspected { name, findings }, table.provenance()?))
 }
 
+/// What one log holds and what is wrong with it, by the robot file.
+///
+/// # Errors
+/// A log that cannot be read at all, and interruption.
+pub(super) fn findings(
+    spec: &LogSpec,
+    machine: &Machine,
+    context: &Context,
+) -> Result<Findings, CliError> {
+    let mut table = Table::open(spec, Some(&machine.file.layout()))?;
+    let (plan, refused) = columns::of_robot(&table, machine);
+    let found = look(&mut table, &plan, &|| context.interrupted())?;
+    let mut findings = found.ok_or_else(CliError::interrupted)?;
+    findings.faults.splice(0..0, refused);
+    Ok(findings)
+}
+
 /// Compares the torques of a log with those that a model gives, joints turned and exchanged.
 fn compare(
     machine: &Machine,

@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 
 use super::friction::new_model;
 use super::machine::{Machine, narrowed, run_error, summary_warnings};
-use super::{CliError, Context, Outcome};
+use super::pages::{self, Look};
+use super::refined::{held_for_pictures, refined};
+use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
@@ -50,6 +52,9 @@ pub struct Args {
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
 }
 
 /// The weighting of the rows.
@@ -471,14 +476,18 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    context.check_outputs(&inputs, &[args.output.as_path()])?;
-    let machine = Machine::load(&args.robot)?;
+    let mut outputs = vec![args.output.as_path()];
+    outputs.extend(args.report.as_deref());
+    context.check_outputs(&inputs, &outputs)?;
+    let robot = files::robot(Path::new(&args.robot))?;
+    let machine = Machine::new(&args.robot, robot.value);
+    let mut given = vec![robot.provenance];
     let friction = match &args.model {
         None => None,
         Some(path) => {
-            let model = ModelFile::load(path)?;
-            model.belongs_to(&path.display().to_string(), &machine.file)?;
-            Some((path.display().to_string(), model))
+            let model = files::model_of(path, &machine.file)?;
+            given.push(model.provenance);
+            Some((model.name, model.value))
         }
     };
     if friction.is_none()
@@ -501,6 +510,25 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &json(&machine, &found),
     )?;
     let mut text = text(&machine, &found);
+    if let Some(path) = &args.report {
+        let logs: Vec<&LogSpec> = args.logs.iter().collect();
+        let held = held_for_pictures(&machine, &logs, context)?;
+        let held = held.as_ref();
+        let page = pages::Lsq {
+            machine: &machine,
+            found: &found,
+            file: &model,
+            model: &refined(&model, &args.output.to_string_lossy())?,
+            logs: &args.logs,
+            given,
+            look: held
+                .map(|held| Look::new(&machine, held, args.logs.iter().map(LogSpec::name)))
+                .transpose()?,
+        };
+        let page = pages::lsq(&page, context)?;
+        context.check()?;
+        super::outputs::write_text(path, &page)?;
+    }
     context.check()?;
     super::outputs::write_text(&args.output, &model.to_toml()?)?;
     text += &format!("written: {}\n", args.output.display());

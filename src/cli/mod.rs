@@ -7,7 +7,6 @@ mod campaign;
 pub mod convert;
 pub mod diagnose;
 mod diagnose_prior;
-mod diagnose_report;
 pub mod excite;
 pub mod friction;
 pub mod identify;
@@ -26,7 +25,9 @@ mod files;
 pub mod machine;
 mod outcome;
 mod outputs;
+mod pages;
 pub mod refined;
+mod typed;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -149,7 +150,8 @@ fn stop() -> ! {
 
 /// Runs one command line, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<AtomicBool>) -> Exit {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(answer) => {
             // Help and version are answers on standard output, the rest are errors.
@@ -160,7 +162,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             };
         }
     };
-    match execute(&cli, interrupted) {
+    match execute(&cli, &arguments, interrupted) {
         Ok(exit) => exit,
         Err(error) => {
             let _ = writeln!(std::io::stderr(), "{error}");
@@ -169,7 +171,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     }
 }
 
-fn execute(cli: &Cli, interrupted: Arc<AtomicBool>) -> Result<Exit, CliError> {
+fn execute(
+    cli: &Cli,
+    arguments: &[OsString],
+    interrupted: Arc<AtomicBool>,
+) -> Result<Exit, CliError> {
     if let Some(threads) = cli.common.threads {
         // A pool that is there already (a second run in one process) keeps its size: the result
         // does not depend on it.
@@ -182,7 +188,8 @@ fn execute(cli: &Cli, interrupted: Arc<AtomicBool>) -> Result<Exit, CliError> {
         cli.common.quiet,
         json.and_then(Destination::file),
         interrupted,
-    );
+    )
+    .called(arguments);
     // Told before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
     let outcome = cli.command.run(&context)?;

@@ -63,8 +63,36 @@ pub struct Held {
     pub averaged: bool,
 }
 
+/// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
+/// is no reason to lose the report.
+///
+/// # Errors
+/// Those of [`hold`].
+pub fn held_for_pictures(
+    machine: &Machine,
+    logs: &[&LogSpec],
+    context: &Context,
+) -> Result<Option<Held>, CliError> {
+    match hold_most(machine, logs, context)? {
+        Ok(held) => Ok(Some(held)),
+        Err(_) => Ok(None),
+    }
+}
+
 /// Reads logs whole, smoothed as the model declares.
+///
+/// # Errors
+/// A log that cannot be read, logs sampled unlike, or more samples than memory is meant to hold.
 pub fn hold(machine: &Machine, logs: &[&LogSpec], context: &Context) -> Result<Held, CliError> {
+    hold_most(machine, logs, context)?
+}
+
+/// The same, what cannot be held apart from what cannot be read.
+fn hold_most(
+    machine: &Machine,
+    logs: &[&LogSpec],
+    context: &Context,
+) -> Result<Result<Held, CliError>, CliError> {
     let n = machine.robot.joints();
     let settings = machine.settings();
     let bar = context.progress("reading", Some(logs.len() as u64));
@@ -81,22 +109,22 @@ pub fn hold(machine: &Machine, logs: &[&LogSpec], context: &Context) -> Result<H
             .map_err(|e| run_error(spec, e))?;
         samples += found.iter().map(Stretch::len).sum::<usize>();
         if samples > MOST_SAMPLES {
-            return Err(CliError::input(format!(
+            return Ok(Err(CliError::input(format!(
                 "{}: {samples} samples are more than the {MOST_SAMPLES} that are held in memory",
                 spec.name()
             ))
-            .hint("choose spans of the logs, as in LOG@0..20%"));
+            .hint("choose spans of the logs, as in LOG@0..20%")));
         }
         if let Some(before) = &last
             && (before.dt / summary.dt - 1.0).abs() > 0.02
         {
-            return Err(CliError::input(format!(
+            return Ok(Err(CliError::input(format!(
                 "{}: sampled at {:.6} s, the log before it at {:.6} s",
                 spec.name(),
                 summary.dt,
                 before.dt
             ))
-            .hint("logs of one run are sampled alike; work on them one by one"));
+            .hint("logs of one run are sampled alike; work on them one by one")));
         }
         warnings.extend(log.warnings());
         warnings.extend(summary_warnings(spec, &summary));
@@ -108,12 +136,12 @@ pub fn hold(machine: &Machine, logs: &[&LogSpec], context: &Context) -> Result<H
     let (Some(summary), Some(origin)) = (last, origin) else {
         return Err(CliError::usage("no log is given"));
     };
-    Ok(Held {
+    Ok(Ok(Held {
         stretches: all,
         inputs,
         warnings,
         summary,
         origin,
         averaged,
-    })
+    }))
 }

@@ -6,9 +6,9 @@ use serde_json::{Value, json};
 
 use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
-use super::refined::{hold, refined};
-use super::{CliError, Context, Outcome, arguments};
-use crate::config::ModelFile;
+use super::pages::{self, Look};
+use super::refined::{held_for_pictures, hold, refined};
+use super::{CliError, Context, Outcome, arguments, files};
 use crate::effect::Refined;
 use crate::log::{Instant, LogSpec, Provenance};
 use crate::output::LogWriter;
@@ -43,6 +43,9 @@ pub struct Args {
     /// Draw measured and reconstructed torque; may be given more than once
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
     pub plot: Vec<PathBuf>,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
 }
 
 /// Result of the stage.
@@ -242,11 +245,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .output
         .iter()
         .chain(&args.plot)
+        .chain(&args.report)
         .map(PathBuf::as_path)
         .collect();
     context.check_outputs(&inputs, &outputs)?;
-    let name = args.model.display().to_string();
-    let file = ModelFile::load(&args.model)?;
+    let given = files::model(&args.model)?;
+    let (name, file) = (given.name, given.value);
     let model = refined(&file, &name)?;
     let machine = Machine::new(&name, file.robot.clone());
     let mut residual = match &args.output {
@@ -286,7 +290,32 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         validation,
         &format!("torque of {title} by {name}"),
     );
+    let page = match &args.report {
+        None => None,
+        Some(path) => {
+            let logs: Vec<&LogSpec> = args.logs.iter().collect();
+            let held = held_for_pictures(&machine, &logs, context)?;
+            let held = held.as_ref();
+            let look = held
+                .map(|held| Look::new(&machine, held, args.logs.iter().map(LogSpec::name)))
+                .transpose()?;
+            let of = pages::Validate {
+                machine: &machine,
+                file: &file,
+                model: &model,
+                logs: &args.logs,
+                found: &found,
+                limit: args.max_relative_error,
+                given: given.provenance,
+                look,
+            };
+            Some((path, pages::validate(&of, context)?))
+        }
+    };
     context.check()?;
+    if let Some((path, page)) = &page {
+        super::outputs::write_text(path, page)?;
+    }
     for path in &args.plot {
         super::outputs::write_text(path, &figure(&machine, validation, &title).svg())?;
     }

@@ -32,3 +32,18 @@ mod colour {
     pub const VERMILLION: &str = "#d55e00";
     pub const COVERED: &str = "#f0f4e8";
 }
+
+/// All of them, for a page that shows figures in the dark.
+#[cfg(test)]
+pub(crate) const PALETTE: [&str; 10] = [
+    colour::INK,
+    colour::MUTED,
+    colour::FRAME,
+    colour::GRID,
+    colour::ZERO,
+    colour::PAPER,
+    colour::BLUE,
+    colour::SKY,
+    colour::VERMILLION,
+    colour::COVERED,
+];

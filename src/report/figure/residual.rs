@@ -70,8 +70,7 @@ impl ResidualFigure {
                 .sum::<f64>();
         let names: Vec<&str> = self.joints.iter().map(|(name, _)| name.as_str()).collect();
         let description = format!(
-            "Torque residual before and after over position, velocity, load, time, order and \
-             frequency, joints {}",
+            "Torque residual over position, velocity, load, time, order and frequency, joints {}",
             names.join(", ")
         );
         let mut svg = Svg::new(WIDTH, height, &self.title, &description);
@@ -80,12 +79,7 @@ impl ResidualFigure {
             &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
             Type::new(14.0, Anchor::Start).bold(),
         );
-        let entries = [
-            (Key::Line(When::Before.stroke()), "before"),
-            (Key::Line(When::BeforeBackward.stroke()), "before, backward"),
-            (Key::Line(When::After.stroke()), "after"),
-            (Key::Line(When::AfterBackward.stroke()), "after, backward"),
-        ];
+        let entries = self.entries();
         legend::draw(&mut svg, [LEFT, 44.0], &entries);
         let column = WIDTH / COLUMNS as f64;
         let mut top = HEAD;
@@ -104,6 +98,28 @@ impl ResidualFigure {
             top += NAME + rows(panels.len()) * (PLOT + NUMBERS);
         }
         svg.finish()
+    }
+
+    /// Only what is drawn is in the legend; a residual that nothing came after is not `before`.
+    fn entries(&self) -> Vec<(Key, &'static str)> {
+        let drawn = |when: When| {
+            let mut panels = self.joints.iter().flat_map(|(_, panels)| panels);
+            panels.any(|panel| panel.lines.iter().any(|(w, _)| *w == when))
+        };
+        let alone = !drawn(When::After) && !drawn(When::AfterBackward);
+        let names = [
+            (When::Before, ["before", "residual"]),
+            (
+                When::BeforeBackward,
+                ["before, backward", "residual, backward"],
+            ),
+            (When::After, ["after", ""]),
+            (When::AfterBackward, ["after, backward", ""]),
+        ];
+        let there = names.into_iter().filter(|(when, _)| drawn(*when));
+        there
+            .map(|(when, names)| (Key::Line(when.stroke()), names[usize::from(alone)]))
+            .collect()
     }
 }
 

@@ -1,0 +1,273 @@
+//! The page of `diagnose`, and its picture.
+
+use super::super::diagnose::{DataFault, Diagnosed, in_words, into_model, verdict};
+use super::super::machine::Machine;
+use super::super::{CliError, Context};
+use super::look::Look;
+use super::torque::Drawn;
+use super::{fit, friction, parameters, provenance, quality, residual, torque};
+use crate::config::ModelFile;
+use crate::diagnose::{Candidate, Errors, Pair};
+use crate::log::{LogSpec, Provenance, escape};
+use crate::report::figure::ResidualFigure;
+use crate::report::number;
+use crate::report::page::{Page, TraceStyle};
+
+/// Candidates that are told.
+const MOST: usize = 20;
+
+/// What the page is made from.
+pub struct Diagnose<'a> {
+    pub machine: &'a Machine,
+    pub file: &'a ModelFile,
+    /// The model file.
+    pub given: Provenance,
+    /// Logs in their order: fitted, veto, holdout.
+    pub logs: Vec<&'a LogSpec>,
+}
+
+/// The residual before and after, over the logs that were fitted.
+pub fn figure(machine: &Machine, found: &Diagnosed) -> Result<ResidualFigure, CliError> {
+    let look = look(machine, found)?;
+    let fitted = found.diagnosis.fitted_logs;
+    let after = &found.diagnosis.model;
+    residual::figure(&look, &|log| log < fitted, &found.given, Some(after))
+}
+
+fn look<'a>(machine: &'a Machine, found: &'a Diagnosed) -> Result<Look<'a>, CliError> {
+    Look::new(machine, &found.held, found.logs.iter().cloned())
+}
+
+/// The verdict in words, and whether nothing calls for attention.
+pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
+    let d = &found.diagnosis;
+    let titles: Vec<String> = d
+        .steps
+        .iter()
+        .map(|s| d.model.effects[s.effect].title(&machine.robot))
+        .collect();
+    match verdict(d) {
+        "effects-found" => (format!("The model lacks: {}.", titles.join("; ")), true),
+        "nothing-missing" => (
+            "Nothing is missing: what is left of the torque is noise.".to_owned(),
+            true,
+        ),
+        _ => (
+            "A residual above the noise is left that no known effect explains.".to_owned(),
+            false,
+        ),
+    }
+}
+
+/// The page as a file; `figure` is that of [`figure`].
+///
+/// # Errors
+/// Interruption, and stretches that are too short for the filter.
+pub fn diagnose(
+    of: &Diagnose,
+    found: &Diagnosed,
+    figure: &str,
+    context: &Context,
+) -> Result<String, CliError> {
+    let machine = of.machine;
+    let mut page = Page::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    let (text, good) = words(machine, found);
+    page.verdict(&text, good);
+    errors(&mut page, machine, found);
+    let look = look(machine, found)?;
+    sections(&mut page, of, found, &look, figure)?;
+    let refined = into_model(machine, of.file, found);
+    parameters::section(&mut page, &refined, &|_| None);
+    friction::section(
+        &mut page,
+        &friction::figure(&look, &refined, &found.diagnosis.model),
+    );
+    page.heading("What the model hardly tells apart");
+    fit::pairs(&mut page, &refined);
+    quality::section(&mut page, machine, &of.logs, &found.held.warnings, context)?;
+    let mut inputs = vec![of.given.clone()];
+    inputs.extend(found.held.inputs.iter().cloned());
+    let summary = Some(&found.held.summary);
+    let made_from = &of.file.provenance.inputs;
+    provenance::section(&mut page, machine, &inputs, made_from, summary, context);
+    Ok(page.html())
+}
+
+/// What was added, the torque and the residual before and after, and what was not added.
+pub fn sections(
+    page: &mut Page,
+    of: &Diagnose,
+    found: &Diagnosed,
+    look: &Look,
+    figure: &str,
+) -> Result<(), CliError> {
+    let d = &found.diagnosis;
+    if !d.steps.is_empty() {
+        page.heading("What was added");
+        steps(page, of.machine, found);
+    }
+    // logs that decided nothing, where there are any
+    let all: Vec<usize> = (0..look.names.len()).collect();
+    let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
+    let shown = if others.is_empty() { fitted } else { others };
+    let names: Vec<&str> = shown.iter().map(|log| look.names[*log].as_str()).collect();
+    let after = Drawn {
+        names: ["after", "residual after"],
+        styles: [TraceStyle::Model, TraceStyle::After],
+        model: &d.model,
+    };
+    let before = Drawn {
+        names: ["before", "residual before"],
+        styles: [TraceStyle::Before, TraceStyle::Before],
+        model: &found.given,
+    };
+    let models = match d.steps.is_empty() {
+        true => vec![Drawn::only(&found.given)],
+        false => vec![before, after],
+    };
+    torque::section(page, look, shown, &models, &names.join(", "))?;
+    residual::section(page, figure);
+    candidates(page, of.machine, found);
+    Ok(())
+}
+
+fn candidates(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
+    let all = found.diagnosis.candidates.iter();
+    let mut rest: Vec<_> = all.filter(|c| c.score.is_some()).collect();
+    rest.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let rows: Vec<Vec<String>> = rest
+        .iter()
+        .take(MOST)
+        .map(|c| {
+            vec![
+                c.effect.title(&machine.robot),
+                c.effect.family().name().to_owned(),
+                number::percent(gain(c)),
+                number::percent(c.score.as_ref().map_or(0.0, |s| s.unique_share)),
+                c.reason.clone(),
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    page.heading("Candidates that were not added");
+    page.table(
+        "the best of them, of the last round",
+        &[
+            "effect",
+            "family",
+            "cross-validated gain",
+            "own share",
+            "why not",
+        ],
+        &rows,
+    );
+}
+
+/// The page where the data are at fault, which comes before any physics.
+///
+/// # Errors
+/// Interruption.
+pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result<String, CliError> {
+    let mut page = Page::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    page.verdict(
+        &format!("The data are at fault ({}): {}.", fault.kind, fault.effect),
+        false,
+    );
+    page.paragraph(&format!("What to do: {}.", fault.remedy));
+    quality::section(&mut page, of.machine, &of.logs, &[], context)?;
+    let inputs = [of.given.clone()];
+    let made_from = &of.file.provenance.inputs;
+    provenance::section(&mut page, of.machine, &inputs, made_from, None, context);
+    Ok(page.html())
+}
+
+/// Errors of every joint before and after, on the logs that were fitted and on those that were not.
+pub fn errors(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+    let d = &found.diagnosis;
+    let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
+    let rows: Vec<Vec<String>> = machine
+        .robot
+        .joint_names()
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            let relative = |e: &Errors| e.joints[j].relative_error;
+            let unseen = |p: &Pair| p.holdout.as_ref().map(relative);
+            let interval = d.after.holdout.as_ref().map_or("-".to_owned(), |e| {
+                let [low, high] = e.joints[j].interval_95;
+                format!("{} to {}", number::percent(low), number::percent(high))
+            });
+            let rms = d.after.holdout.as_ref().unwrap_or(&d.after.train).joints[j].rmse;
+            vec![
+                joint.clone(),
+                percent(Some(relative(&d.before.train))),
+                percent(Some(relative(&d.after.train))),
+                percent(unseen(&d.before)),
+                percent(unseen(&d.after)),
+                interval,
+                format!(
+                    "{} {}",
+                    number::significant(rms, 3),
+                    machine.file.torque_unit(j)
+                ),
+                number::percent(d.left[j].share),
+            ]
+        })
+        .collect();
+    page.table(
+        "relative torque error",
+        &[
+            "joint",
+            "fitted, before",
+            "after",
+            "unseen, before",
+            "after",
+            "95 % of it",
+            "rms after",
+            "torque power left above noise",
+        ],
+        &rows,
+    );
+}
+
+fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+    let d = &found.diagnosis;
+    let mut rows = Vec::new();
+    for step in &d.steps {
+        let effect = &d.model.effects[step.effect];
+        let unseen = step.holdout.map_or("-".to_owned(), |[before, after]| {
+            format!("{} to {}", number::percent(before), number::percent(after))
+        });
+        let alike: Vec<String> = step
+            .alternatives
+            .iter()
+            .map(|c| c.effect.title(&machine.robot))
+            .collect();
+        let score = step.candidate.score.as_ref();
+        rows.push(vec![
+            effect.title(&machine.robot),
+            in_words(machine, d, step.effect),
+            score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
+            unseen,
+            if alike.is_empty() {
+                "separated from all others".to_owned()
+            } else {
+                format!("{}: {}", alike.join(", "), effect.kind.separate_by)
+            },
+        ]);
+    }
+    page.table(
+        "in the order in which they were added; numbers of the last fit",
+        &[
+            "effect",
+            "parameters",
+            "cross-validated gain",
+            "unseen",
+            "not separated from; what would",
+        ],
+        &rows,
+    );
+}

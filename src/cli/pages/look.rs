@@ -1,0 +1,67 @@
+//! Logs held in memory beside the models that are looked at on them.
+
+use super::super::refined::Held;
+use super::super::{CliError, machine::Machine};
+use crate::diagnose::{JointEvidence, evidence};
+use crate::effect::Refined;
+use crate::log::escape;
+use crate::motion::{Parallel, Stretch};
+
+/// Logs with the processing of a model.
+pub struct Look<'a> {
+    pub machine: &'a Machine,
+    pub stretches: &'a [Stretch],
+    /// Names of the logs, by the index that their stretches carry.
+    pub names: Vec<String>,
+    pub parallel: Parallel,
+    pub cutoff_hz: f64,
+}
+
+impl<'a> Look<'a> {
+    /// The logs that were read for `machine`, and their names.
+    ///
+    /// # Errors
+    /// Settings that the sampling rate does not carry.
+    pub fn new(
+        machine: &'a Machine,
+        held: &'a Held,
+        logs: impl Iterator<Item = String>,
+    ) -> Result<Self, CliError> {
+        let settings = machine.settings();
+        let parallel = Parallel::design(&settings, held.summary.dt).map_err(CliError::input)?;
+        Ok(Look {
+            machine,
+            stretches: &held.stretches,
+            names: logs.map(|name| escape(&name)).collect(),
+            parallel,
+            cutoff_hz: settings.cutoff_hz,
+        })
+    }
+
+    /// Stretches of one log.
+    pub fn of_log(&self, log: usize) -> impl Iterator<Item = &Stretch> {
+        self.stretches.iter().filter(move |s| s.log == log)
+    }
+
+    /// What the residual of a model depends on, over the logs of `wanted`.
+    ///
+    /// # Errors
+    /// Stretches that are too short for the filter.
+    pub fn evidence(
+        &self,
+        model: &Refined,
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> Result<Vec<JointEvidence>, CliError> {
+        let stretches: Vec<&Stretch> = self.stretches.iter().filter(|s| wanted(s.log)).collect();
+        evidence(model, &stretches, &self.parallel, self.cutoff_hz).map_err(CliError::input)
+    }
+
+    /// Lowest and highest velocity of a joint over all logs [m/s or rad/s].
+    pub fn velocities(&self, joint: usize) -> Option<[f64; 2]> {
+        let all = self.stretches.iter().filter_map(|s| s.v.get(joint));
+        all.flatten().fold(None, |found, v| {
+            let [low, high] = found.unwrap_or([*v, *v]);
+            Some([low.min(*v), high.max(*v)])
+        })
+    }
+}

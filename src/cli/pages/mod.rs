@@ -1,0 +1,19 @@
+//! The HTML reports: what each section says, and which sections each command has. The verdict comes
+//! first, in words and one table; what it stands on follows; where it came from ends the page.
+
+mod diagnose;
+mod fit;
+mod friction;
+mod look;
+mod lsq;
+mod parameters;
+mod provenance;
+mod quality;
+mod residual;
+mod torque;
+mod validate;
+
+pub(super) use diagnose::{Diagnose, data_fault, diagnose, figure as diagnose_figure};
+pub(super) use look::Look;
+pub(super) use lsq::{Lsq, lsq};
+pub(super) use validate::{Validate, validate};

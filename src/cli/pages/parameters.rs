@@ -1,0 +1,126 @@
+//! Parameters with their standard deviations and what the data say of them.
+
+use crate::config::ModelFile;
+use crate::config::model_file::Parameter;
+use crate::report::number;
+use crate::report::page::Page;
+use crate::verdict::Verdict;
+
+/// How many parameters have which verdict, in words, and whether all are identified.
+pub fn tally(model: &ModelFile) -> (String, bool) {
+    let rated = || model.parameters.iter().filter_map(|p| p.verdict);
+    let count = |wanted| rated().filter(|v| *v == wanted).count();
+    let mut words = vec![format!(
+        "{} of {} parameters are identified",
+        count(Verdict::Identified),
+        rated().count()
+    )];
+    let others = [
+        (Verdict::Weak, "weak"),
+        (Verdict::LowerBound, "known to one side only"),
+        (Verdict::NotIdentifiable, "not determined by these data"),
+    ];
+    for (verdict, word) in others {
+        match count(verdict) {
+            0 => {}
+            n => words.push(format!("{n} {word}")),
+        }
+    }
+    (words.join(", "), words.len() == 1)
+}
+
+/// The section; `truth` gives the true value of a parameter where it is known.
+pub fn section(page: &mut Page, model: &ModelFile, truth: &dyn Fn(&Parameter) -> Option<f64>) {
+    page.heading("Parameters");
+    let truths = model.parameters.iter().any(|p| truth(p).is_some());
+    // theta_1 needs no column that says 1
+    let named = |p: &Parameter| {
+        p.theta
+            .is_none_or(|theta| p.name == format!("theta_{theta}"))
+    };
+    let thetas = !model.parameters.iter().all(named);
+    let mut head = vec!["parameter", "joint"];
+    if thetas {
+        head.push("theta");
+    }
+    head.extend(["value", "std", "relative std"]);
+    if truths {
+        head.extend(["truth", "off by"]);
+    }
+    head.extend(["unit", "verdict", "meaning"]);
+    let rows: Vec<Vec<String>> = model
+        .parameters
+        .iter()
+        .map(|p| {
+            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
+            let std = p.std.unwrap_or(f64::NAN);
+            let (value, deviation) = match unknown {
+                true => number::value_and_std(f64::NAN, f64::NAN),
+                false => number::value_and_std(p.value, std),
+            };
+            let relative = match unknown {
+                true => number::ABSENT.to_owned(),
+                false => number::percent(std / p.value.abs()),
+            };
+            let mut row = vec![p.name.clone(), p.joint.clone().unwrap_or_default()];
+            if thetas {
+                row.push(p.theta.map_or(String::new(), |theta| theta.to_string()));
+            }
+            row.extend([value, deviation, relative]);
+            if truths {
+                let truth = truth(p).unwrap_or(f64::NAN);
+                row.push(number::value_and_std(truth, std).0);
+                let off = (p.value - truth) / std;
+                row.push(match off.is_finite() {
+                    true => format!("{off:+.1} std"),
+                    false => number::ABSENT.to_owned(),
+                });
+            }
+            let verdict = p.verdict.map_or("", Verdict::word);
+            row.extend([p.unit.clone(), verdict.to_owned(), p.meaning.clone()]);
+            row
+        })
+        .collect();
+    page.table(
+        "value and standard deviation (std) in the unit named",
+        &head,
+        &rows,
+    );
+    effects(page, model);
+}
+
+/// Effects that the model has beyond the declared structure.
+fn effects(page: &mut Page, model: &ModelFile) {
+    let rows: Vec<Vec<String>> = model
+        .effects
+        .iter()
+        .flat_map(|effect| {
+            effect.parameters.iter().map(|(key, p)| {
+                let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
+                vec![
+                    effect.name.clone(),
+                    effect.joint.clone().unwrap_or_default(),
+                    key.clone(),
+                    value,
+                    std,
+                    p.unit.clone(),
+                ]
+            })
+        })
+        .collect();
+    if !rows.is_empty() {
+        let head = [
+            "effect",
+            "joint",
+            "parameter",
+            "value",
+            "standard deviation",
+            "unit",
+        ];
+        page.table(
+            "effects that were added to the declared model",
+            &head,
+            &rows,
+        );
+    }
+}

@@ -1,0 +1,63 @@
+//! Where a page came from, so that the run can be repeated.
+
+use super::super::Context;
+use super::super::machine::Machine;
+use crate::log::{Provenance, escape};
+use crate::motion::Summary;
+use crate::report::number;
+use crate::report::page::Page;
+
+/// Files by name, span and checksum.
+fn files(page: &mut Page, caption: &str, inputs: &[Provenance]) {
+    let rows: Vec<Vec<String>> = inputs
+        .iter()
+        .map(|i| {
+            let log = i.samples > 0;
+            let only = |text: String| if log { text } else { String::new() };
+            vec![
+                escape(&i.name),
+                only(i.span.clone().unwrap_or_else(|| "whole".to_owned())),
+                only(i.samples.to_string()),
+                only(number::significant(i.duration_s, 5)),
+                i.sha256.clone(),
+            ]
+        })
+        .collect();
+    if !rows.is_empty() {
+        let head = ["file", "span", "samples", "duration [s]", "SHA-256"];
+        page.table(caption, &head, &rows);
+    }
+}
+
+/// The section: inputs, what the model was made from, processing, command and configuration.
+pub fn section(
+    page: &mut Page,
+    machine: &Machine,
+    inputs: &[Provenance],
+    model_inputs: &[Provenance],
+    summary: Option<&Summary>,
+    context: &Context,
+) {
+    page.heading("Where it came from");
+    files(page, "inputs of this run", inputs);
+    files(page, "what the model was made from", model_inputs);
+    if let Some(s) = summary {
+        page.paragraph(&format!(
+            "Parallel filter {} Hz, every {} samples; position filter {}.",
+            number::significant(s.cutoff_hz, 4),
+            s.decimation,
+            s.q_cutoff_hz.map_or("none".to_owned(), |f| format!(
+                "{} Hz",
+                number::significant(f, 4)
+            )),
+        ));
+    }
+    page.paragraph(&format!(
+        "cft-ident {}, called as:",
+        env!("CARGO_PKG_VERSION")
+    ));
+    page.code(context.command());
+    if let Ok(robot) = toml::to_string(&machine.file) {
+        page.details("robot file, with every setting of this run", &robot);
+    }
+}

@@ -1,0 +1,81 @@
+//! The command line as a report tells it: what was typed, without what belongs to one machine only.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+/// The line: absolute paths are cut to their last part, and the number of threads is left out, so
+/// that the same run makes the same report everywhere.
+pub(super) fn line(arguments: &[OsString]) -> String {
+    let mut words = vec!["cft-ident".to_owned()];
+    let mut rest = arguments.iter().skip(1).map(|a| a.to_string_lossy());
+    while let Some(word) = rest.next() {
+        if word == "--threads" {
+            rest.next();
+            continue;
+        }
+        if word.starts_with("--threads=") || word == "-q" || word == "--quiet" {
+            continue;
+        }
+        words.push(quoted(&local(&word)));
+    }
+    words.join(" ")
+}
+
+/// `--plot=/a/b.svg` and `-o/a/b` are `--plot=b.svg` and `-ob`; relative paths stay.
+fn local(word: &str) -> String {
+    let start = match word.strip_prefix("--") {
+        Some(long) => long.find('=').map_or(word.len(), |at| at + 3),
+        None if word.starts_with('-') => word.char_indices().nth(2).map_or(word.len(), |c| c.0),
+        None => 0,
+    };
+    let (option, value) = word.split_at(start);
+    let path = Path::new(value);
+    match path.file_name() {
+        Some(name) if path.is_absolute() => format!("{option}{}", name.to_string_lossy()),
+        _ => word.to_owned(),
+    }
+}
+
+/// As a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./@%,:=+~".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(words: &[&str]) -> String {
+        let words: Vec<OsString> = words.iter().map(OsString::from).collect();
+        line(&words)
+    }
+
+    #[test]
+    fn what_belongs_to_one_machine_is_left_out() {
+        let typed = of(&[
+            "/usr/bin/cft-ident",
+            "validate",
+            "/data/my log.csv@0..70%",
+            "-q",
+            "--threads",
+            "2",
+            "-m",
+            "runs/m.toml",
+            "--plot=/tmp/a.svg",
+            "-o/tmp/r.csv",
+        ]);
+        assert_eq!(
+            typed,
+            "cft-ident validate 'my log.csv@0..70%' -m runs/m.toml --plot=a.svg -or.csv"
+        );
+    }
+
+    #[test]
+    fn a_quote_inside_a_word_is_kept_apart() {
+        assert_eq!(of(&["x", "it's"]), "cft-ident 'it'\\''s'");
+    }
+}

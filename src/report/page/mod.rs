@@ -1,0 +1,331 @@
+//! One self-contained page: headings, paragraphs, tables and figures in one HTML file that opens
+//! from disk, on paper and on a phone, in light and in dark, without a network.
+//!
+//! Pictures are SVG and are seen without a script. Where a script runs, [`Traces`] take the place of
+//! their still picture and can be zoomed. The page's policy allows that one script, by its checksum,
+//! and nothing from anywhere else.
+
+mod encode;
+mod traces;
+
+use std::fmt::Write;
+
+pub use traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+
+use crate::log::Provenance;
+
+/// A page under construction. Every text that is given is escaped.
+#[derive(Debug, Clone)]
+pub struct Page {
+    title: String,
+    /// What stands before the first section.
+    opening: String,
+    sections: Vec<Section>,
+    scripted: bool,
+}
+
+#[derive(Debug, Clone)]
+struct Section {
+    heading: String,
+    body: String,
+}
+
+const STYLE: &str = include_str!("style.css");
+const VIEWER: &str = include_str!("viewer.js");
+
+impl Page {
+    /// An empty page.
+    pub fn new(title: &str) -> Self {
+        Page {
+            title: escaped(title),
+            opening: String::new(),
+            sections: Vec::new(),
+            scripted: false,
+        }
+    }
+
+    fn body(&mut self) -> &mut String {
+        match self.sections.last_mut() {
+            Some(section) => &mut section.body,
+            None => &mut self.opening,
+        }
+    }
+
+    /// The verdict in words; `good` where nothing calls for attention.
+    pub fn verdict(&mut self, text: &str, good: bool) {
+        let class = if good { "verdict" } else { "verdict bad" };
+        let _ = writeln!(self.body(), "<p class=\"{class}\">{}</p>", escaped(text));
+    }
+
+    /// Begins a section.
+    pub fn heading(&mut self, text: &str) {
+        self.sections.push(Section {
+            heading: escaped(text),
+            body: String::new(),
+        });
+    }
+
+    /// A paragraph.
+    pub fn paragraph(&mut self, text: &str) {
+        let _ = writeln!(self.body(), "<p>{}</p>", escaped(text));
+    }
+
+    /// A list of sentences; nothing where there are none.
+    pub fn list<S: AsRef<str>>(&mut self, items: impl IntoIterator<Item = S>) {
+        let items: String = items
+            .into_iter()
+            .map(|item| format!("<li>{}</li>\n", escaped(item.as_ref())))
+            .collect();
+        if !items.is_empty() {
+            let _ = writeln!(self.body(), "<ul>\n{items}</ul>");
+        }
+    }
+
+    /// A table; the first column holds names. A column of words is set to the left.
+    pub fn table(&mut self, caption: &str, head: &[&str], rows: &[Vec<String>]) {
+        let columns: Vec<Column> = (0..head.len())
+            .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
+            .collect();
+        let class = |c: usize| columns.get(c).map_or("", |column| column.class());
+        let mut out = String::from("<div class=\"wide\" tabindex=\"0\" role=\"region\"");
+        let _ = write!(
+            out,
+            " aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
+            escaped(caption)
+        );
+        for (c, name) in head.iter().enumerate() {
+            let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escaped(name));
+        }
+        out.push_str("</tr></thead><tbody>\n");
+        for row in rows {
+            out.push_str("<tr>");
+            for (c, cell) in row.iter().enumerate() {
+                let _ = write!(out, "<td{}>{}</td>", class(c), escaped(cell));
+            }
+            out.push_str("</tr>\n");
+        }
+        out.push_str("</tbody></table></div>\n");
+        self.body().push_str(&out);
+    }
+
+    /// A figure: an SVG document of this crate, its words escaped where it was drawn.
+    pub fn figure(&mut self, svg: &str) {
+        let svg = inline(svg);
+        let _ = writeln!(
+            self.body(),
+            "<figure><div class=\"still\">{svg}</div></figure>"
+        );
+    }
+
+    /// Series over time that can be zoomed, and the still picture that stands in for them.
+    pub fn traces(&mut self, traces: &Traces, still: &str) {
+        let (svg, data) = (inline(still), traces.data());
+        let _ = writeln!(
+            self.body(),
+            "<figure><div class=\"still\">{svg}</div>\
+             <script type=\"application/json\" class=\"traces\">{data}</script></figure>"
+        );
+        self.scripted = true;
+    }
+
+    /// A line of code.
+    pub fn code(&mut self, text: &str) {
+        let _ = writeln!(self.body(), "<pre>{}</pre>", escaped(text));
+    }
+
+    /// Text that is folded away, as it stands.
+    pub fn details(&mut self, summary: &str, text: &str) {
+        let _ = writeln!(
+            self.body(),
+            "<details><summary>{}</summary><pre>{}</pre></details>",
+            escaped(summary),
+            escaped(text)
+        );
+    }
+
+    /// The page as a file.
+    pub fn html(&self) -> String {
+        let mut out = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+             style-src 'unsafe-inline'; script-src '{}'\">\n\
+             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
+             <title>{title}</title><style>\n{STYLE}</style></head><body>\n<h1>{title}</h1>\n{}",
+            fingerprint(),
+            self.opening,
+            title = self.title,
+        );
+        if self.sections.len() > 2 {
+            out.push_str("<nav aria-label=\"sections\">");
+            for (k, section) in self.sections.iter().enumerate() {
+                let _ = write!(out, "<a href=\"#s{}\">{}</a> ", k + 1, section.heading);
+            }
+            out.push_str("</nav>\n");
+        }
+        for (k, section) in self.sections.iter().enumerate() {
+            let _ = write!(
+                out,
+                "<section><h2 id=\"s{}\">{}</h2>\n{}</section>\n",
+                k + 1,
+                section.heading,
+                section.body
+            );
+        }
+        if self.scripted {
+            let _ = writeln!(out, "<script>{VIEWER}</script>");
+        }
+        out.push_str("</body></html>\n");
+        out
+    }
+}
+
+/// What a column of a table holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Column {
+    Numbers,
+    Words,
+    /// Sentences, which are broken into lines.
+    Long,
+    /// Checksums, which break anywhere.
+    Code,
+}
+
+/// Longest cell that stays on one line.
+const LONG: usize = 28;
+
+impl Column {
+    fn of<'a>(c: usize, mut cells: impl Iterator<Item = &'a String> + Clone) -> Self {
+        let checksum = |cell: &String| cell.len() == 64 && !cell.contains(' ');
+        if cells.clone().any(checksum) {
+            Column::Code
+        } else if cells.clone().any(|cell| cell.chars().count() > LONG) {
+            Column::Long
+        } else if c == 0 || cells.any(|cell| wordy(cell)) {
+            Column::Words
+        } else {
+            Column::Numbers
+        }
+    }
+
+    fn class(self) -> &'static str {
+        match self {
+            Column::Numbers => "",
+            Column::Words => " class=\"text\"",
+            Column::Long => " class=\"long\"",
+            Column::Code => " class=\"code\"",
+        }
+    }
+}
+
+/// Whether a cell holds words and not a number with its unit.
+fn wordy(cell: &str) -> bool {
+    let starts = cell.starts_with(|c: char| c.is_alphabetic());
+    starts && cell.chars().filter(|c| c.is_alphabetic()).count() > 3
+}
+
+/// Inside HTML the XML declaration is not wanted.
+fn inline(svg: &str) -> &str {
+    svg.find("<svg").map_or(svg, |start| &svg[start..])
+}
+
+/// The script's checksum as a content security policy names it.
+fn fingerprint() -> String {
+    let hex = Provenance::of_text("", VIEWER).sha256;
+    let digit = |c: u8| char::from(c).to_digit(16).unwrap_or(0) as u8;
+    let bytes: Vec<u8> = hex
+        .as_bytes()
+        .chunks(2)
+        .map(|pair| pair.iter().fold(0, |byte, c| byte << 4 | digit(*c)))
+        .collect();
+    format!("sha256-{}", encode::base64(&bytes))
+}
+
+/// Text as HTML may hold it.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            c if c.is_control() && c != '\n' => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_is_given_becomes_markup() {
+        let evil = "</script><script>alert('x')</script>&\"";
+        let mut page = Page::new(evil);
+        page.verdict(evil, true);
+        for _ in 0..3 {
+            page.heading(evil);
+        }
+        page.paragraph(evil);
+        page.list([evil]);
+        page.details(evil, evil);
+        page.table(evil, &[evil], &[vec![evil.to_owned()]]);
+        page.traces(&Traces::sample(evil), "<svg></svg>");
+        let html = page.html();
+        // the data of the traces and the viewer
+        assert_eq!(html.matches("<script").count(), 2);
+        assert_eq!(html.matches("</script>").count(), 2);
+        assert!(!html.contains("alert('x')"));
+        assert!(html.matches("&lt;script&gt;").count() >= 16);
+    }
+
+    #[test]
+    fn the_page_asks_for_nothing_from_anywhere() {
+        let mut page = Page::new("t");
+        page.traces(&Traces::sample("q1"), "<svg></svg>");
+        let html = page.html();
+        for word in [
+            "http:", "https:", "src=", "@import", "url(", "fetch(", "import(",
+        ] {
+            let found = html.replace("http://www.w3.org/2000/svg", "");
+            assert!(!found.contains(word), "{word}");
+        }
+        assert!(html.contains("default-src 'none'"));
+    }
+
+    #[test]
+    fn the_policy_names_the_script_by_its_checksum() {
+        // of an empty script, from the definition of SHA-256
+        assert_eq!(encode::base64(&[0xe3, 0xb0, 0xc4, 0x42]), "47DEQg==");
+        let fingerprint = fingerprint();
+        assert_eq!(fingerprint.len(), "sha256-".len() + 44);
+        assert!(Page::new("t").html().contains(&fingerprint));
+    }
+
+    #[test]
+    fn every_colour_of_the_figures_has_its_place_in_the_dark() {
+        for colour in crate::report::figure::PALETTE {
+            let known = STYLE.contains(&format!("[fill=\"{colour}\"]"))
+                || STYLE.contains(&format!("[stroke=\"{colour}\"]"))
+                || STYLE.contains(&format!("--sky:{colour}"));
+            assert!(known, "{colour}");
+        }
+    }
+
+    #[test]
+    fn a_column_of_words_is_told_from_a_column_of_numbers() {
+        let cells = |text: &[&str]| text.iter().map(|t| (*t).to_owned()).collect::<Vec<_>>();
+        assert_eq!(
+            Column::of(1, cells(&["1.2 N", "-"]).iter()),
+            Column::Numbers
+        );
+        assert_eq!(Column::of(1, cells(&["-", "weak"]).iter()), Column::Words);
+        assert_eq!(
+            Column::of(3, cells(&[&"0".repeat(64)]).iter()),
+            Column::Code
+        );
+    }
+}

@@ -1,0 +1,315 @@
+//! Series over time for the viewer of a page, thinned so that every extreme survives and the page
+//! stays small.
+
+use serde_json::{Value, json};
+
+use super::encode;
+
+/// Bytes that the numbers of all traces of one figure may take before they are written as text (a
+/// third more): a log of 60 s at 1 kHz with four joints, measured, reconstructed twice and both
+/// residuals, fits whole.
+const MOST_BYTES: usize = 2_700_000;
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TraceStyle {
+    Measured,
+    Model,
+    Residual,
+    Before,
+    After,
+    Motion,
+}
+
+impl TraceStyle {
+    fn name(self) -> &'static str {
+        match self {
+            TraceStyle::Measured => "measured",
+            TraceStyle::Model => "model",
+            TraceStyle::Residual => "residual",
+            TraceStyle::Before => "before",
+            TraceStyle::After => "after",
+            TraceStyle::Motion => "motion",
+        }
+    }
+}
+
+/// One line of a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TraceLine {
+    pub name: String,
+    pub style: TraceStyle,
+    /// One value per time of the trace; a gap where it is not finite.
+    pub values: Vec<f64>,
+}
+
+/// One panel: what shares an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TracePanel {
+    /// Joint or coordinate; empty where the panel above has it.
+    pub name: String,
+    /// What it is, and its unit.
+    pub quantity: String,
+    pub unit: String,
+    /// Low and centred on 0, below the panel that it belongs to: a residual.
+    pub small: bool,
+    pub limits: Option<[f64; 2]>,
+    pub lines: Vec<TraceLine>,
+}
+
+/// What is shown at a time: one log in one form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Name in the list of traces.
+    pub name: String,
+    /// Time [s], rising.
+    pub t: Vec<f64>,
+    /// First samples of stretches that no line joins with what is before.
+    pub breaks: Vec<usize>,
+    pub panels: Vec<TracePanel>,
+}
+
+/// The traces of one figure; the first is shown first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traces {
+    /// What a screen reader says.
+    pub label: String,
+    /// Traces with the same lines.
+    pub traces: Vec<Trace>,
+}
+
+impl Traces {
+    /// The data as the viewer reads them, safe inside a script element.
+    pub(super) fn data(&self) -> String {
+        let most = self.most_samples();
+        let views: Vec<Value> = self.traces.iter().map(|t| t.view(most)).collect();
+        let data = json!({"label": self.label, "over": "time", "unit": "s", "views": views});
+        // inside a script element the end tag alone has a meaning; no `<` is left at all
+        data.to_string().replace('<', "\\u003c")
+    }
+
+    /// Samples that a trace may have for all of them to fit.
+    fn most_samples(&self) -> usize {
+        let longest = self.traces.iter().map(|t| t.t.len()).max().unwrap_or(0);
+        let bytes = |most: usize| -> usize {
+            let each = self.traces.iter();
+            each.map(|t| t.t.len().min(most) * (4 + 2 * t.lines().count()))
+                .sum()
+        };
+        let mut most = longest;
+        while bytes(most) > MOST_BYTES && most > 16 {
+            most = most / 10 * 9;
+        }
+        most
+    }
+}
+
+impl Trace {
+    fn lines(&self) -> impl Iterator<Item = &TraceLine> {
+        self.panels.iter().flat_map(|panel| &panel.lines)
+    }
+
+    fn view(&self, most: usize) -> Value {
+        let buckets = Buckets::of(self.t.len(), &self.breaks, most);
+        let t = buckets.times(&self.t);
+        let [from, to] = encode::extent(&t);
+        let line = |line: &TraceLine| {
+            let values = buckets.extremes(&line.values);
+            let extent = encode::extent(&values);
+            json!({
+                "name": line.name,
+                "style": line.style.name(),
+                "from": extent[0],
+                "to": extent[1],
+                "data": encode::values(&values, extent),
+            })
+        };
+        let panel = |panel: &TracePanel| {
+            json!({
+                "name": panel.name,
+                "quantity": panel.quantity,
+                "unit": panel.unit,
+                "small": panel.small,
+                "limits": panel.limits,
+                "lines": panel.lines.iter().map(line).collect::<Vec<_>>(),
+            })
+        };
+        json!({
+            "name": self.name,
+            "t": {"from": from, "to": to, "data": encode::times(&t, [from, to])},
+            "breaks": buckets.breaks(),
+            "panels": self.panels.iter().map(panel).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Runs of consecutive samples, each to become at most two, none across a break.
+struct Buckets {
+    /// First sample of each and the end of the last.
+    bounds: Vec<usize>,
+    /// Buckets that begin a stretch.
+    begins: Vec<usize>,
+    /// Every sample is a bucket of its own.
+    whole: bool,
+}
+
+impl Buckets {
+    fn of(samples: usize, breaks: &[usize], most: usize) -> Self {
+        let whole = samples <= most;
+        let size = match whole {
+            true => 1,
+            false => (2 * samples).div_ceil(most.max(2)),
+        };
+        let mut stretches: Vec<usize> = breaks.iter().copied().filter(|b| *b < samples).collect();
+        stretches.extend([0, samples]);
+        stretches.sort_unstable();
+        stretches.dedup();
+        let (mut bounds, mut begins) = (Vec::new(), Vec::new());
+        for pair in stretches.windows(2) {
+            begins.push(bounds.len());
+            bounds.extend((pair[0]..pair[1]).step_by(size));
+        }
+        bounds.push(samples);
+        Buckets {
+            bounds,
+            begins,
+            whole,
+        }
+    }
+
+    fn ranges(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        self.bounds.windows(2).map(|pair| pair[0]..pair[1])
+    }
+
+    /// First sample of each stretch among those that are left.
+    fn breaks(&self) -> Vec<usize> {
+        let each = if self.whole { 1 } else { 2 };
+        self.begins.iter().map(|b| each * b).collect()
+    }
+
+    fn times(&self, t: &[f64]) -> Vec<f64> {
+        if self.whole {
+            return t.to_vec();
+        }
+        let ends = |range: std::ops::Range<usize>| {
+            let bucket = t.get(range).unwrap_or_default();
+            [bucket.first(), bucket.last()].map(|t| t.copied().unwrap_or(0.0))
+        };
+        self.ranges().flat_map(ends).collect()
+    }
+
+    /// The smallest and the largest of each bucket, in their order.
+    fn extremes(&self, values: &[f64]) -> Vec<f64> {
+        if self.whole {
+            return values.to_vec();
+        }
+        let both = |range: std::ops::Range<usize>| {
+            let bucket = values.get(range).unwrap_or_default().iter().enumerate();
+            let finite = bucket.filter(|(_, v)| v.is_finite());
+            let low = finite.clone().min_by(|a, b| a.1.total_cmp(b.1));
+            let high = finite.max_by(|a, b| a.1.total_cmp(b.1));
+            match (low, high) {
+                (Some(low), Some(high)) if low.0 <= high.0 => [*low.1, *high.1],
+                (Some(low), Some(high)) => [*high.1, *low.1],
+                _ => [f64::NAN; 2],
+            }
+        };
+        self.ranges().flat_map(both).collect()
+    }
+}
+
+#[cfg(test)]
+impl Traces {
+    /// Two samples, every word of it `text`.
+    pub(super) fn sample(text: &str) -> Self {
+        let line = TraceLine {
+            name: text.into(),
+            style: TraceStyle::Measured,
+            values: vec![1.0, 2.0],
+        };
+        let panel = TracePanel {
+            name: text.into(),
+            quantity: text.into(),
+            unit: text.into(),
+            small: false,
+            limits: None,
+            lines: vec![line],
+        };
+        Traces {
+            label: text.into(),
+            traces: vec![Trace {
+                name: text.into(),
+                t: vec![0.0, 1.0],
+                breaks: vec![0],
+                panels: vec![panel],
+            }],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spike_of_one_sample_survives_and_no_bucket_crosses_a_break() {
+        let mut values: Vec<f64> = (0..1000).map(|k| f64::from(k) * 1e-3).collect();
+        values[333] = 9.0;
+        values[700] = -9.0;
+        values[20..40].fill(f64::NAN);
+        let buckets = Buckets::of(1000, &[0, 501], 100);
+        assert!(buckets.ranges().all(|r| r.end <= 501 || r.start >= 501));
+        let t: Vec<f64> = (0..1000).map(f64::from).collect();
+        let thinned = buckets.extremes(&values);
+        assert_eq!(thinned.len(), buckets.times(&t).len());
+        assert!(thinned.len() <= 104, "{}", thinned.len());
+        assert!(thinned.contains(&9.0) && thinned.contains(&-9.0));
+        assert!(thinned[2].is_nan() && thinned[0] == 0.0);
+        let second = buckets.breaks()[1];
+        assert_eq!(buckets.times(&t)[second], 501.0);
+        assert!(buckets.times(&t).is_sorted());
+    }
+
+    #[test]
+    fn a_minute_of_four_joints_is_kept_whole_and_an_hour_still_fits() {
+        let of = |samples: usize| {
+            let line = |style| TraceLine {
+                name: "l".into(),
+                style,
+                values: vec![0.5; samples],
+            };
+            let panel = TracePanel {
+                lines: vec![
+                    line(TraceStyle::Measured),
+                    line(TraceStyle::Before),
+                    line(TraceStyle::After),
+                    line(TraceStyle::Before),
+                    line(TraceStyle::After),
+                ],
+                ..Traces::sample("q").traces[0].panels[0].clone()
+            };
+            Traces {
+                label: "l".into(),
+                traces: vec![Trace {
+                    name: "n".into(),
+                    t: (0..samples).map(|k| k as f64).collect(),
+                    breaks: vec![0],
+                    panels: vec![panel; 4],
+                }],
+            }
+        };
+        let minute = of(60_001);
+        assert_eq!(minute.most_samples(), 60_001);
+        assert!(minute.data().len() < 3_700_000, "{}", minute.data().len());
+        let hour = of(400_000).data();
+        assert!(hour.len() < 3_700_000, "{}", hour.len());
+    }
+
+    #[test]
+    fn words_from_a_file_cannot_leave_the_script_element() {
+        let data = Traces::sample("</script><!--").data();
+        assert!(!data.contains('<'));
+        let back: Value = serde_json::from_str(&data).unwrap();
+        assert_eq!(back["views"][0]["panels"][0]["name"], "</script><!--");
+    }
+}
