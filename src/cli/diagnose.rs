@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::diagnose_fault::{self as fault, DataFault};
 use super::diagnose_prior::{information, open};
 use super::friction::new_model;
 use super::lsq::processing;
@@ -12,8 +13,7 @@ use super::refined::{Held, hold, in_file, refined};
 use super::{CliError, Context, Outcome, arguments, files, pages};
 use crate::config::ModelFile;
 use crate::diagnose::{
-    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Suspicion,
-    Unknown,
+    self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
 };
 use crate::effect::{Added, Refined, Told};
 use crate::log::LogSpec;
@@ -69,15 +69,6 @@ pub enum Found {
     Diagnosed(Box<Diagnosed>),
     /// A fault of the data, which comes before any physics.
     DataFault(DataFault),
-}
-
-/// A fault of the data.
-#[derive(Debug, Clone)]
-pub struct DataFault {
-    pub kind: String,
-    pub channel: Option<String>,
-    pub effect: String,
-    pub remedy: String,
 }
 
 /// Result of the stage.
@@ -163,7 +154,7 @@ pub fn diagnose(
     ) {
         Ok(diagnosis) => diagnosis,
         Err(DiagnoseError::Channels(found)) => {
-            return Ok(Found::DataFault(wrong_channel(machine, found)));
+            return Ok(Found::DataFault(fault::wrong_channel(machine, found)));
         }
         Err(DiagnoseError::Interrupted) => return Err(CliError::interrupted()),
         Err(DiagnoseError::Motion(e)) => return Err(CliError::input(e)),
@@ -190,62 +181,6 @@ pub fn diagnose(
         parallel,
         cutoff_hz: case.cutoff_hz,
     })))
-}
-
-/// A torque channel that the model knows otherwise, as a fault.
-fn wrong_channel(machine: &Machine, found: Suspicion) -> DataFault {
-    let names = machine.robot.joint_names();
-    let (joint, effect, remedy) = match found {
-        Suspicion::Turned { joint } => (
-            joint,
-            format!(
-                "the torque of {} has the other sign than the model's",
-                names[joint]
-            ),
-            "set `torque_scale` of the joint to its negative in [log], or correct the log",
-        ),
-        Suspicion::Exchanged { joint, with } => (
-            joint,
-            format!(
-                "the torques of {} and {} have changed places",
-                names[joint], names[with]
-            ),
-            "exchange the two torque columns in [log]",
-        ),
-    };
-    DataFault {
-        kind: "wrong-sign-or-order".to_owned(),
-        channel: Some(names[joint].clone()),
-        effect,
-        remedy: remedy.to_owned(),
-    }
-}
-
-/// The JSON fields of a command that ends with a fault of the data.
-pub fn fault_json(fault: &DataFault) -> Value {
-    json!({
-        "verdict": "data-fault",
-        "steps": [],
-        "before": null,
-        "after": null,
-        "unexplained": [],
-        "candidates": [],
-        "processing": null,
-        "faults": [{
-            "kind": fault.kind,
-            "channel": fault.channel,
-            "effect": fault.effect,
-            "remedy": fault.remedy,
-        }],
-    })
-}
-
-/// The same for a person.
-pub fn fault_text(fault: &DataFault) -> String {
-    format!(
-        "The data are at fault ({}): {}.\n  {}\n",
-        fault.kind, fault.effect, fault.remedy
-    )
 }
 
 /// Parameters of an accepted effect with their standard deviations.
@@ -577,8 +512,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 super::outputs::write_text(path, &page)?;
             }
             return Ok(Outcome {
-                text: fault_text(&fault),
-                document: Document::new("diagnose", &[], &[], &fault_json(&fault))?,
+                text: fault::text(&fault),
+                document: Document::new("diagnose", &[], &[], &fault::json(&fault))?,
                 missed: Vec::new(),
             });
         }

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use super::machine::Machine;
 use super::refined::refined;
 use super::{
-    CliError, Context, Exit, Outcome, campaign, diagnose, friction, lsq, simulate, validate,
+    CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, friction, lsq, simulate,
+    validate,
 };
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
@@ -197,8 +198,8 @@ fn execute(
     };
     match diagnose::diagnose(&machine, &model, "model.toml", &roles, false, context) {
         Ok(diagnose::Found::DataFault(fault)) => {
-            diagnose_json = diagnose::fault_json(&fault);
-            lacking = diagnose::fault_text(&fault);
+            diagnose_json = diagnose_fault::json(&fault);
+            lacking = diagnose_fault::text(&fault);
         }
         Ok(diagnose::Found::Diagnosed(found)) => {
             diagnose_json = diagnose::json(&machine, &found);

@@ -6,6 +6,7 @@
 mod campaign;
 pub mod convert;
 pub mod diagnose;
+mod diagnose_fault;
 mod diagnose_prior;
 pub mod excite;
 pub mod friction;

@@ -1,6 +1,7 @@
 //! The page of `diagnose`, and its picture.
 
-use super::super::diagnose::{DataFault, Diagnosed, in_words, into_model, verdict};
+use super::super::diagnose::{Diagnosed, in_words, into_model, verdict};
+use super::super::diagnose_fault::DataFault;
 use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
