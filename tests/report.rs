@@ -146,7 +146,7 @@ fn the_report_of_a_minute_is_whole_small_and_the_same_again() {
     let verdict = page.find("class=\"verdict").unwrap();
     let table = page.find("<table>").unwrap();
     assert!(verdict < table && table < page.find("<h2").unwrap());
-    assert!(page.contains("cft-ident validate unseen.csv -m model.toml --report page.html"));
+    assert!(page.contains("cft-ident validate unseen.csv -m model.toml</pre>"));
     println!("{} bytes", page.len());
 }
 
@@ -159,6 +159,65 @@ fn a_fit_tells_what_it_leaves_open_and_a_log_used_twice_is_no_test() {
     let folder = tempfile::tempdir().unwrap();
     let page = validate(folder.path(), "id.csv", "2");
     assert!(page.contains("id.csv was used to make this model"));
+}
+
+#[test]
+fn a_motion_is_told_before_the_robot_moves() {
+    let at = campaign();
+    run(
+        at,
+        &[
+            "excite",
+            "--check",
+            "configs/table3.toml",
+            "--report",
+            "motion.html",
+        ],
+    );
+    let page = read(&at.join("motion.html"));
+    is_sound(&page);
+    assert!(page.contains("The motion keeps every limit."));
+    assert_eq!(
+        headings(&page),
+        [
+            "Expected parameters",
+            "Positions, speeds and drives",
+            "Spectrum",
+            "Where it came from"
+        ]
+    );
+    assert_eq!(page.matches("class=\"traces\">").count(), 1);
+}
+
+#[test]
+fn a_diagnosis_shows_what_was_added_and_what_was_not() {
+    let at = campaign();
+    run(
+        at,
+        &[
+            "diagnose",
+            "id.csv",
+            "-m",
+            "model.toml",
+            "--holdout",
+            "unseen.csv@0..15s",
+            "--report",
+            "diagnosis.html",
+        ],
+    );
+    let page = read(&at.join("diagnosis.html"));
+    is_sound(&page);
+    // friction was declared without its saturating terms
+    assert!(page.contains("The model lacks: "));
+    let headings = headings(&page);
+    for heading in [
+        "What was added",
+        "Candidates that were not added",
+        "Data quality",
+    ] {
+        assert!(headings.contains(&heading), "{headings:?}");
+    }
+    assert_eq!(page.matches("<figure>").count(), 3);
 }
 
 #[cfg(unix)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::machine::Machine;
-use super::{CliError, Context, Outcome, arguments};
+use super::{CliError, Context, Outcome, arguments, files, pages};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_theta, friction_unit};
 use crate::config::model_file::{ModelProvenance, Parameter};
@@ -53,6 +53,9 @@ pub struct Args {
     /// Draw the friction curves; may be given more than once
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
     pub plot: Vec<PathBuf>,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
     /// Seed of the starting points
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -447,15 +450,17 @@ pub fn figure(machine: &Machine, found: &Identified) -> FrictionFigure {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs: Vec<&Path> = vec![&args.output];
-    outputs.extend(args.plot.iter().map(PathBuf::as_path));
+    outputs.extend(args.plot.iter().chain(&args.report).map(PathBuf::as_path));
     context.check_outputs(&inputs, &outputs)?;
-    let machine = Machine::load(&args.robot)?;
+    let robot = files::robot(Path::new(&args.robot))?;
+    let machine = Machine::new(&args.robot, robot.value);
+    let mut given = vec![robot.provenance];
     let old = match &args.model {
         None => None,
         Some(path) => {
-            let model = ModelFile::load(path)?;
-            model.belongs_to(&path.display().to_string(), &machine.file)?;
-            Some(model)
+            let model = files::model_of(path, &machine.file)?;
+            given.push(model.provenance);
+            Some(model.value)
         }
     };
     let found = identify(&machine, &args.logs, args.joint.as_deref(), context)?;
@@ -474,6 +479,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &json(&machine, &found),
     )?;
     let mut text = text(&machine, &found);
+    if let Some(path) = &args.report {
+        let page = pages::FrictionFit {
+            machine: &machine,
+            found: &found,
+            file: &model,
+            logs: &args.logs,
+            given,
+        };
+        let page = pages::friction_fit(&page, context)?;
+        context.check()?;
+        super::outputs::write_text(path, &page)?;
+    }
     context.check()?;
     for path in &args.plot {
         super::outputs::write_text(path, &figure(&machine, &found).svg())?;

@@ -6,7 +6,8 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use super::machine::Machine;
-use super::refined::refined;
+use super::pages::{self, Look};
+use super::refined::{held_for_pictures, refined};
 use super::{
     CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, friction, lsq, simulate,
     validate,
@@ -77,8 +78,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let campaign = Campaign::load(&file)?;
     let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
-    let mut outcome = execute(&campaign, &base, &folder, context, warnings)?;
-    outcome.text += &format!("written to {}/\n", folder.display());
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let mut outcome = execute((&name, &campaign), &base, &folder, context, warnings)?;
+    outcome.text += &format!(
+        "written to {0}/; open {0}/report.html in a browser\n",
+        folder.display()
+    );
     Ok(outcome)
 }
 
@@ -104,7 +109,7 @@ fn logs(base: &Path, specs: &[String]) -> Result<Vec<LogSpec>, CliError> {
 }
 
 fn execute(
-    campaign: &Campaign,
+    (name, campaign): (&str, &Campaign),
     base: &Path,
     folder: &Path,
     context: &Context,
@@ -164,32 +169,34 @@ fn execute(
 
     // torque on logs that were not used
     let unseen = logs(base, &roles.validation)?;
+    let mut validated = None;
     let mut validate_json = Value::Null;
     let mut missed = Vec::new();
     let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
+    let numbers = refined(&model, "model.toml")?;
     if !unseen.is_empty() {
-        let numbers = refined(&model, "model.toml")?;
-        let validated =
-            validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_, _| {})?;
+        let found = validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_, _| {})?;
         let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
         let title = names.join(", ");
-        let figure = validate::figure(&machine, &validated.validation, &title).svg();
+        let figure = validate::figure(&machine, &found.validation, &title).svg();
         write(folder, "validation.svg", &figure, &mut files)?;
-        validate_json = validate::json(&machine, &validated.validation);
+        validate_json = validate::json(&machine, &found.validation);
         errors = validate::text(
             &machine,
-            &validated.validation,
+            &found.validation,
             &format!("torque on unseen data ({title})"),
         );
-        missed = validate::missed(&validated.validation, campaign.settings.max_relative_error);
-        warnings.extend(validated.warnings);
-        inputs.extend(validated.inputs);
+        missed = validate::missed(&found.validation, campaign.settings.max_relative_error);
+        warnings.extend(found.warnings.iter().cloned());
+        inputs.extend(found.inputs.iter().cloned());
+        validated = Some(found);
     }
 
     // what the declared model lacks; the validation logs decide nothing
     let mut refined_model = None;
     let mut diagnose_json = Value::Null;
     let mut lacking = String::new();
+    let (mut diagnosed, mut at_fault) = (None, None);
     let training = logs(base, &roles.identification)?;
     let roles = diagnose::Logs {
         train: &training,
@@ -200,6 +207,7 @@ fn execute(
         Ok(diagnose::Found::DataFault(fault)) => {
             diagnose_json = diagnose_fault::json(&fault);
             lacking = diagnose_fault::text(&fault);
+            at_fault = Some(fault);
         }
         Ok(diagnose::Found::Diagnosed(found)) => {
             diagnose_json = diagnose::json(&machine, &found);
@@ -209,6 +217,7 @@ fn execute(
                 write(folder, "refined.toml", &refined.to_toml()?, &mut files)?;
                 refined_model = Some(refined);
             }
+            diagnosed = Some(found);
         }
         // logs too short to look for effects are no reason to lose the fit
         Err(error) if error.exit() == Exit::Undetermined => {
@@ -232,7 +241,47 @@ fn execute(
         None => Value::Null,
         Some(truth) => comparison(refined_model.as_ref().unwrap_or(&model), truth),
     };
+    let held = match diagnosed {
+        None if !unseen.is_empty() => {
+            held_for_pictures(&machine, &unseen.iter().collect::<Vec<_>>(), context)?
+        }
+        _ => None,
+    };
+    let look = held.as_ref().map(|held| {
+        let names = unseen.iter().map(LogSpec::name);
+        Look::new(&machine, held, names)
+    });
+    let campaign_text = toml::to_string(campaign).unwrap_or_default();
+    let page = pages::Identify {
+        machine: &machine,
+        campaign: (name, &campaign_text),
+        friction: found.as_ref(),
+        fitted: &fitted,
+        declared: &model,
+        refined: refined_model.as_ref(),
+        numbers: &numbers,
+        validated: validated.as_ref(),
+        diagnosed: diagnosed.as_deref(),
+        fault: at_fault.as_ref(),
+        look: look.transpose()?,
+        unseen: &unseen,
+        logs: one_joint.iter().chain(&training).chain(&unseen).collect(),
+        truth: &|p| true_value(truth.as_ref(), p),
+        limit: campaign.settings.max_relative_error,
+        inputs: &inputs,
+        warnings: &warnings,
+    };
+    let residuals = match &diagnosed {
+        None => String::new(),
+        Some(found) => {
+            let figure = pages::diagnose_figure(&machine, found)?.svg();
+            write(folder, "residual.svg", &figure, &mut files)?;
+            figure
+        }
+    };
+    let page = pages::identify(&page, &residuals, context)?;
     context.check()?;
+    write(folder, "report.html", &page, &mut files)?;
     write(folder, "summary.txt", &text, &mut files)?;
     files.push("result.json".into());
     let result = json!({

@@ -3,8 +3,18 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-/// The line: absolute paths are cut to their last part, and the number of threads is left out, so
-/// that the same run makes the same report everywhere.
+/// Options that name what is written.
+const OUTPUTS: [&str; 6] = [
+    "-o",
+    "--output",
+    "--plot",
+    "--report",
+    "--json",
+    "--samples",
+];
+
+/// The line: absolute paths are cut to their last part, and left out where they name an output, as
+/// is the number of threads, so that the same run makes the same report everywhere.
 pub(super) fn line(arguments: &[OsString]) -> String {
     let mut words = vec!["cft-ident".to_owned()];
     let mut rest = arguments.iter().skip(1).map(|a| a.to_string_lossy());
@@ -16,12 +26,24 @@ pub(super) fn line(arguments: &[OsString]) -> String {
         if word.starts_with("--threads=") || word == "-q" || word == "--quiet" {
             continue;
         }
+        if OUTPUTS.contains(&&*word) {
+            match rest.next() {
+                Some(value) if Path::new(&*value).is_absolute() => {}
+                value => words.extend([word].into_iter().chain(value).map(|w| quoted(&w))),
+            }
+            continue;
+        }
+        let glued = OUTPUTS.iter().find_map(|name| word.strip_prefix(name));
+        let glued = glued.map(|value| value.strip_prefix('=').unwrap_or(value));
+        if glued.is_some_and(|value| Path::new(value).is_absolute()) {
+            continue;
+        }
         words.push(quoted(&local(&word)));
     }
     words.join(" ")
 }
 
-/// `--plot=/a/b.svg` and `-o/a/b` are `--plot=b.svg` and `-ob`; relative paths stay.
+/// `--model=/a/b.toml` and `-m/a/b.toml` are `--model=b.toml` and `-mb.toml`; relative paths stay.
 fn local(word: &str) -> String {
     let start = match word.strip_prefix("--") {
         Some(long) => long.find('=').map_or(word.len(), |at| at + 3),
@@ -65,12 +87,17 @@ mod tests {
             "2",
             "-m",
             "runs/m.toml",
+            "--holdout=/data/b.csv",
             "--plot=/tmp/a.svg",
             "-o/tmp/r.csv",
+            "--report",
+            "/tmp/r.html",
+            "--json",
+            "r.json",
         ]);
         assert_eq!(
             typed,
-            "cft-ident validate 'my log.csv@0..70%' -m runs/m.toml --plot=a.svg -or.csv"
+            "cft-ident validate 'my log.csv@0..70%' -m runs/m.toml --holdout=b.csv --json r.json"
         );
     }
 

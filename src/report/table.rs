@@ -60,6 +60,16 @@ impl Table {
         self.rows.push(row);
     }
 
+    /// Caption, names of the columns and rows, for another way to show them.
+    pub(super) fn parts(&self) -> (&str, Vec<&str>, &[Vec<String>]) {
+        let names = self.columns.iter().map(|(name, _)| name.as_str());
+        (
+            self.caption.as_deref().unwrap_or(""),
+            names.collect(),
+            &self.rows,
+        )
+    }
+
     /// Whether no row was added.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()

@@ -27,13 +27,13 @@ pub(super) struct Judged {
     pub together: Option<Foresight>,
     pub uses: Vec<Use>,
     /// Amplitudes of the speed per coordinate and harmonic; of a series alone.
-    spectrum: Option<Vec<Vec<f64>>>,
+    pub spectrum: Option<Vec<Vec<f64>>>,
     /// Frequency below which the torque's power lies, per joint \[Hz\]; of a series alone.
-    band: Option<Vec<f64>>,
+    pub band: Option<Vec<f64>>,
     seconds: f64,
     periods: Option<u32>,
     /// Of a one-joint move: what it tells about the joint's friction.
-    friction: Option<Friction>,
+    pub friction: Option<Friction>,
     pub evaluations: Option<u64>,
     pub warnings: Vec<String>,
 }
@@ -299,7 +299,7 @@ impl Judged {
         text
     }
 
-    fn limits_table(&self, bench: &Bench, name: &str) -> Table {
+    pub fn limits_table(&self, bench: &Bench, name: &str) -> Table {
         let shown = |value: Option<f64>, digits| {
             value.map_or(number::ABSENT.into(), |v| number::significant(v, digits))
         };
@@ -348,7 +348,7 @@ impl Judged {
         table
     }
 
-    fn parameters_table(&self) -> Table {
+    pub fn parameters_table(&self) -> Table {
         let rows = self.foresight.rows;
         let caption = format!(
             "expected from {} samples, friction known:",
@@ -385,7 +385,7 @@ impl Judged {
 }
 
 impl Friction {
-    fn table(&self, rows: f64) -> Table {
+    pub fn table(&self, rows: f64) -> Table {
         let caption = format!(
             "friction of {} expected from {} samples:",
             self.joint,

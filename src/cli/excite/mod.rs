@@ -3,6 +3,7 @@
 
 mod given;
 mod judge;
+mod page;
 mod samples;
 
 use std::path::{Path, PathBuf};
@@ -118,6 +119,9 @@ pub struct Args {
     /// Draw positions, speeds and volts with their limits
     #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
     pub plot: Option<PathBuf>,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
 }
 
 /// What a design makes small.
@@ -233,6 +237,7 @@ struct Names {
     trajectory: Option<PathBuf>,
     samples: Option<PathBuf>,
     plot: Option<PathBuf>,
+    report: Option<PathBuf>,
 }
 
 impl Names {
@@ -250,13 +255,14 @@ impl Names {
                     trajectory: numbered(&args.output),
                     samples: numbered(&args.samples),
                     plot: numbered(&args.plot),
+                    report: numbered(&args.report),
                 }
             })
             .collect()
     }
 
     fn paths(&self) -> impl Iterator<Item = &Path> {
-        let all = [&self.trajectory, &self.samples, &self.plot];
+        let all = [&self.trajectory, &self.samples, &self.plot, &self.report];
         all.into_iter().filter_map(|path| path.as_deref())
     }
 }
@@ -489,9 +495,14 @@ fn extras(
     title: &str,
 ) -> Result<String, CliError> {
     let mut text = String::new();
+    let title = Path::new(title).file_name().unwrap_or_default();
+    let title = title.to_string_lossy();
+    if let Some(path) = &names.report {
+        write_text(path, &page::page(bench, motion, judged, &title))?;
+        text += &format!("written: {}\n", path.display());
+    }
     if let Some(path) = &names.plot {
-        let title = Path::new(title).file_name().unwrap_or_default();
-        let figure = judge::figure(bench, motion, judged, &title.to_string_lossy());
+        let figure = judge::figure(bench, motion, judged, &title);
         write_text(path, &figure.svg())?;
         text += &format!("written: {}\n", path.display());
     }

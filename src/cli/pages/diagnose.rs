@@ -48,7 +48,18 @@ pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
         .map(|s| d.model.effects[s.effect].title(&machine.robot))
         .collect();
     match verdict(d) {
-        "effects-found" => (format!("The model lacks: {}.", titles.join("; ")), true),
+        "effects-found" => {
+            let mut text = format!("The model lacks: {}.", titles.join("; "));
+            if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
+                text += &format!(
+                    " With it the error on data that decided nothing goes from {} to {}, as the \
+                     mean over the joints.",
+                    number::percent(before.overall.mean_relative_error),
+                    number::percent(after.overall.mean_relative_error)
+                );
+            }
+            (text, true)
+        }
         "nothing-missing" => (
             "Nothing is missing: what is left of the torque is noise.".to_owned(),
             true,
@@ -75,8 +86,8 @@ pub fn diagnose(
     let (text, good) = words(machine, found);
     page.verdict(&text, good);
     errors(&mut page, machine, found);
+    sections(&mut page, machine, found, figure)?;
     let look = look(machine, found)?;
-    sections(&mut page, of, found, &look, figure)?;
     let refined = into_model(machine, of.file, found);
     parameters::section(&mut page, &refined, &|_| None);
     friction::section(
@@ -90,22 +101,32 @@ pub fn diagnose(
     inputs.extend(found.held.inputs.iter().cloned());
     let summary = Some(&found.held.summary);
     let made_from = &of.file.provenance.inputs;
-    provenance::section(&mut page, machine, &inputs, made_from, summary, context);
+    provenance::section(
+        &mut page,
+        &machine.file,
+        &inputs,
+        made_from,
+        summary,
+        context,
+    );
     Ok(page.html())
 }
 
 /// What was added, the torque and the residual before and after, and what was not added.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
 pub fn sections(
     page: &mut Page,
-    of: &Diagnose,
+    machine: &Machine,
     found: &Diagnosed,
-    look: &Look,
     figure: &str,
 ) -> Result<(), CliError> {
+    let look = look(machine, found)?;
     let d = &found.diagnosis;
     if !d.steps.is_empty() {
         page.heading("What was added");
-        steps(page, of.machine, found);
+        steps(page, machine, found);
     }
     // logs that decided nothing, where there are any
     let all: Vec<usize> = (0..look.names.len()).collect();
@@ -126,9 +147,9 @@ pub fn sections(
         true => vec![Drawn::only(&found.given)],
         false => vec![before, after],
     };
-    torque::section(page, look, shown, &models, &names.join(", "))?;
+    torque::section(page, &look, shown, &models, &names.join(", "))?;
     residual::section(page, figure);
-    candidates(page, of.machine, found);
+    candidates(page, machine, found);
     Ok(())
 }
 
@@ -181,7 +202,14 @@ pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result
     quality::section(&mut page, of.machine, &of.logs, &[], context)?;
     let inputs = [of.given.clone()];
     let made_from = &of.file.provenance.inputs;
-    provenance::section(&mut page, of.machine, &inputs, made_from, None, context);
+    provenance::section(
+        &mut page,
+        &of.machine.file,
+        &inputs,
+        made_from,
+        None,
+        context,
+    );
     Ok(page.html())
 }
 

@@ -81,6 +81,6 @@ pub fn lsq(of: &Lsq, context: &Context) -> Result<String, CliError> {
     let mut inputs = of.given.clone();
     inputs.extend(of.found.inputs.iter().cloned());
     let summary = Some(&of.found.summary);
-    provenance::section(&mut page, of.machine, &inputs, &[], summary, context);
+    provenance::section(&mut page, &of.machine.file, &inputs, &[], summary, context);
     Ok(page.html())
 }

@@ -4,16 +4,20 @@
 mod diagnose;
 mod fit;
 mod friction;
+mod friction_fit;
+mod identify;
 mod look;
 mod lsq;
 mod parameters;
-mod provenance;
+pub mod provenance;
 mod quality;
 mod residual;
 mod torque;
 mod validate;
 
 pub(super) use diagnose::{Diagnose, data_fault, diagnose, figure as diagnose_figure};
+pub(super) use friction_fit::{FrictionFit, friction_fit};
+pub(super) use identify::{Identify, identify};
 pub(super) use look::Look;
 pub(super) use lsq::{Lsq, lsq};
 pub(super) use validate::{Validate, validate};

@@ -4,7 +4,7 @@ use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::report::number;
 use crate::report::page::Page;
-use crate::verdict::Verdict;
+use crate::verdict::{IDENTIFIED, Verdict};
 
 /// How many parameters have which verdict, in words, and whether all are identified.
 pub fn tally(model: &ModelFile) -> (String, bool) {
@@ -76,7 +76,12 @@ pub fn section(page: &mut Page, model: &ModelFile, truth: &dyn Fn(&Parameter) ->
                     false => number::ABSENT.to_owned(),
                 });
             }
-            let verdict = p.verdict.map_or("", Verdict::word);
+            let verdict = match p.verdict {
+                // identified though uncertain: its torque is not worth mentioning
+                Some(Verdict::Identified) if std > IDENTIFIED * p.value.abs() => "negligible",
+                Some(verdict) => verdict.word(),
+                None => "",
+            };
             row.extend([p.unit.clone(), verdict.to_owned(), p.meaning.clone()]);
             row
         })

@@ -1,7 +1,7 @@
 //! Where a page came from, so that the run can be repeated.
 
 use super::super::Context;
-use super::super::machine::Machine;
+use crate::config::RobotFile;
 use crate::log::{Provenance, escape};
 use crate::motion::Summary;
 use crate::report::number;
@@ -32,7 +32,7 @@ fn files(page: &mut Page, caption: &str, inputs: &[Provenance]) {
 /// The section: inputs, what the model was made from, processing, command and configuration.
 pub fn section(
     page: &mut Page,
-    machine: &Machine,
+    robot: &RobotFile,
     inputs: &[Provenance],
     model_inputs: &[Provenance],
     summary: Option<&Summary>,
@@ -57,7 +57,7 @@ pub fn section(
         env!("CARGO_PKG_VERSION")
     ));
     page.code(context.command());
-    if let Ok(robot) = toml::to_string(&machine.file) {
-        page.details("robot file, with every setting of this run", &robot);
+    if let Ok(text) = toml::to_string(robot) {
+        page.details("robot file, with every setting of this run", &text);
     }
 }

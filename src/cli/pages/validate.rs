@@ -187,6 +187,13 @@ pub fn validate(of: &Validate, context: &Context) -> Result<String, CliError> {
     inputs.extend(of.found.inputs.iter().cloned());
     let made_from = &of.file.provenance.inputs;
     let summary = Some(&validation.summary);
-    provenance::section(&mut page, machine, &inputs, made_from, summary, context);
+    provenance::section(
+        &mut page,
+        &machine.file,
+        &inputs,
+        made_from,
+        summary,
+        context,
+    );
     Ok(page.html())
 }

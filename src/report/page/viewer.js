@@ -48,17 +48,22 @@ function first(times, t) {
 
 // --- axes ---------------------------------------------------------------------------------------
 
+// Round numbers along an axis: about as many as wanted, and two at least.
 function ticks(from, to, wanted) {
-  const raw = (to - from) / Math.max(wanted, 1);
-  const decade = Math.pow(10, Math.floor(Math.log10(raw)));
-  const step = [1, 2, 5, 10].find(f => f * decade >= raw * 0.999) * decade;
-  const decimals = clamp(Math.ceil(-Math.log10(step) - 1e-9), 0, 9);
-  const out = [];
-  for (let k = Math.ceil(from / step - 1e-9); k * step <= to + 1e-9 * step; k++) {
-    const value = k === 0 ? 0 : k * step;
-    out.push([value, value.toFixed(decimals).replace('-', '\u2212')]);
+  let raw = (to - from) / Math.max(wanted, 1);
+  for (;;) {
+    const decade = Math.pow(10, Math.floor(Math.log10(raw)));
+    const step = [1, 2, 5, 10].find(f => f * decade >= raw * 0.999) * decade;
+    const k0 = Math.ceil(from / step - 1e-9), k1 = Math.floor(to / step + 1e-9);
+    if (k1 <= k0 && raw > (to - from) / 20) { raw /= 2; continue; }
+    const decimals = clamp(Math.ceil(-Math.log10(step) - 1e-9), 0, 9);
+    const out = [];
+    for (let k = k0; k <= k1; k++) {
+      const value = k === 0 ? 0 : k * step;
+      out.push([value, value.toFixed(decimals).replace('-', '\u2212')]);
+    }
+    return out;
   }
-  return out;
 }
 
 function shown(value, span) {
@@ -388,8 +393,9 @@ class Viewer {
     for (const limit of panel.limits || []) {
       put(inside, 'path', { class: 'limit', d: `M${left} ${py(limit)}H${right}` });
     }
-    // the model's wide line lies under the measured one
-    const order = [...panel.lines].sort((a, b) => (b.style === 'model') - (a.style === 'model'));
+    // the model's wide line lies lowest, the measured one on top of all
+    const rank = line => ({ model: 0, measured: 2 })[line.style] ?? 1;
+    const order = [...panel.lines].sort((a, b) => rank(a) - rank(b));
     for (const line of order) {
       put(inside, 'path', { class: 'l ' + line.style, d: path(view, line.y, i0, i1, x, py, dense) });
     }
