@@ -51,6 +51,7 @@ const DOORS: &[(&str, &str)] = &[
     ("rusqlite", "log/recording/bag.rs"),
     ("flate2", "log/content.rs|output/log.rs"),
     ("zstd", "log/content.rs|output/log.rs"),
+    ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),
 ];
 

@@ -70,9 +70,10 @@ pub(super) fn log_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// A picture to be written.
-pub(super) fn svg_file(text: &str) -> Result<PathBuf, String> {
-    with_ending(text, "svg")
+/// A picture to be written: the ending chooses the format.
+pub(super) fn picture_file(text: &str) -> Result<PathBuf, String> {
+    let known = with_ending(text, "svg").or_else(|_| with_ending(text, "png"));
+    known.map_err(|_| "must end in .svg or .png".into())
 }
 
 /// A page to be written.
@@ -113,6 +114,7 @@ mod tests {
         assert!(log_file("a.mcap").is_ok() && log_file("a.csv.zst").is_ok());
         let error = log_file("a.txt").unwrap_err();
         assert!(error.starts_with("must end in .csv or .mcap"), "{error}");
-        assert!(svg_file("csv").is_err());
+        assert!(picture_file("csv").is_err() && picture_file("a.pdf").is_err());
+        assert!(picture_file("a.svg").is_ok() && picture_file("a.PNG").is_ok());
     }
 }

@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
     /// Draw the residual before and after; may be given more than once
-    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -529,7 +529,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if !args.plot.is_empty() || args.report.is_some() {
         let figure = pages::diagnose_figure(&machine, &found)?.svg();
         for path in &args.plot {
-            super::outputs::write_text(path, &figure)?;
+            super::outputs::write_picture(path, &figure)?;
         }
         if let Some(path) = &args.report {
             let page = pages::diagnose(&of, &found, &figure, context)?;

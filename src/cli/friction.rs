@@ -51,7 +51,7 @@ pub struct Args {
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
     /// Draw the friction curves; may be given more than once
-    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -493,7 +493,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     for path in &args.plot {
-        super::outputs::write_text(path, &figure(&machine, &found).svg())?;
+        super::outputs::write_picture(path, &figure(&machine, &found).svg())?;
     }
     super::outputs::write_text(&args.output, &model.to_toml()?)?;
     text += &format!("written: {}\n", args.output.display());

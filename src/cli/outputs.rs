@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::CliError;
 use crate::output::write_whole;
+use crate::report::figure;
 
 /// Checks the files that a command is going to write: see [`super::Context::check_outputs`].
 pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
@@ -35,6 +36,19 @@ pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError>
 /// Writes a text file whole or not at all.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), CliError> {
     Ok(write_whole(path, |file| file.write_all(text.as_bytes()))?)
+}
+
+/// Writes a figure, as SVG or as PNG by the path's ending.
+pub(super) fn write_picture(path: &Path, svg: &str) -> Result<(), CliError> {
+    let png = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if !png {
+        return write_text(path, svg);
+    }
+    let picture =
+        figure::png(svg).map_err(|e| CliError::output(format!("{}: {e}", path.display())))?;
+    Ok(write_whole(path, |file| file.write_all(&picture))?)
 }
 
 fn folder(path: &Path) -> &Path {

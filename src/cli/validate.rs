@@ -41,7 +41,7 @@ pub struct Args {
     #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
-    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Vec<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -317,7 +317,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         super::outputs::write_text(path, page)?;
     }
     for path in &args.plot {
-        super::outputs::write_text(path, &figure(&machine, validation, &title).svg())?;
+        super::outputs::write_picture(path, &figure(&machine, validation, &title).svg())?;
     }
     if let Some(file) = residual {
         file.commit()?;

@@ -14,7 +14,7 @@ use super::context::Context;
 use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
-use super::outputs::write_text;
+use super::outputs::{write_picture, write_text};
 use super::{arguments, files, keep_what_there_is};
 use crate::config::{ModelFile, RobotFile, Trajectory};
 use crate::excite::blend::Blend;
@@ -117,7 +117,7 @@ pub struct Args {
     #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = arguments::positive)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
-    #[arg(long, value_name = "FILE.svg", value_parser = arguments::svg_file)]
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
     pub plot: Option<PathBuf>,
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
@@ -503,7 +503,7 @@ fn extras(
     }
     if let Some(path) = &names.plot {
         let figure = judge::figure(bench, motion, judged, &title);
-        write_text(path, &figure.svg())?;
+        write_picture(path, &figure.svg())?;
         text += &format!("written: {}\n", path.display());
     }
     if let Some(path) = &names.samples {

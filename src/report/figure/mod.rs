@@ -1,4 +1,4 @@
-//! Static figures as SVG: measured and reconstructed torque, friction curves, and designed motions.
+//! Static figures as SVG, and as PNG made from it: measured and reconstructed torque, friction curves, and designed motions.
 //!
 //! A small writer of our own instead of a plot library: panels of unequal height, dashes, bands and
 //! a legend outside the data are what these figures consist of, and the same data must give the same
@@ -10,12 +10,14 @@ mod friction;
 mod legend;
 mod motion;
 mod panel;
+mod png;
 mod residual;
 mod svg;
 mod torque;
 
 pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
 pub use motion::{MotionFigure, MotionPanel};
+pub use png::{PngError, png};
 pub use residual::{ResidualFigure, ResidualPanel, When};
 pub use torque::{JointTorque, TorqueFigure};
 
