@@ -109,7 +109,7 @@ pub fn identify(
         .robot
         .parameters()
         .iter()
-        .map(|p| p.name.to_owned())
+        .map(|p| p.name.to_string())
         .collect();
     // joints do not know of one another: they run in parallel, and are collected in joint order
     let found: Vec<Result<(usize, JointEstimate), CliError>> = groups

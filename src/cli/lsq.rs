@@ -257,11 +257,11 @@ fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
         let value = fit.theta[i];
         let (std, verdict, negligible) = rate(i, value);
         out.push(Unknown {
-            name: info.name.to_owned(),
+            name: info.name.to_string(),
             theta: info.theta,
             joint: None,
-            unit: inertia_unit(robot, info.unit, machine.file.torque_unit(0)),
-            meaning: info.meaning.to_owned(),
+            unit: inertia_unit(robot, &info.unit, machine.file.torque_unit(0)),
+            meaning: info.meaning.to_string(),
             value,
             std,
             verdict,

@@ -16,7 +16,7 @@ use crate::log::{Block, Instant, Layout, LogError, LogSpec, Provenance, Reader, 
 use crate::motion::{
     Differences, HeldForces, ParallelFilter, RunError, Settings, Summary, TorqueTiming,
 };
-use crate::robot::Robot;
+use crate::robot::{JointKind, Robot};
 
 /// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
 /// file names none and the sampling rate allows it. Wide, because the acceleration of held joints
@@ -339,6 +339,16 @@ impl Machine {
         })
     }
 
+    /// Travel of a joint by the file's limits; a turn, or a metre, where it has none.
+    fn range(&self, j: usize, name: &str) -> f64 {
+        let limits = self.file.limits.get(name).and_then(|l| l.position);
+        match (limits, self.robot.joint_kind(j)) {
+            (Some([low, high]), _) => high - low,
+            (None, JointKind::Revolute) => std::f64::consts::TAU,
+            (None, JointKind::Prismatic) => 1.0,
+        }
+    }
+
     /// Full travel of each joint, by which motions of metres and radians are compared.
     pub fn ranges(&self) -> Vec<f64> {
         match &self.robot {
@@ -348,6 +358,10 @@ impl Machine {
                 vec![spans[3], spans[2], 2.2, 1.7]
             }
             Robot::SingleJoint(_) => vec![f64::MIN_POSITIVE; 1],
+            Robot::Serial(_) => {
+                let names = self.robot.joint_names().iter().enumerate();
+                names.map(|(j, name)| self.range(j, name)).collect()
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::Document;
 use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
-use super::{ConfigError, check_log};
+use super::{ConfigError, check_log, serial_section};
 use crate::log::{list, nearest};
 
 /// Checks a robot file that was read from `document`.
@@ -34,12 +34,40 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         let remedy = format!("delete it, or set `model = \"{model}\"`");
         document.value(&["robot", key], "does not belong to this model", &remedy)
     };
+    if robot.model != ModelKind::Serial {
+        for (key, given) in [
+            ("gravity", robot.gravity.is_some()),
+            ("drive_inertia", robot.drive_inertia.is_some()),
+            ("urdf", robot.urdf.is_some()),
+            ("tip", robot.tip.is_some()),
+            ("coupling", !robot.coupling.is_empty()),
+            ("link", !robot.link.is_empty()),
+        ] {
+            if given {
+                return Err(foreign(key, "serial"));
+            }
+        }
+    }
     match robot.model {
-        ModelKind::Serial => Err(document.value(
-            &["robot", "model"],
-            "is \"serial\", which this version does not have yet",
-            "use \"cft\" or \"single-joint\"",
-        )),
+        ModelKind::Serial => {
+            for (key, given) in [
+                ("setup", robot.setup.is_some()),
+                ("parameters", robot.parameters.is_some()),
+            ] {
+                if given {
+                    return Err(foreign(key, "cft"));
+                }
+            }
+            for (key, given) in [
+                ("joint", robot.joint.is_some()),
+                ("kind", robot.kind.is_some()),
+            ] {
+                if given {
+                    return Err(foreign(key, "single-joint"));
+                }
+            }
+            serial_section::check(robot, document)
+        }
         ModelKind::Cft => {
             if robot.setup.is_none() {
                 return Err(
@@ -69,14 +97,7 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
                     "the joint's name, e.g. `joint = \"q1\"`",
                 ));
             };
-            let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-            if joint.is_empty() || joint.len() > 64 || !joint.chars().all(plain) {
-                return Err(document.value(
-                    &["robot", "joint"],
-                    "is no name for a joint",
-                    "use letters, digits, `_`, `-` and `.`",
-                ));
-            }
+            plain_name(document, &["robot", "joint"], joint)?;
             if robot.kind.is_none() {
                 return Err(document.missing(
                     &["robot", "kind"],
@@ -90,6 +111,23 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             }
         }
     }
+}
+
+/// Refuses what is no name for a joint.
+pub(super) fn plain_name(
+    document: &Document,
+    path: &[&str],
+    joint: &str,
+) -> Result<(), ConfigError> {
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    if joint.is_empty() || joint.len() > 64 || !joint.chars().all(plain) {
+        return Err(document.value(
+            path,
+            "is no name for a joint",
+            "use letters, digits, `_`, `-` and `.`",
+        ));
+    }
+    Ok(())
 }
 
 fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
@@ -241,7 +279,7 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 
 fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let control = &file.control;
-    let joints = file.robot().joints();
+    let joints = file.joint_names().len();
     per_joint(document, &["control", "kp"], &control.kp, joints)?;
     per_joint(document, &["control", "kd"], &control.kd, joints)?;
     for (key, value) in [

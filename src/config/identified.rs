@@ -33,7 +33,7 @@ pub fn inertia_unit(robot: &Robot, si: &str, torque_unit: &str) -> String {
 pub fn friction_theta(robot: &Robot, j: usize, k: usize) -> Option<u32> {
     match robot {
         Robot::Cft(_) => FRICTION[4 * k + j].theta,
-        Robot::SingleJoint(_) => None,
+        Robot::SingleJoint(_) | Robot::Serial(_) => None,
     }
 }
 
@@ -93,7 +93,7 @@ impl ModelFile {
             .robot
             .parameters()
             .iter()
-            .map(|p| p.name.to_owned())
+            .map(|p| p.name.to_string())
             .collect();
         for (joint, friction) in model.robot.joint_names().iter().zip(&model.friction) {
             let names: &[&str] = match friction {

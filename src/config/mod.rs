@@ -15,6 +15,7 @@ pub mod log_section;
 pub mod model_file;
 mod model_text;
 pub mod robot_file;
+pub mod serial_section;
 pub mod trajectory;
 mod trajectory_text;
 

@@ -161,7 +161,7 @@ impl ModelFile {
         let robot = self.robot.robot();
         let needed = robot.parameters().iter();
         needed
-            .map(|info| Ok(self.parameter(file, info.name, None)?.value))
+            .map(|info| Ok(self.parameter(file, &info.name, None)?.value))
             .collect()
     }
 
@@ -225,7 +225,12 @@ impl ModelFile {
                     section.setup.unwrap_or_default().name(),
                     section.parameters.unwrap_or(12)
                 ),
-                ModelKind::SingleJoint | ModelKind::Serial => {
+                ModelKind::Serial => format!(
+                    "serial, {} links, joints {}",
+                    section.link.len(),
+                    escape(&robot.joint_names().join(", "))
+                ),
+                ModelKind::SingleJoint => {
                     let kind = section.kind.map_or("m or rad", |kind| kind.position_unit());
                     format!(
                         "single-joint {} in {kind}",

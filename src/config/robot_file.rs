@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::log_section::LogSection;
+use super::serial_section::{CouplingSection, LinkSection};
 use crate::robot::cft::{self, Setup, Structure};
 use crate::robot::{JointKind, Robot};
 
@@ -16,7 +17,7 @@ pub enum ModelKind {
     Cft,
     /// One prismatic or revolute joint.
     SingleJoint,
-    /// An open chain: not built yet.
+    /// Any chain of links on revolute and prismatic joints.
     Serial,
 }
 
@@ -38,6 +39,25 @@ pub struct RobotSection {
     /// Kind of a single joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<JointKind>,
+    /// Acceleration of free fall in the base frame of a serial chain [m/s^2]; (0, 0, -9.81) where
+    /// absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<[f64; 3]>,
+    /// Whether each joint of a serial chain has a drive inertia; true where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive_inertia: Option<bool>,
+    /// URDF file of a serial chain, beside the robot file; it is read into `link`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<String>,
+    /// Link of the URDF where the chain ends; needed where it branches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip: Option<String>,
+    /// Coupled gear trains of a serial chain.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coupling: Vec<CouplingSection>,
+    /// Moving links of a serial chain, from the base outward.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub link: Vec<LinkSection>,
 }
 
 /// `[friction] law`.
@@ -284,7 +304,8 @@ impl RobotFile {
                     _ => Structure::Printed12,
                 },
             ),
-            ModelKind::SingleJoint | ModelKind::Serial => Robot::single_joint(
+            ModelKind::Serial => self.robot.checked_serial(),
+            ModelKind::SingleJoint => Robot::single_joint(
                 self.robot.joint.as_deref().unwrap_or("q1"),
                 self.robot.kind.unwrap_or(JointKind::Revolute),
             ),
@@ -293,7 +314,10 @@ impl RobotFile {
 
     /// Joint names in the order of every vector.
     pub fn joint_names(&self) -> Vec<String> {
-        self.robot().joint_names().to_vec()
+        match self.robot.model {
+            ModelKind::Serial => self.robot.chain_joints(),
+            _ => self.robot().joint_names().to_vec(),
+        }
     }
 
     /// Joint names, and the actuator coordinates of the CFT robot.

@@ -131,7 +131,7 @@ fn full_range(robot: &Robot, j: usize) -> Option<f64> {
             let spans = robot.setup.limits().spans();
             [spans[3], spans[2], 2.2, 1.7].get(j).copied()
         }
-        Robot::SingleJoint(_) => None,
+        Robot::SingleJoint(_) | Robot::Serial(_) => None,
     }
 }
 

@@ -5,6 +5,8 @@ use super::{Family, Key, Kind, Role, Unit, all_joints, no_limits, no_shape};
 use crate::robot::Robot;
 use crate::robot::cft::links::{PseudoInertia, base_parameters};
 use crate::robot::cft::regressor::regressor22;
+use crate::robot::serial::chain::MOST_JOINTS;
+use crate::robot::serial::newton_euler::walk;
 
 pub const KIND: Kind = Kind {
     name: "payload",
@@ -36,6 +38,22 @@ pub const KIND: Kind = Kind {
                 }
             }
             Robot::SingleJoint(_) => out[0].copy_from_slice(&s.a[joint]),
+            Robot::Serial(robot) => {
+                let n = robot.chain().joints();
+                let mut state = [[0.0; MOST_JOINTS]; 3];
+                let last = robot.chain().links().len() - 1;
+                for k in 0..s.len() {
+                    let [q, v, a] = &mut state;
+                    s.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
+                    walk(robot.chain(), &*q, &*v, &*a, |link, on, row| {
+                        if link == last && on == joint {
+                            for (column, c) in out.iter_mut().zip([9, 6, 7, 8]) {
+                                column[k] = row[c];
+                            }
+                        }
+                    });
+                }
+            }
         }
     },
     separate_by: "identify unloaded, then diagnose loaded logs with --keep",

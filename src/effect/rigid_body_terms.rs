@@ -4,11 +4,11 @@
 use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
 use crate::robot::Robot;
 use crate::robot::cft::regressor::regressor22;
-use crate::robot::cft::{EXTENDED, Structure};
+use crate::robot::cft::{Structure, UNPRINTED};
 
 /// Name and unit of an extra parameter of the full chain.
 const fn extra(i: usize) -> Key {
-    Key::new(EXTENDED[12 + i].name, Unit::Text(EXTENDED[12 + i].unit))
+    Key::new(UNPRINTED[i], Unit::Text("kg m^2"))
 }
 
 pub const KIND: Kind = Kind {

@@ -240,7 +240,7 @@ fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) 
 fn unit(machine: &Machine, i: usize) -> String {
     let robot = &machine.model.robot;
     if let Some(info) = robot.parameters().get(i) {
-        return info.unit.to_owned();
+        return info.unit.to_string();
     }
     for (j, own) in machine.columns.own.iter().enumerate() {
         let first = machine.columns.first_own(j);

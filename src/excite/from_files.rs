@@ -57,7 +57,7 @@ pub fn machine(
     }
     let motors = match &robot {
         Robot::Cft(cft) => Motors::Cft(cft.setup),
-        Robot::SingleJoint(_) => Motors::Joints,
+        Robot::SingleJoint(_) | Robot::Serial(_) => Motors::Joints,
     };
     let mut machine = Machine {
         columns: Columns {
@@ -101,7 +101,7 @@ fn nominal(file: &RobotFile, robot: &Robot) -> Model {
                 robot: robot.clone(),
             }
         }
-        Robot::SingleJoint(_) => {
+        Robot::SingleJoint(_) | Robot::Serial(_) => {
             let friction = robot.joint_names().iter().map(|joint| {
                 let start = file.friction.joint.get(joint).cloned().unwrap_or_default();
                 match (start.viscous, start.coulomb) {

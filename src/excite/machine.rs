@@ -111,7 +111,7 @@ impl Machine {
         let mut names: Vec<String> = robot
             .parameters()
             .iter()
-            .map(|p| p.name.to_owned())
+            .map(|p| p.name.to_string())
             .collect();
         for (joint, own) in robot.joint_names().iter().zip(&self.columns.own) {
             names.extend(own.iter().map(|own| format!("{}:{joint}", own.name())));

@@ -5,9 +5,14 @@
 pub mod cft;
 pub mod friction;
 pub mod model;
+pub mod serial;
 
 use cft::regressor::{regressor12, regressor22};
 use cft::{Setup, Structure};
+use serial::SerialRobot;
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 /// What the model cannot answer for.
@@ -34,16 +39,16 @@ pub enum RobotError {
 }
 
 /// Name, unit and meaning of one inertial parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ParameterInfo {
     /// Name in files and reports.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Number in the report's Table 4, where it has one.
     pub theta: Option<u32>,
     /// SI unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// What it stands for, in link masses, centres of gravity and pseudo-inertias.
-    pub meaning: &'static str,
+    pub meaning: Cow<'static, str>,
 }
 
 /// Kind of a joint: it decides the units of position and torque.
@@ -81,6 +86,8 @@ pub enum Robot {
     Cft(CftRobot),
     /// One joint that carries one inertia: tau = inertia a + F(v).
     SingleJoint(SingleJoint),
+    /// A chain of links on revolute and prismatic joints, in its base parameters.
+    Serial(Arc<SerialRobot>),
 }
 
 /// The CFT robot as it is set up and modelled.
@@ -101,17 +108,17 @@ pub struct SingleJoint {
     names: [String; 1],
 }
 
-const INERTIA_KG: [ParameterInfo; 1] = [ParameterInfo {
-    name: "inertia",
+static INERTIA_KG: [ParameterInfo; 1] = [ParameterInfo {
+    name: Cow::Borrowed("inertia"),
     theta: None,
-    unit: "kg",
-    meaning: "moving mass",
+    unit: Cow::Borrowed("kg"),
+    meaning: Cow::Borrowed("moving mass"),
 }];
-const INERTIA_KG_M2: [ParameterInfo; 1] = [ParameterInfo {
-    name: "inertia",
+static INERTIA_KG_M2: [ParameterInfo; 1] = [ParameterInfo {
+    name: Cow::Borrowed("inertia"),
     theta: None,
-    unit: "kg m^2",
-    meaning: "moment of inertia about the joint axis",
+    unit: Cow::Borrowed("kg m^2"),
+    meaning: Cow::Borrowed("moment of inertia about the joint axis"),
 }];
 
 impl Robot {
@@ -132,6 +139,11 @@ impl Robot {
         })
     }
 
+    /// A serial robot.
+    pub fn serial(robot: SerialRobot) -> Self {
+        Self::Serial(Arc::new(robot))
+    }
+
     /// Number of joints n.
     pub fn joints(&self) -> usize {
         self.joint_names().len()
@@ -142,6 +154,7 @@ impl Robot {
         match self {
             Self::Cft(robot) => &robot.names,
             Self::SingleJoint(robot) => &robot.names,
+            Self::Serial(robot) => robot.names(),
         }
     }
 
@@ -151,6 +164,7 @@ impl Robot {
             Self::Cft(_) if i == 0 => JointKind::Prismatic,
             Self::Cft(_) => JointKind::Revolute,
             Self::SingleJoint(robot) => robot.kind,
+            Self::Serial(robot) => robot.joint_kind(i),
         }
     }
 
@@ -160,16 +174,17 @@ impl Robot {
     }
 
     /// The inertial parameters, in the order of the regressor's columns.
-    pub fn parameters(&self) -> &'static [ParameterInfo] {
+    pub fn parameters(&self) -> &[ParameterInfo] {
         match self {
             Self::Cft(robot) => match robot.structure {
-                Structure::Printed12 => &cft::PRINTED,
+                Structure::Printed12 => &cft::EXTENDED[..cft::PRINTED],
                 Structure::Full22 => &cft::EXTENDED,
             },
             Self::SingleJoint(robot) => match robot.kind {
                 JointKind::Prismatic => &INERTIA_KG,
                 JointKind::Revolute => &INERTIA_KG_M2,
             },
+            Self::Serial(robot) => robot.parameters(),
         }
     }
 
@@ -216,7 +231,7 @@ impl Robot {
                     .ok()
                     .map(|c| c[i][i])
             }
-            Self::SingleJoint(_) => None,
+            Self::SingleJoint(_) | Self::Serial(_) => None,
         }
     }
 
@@ -242,6 +257,7 @@ impl Robot {
                 );
                 y[0] = a[0];
             }
+            Self::Serial(robot) => robot.regressor(q, v, a, y),
         }
     }
 }

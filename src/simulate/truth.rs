@@ -62,7 +62,7 @@ fn parameter(name: &str, joint: Option<&str>, value: f64, unit: &str, meaning: &
 fn inertial(info: &ParameterInfo, value: f64) -> Parameter {
     Parameter {
         theta: info.theta,
-        ..parameter(info.name, None, value, info.unit, info.meaning)
+        ..parameter(&info.name, None, value, &info.unit, &info.meaning)
     }
 }
 

@@ -27,7 +27,7 @@ mod parameters;
 
 pub use actuation::{Limits, Setup};
 pub use dynamics::Coefficients;
-pub use parameters::{EXTENDED, FRICTION, PRINTED};
+pub use parameters::{EXTENDED, FRICTION, PRINTED, UNPRINTED};
 
 /// Joint names in the order of all vectors.
 pub const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];

@@ -1,5 +1,7 @@
 //! Names, units and meanings of the parameters (Table 4, corrected).
 
+use std::borrow::Cow;
+
 use crate::robot::ParameterInfo;
 
 const fn printed(
@@ -9,26 +11,26 @@ const fn printed(
     meaning: &'static str,
 ) -> ParameterInfo {
     ParameterInfo {
-        name,
+        name: Cow::Borrowed(name),
         theta: Some(theta),
-        unit,
-        meaning,
+        unit: Cow::Borrowed(unit),
+        meaning: Cow::Borrowed(meaning),
     }
 }
 
 const fn extra(name: &'static str, meaning: &'static str) -> ParameterInfo {
     ParameterInfo {
-        name,
+        name: Cow::Borrowed(name),
         theta: None,
-        unit: "kg m^2",
-        meaning,
+        unit: Cow::Borrowed("kg m^2"),
+        meaning: Cow::Borrowed(meaning),
     }
 }
 
 /// All 22 base parameters. m_i is the mass of link i, l_i its centre of gravity and J_i its
 /// pseudo-inertia, both in the Denavit-Hartenberg frame of link i;
 /// delta = (Jxx4 + Jxx6 - L4^2 (m3 + m4))/L6^2.
-pub const EXTENDED: [ParameterInfo; 22] = [
+pub static EXTENDED: [ParameterInfo; 22] = [
     printed("theta_1", 1, "kg", "m1 + m2"),
     printed(
         "theta_2",
@@ -71,16 +73,11 @@ pub const EXTENDED: [ParameterInfo; 22] = [
     ),
 ];
 
-/// theta_1..theta_12 of Table 4.
-pub const PRINTED: [ParameterInfo; 12] = {
-    let mut first = [EXTENDED[0]; 12];
-    let mut i = 1;
-    while i < 12 {
-        first[i] = EXTENDED[i];
-        i += 1;
-    }
-    first
-};
+/// Number of them that the report's structure has: theta_1..theta_12 of Table 4.
+pub const PRINTED: usize = 12;
+
+/// Names of the ten that the report's structure lacks [kg m^2].
+pub const UNPRINTED: [&str; 10] = ["BB", "EE", "CC", "AC", "BE", "S", "OC", "OE", "OA", "OB"];
 
 /// theta_13..theta_32, the friction of law (18): parameter p of [`DoubleTanh::NAMES`] of joint i is
 /// entry 4 p + i.

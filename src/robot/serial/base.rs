@@ -1,0 +1,123 @@
+//! Base parameters: the combinations of standard parameters that torques can tell.
+//!
+//! The columns of the standard regressor on random states are orthogonalised in a fixed order, from
+//! the base outward (the QR factorisation of Gautier 1990, without exchange of columns). A column
+//! that adds nothing to those before it belongs to no parameter of its own; its coefficients say
+//! into which parameters it is grouped. The order, and with it the grouping, is the same from run to
+//! run and is that of Khalil and Dombre: a link's mass goes into the link before it.
+
+use super::chain::{Chain, MOST_JOINTS};
+use super::newton_euler::{STANDARD, walk};
+use crate::robot::JointKind;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// A column whose new part is below this share of its norm depends on those before it.
+const TOLERANCE: f64 = 1e-9;
+/// A coefficient below this is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// One base parameter: a kept standard parameter and what is grouped into it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grouping {
+    /// Index of the kept standard parameter.
+    pub kept: usize,
+    /// Indices of the parameters grouped into it, with their coefficients.
+    pub terms: Vec<(usize, f64)>,
+}
+
+/// Number of standard parameters: ten a link, then a drive inertia a joint where they are modelled.
+pub fn standard_parameters(chain: &Chain, drive_inertia: bool) -> usize {
+    chain.links().len() * STANDARD + if drive_inertia { chain.joints() } else { 0 }
+}
+
+/// The base parameters in the order of their kept parameters.
+pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
+    let n = chain.joints();
+    let p = standard_parameters(chain, drive_inertia);
+    let states = (3 * p).div_ceil(n) + 8;
+    let rows = states * n;
+    let mut columns = vec![vec![0.0; rows]; p];
+    let mut chance = ChaCha8Rng::seed_from_u64(0x0ba5e);
+    let mut draw = |scale: f64| scale * (2.0 * chance.random::<f64>() - 1.0);
+    for s in 0..states {
+        let mut state = [[0.0; MOST_JOINTS]; 3];
+        for j in 0..n {
+            let slides = chain.links().iter().any(|l| {
+                l.kind == JointKind::Prismatic && l.coordinate == super::chain::Coordinate::Joint(j)
+            });
+            state[0][j] = draw(if slides { 0.7 } else { 3.0 });
+            state[1][j] = draw(2.0);
+            state[2][j] = draw(8.0);
+        }
+        walk(chain, &state[0], &state[1], &state[2], |i, k, row| {
+            for (c, x) in row.iter().enumerate() {
+                columns[i * STANDARD + c][s * n + k] = *x;
+            }
+        });
+        if drive_inertia {
+            for j in 0..n {
+                columns[p - n + j][s * n + j] = state[2][j];
+            }
+        }
+    }
+    group(&columns)
+}
+
+/// Orthogonalises columns in their order (twice, so that rounding does not add up).
+fn group(columns: &[Vec<f64>]) -> Vec<Grouping> {
+    let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    // R, column by column: coefficients of the kept columns in the orthonormal basis
+    let mut triangle: Vec<Vec<f64>> = Vec::new();
+    let mut found: Vec<Grouping> = Vec::new();
+    for (index, column) in columns.iter().enumerate() {
+        let size = norm(column);
+        if size <= TOLERANCE * largest {
+            continue;
+        }
+        let mut rest = column.clone();
+        let mut along = vec![0.0; basis.len()];
+        for _ in 0..2 {
+            for (b, total) in basis.iter().zip(&mut along) {
+                let part: f64 = b.iter().zip(&rest).map(|(b, x)| b * x).sum();
+                *total += part;
+                for (x, b) in rest.iter_mut().zip(b) {
+                    *x -= part * b;
+                }
+            }
+        }
+        let left = norm(&rest);
+        if left > TOLERANCE * size {
+            for x in &mut rest {
+                *x /= left;
+            }
+            basis.push(rest);
+            along.push(left);
+            triangle.push(along);
+            found.push(Grouping {
+                kept: index,
+                terms: Vec::new(),
+            });
+            continue;
+        }
+        // back substitution: the column is this combination of the kept ones
+        for i in (0..along.len()).rev() {
+            let share = along[i] / triangle[i][i];
+            for (x, r) in along.iter_mut().zip(&triangle[i]).take(i) {
+                *x -= share * r;
+            }
+            if share.abs() > ROUNDING {
+                found[i].terms.push((index, tidy(share)));
+            }
+        }
+    }
+    found
+}
+
+/// A number near a round one of nine decimals is that one.
+fn tidy(x: f64) -> f64 {
+    let round = (x * 1e9).round() / 1e9;
+    if (x - round).abs() < 1e-10 { round } else { x }
+}

@@ -1,0 +1,141 @@
+//! The regressor by recursive Newton-Euler: forces of links with unit parameters, in one pass.
+//!
+//! Link i with the ten standard parameters (its inertia about the origin of its own frame, first
+//! moments m c and mass m) needs at that origin the force and the moment
+//!
+//! ```text
+//! f = m a + dw x (m c) + w x (w x (m c))        n = I dw + w x (I w) + (m c) x a
+//! ```
+//!
+//! (w, dw its angular velocity and acceleration, a the acceleration of its origin less that of free
+//! fall). Both are linear in the parameters. What they ask of independent joint k is l_k . f +
+//! w_k . n, where (w_k, l_k) is the motion that a unit speed of joint k gives to the link: its
+//! column of the link's Jacobian, carried outward with the recursion, so that no wrench has to be
+//! carried back (Atkeson, An and Hollerbach 1986 in the frames of the links).
+
+use super::chain::{Chain, MOST_JOINTS, MOST_LINKS};
+use super::space::{Vector, about, add, cross, dot, product, times, turn, turn_back};
+use crate::robot::JointKind;
+
+/// Standard parameters of a link: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of its frame
+/// [kg m^2], mx, my, mz [kg m], m [kg].
+pub const STANDARD: usize = 10;
+
+/// Motion of a link, in its own frame.
+#[derive(Clone, Copy)]
+struct State {
+    /// Angular velocity [rad/s].
+    w: Vector,
+    /// Angular acceleration [rad/s^2].
+    dw: Vector,
+    /// Acceleration of the origin less that of free fall [m/s^2].
+    a: Vector,
+    /// Per independent joint, angular and linear velocity of the frame at unit speed.
+    jacobian: [[Vector; 2]; MOST_JOINTS],
+}
+
+const AT_REST: State = State {
+    w: [0.0; 3],
+    dw: [0.0; 3],
+    a: [0.0; 3],
+    jacobian: [[[0.0; 3]; 2]; MOST_JOINTS],
+};
+
+/// Calls `visit(link, joint, row)` for every link and every independent joint that moves it, with
+/// the derivatives of that joint's torque by the link's ten standard parameters.
+///
+/// # Panics
+/// Where q, v or a holds fewer than n numbers: a mistake of the caller's code.
+#[inline]
+pub fn walk(
+    chain: &Chain,
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+    mut visit: impl FnMut(usize, usize, &[f64; STANDARD]),
+) {
+    let n = chain.joints();
+    assert!(
+        q.len() >= n && v.len() >= n && a.len() >= n,
+        "{n} joints each"
+    );
+    let mut states = [AT_REST; MOST_LINKS];
+    let base = State {
+        a: times(-1.0, &chain.gravity()),
+        ..AT_REST
+    };
+    for (i, link) in chain.links().iter().enumerate() {
+        let before = link.parent.map_or(&base, |parent| &states[parent]);
+        let mut slope = [0.0; MOST_JOINTS];
+        let [u, du, ddu] = link.coordinate.motion(q, v, a, &mut slope);
+        let (rotation, origin) = match link.kind {
+            JointKind::Revolute => (product(&link.rotation, &about(&link.axis, u)), link.origin),
+            JointKind::Prismatic => {
+                let moved = turn(&link.rotation, &times(u, &link.axis));
+                (link.rotation, add(&link.origin, &moved))
+            }
+        };
+        let swept = cross(&before.w, &origin);
+        let carried = add(
+            &before.a,
+            &add(&cross(&before.dw, &origin), &cross(&before.w, &swept)),
+        );
+        let mut state = State {
+            w: turn_back(&rotation, &before.w),
+            dw: turn_back(&rotation, &before.dw),
+            a: turn_back(&rotation, &carried),
+            jacobian: [[[0.0; 3]; 2]; MOST_JOINTS],
+        };
+        let along = times(du, &link.axis);
+        let pushed = times(ddu, &link.axis);
+        match link.kind {
+            JointKind::Revolute => {
+                state.dw = add(&state.dw, &add(&pushed, &cross(&state.w, &along)));
+                state.w = add(&state.w, &along);
+            }
+            JointKind::Prismatic => {
+                let coriolis = times(2.0, &cross(&state.w, &along));
+                state.a = add(&state.a, &add(&pushed, &coriolis));
+            }
+        }
+        for k in (0..n).filter(|k| chain.moves(*k, i)) {
+            let [wk, lk] = &before.jacobian[k];
+            let mut wk_here = turn_back(&rotation, wk);
+            let mut lk_here = turn_back(&rotation, &add(lk, &cross(wk, &origin)));
+            if slope[k] != 0.0 {
+                let own = times(slope[k], &link.axis);
+                match link.kind {
+                    JointKind::Revolute => wk_here = add(&wk_here, &own),
+                    JointKind::Prismatic => lk_here = add(&lk_here, &own),
+                }
+            }
+            state.jacobian[k] = [wk_here, lk_here];
+            visit(i, k, &row(&state, &wk_here, &lk_here));
+        }
+        states[i] = state;
+    }
+}
+
+/// l . f + w . n for unit standard parameters.
+#[inline(always)]
+fn row(state: &State, wk: &Vector, lk: &Vector) -> [f64; STANDARD] {
+    let State { w, dw, a, .. } = state;
+    // w_k . (w x (I w)) = (w_k x w) . (I w)
+    let c = cross(wk, w);
+    let moment = add(
+        &add(&cross(lk, dw), &cross(&cross(lk, w), w)),
+        &cross(a, wk),
+    );
+    [
+        wk[0] * dw[0] + c[0] * w[0],
+        wk[0] * dw[1] + wk[1] * dw[0] + c[0] * w[1] + c[1] * w[0],
+        wk[0] * dw[2] + wk[2] * dw[0] + c[0] * w[2] + c[2] * w[0],
+        wk[1] * dw[1] + c[1] * w[1],
+        wk[1] * dw[2] + wk[2] * dw[1] + c[1] * w[2] + c[2] * w[1],
+        wk[2] * dw[2] + c[2] * w[2],
+        moment[0],
+        moment[1],
+        moment[2],
+        dot(lk, a),
+    ]
+}
