@@ -65,7 +65,7 @@ fn campaign(seed: u64) -> Value {
     let names: Vec<String> = robot
         .parameters()
         .iter()
-        .map(|p| p.name.to_owned())
+        .map(|p| p.name.to_string())
         .collect();
     let truth = CftTruth::synthetic(Setup::Tuedacs)
         .varied(0.15, seed)

@@ -218,7 +218,7 @@ fn case(number: u64) -> Value {
 
     // the declared model, as a lab has it
     let infos = robot.parameters();
-    let names: Vec<String> = infos.iter().map(|p| p.name.to_owned()).collect();
+    let names: Vec<String> = infos.iter().map(|p| p.name.to_string()).collect();
     let mut known = Vec::new();
     for j in 0..JOINTS.len() {
         let motion = OneJointMove::new(j, SECONDS, Some(seed))

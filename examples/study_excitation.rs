@@ -38,7 +38,7 @@ fn main() {
 /// What the one-joint logs of a plant tell of its friction.
 fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFriction>> {
     let infos = robot.parameters();
-    let names: Vec<String> = infos.iter().map(|p| p.name.to_owned()).collect();
+    let names: Vec<String> = infos.iter().map(|p| p.name.to_string()).collect();
     let of = |j: usize| {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
             .reference(Setup::Tuedacs)

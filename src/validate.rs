@@ -103,23 +103,37 @@ pub struct Reconstructed<'a> {
 }
 
 /// Where the thinning of a log's rows stands.
-struct Taken {
-    declared: Option<usize>,
-    cutoff_hz: f64,
+struct Taken<'a> {
+    settings: &'a Settings,
     stretch: Option<usize>,
     count: usize,
-    last_t: Option<f64>,
+    began: f64,
+    every: usize,
 }
 
-impl Taken {
-    fn new(settings: &Settings) -> Self {
+impl<'a> Taken<'a> {
+    fn new(settings: &'a Settings) -> Self {
         Taken {
-            declared: settings.decimation,
-            cutoff_hz: settings.cutoff_hz,
+            settings,
             stretch: None,
             count: 0,
-            last_t: None,
+            began: 0.0,
+            every: 1,
         }
+    }
+
+    /// Whether the next row, at `t` of `stretch`, is kept; and whether a stretch begins with it.
+    fn keeps(&mut self, stretch: usize, t: f64) -> (bool, bool) {
+        let begins = self.stretch != Some(stretch);
+        if begins {
+            (self.stretch, self.count, self.began) = (Some(stretch), 0, t);
+        } else if self.count == 1 {
+            // rows come at full rate: two of them tell the step
+            self.every = self.settings.decimation_at(t - self.began);
+        }
+        let keeps = self.count.is_multiple_of(self.every) || begins;
+        self.count += 1;
+        (keeps, begins)
     }
 }
 
@@ -169,7 +183,10 @@ impl<'a> Reconstruction<'a> {
             },
             &mut |r| self.take(&mut taken, r.segment, r.t, r.raw, r.filtered, row),
         )?;
-        Ok(summary)
+        Ok(Summary {
+            decimation: settings.decimation_at(summary.dt),
+            ..summary
+        })
     }
 
     /// Adds one stretch of a log in memory with its reconstructed torque, `[joint][sample]`: for
@@ -220,10 +237,8 @@ impl<'a> Reconstruction<'a> {
         row: &mut dyn FnMut(&Reconstructed),
     ) {
         let n = self.sums.len();
-        if taken.stretch != Some(segment) {
-            taken.stretch = Some(segment);
-            taken.count = 0;
-            taken.last_t = None;
+        let (keep, begins) = taken.keeps(segment, t);
+        if begins {
             self.traces.breaks.push(self.traces.t.len());
         }
         for (j, s) in self.sums.iter_mut().enumerate() {
@@ -234,16 +249,7 @@ impl<'a> Reconstruction<'a> {
             measured: &raw[..n],
             reconstructed: &raw[n..],
         });
-        // without a declared decimation: ten rows a period of the cut-off
-        let keep = match taken.declared {
-            Some(every) => taken.count.is_multiple_of(every.max(1)),
-            None => taken
-                .last_t
-                .is_none_or(|l| t - l >= 0.0999 / taken.cutoff_hz),
-        };
-        taken.count += 1;
         if keep {
-            taken.last_t = Some(t);
             for (j, s) in self.sums.iter_mut().enumerate() {
                 s.add(filtered[j], filtered[n + j]);
             }

@@ -232,7 +232,11 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
     let mut widened = Vec::new();
     for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
         let (name, joint, value) = match *unknown {
-            Unknown::Theta(k) => (robot.parameters()[k].name.to_string(), None, fitted.theta[k]),
+            Unknown::Theta(k) => (
+                robot.parameters()[k].name.to_string(),
+                None,
+                fitted.theta[k],
+            ),
             Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
             Unknown::Friction { joint, k } => match &fitted.friction[joint] {
                 JointFriction::None => continue,

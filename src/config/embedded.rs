@@ -11,7 +11,7 @@ use super::{ConfigError, check};
 use crate::log::{list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
-pub const EMBEDDED: [(&str, &str); 8] = [
+pub const EMBEDDED: [(&str, &str); 11] = [
     ("configs/cft.toml", include_str!("../../configs/cft.toml")),
     (
         "configs/cft-validation.toml",
@@ -31,6 +31,12 @@ pub const EMBEDDED: [(&str, &str); 8] = [
         include_str!("../../configs/emps-symmetric.toml"),
     ),
     ("configs/bldc.toml", include_str!("../../configs/bldc.toml")),
+    (
+        "configs/panda.toml",
+        include_str!("../../configs/panda.toml"),
+    ),
+    ("configs/tx40.toml", include_str!("../../configs/tx40.toml")),
+    ("configs/ur10.toml", include_str!("../../configs/ur10.toml")),
     (
         "configs/table3.toml",
         include_str!("../../configs/table3.toml"),

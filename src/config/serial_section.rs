@@ -172,15 +172,15 @@ impl RobotSection {
             let parent = match section.parent.as_deref() {
                 None => i.checked_sub(1),
                 Some(BASE) => None,
-                Some(parent) => Some(names[..i].iter().position(|n| n == parent).ok_or_else(
-                    || {
+                Some(parent) => {
+                    Some(names[..i].iter().position(|n| n == parent).ok_or_else(|| {
                         misfit(
                             "parent",
                             "is no link before this one",
                             "write `base` or the name of a link above".into(),
                         )
-                    },
-                )?),
+                    })?)
+                }
             };
             let terms = |of: &BTreeMap<String, f64>| -> Result<Vec<(usize, f64)>, Misfit> {
                 of.iter()
@@ -202,7 +202,9 @@ impl RobotSection {
                         return Err(misfit(
                             "joint",
                             "moves another link too",
-                            format!("let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"),
+                            format!(
+                                "let this link follow it: `follows = {{ linear = {{ {joint} = 1.0 }} }}`"
+                            ),
                         ));
                     }
                     Coordinate::Joint(find(joint).unwrap_or_default())
@@ -271,7 +273,10 @@ impl RobotSection {
         for c in &self.coupling {
             let joint = |name: &str| {
                 find(name).ok_or_else(|| {
-                    Misfit::of_robot(&format!("couples `{name}`, which is no independent joint"), unknown(name))
+                    Misfit::of_robot(
+                        &format!("couples `{name}`, which is no independent joint"),
+                        unknown(name),
+                    )
                 })
             };
             let coupling = Coupling {
@@ -326,7 +331,9 @@ impl Misfit {
 
     fn of_chain(error: &ChainError) -> Self {
         let text = error.to_string();
-        let (problem, remedy) = text.rsplit_once("; ").unwrap_or((&text, "correct [[robot.link]]"));
+        let (problem, remedy) = text
+            .rsplit_once("; ")
+            .unwrap_or((&text, "correct [[robot.link]]"));
         Self::of_robot(&format!("is \"serial\", but {problem}"), remedy.to_owned())
     }
 }

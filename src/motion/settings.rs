@@ -126,6 +126,16 @@ pub(super) struct Chain {
     pub shortest: usize,
 }
 
+impl Settings {
+    /// Every how many samples of step `dt` [s] a row is kept: the declared decimation, else ten rows
+    /// a period of the cut-off.
+    pub fn decimation_at(&self, dt: f64) -> usize {
+        // a step that is rounded must not cost a row
+        let ten_a_period = 1.0 / (10.0 * self.cutoff_hz * dt) + 1e-6;
+        self.decimation.unwrap_or((ten_a_period as usize).max(1))
+    }
+}
+
 impl Chain {
     pub(super) fn design(settings: &Settings, dt: f64) -> Result<Self, MotionError> {
         let rate = 1.0 / dt;
@@ -138,7 +148,7 @@ impl Chain {
                 });
             }
             Some(every) => every,
-            None => ((rate / (10.0 * settings.cutoff_hz)) as usize).max(1),
+            None => settings.decimation_at(dt),
         };
         let parallel = match settings.filter {
             ParallelFilter::Butterworth { order } => {

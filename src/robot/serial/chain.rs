@@ -87,7 +87,9 @@ pub enum ChainError {
     TooManyLinks { links: usize },
     #[error("the chain has {joints} independent joints; 1 to {MOST_JOINTS} are supported")]
     TooManyJoints { joints: usize },
-    #[error("link `{link}` comes before the link that it hangs on; list links from the base outward")]
+    #[error(
+        "link `{link}` comes before the link that it hangs on; list links from the base outward"
+    )]
     Order { link: String },
     #[error("the axis of link `{link}` is {axis:?}, whose length is not 1")]
     Axis { link: String, axis: Vector },

@@ -344,7 +344,14 @@ mod tests {
         // Khalil and Dombre: the second mass goes into the first link
         assert_eq!(
             meanings,
-            ["Izz1 + 0.16 m2", "mx1 + 0.4 m2", "my1", "Izz2", "mx2", "my2"]
+            [
+                "Izz1 + 0.16 m2",
+                "mx1 + 0.4 m2",
+                "my1",
+                "Izz2",
+                "mx2",
+                "my2"
+            ]
         );
     }
 
