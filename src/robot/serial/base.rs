@@ -6,7 +6,7 @@
 //! into which parameters it is grouped. The order, and with it the grouping, is the same from run to
 //! run and is that of Khalil and Dombre: a link's mass goes into the link before it.
 
-use super::chain::{Chain, MOST_JOINTS};
+use super::chain::{Chain, Coordinate, Link, MOST_JOINTS};
 use super::newton_euler::{STANDARD, walk};
 use crate::robot::JointKind;
 use rand::{RngExt, SeedableRng};
@@ -40,15 +40,19 @@ pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
     let mut columns = vec![vec![0.0; rows]; p];
     let mut chance = ChaCha8Rng::seed_from_u64(0x0ba5e);
     let mut draw = |scale: f64| scale * (2.0 * chance.random::<f64>() - 1.0);
+    let slides = |j: usize| {
+        let own = |l: &Link| l.coordinate == Coordinate::Joint(j);
+        let link = chain.links().iter().find(|l| own(l));
+        link.is_some_and(|l| l.kind == JointKind::Prismatic)
+    };
+    let reach: Vec<f64> = (0..n).map(|j| if slides(j) { 0.7 } else { 3.0 }).collect();
     for s in 0..states {
         let mut state = [[0.0; MOST_JOINTS]; 3];
-        for j in 0..n {
-            let slides = chain.links().iter().any(|l| {
-                l.kind == JointKind::Prismatic && l.coordinate == super::chain::Coordinate::Joint(j)
-            });
-            state[0][j] = draw(if slides { 0.7 } else { 3.0 });
-            state[1][j] = draw(2.0);
-            state[2][j] = draw(8.0);
+        for (x, reach) in state[0].iter_mut().zip(&reach) {
+            *x = draw(*reach);
+        }
+        for (k, scale) in [(1, 2.0), (2, 8.0)] {
+            state[k][..n].fill_with(|| draw(scale));
         }
         walk(chain, &state[0], &state[1], &state[2], |i, k, row| {
             for (c, x) in row.iter().enumerate() {
@@ -56,8 +60,8 @@ pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
             }
         });
         if drive_inertia {
-            for j in 0..n {
-                columns[p - n + j][s * n + j] = state[2][j];
+            for (j, a) in state[2].iter().enumerate().take(n) {
+                columns[p - n + j][s * n + j] = *a;
             }
         }
     }
