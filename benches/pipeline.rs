@@ -3,7 +3,9 @@
 //! accumulation. `cargo bench --bench pipeline`.
 
 use std::hint::black_box;
+use std::path::Path;
 
+use cft_ident::config::RobotFile;
 use cft_ident::friction::filter::Filter;
 use cft_ident::friction::passes::spread;
 use cft_ident::friction::problem::{FRICTION, Noise, Problem, Record};
@@ -199,5 +201,49 @@ fn regressor(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, filter, regressor);
+/// The TX40's 40 base parameters: its chain is timed beside Pinocchio by benches/pinocchio/run.sh.
+fn serial(c: &mut Criterion) {
+    const STATES: usize = 1000;
+    let file = RobotFile::load(Path::new("configs/tx40.toml")).expect("a robot file");
+    let robot = file.robot();
+    let p = robot.parameters().len();
+    let states: Vec<[[f64; 6]; 3]> = (0..STATES)
+        .map(|k| {
+            let t = k as f64 * 0.37;
+            let of = |scale: f64, rate: f64| {
+                std::array::from_fn(|i| scale * (t * (rate + 0.1 * i as f64)).sin())
+            };
+            [of(3.0, 1.0), of(2.0, 1.7), of(8.0, 2.3)]
+        })
+        .collect();
+    let mut group = c.benchmark_group("regressor of six joints");
+    group.throughput(Throughput::Elements(STATES as u64));
+    let mut y = vec![0.0; 6 * p];
+    group.bench_function("regressor", |b| {
+        b.iter(|| {
+            for [q, v, a] in &states {
+                robot.regressor(q, v, a, &mut y);
+                black_box(&y);
+            }
+        });
+    });
+    group.bench_function("regressor and R factor", |b| {
+        let mut factor = RFactor::new(p + 1);
+        let mut row = vec![0.0; p + 1];
+        b.iter(|| {
+            for [q, v, a] in &states {
+                robot.regressor(q, v, a, &mut y);
+                for (y, q) in y.chunks_exact(p).zip(q) {
+                    row[..p].copy_from_slice(y);
+                    row[p] = *q;
+                    factor.fold(&row);
+                }
+            }
+            black_box(factor.rows())
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, filter, regressor, serial);
 criterion_main!(benches);

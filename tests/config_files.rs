@@ -164,7 +164,7 @@ fn the_robot_section_says_what_it_needs() {
     robot_refused(
         "[robot]\nmodel = \"serial\"\n",
         "",
-        &["r.toml:2", "does not have yet", "single-joint"],
+        &["`robot.link` is missing", "[[robot.link]]", "urdf"],
     );
     robot_refused(
         "[robot]\nmodel = \"cft\"\n",

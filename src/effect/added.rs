@@ -173,6 +173,13 @@ impl Added {
                     robot.joint_names()[of]
                 )
             }
+            (Place::Geared { other, .. }, Some(motor)) => {
+                format!(
+                    "{} of {motor} and {}",
+                    self.kind.name,
+                    robot.joint_names()[other]
+                )
+            }
             (_, Some(place)) => format!("{} of {place}", self.kind.name),
             (_, None) => self.kind.name.to_owned(),
         }
@@ -242,13 +249,21 @@ impl Added {
                 }
             }
         }
-        if let Place::Pair { of, .. } = self.place {
+        let mut place = |key: &str, value: usize| {
             out.push(Told {
-                key: "from".to_owned(),
-                value: (of + 1) as f64,
+                key: key.to_owned(),
+                value: value as f64,
                 std: None,
                 unit: String::new(),
             });
+        };
+        match self.place {
+            Place::Pair { of, .. } => place("from", of + 1),
+            Place::Geared { other, .. } => {
+                place("from", other + 1);
+                place("both", 1);
+            }
+            _ => {}
         }
         out
     }
@@ -297,7 +312,14 @@ fn place(
                     value: of,
                 });
             }
-            Ok(Place::Pair { on, of: at - 1 })
+            let both = get("both").is_ok_and(|both| both != 0.0);
+            Ok(match both {
+                true => Place::Geared {
+                    motor: on,
+                    other: at - 1,
+                },
+                false => Place::Pair { on, of: at - 1 },
+            })
         }
         "payload" | "rigid-body-terms" | "actuator-friction" => Err(nowhere()),
         _ => Ok(Place::Joint(on)),

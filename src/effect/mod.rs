@@ -79,6 +79,8 @@ pub enum Place {
     Actuator(usize),
     /// Joint `on`, from the motion of joint `of`.
     Pair { on: usize, of: usize },
+    /// Joints `motor` and `other`, through a gear train that both turn.
+    Geared { motor: usize, other: usize },
     /// All joints together.
     All,
 }
@@ -87,7 +89,7 @@ impl Place {
     /// The joint, where it is one; none for actuator coordinates and for all joints.
     pub fn joint(self) -> Option<usize> {
         match self {
-            Place::Joint(j) | Place::Pair { on: j, .. } => Some(j),
+            Place::Joint(j) | Place::Pair { on: j, .. } | Place::Geared { motor: j, .. } => Some(j),
             Place::Actuator(_) | Place::All => None,
         }
     }
@@ -96,6 +98,7 @@ impl Place {
     pub fn touches(self, j: usize) -> bool {
         match self {
             Place::Joint(i) | Place::Pair { on: i, .. } => i == j,
+            Place::Geared { motor, other } => j == motor || j == other,
             // the pantograph's references move q4 and q5
             Place::Actuator(_) => j == 2 || j == 3,
             Place::All => true,
@@ -105,7 +108,9 @@ impl Place {
     /// Name in results and files: the joint's, `x_r` or `y_r`; none for all joints.
     pub fn name(self, robot: &Robot) -> Option<String> {
         match self {
-            Place::Joint(j) | Place::Pair { on: j, .. } => Some(robot.joint_names()[j].clone()),
+            Place::Joint(j) | Place::Pair { on: j, .. } | Place::Geared { motor: j, .. } => {
+                Some(robot.joint_names()[j].clone())
+            }
             Place::Actuator(0) => Some("x_r".to_owned()),
             Place::Actuator(_) => Some("y_r".to_owned()),
             Place::All => None,
@@ -115,7 +120,9 @@ impl Place {
     /// Whether the coordinate slides or turns.
     pub fn kind(self, robot: &Robot) -> JointKind {
         match self {
-            Place::Joint(j) | Place::Pair { on: j, .. } => robot.joint_kind(j),
+            Place::Joint(j) | Place::Pair { on: j, .. } | Place::Geared { motor: j, .. } => {
+                robot.joint_kind(j)
+            }
             Place::Actuator(_) => JointKind::Prismatic,
             Place::All => robot.joint_kind(0),
         }
