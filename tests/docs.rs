@@ -1,5 +1,7 @@
 //! The documents say what the results say, and point to what is there.
 
+#[path = "../examples/docs_tables/arms.rs"]
+mod arms;
 #[path = "../examples/docs_tables/blocks.rs"]
 mod blocks;
 #[path = "../examples/docs_tables/tables.rs"]

@@ -9,11 +9,13 @@ const END: &str = "<!-- end of table -->";
 /// README.md and docs/*.md, in the order of their names.
 pub fn documents(root: &Path) -> Vec<PathBuf> {
     let mut found = vec![root.join("README.md")];
-    let entries = std::fs::read_dir(root.join("docs")).into_iter().flatten();
-    let markdown = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|end| end == "md"));
-    found.extend(markdown);
+    for folder in ["docs", "docs/measured"] {
+        let entries = std::fs::read_dir(root.join(folder)).into_iter().flatten();
+        let markdown = entries
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.extension().is_some_and(|end| end == "md"));
+        found.extend(markdown);
+    }
     found.sort();
     found
 }

@@ -4,6 +4,7 @@
 //! A table stands between `<!-- table: KIND FILE... -->` and `<!-- end of table -->`; the kinds are
 //! in `tables.rs`. The results are made by `docs/generate`, or by the command that they name.
 
+mod arms;
 mod blocks;
 mod tables;
 

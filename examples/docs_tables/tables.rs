@@ -3,10 +3,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use super::arms;
 use cft_ident::report::number::{percent, significant, value_and_std};
 use serde_json::Value;
 
-type Rendered = Result<String, String>;
+pub type Rendered = Result<String, String>;
 
 /// Renders the block of these words: a kind, then files of docs/results without their ending.
 pub fn render(words: &[&str]) -> Rendered {
@@ -19,6 +20,9 @@ pub fn render(words: &[&str]) -> Rendered {
         ["study", study] => self::study(&json(study)?),
         ["steps", diagnosis] => steps(&json(diagnosis)?),
         ["before-after", diagnoses @ ..] => before_after(diagnoses),
+        ["arm-errors", names @ ..] => arms::errors(names),
+        ["arm-friction", names @ ..] => arms::friction(names),
+        ["arm-parameters", names @ ..] => arms::named(names),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))
@@ -33,26 +37,26 @@ fn read(name: &str) -> Result<String, String> {
         .map_err(|error| format!("docs/results/{name}: {error}"))
 }
 
-fn json(name: &str) -> Result<Value, String> {
+pub fn json(name: &str) -> Result<Value, String> {
     serde_json::from_str(&read(&format!("{name}.json"))?)
         .map_err(|error| format!("docs/results/{name}.json: {error}"))
 }
 
 /// A number, NaN where there is none.
-fn number(value: &Value) -> f64 {
+pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-fn text(value: &Value) -> &str {
+pub fn text(value: &Value) -> &str {
     value.as_str().unwrap_or("")
 }
 
-fn rows(value: &Value) -> &[Value] {
+pub fn rows(value: &Value) -> &[Value] {
     value.as_array().map_or(&[], Vec::as_slice)
 }
 
 /// A Markdown table; columns whose name begins with `<` stand at the left.
-fn table(columns: &[&str], rows: &[Vec<String>]) -> String {
+pub fn table(columns: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = String::new();
     let names: Vec<&str> = columns.iter().map(|c| c.trim_start_matches('<')).collect();
     let rules: Vec<&str> = columns

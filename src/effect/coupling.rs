@@ -2,8 +2,8 @@
 //! coulomb sgn(v_i + r v_j), inertia a_j.
 //!
 //! Where both joints turn one motor, as in the wrist of many arms, what it asks of joint i it asks of
-//! joint j too: power is kept, so that both rows have the same three numbers (Janot, Vandanjon and
-//! Gautier 2014). That place is told by `both`.
+//! joint j too: power is kept, so that both rows have the same three numbers. That place is told by
+//! `both`.
 
 use super::{Family, Key, Kind, Place, Role, Unit, sign};
 

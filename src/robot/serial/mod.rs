@@ -35,8 +35,7 @@ pub const MOST_ENTRIES: usize = 832;
 /// q_motor + ratio q_other. Its inertia a, viscous v and Coulomb s act as
 /// tau_motor += a ratio a_other + v ratio v_other + s sgn(v_motor + ratio v_other) and
 /// tau_other += ratio (a a_motor + v v_motor + s sgn(v_motor + ratio v_other)); what either joint
-/// does to itself is in its own drive inertia and friction (Janot, Vandanjon and Gautier 2014, the
-/// wrist of the TX40, with ratio 1).
+/// does to itself is in its own drive inertia and friction. The wrist of the TX40 is so, with ratio 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
     /// Joint whose motor it is.
