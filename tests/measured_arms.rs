@@ -1,0 +1,143 @@
+//! Measured arms through `lsq` and `validate`, beside what others got from the same logs; and what the
+//! committed diagnoses of them say. Skipped aloud where ../shared/data is not there.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn shared(file: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!(
+        "SKIPPED: {} is not there (docs/data.md says where it is from)",
+        path.display()
+    );
+    None
+}
+
+#[track_caller]
+fn run(folder: &Path, words: &[&str]) -> Value {
+    let output = Command::cargo_bin("cft-ident")
+        .unwrap()
+        .current_dir(folder)
+        .args(words)
+        .args(["--json", "-", "-q"])
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{words:?}: {message}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Fits on one span and judges on another: errors per joint in per cent, and the document.
+fn fitted(robot: &str, more: &[&str], log: &str, fit: &str, unseen: &str) -> (Vec<f64>, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let (fit, unseen) = (format!("{log}{fit}"), format!("{log}{unseen}"));
+    let mut words = vec!["lsq", &fit, "-r", robot, "-o", "model.toml"];
+    words.extend(more);
+    run(folder.path(), &words);
+    let found = run(folder.path(), &["validate", &unseen, "-m", "model.toml"]);
+    let joints = found["joints"].as_array().unwrap();
+    let errors = joints
+        .iter()
+        .map(|j| 100.0 * j["relative_error"].as_f64().unwrap());
+    (errors.collect(), found)
+}
+
+/// Each error is at most the limit, both to the limit's one decimal.
+#[track_caller]
+fn assert_at_most(errors: &[f64], limits: &[f64]) {
+    assert_eq!(errors.len(), limits.len());
+    for (error, limit) in errors.iter().zip(limits) {
+        let shown = (10.0 * error).round() / 10.0;
+        assert!(shown <= *limit, "{errors:.2?} against {limits:?}");
+    }
+}
+
+#[test]
+fn the_tx40_is_as_others_have_it_without_and_with_the_coupling_of_its_wrist() {
+    let Some(log) = shared("tx40/tx40_joint.csv") else {
+        return;
+    };
+    let log = log.to_str().unwrap();
+    let (plain, _) = fitted("configs/tx40.toml", &[], log, "", "");
+    assert_at_most(&plain, &[5.9, 7.1, 9.4, 11.5, 53.5, 32.2]);
+
+    let text = std::fs::read_to_string("configs/tx40.toml").unwrap();
+    let coupling = "[[robot.coupling]]\nmotor = \"q6\"\nother = \"q5\"\nratio = 1.0\n\n[friction]";
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("coupled.toml");
+    std::fs::write(&robot, text.replace("[friction]", coupling)).unwrap();
+    let (coupled, _) = fitted(robot.to_str().unwrap(), &[], log, "", "");
+    assert_at_most(&coupled, &[5.9, 7.0, 9.6, 11.6, 14.2, 13.9]);
+}
+
+#[test]
+fn the_panda_is_at_one_and_a_half_per_cent() {
+    let Some(log) = shared("panda/panda_exciting.csv") else {
+        return;
+    };
+    let log = log.to_str().unwrap();
+    let robot = "configs/panda.toml";
+    let (_, found) = fitted(robot, &["--estimator", "ols"], log, "", "");
+    let overall = found["overall"]["relative_error"].as_f64().unwrap();
+    assert!(overall <= 0.015, "{overall}");
+}
+
+#[test]
+fn the_ur10_is_as_others_have_it_on_what_was_not_fitted() {
+    let Some(log) = shared("ur10/ur10_exciting_trajectory.mcap") else {
+        return;
+    };
+    let log = log.to_str().unwrap();
+    let (unseen, _) = fitted("configs/ur10.toml", &[], log, "@0..70%", "@70..100%");
+    assert_at_most(&unseen, &[17.0, 6.8, 6.0, 12.6, 13.8, 16.5]);
+}
+
+fn committed(name: &str) -> Value {
+    let text = std::fs::read_to_string(format!("docs/results/{name}.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn the_coupling_of_the_tx40_is_the_first_thing_that_its_diagnosis_finds() {
+    let diagnosis = committed("tx40_diagnosis");
+    let step = &diagnosis["steps"][0];
+    assert_eq!(
+        (&step["effect"], &step["joint"]),
+        (&"coupling".into(), &"q6".into())
+    );
+    let number = |key: &str, what: &str| step["parameters"][key][what].as_f64().unwrap();
+    // the motor of joint 6 turns with the sum of both: sgn(v6 + v5)
+    assert_eq!(
+        (number("from", "value"), number("both", "value")),
+        (5.0, 1.0)
+    );
+    assert!((number("r", "value") - 1.0).abs() < 1e-3);
+    assert!((number("viscous", "value") / 0.616 - 1.0).abs() < 0.15);
+    for (key, literature) in [("inertia", 0.00964), ("coulomb", 1.95)] {
+        let off = (number(key, "value") - literature).abs();
+        assert!(
+            off < (1.96 * number(key, "std")).max(0.2 * literature),
+            "{key}"
+        );
+    }
+}
+
+#[test]
+fn what_the_diagnosis_adds_to_panda_and_ur10_does_not_worsen_what_it_never_saw() {
+    for name in ["panda", "ur10"] {
+        let mean = |which: &str| {
+            let found = committed(&format!("{name}_{which}"));
+            found["overall"]["mean_relative_error"].as_f64().unwrap()
+        };
+        assert!(mean("refined_unseen") < mean("unseen"), "{name}");
+    }
+    let overall = &committed("panda_closed_all")["overall"]["relative_error"];
+    assert!(overall.as_f64().unwrap() < 0.014, "{overall}");
+}
