@@ -56,7 +56,7 @@ fn what_is_no_chain_is_refused_with_the_line_and_the_way_out() {
     let panda = "configs/panda.toml";
     let twice = refused(panda, "joint = \"q2\"", "joint = \"q1\"");
     assert!(
-        twice.contains("robot.toml:14: `robot.link.1.joint`"),
+        twice.contains("robot.toml:13: `robot.link.1.joint`"),
         "{twice}"
     );
     assert!(twice.contains("moves another link too"), "{twice}");
