@@ -12,6 +12,7 @@
 //! | [`diagnose`] | model, logs | effects that the model lacks, refined model | |
 //! | [`validate`] | a log that was not used, model | torque errors | Figures 7 and 8 |
 //! | [`report`] | results | tables, figures | |
+//! | [`export`] | model | C header, Rust module, URDF | |
 //!
 //! [`robot`] holds the physics, [`math`] what is small and general, [`config`] the files,
 //! [`simulate`] a plant to test against.
@@ -40,6 +41,7 @@ pub mod excite;
 pub mod report;
 
 pub mod config;
+pub mod export;
 pub mod output;
 
 pub mod cli;

@@ -1,10 +1,11 @@
 //! What the data say about a parameter.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Verdict on an estimated parameter; limits on the relative standard deviation as in
 /// [`verdict_of`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Relative standard deviation of at most 10 %, or negligible.

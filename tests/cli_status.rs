@@ -107,6 +107,11 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "inspect no.csv",
         "convert no.csv a.mcap",
         "excite -r configs/cft.toml -o e.toml",
+        "export -m no.toml --c a.h",
+        "new mine",
+        "schema robot",
+        "completions bash",
+        "man .",
     ];
     assert_eq!(
         lines.len(),

@@ -13,6 +13,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("log", &["math", "robot"]),
     ("config", &["robot", "log", "verdict"]),
     ("output", &["log"]),
+    ("export", &["robot", "config"]),
     ("motion", &["math", "robot", "log"]),
     ("effect", &["math", "robot", "motion"]),
     ("friction", &["math", "robot", "log", "motion", "verdict"]),
@@ -33,7 +34,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "robot", "log", "config", "output", "motion", "effect", "friction",
-            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "report",
+            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "report", "export",
         ],
     ),
 ];
@@ -43,6 +44,8 @@ const DOORS: &[(&str, &str)] = &[
     ("faer", "math/rank.rs"),
     ("argmin", "math/minimise.rs"),
     ("clap", "cli/"),
+    ("clap_complete", "cli/completions.rs"),
+    ("clap_mangen", "cli/man.rs"),
     ("indicatif", "cli/context.rs"),
     ("ctrlc", "cli/mod.rs"),
     ("csv", "log/csv.rs"),
@@ -53,6 +56,7 @@ const DOORS: &[(&str, &str)] = &[
     ("zstd", "log/content.rs|output/log.rs"),
     ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),
+    ("quick_xml", "config/urdf/xml.rs"),
 ];
 
 /// Every source file with its path below `src`.

@@ -81,6 +81,21 @@ pub(super) fn html_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "html")
 }
 
+/// A URDF to be written.
+pub(super) fn urdf_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "urdf")
+}
+
+/// A C header to be written.
+pub(super) fn header_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "h")
+}
+
+/// A Rust module to be written.
+pub(super) fn rust_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "rs")
+}
+
 fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension() {

@@ -19,7 +19,7 @@ pub struct Given<T> {
 
 fn read<T>(
     path: &Path,
-    parse: fn(&str, &str) -> Result<T, ConfigError>,
+    parse: impl Fn(&str, &str) -> Result<T, ConfigError>,
 ) -> Result<Given<T>, CliError> {
     let name = escape(&path.to_string_lossy());
     let text = config::text(path)?;
@@ -33,12 +33,16 @@ fn read<T>(
 
 /// A robot file, or one that comes with the tool.
 pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
-    read(path, RobotFile::parse)
+    read(path, |name, text| {
+        RobotFile::parse_in(name, text, path.parent())
+    })
 }
 
 /// A model file.
 pub fn model(path: &Path) -> Result<Given<ModelFile>, CliError> {
-    read(path, ModelFile::parse)
+    read(path, |name, text| {
+        ModelFile::parse_in(name, text, path.parent())
+    })
 }
 
 /// A model file of the robot given.

@@ -4,15 +4,20 @@
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
 mod campaign;
+pub mod completions;
 pub mod convert;
 pub mod diagnose;
 mod diagnose_fault;
 mod diagnose_prior;
 pub mod excite;
+pub mod export;
 pub mod friction;
 pub mod identify;
 pub mod inspect;
 pub mod lsq;
+pub mod man;
+pub mod new;
+pub mod schema;
 pub mod simulate;
 pub mod torque;
 pub mod validate;
@@ -86,6 +91,12 @@ enum Command {
     Torque(torque::Args),
     Simulate(simulate::Args),
     Excite(excite::Args),
+    Export(export::Args),
+    New(new::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
+    #[command(hide = true)]
+    Man(man::Args),
 }
 
 impl Command {
@@ -101,6 +112,11 @@ impl Command {
             Command::Torque(args) => torque::run(args, context),
             Command::Simulate(args) => simulate::run(args, context),
             Command::Excite(args) => excite::run(args, context),
+            Command::Export(args) => export::run(args, context),
+            Command::New(args) => new::run(args, context),
+            Command::Schema(args) => schema::run(args, context),
+            Command::Completions(args) => completions::run(args, context),
+            Command::Man(args) => man::run(args, context),
         }
     }
 }
@@ -261,7 +277,10 @@ mod tests {
 
     #[test]
     fn every_help_fits_80_columns_and_has_an_example() {
-        use super::{convert, friction, identify, inspect, lsq, simulate, torque, validate};
+        use super::{
+            completions, convert, export, friction, identify, inspect, lsq, new, schema, simulate,
+            torque, validate,
+        };
         let texts = [
             help::<friction::Args>(),
             help::<lsq::Args>(),
@@ -271,6 +290,10 @@ mod tests {
             help::<identify::Args>(),
             help::<inspect::Args>(),
             help::<convert::Args>(),
+            help::<export::Args>(),
+            help::<new::Args>(),
+            help::<schema::Args>(),
+            help::<completions::Args>(),
         ];
         for text in texts {
             assert!(text.contains("Example:\n  cft-ident "), "{text}");

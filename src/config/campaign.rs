@@ -1,5 +1,6 @@
 //! Campaign files: the robot and the logs by role, for `identify`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
@@ -7,7 +8,7 @@ use super::document::Document;
 use crate::log::LogSpec;
 
 /// `[logs]`: log specifications by role, paths relative to the campaign file's folder.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignLogs {
     /// One-joint logs for the friction filter; empty: friction is fitted with the inertias.
@@ -28,7 +29,7 @@ pub struct CampaignLogs {
 }
 
 /// `[lsq] estimator`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorKind {
     /// Rows weighted by each joint's noise.
@@ -45,7 +46,7 @@ pub enum EstimatorKind {
 }
 
 /// `[settings]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignSettings {
     /// Estimator of the inertial parameters.
@@ -63,7 +64,7 @@ pub struct CampaignSettings {
 }
 
 /// A campaign file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Campaign {
     /// Robot file, relative to the campaign file's folder, or one that comes with the tool.

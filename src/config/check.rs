@@ -113,14 +113,19 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     }
 }
 
+/// Whether a text can be the name of a joint.
+pub(super) fn is_plain_name(joint: &str) -> bool {
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    !joint.is_empty() && joint.len() <= 64 && joint.chars().all(plain)
+}
+
 /// Refuses what is no name for a joint.
 pub(super) fn plain_name(
     document: &Document,
     path: &[&str],
     joint: &str,
 ) -> Result<(), ConfigError> {
-    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-    if joint.is_empty() || joint.len() > 64 || !joint.chars().all(plain) {
+    if !is_plain_name(joint) {
         return Err(document.value(
             path,
             "is no name for a joint",

@@ -7,7 +7,7 @@ use super::document::Document;
 use super::model_file::ModelFile;
 use super::robot_file::RobotFile;
 use super::trajectory::Trajectory;
-use super::{ConfigError, check};
+use super::{ConfigError, check, urdf};
 use crate::log::{list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
@@ -81,24 +81,32 @@ pub fn text(path: &Path) -> Result<String, ConfigError> {
 }
 
 impl RobotFile {
-    /// Reads and checks a robot file from TOML text; `file` names it in errors.
+    /// Reads and checks a robot file from TOML text; `file` names it in errors. A text alone
+    /// cannot name a URDF, which would stand beside it.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_in(file, text, None)
+    }
+
+    /// The same for the text of a file in `folder`, from where the URDF is read that it names: the
+    /// robot file then holds its links and limits.
+    pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
         let document = Document::new(file, text);
-        let robot: Self = document.read()?;
+        let mut robot: Self = document.read()?;
+        urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
         Ok(robot)
     }
 
     /// Reads and checks a robot file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text(path)?)
+        Self::parse_in(&shown(path), &text(path)?, path.parent())
     }
 }
 
 impl ModelFile {
     /// Reads and checks a model file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text(path)?)
+        Self::parse_in(&shown(path), &text(path)?, path.parent())
     }
 }
 

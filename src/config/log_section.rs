@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::de::{Deserializer, Error, Visitor};
 use serde::{Deserialize, Serialize};
 
 use super::robot_file::is_default;
 
 /// Unit of a logged position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PositionUnit {
     /// Metre.
     #[serde(rename = "m")]
@@ -51,7 +52,7 @@ impl PositionUnit {
 }
 
 /// Unit of a logged torque or force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TorqueUnit {
     /// Newton.
     #[serde(rename = "N")]
@@ -80,7 +81,7 @@ impl TorqueUnit {
 }
 
 /// What the torque channel is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TorqueIs {
     /// Torque at the joint.
@@ -94,7 +95,7 @@ pub enum TorqueIs {
 }
 
 /// Unit of the time column.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TimeUnit {
     /// Second.
     #[default]
@@ -112,7 +113,7 @@ pub enum TimeUnit {
 }
 
 /// What parts the columns of a text log.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DelimiterKind {
     /// Found from the header line.
@@ -129,7 +130,7 @@ pub enum DelimiterKind {
 }
 
 /// Which channels of a log are read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChannelsKind {
     /// Joint channels where the log has them, else actuator channels.
@@ -142,7 +143,7 @@ pub enum ChannelsKind {
 }
 
 /// Which time of a message is the time of its row.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StampKind {
     /// The field that `time` names, else the header's stamp, else the time of recording.
@@ -157,7 +158,7 @@ pub enum StampKind {
 }
 
 /// `[log.joint.NAME]`: SI value = sign x scale x unit x logged value + offset.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointChannels {
     /// Name of the joint in messages that list their joints by name; NAME where absent.
@@ -170,6 +171,7 @@ pub struct JointChannels {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub position: Option<String>,
     /// Unit of the position column.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -189,6 +191,7 @@ pub struct JointChannels {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub velocity: Option<String>,
     /// Column of the torque; `tau_NAME` where absent.
     #[serde(
@@ -196,6 +199,7 @@ pub struct JointChannels {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub torque: Option<String>,
     /// Unit of the torque column.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -212,7 +216,7 @@ pub struct JointChannels {
 }
 
 /// `[log.actuator.x_c1]`..: raw channels of the CFT robot.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorChannels {
     /// Column of the position; `x_c1`.. where absent.
@@ -221,6 +225,7 @@ pub struct ActuatorChannels {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub position: Option<String>,
     /// Unit of the position: SI where absent, or `counts` (Table 5).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -237,6 +242,7 @@ pub struct ActuatorChannels {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub volts: Option<String>,
     /// 1 or -1.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -244,7 +250,7 @@ pub struct ActuatorChannels {
 }
 
 /// `[log]`: how the logs of this machine are written.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
     /// Column of the time, or field of a message; `t` where absent.
@@ -253,6 +259,7 @@ pub struct LogSection {
         deserialize_with = "column",
         skip_serializing_if = "Option::is_none"
     )]
+    #[schemars(with = "Option<NameOrNumber>")]
     pub time: Option<String>,
     /// Unit of the time column.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -291,6 +298,15 @@ pub struct LogSection {
     /// Raw columns by actuator coordinate.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub actuator: BTreeMap<String, ActuatorChannels>,
+}
+
+/// What [`column`] reads, for the schema.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code)]
+enum NameOrNumber {
+    Name(String),
+    Number(u32),
 }
 
 /// A column by its name, or by its number from 1: `3` is kept as `#3`.

@@ -15,9 +15,11 @@ pub mod log_section;
 pub mod model_file;
 mod model_text;
 pub mod robot_file;
+pub mod schema;
 pub mod serial_section;
 pub mod trajectory;
 mod trajectory_text;
+mod urdf;
 
 pub use campaign::Campaign;
 pub use embedded::{EMBEDDED, embedded, text};
@@ -25,3 +27,5 @@ pub use error::ConfigError;
 pub use model_file::ModelFile;
 pub use robot_file::RobotFile;
 pub use trajectory::Trajectory;
+pub use urdf::UrdfChain;
+pub use urdf::beside::DRIVE_INERTIA;

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
@@ -12,7 +13,7 @@ use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 pub use crate::verdict::Verdict;
 
 /// One parameter of a model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Name: `theta_1`.., or the key of a friction law, `inertia`, `offset`, ...
@@ -49,7 +50,7 @@ impl Parameter {
 }
 
 /// Covariance of the parameters, in the order of `names`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Covariance {
     /// Keys of the parameters ([`Parameter::key`]).
@@ -59,7 +60,7 @@ pub struct Covariance {
 }
 
 /// A number of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EffectParameter {
     /// Value in `unit`.
@@ -73,7 +74,7 @@ pub struct EffectParameter {
 }
 
 /// An effect that was added to the declared model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Effect {
     /// Name, e.g. `ripple`.
@@ -87,7 +88,7 @@ pub struct Effect {
 }
 
 /// Where a model came from. No clock time and no path: the same inputs give the same bytes.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelProvenance {
     /// Version of the tool.

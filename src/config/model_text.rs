@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::Document;
@@ -13,12 +15,12 @@ use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
     RobotSection, SensorsSection,
 };
-use super::{ConfigError, check};
+use super::{ConfigError, check, urdf};
 
 /// The file as it is written: the sections of a robot file, and what was identified.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct ModelToml {
+pub(super) struct ModelToml {
     robot: RobotSection,
     #[serde(default)]
     friction: FrictionSection,
@@ -61,9 +63,15 @@ impl ModelFile {
     /// Everything that a robot file can have wrong; a parameter twice, or not finite; a covariance
     /// that is not square or names what is no parameter.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_in(file, text, None)
+    }
+
+    /// The same for the text of a file in `folder`, from where the URDF is read that it may name:
+    /// base parameters that the file does not give are then those of the URDF's inertials.
+    pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
         let document = Document::new(file, text);
-        let raw: ModelToml = document.read()?;
-        let robot = RobotFile {
+        let mut raw: ModelToml = document.read()?;
+        let mut robot = RobotFile {
             robot: raw.robot,
             friction: raw.friction,
             log: raw.log,
@@ -73,7 +81,12 @@ impl ModelFile {
             control: raw.control,
             sensors: raw.sensors,
         };
+        let beside = robot.robot.urdf.is_some();
+        urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
+        if beside {
+            urdf::beside::base_parameters(&robot, &mut raw.parameter, &document)?;
+        }
         if raw.parameter.is_empty() {
             return Err(document.missing(
                 &["parameter"],
@@ -102,6 +115,18 @@ impl ModelFile {
         let mut text = String::from(
             "# A dynamic model identified by cft-ident. SI units and radians. It may be edited by hand.\n\n",
         );
+        text.push_str(&self.sections()?);
+        // What cannot be read back must not be written.
+        Self::parse("model", &text)?;
+        Ok(text)
+    }
+
+    /// The sections of [`Self::to_toml`], without its head.
+    ///
+    /// # Errors
+    /// A content that TOML cannot hold.
+    pub fn sections(&self) -> Result<String, ConfigError> {
+        let mut text = String::new();
         let unwritable = |error: toml::ser::Error| ConfigError::Syntax {
             file: "model".to_owned(),
             line: 1,
@@ -145,8 +170,6 @@ impl ModelFile {
             provenance: &self.provenance,
         };
         text.push_str(&toml::to_string(&provenance).map_err(unwritable)?);
-        // What cannot be read back must not be written.
-        Self::parse("model", &text)?;
         Ok(text)
     }
 

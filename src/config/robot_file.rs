@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::log_section::LogSection;
@@ -10,7 +11,7 @@ use crate::robot::cft::{self, Setup, Structure};
 use crate::robot::{JointKind, Robot};
 
 /// `[robot] model`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ModelKind {
     /// The CFT transposer robot of the report.
@@ -22,7 +23,7 @@ pub enum ModelKind {
 }
 
 /// `[robot]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotSection {
     /// Which model.
@@ -61,7 +62,7 @@ pub struct RobotSection {
 }
 
 /// `[friction] law`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FrictionLawKind {
     /// `Bv v + Bf1 tanh(w1 v) + Bf2 tanh(w2 v)`, eq. (18).
@@ -71,7 +72,7 @@ pub enum FrictionLawKind {
 }
 
 /// Starting values of one joint's friction; the keys are those of the law.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionStart {
     /// Bv or Fv [N s/m or Nm s/rad].
@@ -95,7 +96,7 @@ pub struct FrictionStart {
 }
 
 /// `[friction]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionSection {
     /// The law; double-tanh for the CFT robot and viscous-coulomb for a single joint where absent.
@@ -113,7 +114,7 @@ pub struct FrictionSection {
 }
 
 /// `[filter] kind`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FilterKind {
     /// Butterworth low-pass, forward and backward.
@@ -123,7 +124,7 @@ pub enum FilterKind {
 }
 
 /// `[filter] differences`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DifferencesKind {
     /// Three-point central differences.
@@ -133,7 +134,7 @@ pub enum DifferencesKind {
 }
 
 /// `[filter]`: how logs become rows; what is absent is chosen by the stage.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FilterSection {
     /// Kind of the parallel filter over torque and all columns.
@@ -173,7 +174,7 @@ pub struct FilterSection {
 }
 
 /// Noise of one joint, where the user overrides what is estimated.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointNoise {
     /// Step of the position measurement [m or rad].
@@ -185,7 +186,7 @@ pub struct JointNoise {
 }
 
 /// `[noise]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseSection {
     /// Overrides by joint.
@@ -194,7 +195,7 @@ pub struct NoiseSection {
 }
 
 /// `[limits.NAME]` of a joint or an actuator coordinate.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CoordinateLimits {
     /// Lower and upper end [m or rad].
@@ -215,7 +216,7 @@ pub struct CoordinateLimits {
 }
 
 /// `[control]` of the simulator: u = kp (x_d - x) + kd (v_d - v) per actuator coordinate, saturated.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ControlSection {
     /// Proportional gain per coordinate [V/m or V/rad]; one number for a single joint.
@@ -236,7 +237,7 @@ pub struct ControlSection {
 }
 
 /// `[sensors]` of the simulator.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorsSection {
     /// Positions are rounded to encoder counts (Table 5).
@@ -260,7 +261,7 @@ pub struct SensorsSection {
 }
 
 /// A robot file. Every section but `[robot]` may be left out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotFile {
     /// Which machine.

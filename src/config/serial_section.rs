@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
@@ -14,7 +15,7 @@ use crate::robot::serial::{
 use crate::robot::{JointKind, Robot};
 
 /// A sine in a dependent coordinate: amplitude sin(phase + sum of `of`).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SineSection {
     /// \[m or rad\]
@@ -27,7 +28,7 @@ pub struct SineSection {
 }
 
 /// A coordinate that follows the independent joints, as a URDF mimic joint or a linkage does.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FollowsSection {
     /// Constant part [m or rad].
@@ -42,7 +43,7 @@ pub struct FollowsSection {
 }
 
 /// What a drawing or a URDF says of a link's mass: a prior, never taken for the answer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InertialSection {
     /// \[kg\]
@@ -55,7 +56,7 @@ pub struct InertialSection {
 
 /// One moving link and the joint before it: a modified Denavit-Hartenberg row (`a`, `alpha`, `d`,
 /// `theta`) or a URDF origin (`xyz`, `rpy`, `axis`).
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinkSection {
     /// Name of the link; `link_1`, `link_2`, ... where absent.
@@ -100,7 +101,7 @@ pub struct LinkSection {
 }
 
 /// Two joints whose gear trains are coupled: the motor of the first turns with the second too.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CouplingSection {
     /// Joint whose motor it is.
@@ -114,7 +115,7 @@ pub struct CouplingSection {
 /// Free fall, where the file says nothing: along -z of the base \[m/s^2\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 /// Name of the frame that does not move.
-const BASE: &str = "base";
+pub(super) const BASE: &str = "base";
 
 impl RobotSection {
     /// Names of the independent joints of a chain, in the order of its links.

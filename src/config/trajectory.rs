@@ -1,12 +1,13 @@
 //! Trajectory files: a Fourier series (43), a single-joint ladder of speeds, or a list of points.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
 
 /// In which coordinates a trajectory is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// Actuator coordinates x_c1..x_c4 of the CFT robot [m, m, rad, m].
@@ -19,7 +20,7 @@ pub enum Coordinates {
 ///
 /// `x(t) = offset + sum_l a_l/(l w) sin(l w t) - b_l/(l w) cos(l w t)`, `w = 2 pi fundamental_hz`;
 /// so a and b are amplitudes of the velocity [m/s or rad/s].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FourierCoordinate {
     /// Coordinate: `x_c1`..`x_c4`, or a joint name.
@@ -67,7 +68,7 @@ pub struct SingleJointMove {
 }
 
 /// A pose at a time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
     /// Time [s], increasing along the list.
@@ -99,7 +100,7 @@ pub enum Trajectory {
 /// Names of the actuator coordinates of the CFT robot.
 pub const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
     Fourier,
@@ -108,9 +109,9 @@ enum Kind {
 }
 
 /// The file as it is written: one flat table, so that errors keep their line.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct TrajectoryToml {
+pub(super) struct TrajectoryToml {
     kind: Kind,
     coordinates: Option<Coordinates>,
     fundamental_hz: Option<f64>,

@@ -13,6 +13,7 @@ use serial::SerialRobot;
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the model cannot answer for.
@@ -52,7 +53,7 @@ pub struct ParameterInfo {
 }
 
 /// Kind of a joint: it decides the units of position and torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum JointKind {
     /// Position in m, force in N.

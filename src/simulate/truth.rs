@@ -3,6 +3,7 @@
 //! Only `identify` may look at it, and only after everything is decided. Parameters carry the names,
 //! joints and units of a model file, so that the two can be compared by key.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::cft::CftTruth;
@@ -14,7 +15,7 @@ use crate::robot::friction::DoubleTanh;
 use crate::robot::{JointKind, ParameterInfo};
 
 /// Content of LOG.truth.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TruthFile {
     /// Version of the tool.
     pub version: String,

@@ -7,13 +7,14 @@
 use super::geometry::L4;
 use super::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, inverse_reference_jacobian};
 use crate::robot::RobotError;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Encoder scale of x_c1..x_c4 in m or rad per count (Table 5), the same for both set-ups.
 pub const ENCODER_SCALE: [f64; 4] = [8.7989e-6, 7.5209e-6, 1.6886e-5, 5.0e-6];
 
 /// Which of the two laboratory set-ups drives the robot (Remark 5, Table 6).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Setup {
     /// TUeDACS: amplifiers of 1.6 A/V.

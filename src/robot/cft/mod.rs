@@ -11,6 +11,7 @@
 //! | [`cartesian`] | M_x, V_x, G_x, F_x | after (61) |
 //! | [`bounds`] | bounds of M, C, G, F | (22)-(25) |
 //! | [`links`] | link masses to theta | Table 4, (5)-(9) |
+//! | [`linkage`] | the arm as a chain of general links | Table 2, (54), (56) |
 //! | [`actuation`] | volts, motor forces, counts, limits | (63)-(66), Tables 5 and 6 |
 
 pub mod actuation;
@@ -19,6 +20,7 @@ pub mod cartesian;
 pub mod chain;
 pub mod dynamics;
 pub mod geometry;
+pub mod linkage;
 pub mod links;
 pub mod pantograph;
 pub mod regressor;

@@ -21,6 +21,24 @@ use crate::robot::JointKind;
 /// [kg m^2], mx, my, mz [kg m], m [kg].
 pub const STANDARD: usize = 10;
 
+/// Standard parameters of a body: its mass [kg], centre of gravity [m], and Ixx, Ixy, Ixz, Iyy, Iyz,
+/// Izz about that centre along the axes of the link [kg m^2].
+pub fn standard_of(m: f64, centre: &Vector, inertia: &[f64; 6]) -> [f64; STANDARD] {
+    let ([x, y, z], [xx, xy, xz, yy, yz, zz]) = (*centre, *inertia);
+    [
+        xx + m * (y * y + z * z),
+        xy - m * x * y,
+        xz - m * x * z,
+        yy + m * (x * x + z * z),
+        yz - m * y * z,
+        zz + m * (x * x + y * y),
+        m * x,
+        m * y,
+        m * z,
+        m,
+    ]
+}
+
 /// Motion of a link, in its own frame.
 #[derive(Clone, Copy)]
 struct State {

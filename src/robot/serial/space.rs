@@ -85,13 +85,13 @@ pub fn of_roll_pitch_yaw(rpy: &Vector) -> Rotation {
     product(&z, &product(&y, &x))
 }
 
-/// Roll, pitch and yaw of a rotation [rad]; at pitch +-pi/2 the yaw is set to 0.
+/// Roll, pitch and yaw of a rotation [rad], to the last digits also where the pitch is near
+/// +-pi/2: there roll and yaw turn about almost the same axis, and the roll is what the yaw, taken
+/// first, leaves of the turn.
 pub fn roll_pitch_yaw(r: &Rotation) -> Vector {
-    let pitch = (-r[2][0]).clamp(-1.0, 1.0).asin();
-    if r[2][0].abs() < 1.0 - 1e-12 {
-        [r[2][1].atan2(r[2][2]), pitch, r[1][0].atan2(r[0][0])]
-    } else {
-        // roll and yaw turn about the same axis
-        [(-r[1][2]).atan2(r[1][1]), pitch, 0.0]
-    }
+    let pitch = (-r[2][0]).atan2(r[0][0].hypot(r[1][0]));
+    let yaw = r[1][0].atan2(r[0][0]);
+    let (s, c) = yaw.sin_cos();
+    let roll = (s * r[0][2] - c * r[1][2]).atan2(c * r[1][1] - s * r[0][1]);
+    [roll, pitch, yaw]
 }

@@ -19,7 +19,7 @@ pub struct EffectSpec {
 }
 
 /// An effect as it acts: all its values, with units.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct EffectValue {
     pub effect: String,
     pub family: String,
@@ -31,7 +31,7 @@ pub struct EffectValue {
 }
 
 /// One value of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct EffectParameter {
     pub value: f64,
     pub unit: String,

@@ -1,0 +1,255 @@
+//! The robot file as text, with words on what was seen, what was guessed, and what is left to do.
+
+use std::fmt::Write;
+
+use super::Shape;
+use super::columns::{Joint, Mapping, Seen};
+use crate::report::number;
+use crate::robot::JointKind;
+
+/// What the text is made from.
+pub(super) struct Draft<'a> {
+    pub name: String,
+    pub shape: Shape,
+    pub mapping: &'a Mapping,
+    pub seen: Option<&'a Seen>,
+}
+
+/// A text in quotes, as TOML holds it.
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}
+
+/// A key, in quotes where it must be.
+fn key(text: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match text.chars().all(bare) {
+        true => text.to_owned(),
+        false => quoted(text),
+    }
+}
+
+impl Draft<'_> {
+    /// `[robot] model`.
+    pub(super) fn model(&self) -> &'static str {
+        match self.shape {
+            Shape::Single(_) => "single-joint",
+            Shape::Urdf { .. } | Shape::Rows => "serial",
+        }
+    }
+
+    /// Cut-off of the parallel filter: some twelve samples a period, and at most 20 Hz, above which
+    /// few drives and no arm follow.
+    pub(super) fn cutoff_hz(&self) -> Option<f64> {
+        let rate = self.seen.and_then(|s| s.rate_hz)?;
+        Some((rate / 12.5).min(20.0))
+    }
+
+    /// The whole file.
+    pub(super) fn text(&self) -> String {
+        let mut out = format!(
+            "# {}: a robot file of cft-ident. SI units and radians.\n",
+            self.name
+        );
+        if let Some(seen) = self.seen {
+            let rate = seen.rate_hz.map_or("an unknown rate".to_owned(), |rate| {
+                format!("{} Hz", number::significant(rate, 4))
+            });
+            let _ = writeln!(
+                out,
+                "# Seen in {}: {} columns, {} s at {rate}.",
+                seen.name,
+                seen.columns.len(),
+                number::significant(seen.duration_s, 4)
+            );
+        }
+        self.robot(&mut out);
+        out.push_str(
+            "\n# Friction and a constant torque per joint are fitted with the inertias, in one step. With logs of\n\
+             # one joint at a time, `law = \"double-tanh\"` and `cft-ident friction` tell friction more exactly.\n\
+             [friction]\n\
+             law = \"viscous-coulomb\"\n\
+             fitted_with_inertias = true\n\
+             offset = true\n",
+        );
+        self.log(&mut out);
+        self.filter(&mut out);
+        out.push_str(
+            "\n# Limits are used by `inspect`, `excite` and `simulate`; those of a URDF need not be repeated.\n",
+        );
+        if let Some(joint) = self.mapping.joints.first() {
+            let _ = write!(
+                out,
+                "# [limits.{}]\n# position = [-1.0, 1.0]\n# speed = 1.0\n# acceleration = 5.0\n# torque = 10.0\n",
+                key(&joint.name)
+            );
+        }
+        out
+    }
+
+    fn robot(&self, out: &mut String) {
+        let _ = writeln!(out, "\n[robot]\nmodel = {}", quoted(self.model()));
+        let serial = "# gravity = [0.0, 0.0, -9.81]   # free fall in the frame of the base; turn it where the base is tilted\n\
+                      # drive_inertia = false         # where torques are measured behind the gears, on the link side\n";
+        match &self.shape {
+            Shape::Urdf { path, tip } => {
+                let _ = writeln!(
+                    out,
+                    "urdf = {}   # from the folder of this file",
+                    quoted(path)
+                );
+                match tip {
+                    Some(tip) => {
+                        let _ = writeln!(out, "tip = {}", quoted(tip));
+                    }
+                    None => out.push_str("# tip = \"tool0\"               # link where the chain ends, where the URDF branches\n"),
+                }
+                out.push_str(serial);
+            }
+            Shape::Single(kind) => {
+                let name = self
+                    .mapping
+                    .joints
+                    .first()
+                    .map_or("q1", |j| j.name.as_str());
+                let (kind, why) = match kind {
+                    JointKind::Prismatic => ("prismatic", "its position is in m"),
+                    JointKind::Revolute => ("revolute", "guessed; prismatic where it slides"),
+                };
+                let _ = writeln!(
+                    out,
+                    "joint = {}\nkind = {}   # {why}",
+                    quoted(name),
+                    quoted(kind)
+                );
+            }
+            Shape::Rows => {
+                out.push_str(serial);
+                out.push_str(
+                    "\n# TO BE FILLED IN: a row of the modified Denavit-Hartenberg table (Craig) for each joint: alpha and\n\
+                     # a of the link before it, then d and the angle theta at q = 0. With zeros every axis is that\n\
+                     # of the base and upright: a fit runs, but it knows friction and inertias about one axis only.\n",
+                );
+                for joint in &self.mapping.joints {
+                    let kind = match joint.kind {
+                        JointKind::Prismatic => "kind = \"prismatic\"\n",
+                        JointKind::Revolute => "",
+                    };
+                    let _ = write!(
+                        out,
+                        "\n[[robot.link]]\njoint = {}\n{kind}a = 0.0         # m\nalpha = 0.0     # rad\nd = 0.0         # m\ntheta = 0.0     # rad\n",
+                        quoted(&joint.name)
+                    );
+                }
+            }
+        }
+    }
+
+    fn log(&self, out: &mut String) {
+        out.push_str("\n[log]\n");
+        if let Some(seen) = self.seen
+            && let Some((time, seconds)) = &seen.time
+        {
+            if time != "t" {
+                let _ = writeln!(out, "time = {}", quoted(time));
+            }
+            let unit = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
+                .into_iter()
+                .find(|(_, size)| size == seconds);
+            if let Some((unit, _)) = unit {
+                let _ = writeln!(out, "time_unit = {}", quoted(unit));
+            }
+        }
+        out.push_str(
+            "torque_is = \"joint\"     # or \"motor\", \"current\", \"commanded\"\n\
+             torque_held = false     # true where a torque was held from its own row to the next\n",
+        );
+        if self.seen.is_none() {
+            out.push_str(
+                "# Columns are t, q_<joint>, tau_<joint> and, where there are some, dq_<joint>. Others are mapped so:\n\
+                 # [log.joint]\n",
+            );
+            if let Some(joint) = self.mapping.joints.first() {
+                let _ = writeln!(
+                    out,
+                    "# {} = {{ position = \"pos 1\", torque = \"I 1\", torque_unit = \"A\", torque_scale = 12.5 }}",
+                    key(&joint.name)
+                );
+            }
+            return;
+        }
+        let lines: Vec<String> = self.mapping.joints.iter().filter_map(columns).collect();
+        if lines.is_empty() {
+            out.push_str(
+                "# The log has the tool's own names for its columns: nothing is to be mapped.\n",
+            );
+            return;
+        }
+        let how = match self.mapping.by_order {
+            true => "in the order of the columns, for their names tell nothing: CHECK IT",
+            false => "by their names",
+        };
+        let _ = write!(
+            out,
+            "\n# Columns of each joint, {how}.\n\
+             # More keys: position_unit, position_sign, position_scale, position_offset,\n\
+             # torque_unit, torque_sign, torque_scale (gear ratio times torque constant).\n[log.joint]\n"
+        );
+        for line in lines {
+            out.push_str(&line);
+            out.push('\n');
+        }
+    }
+
+    fn filter(&self, out: &mut String) {
+        out.push_str("\n[filter]\n");
+        match (self.cutoff_hz(), self.seen.and_then(|s| s.rate_hz)) {
+            (Some(cutoff), Some(rate)) => {
+                let _ = write!(
+                    out,
+                    "# From the rate of the log, {} Hz. Torque and all columns of the model pass the same filter; a\n\
+                     # lower cut-off makes every error look smaller, so choose it once and keep it.\n\
+                     cutoff_hz = {:?}\n",
+                    number::significant(rate, 4),
+                    (cutoff * 10.0).round() / 10.0
+                );
+            }
+            _ => out.push_str(
+                "# cutoff_hz = 10.0   # of torque and all columns; some twelve samples a period\n",
+            ),
+        }
+        out.push_str(
+            "# position_cutoff_hz = 60.0   # of the positions before they are differentiated\n",
+        );
+    }
+}
+
+/// The line of a joint in `[log.joint]`, where its columns have names of their own.
+fn columns(joint: &Joint) -> Option<String> {
+    let mut keys = Vec::new();
+    for (what, column, plain) in [
+        ("position", &joint.position, "q_"),
+        ("velocity", &joint.velocity, "dq_"),
+        ("torque", &joint.torque, "tau_"),
+    ] {
+        if let Some(column) = column
+            && *column != format!("{plain}{}", joint.name)
+        {
+            keys.push(format!("{what} = {}", quoted(column)));
+        }
+    }
+    if let Some(unit @ ("deg" | "mm" | "counts")) = joint.position_unit.as_deref() {
+        keys.push(format!("position_unit = {}", quoted(unit)));
+    }
+    if let Some(unit @ ("A" | "V")) = joint.torque_unit.as_deref() {
+        keys.push(format!("torque_unit = {}", quoted(unit)));
+    }
+    // no joint turns that far in radians
+    let degrees =
+        joint.kind == JointKind::Revolute && joint.span > 40.0 && joint.position_unit.is_none();
+    let remark = match degrees {
+        true => "   # went through more than 40: in deg? then position_unit = \"deg\"",
+        false => "",
+    };
+    (!keys.is_empty()).then(|| format!("{} = {{ {} }}{remark}", key(&joint.name), keys.join(", ")))
+}

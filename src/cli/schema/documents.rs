@@ -1,0 +1,365 @@
+//! Schemas of the JSON documents: the fields that a script may rely on.
+
+use serde_json::{Map, Value, json};
+
+use super::Kind;
+
+/// A number, or null where nothing determines it.
+fn number() -> Value {
+    json!({"type": ["number", "null"]})
+}
+
+fn text() -> Value {
+    json!({"type": "string"})
+}
+
+/// A text, or null where it concerns all.
+fn maybe_text() -> Value {
+    json!({"type": ["string", "null"]})
+}
+
+fn truth() -> Value {
+    json!({"type": "boolean"})
+}
+
+fn count() -> Value {
+    json!({"type": ["number", "null"], "minimum": 0})
+}
+
+fn one_of(words: &[&str]) -> Value {
+    json!({"type": "string", "enum": words})
+}
+
+fn list(of: Value) -> Value {
+    json!({"type": "array", "items": of})
+}
+
+/// An object that has these fields, and may have others.
+fn object(fields: &[(&str, Value)]) -> Value {
+    let names: Vec<&str> = fields.iter().map(|(name, _)| *name).collect();
+    let properties: Map<String, Value> = fields
+        .iter()
+        .map(|(name, of)| ((*name).to_owned(), of.clone()))
+        .collect();
+    json!({"type": "object", "properties": properties, "required": names})
+}
+
+/// An object with any keys, each of this kind.
+fn table(of: Value) -> Value {
+    json!({"type": "object", "additionalProperties": of})
+}
+
+fn verdict() -> Value {
+    json!({"enum": ["identified", "weak", "not-identifiable", "lower-bound", null]})
+}
+
+fn measured() -> Value {
+    object(&[("value", number()), ("std", number()), ("unit", text())])
+}
+
+fn processing() -> Value {
+    object(&[("cutoff_hz", number()), ("decimation", number())])
+}
+
+/// Errors of torques, by joint and over all.
+fn errors() -> Vec<(&'static str, Value)> {
+    let joint = object(&[
+        ("joint", text()),
+        ("unit", text()),
+        ("rmse", number()),
+        ("relative_error", number()),
+        ("relative_error_raw", number()),
+        ("max_abs", number()),
+        ("r2", number()),
+        ("samples", count()),
+    ]);
+    let overall = object(&[
+        ("relative_error", number()),
+        ("mean_relative_error", number()),
+    ]);
+    vec![("joints", list(joint)), ("overall", overall)]
+}
+
+fn friction() -> Vec<(&'static str, Value)> {
+    let joint = object(&[
+        ("joint", text()),
+        ("converged", truth()),
+        ("starts", count()),
+        (
+            "parameters",
+            table(object(&[
+                ("value", number()),
+                ("std", number()),
+                ("unit", text()),
+                ("theta", number()),
+                ("verdict", verdict()),
+            ])),
+        ),
+        (
+            "nuisance",
+            list(object(&[
+                ("name", text()),
+                ("value", number()),
+                ("std", number()),
+                ("unit", text()),
+            ])),
+        ),
+        ("speeds_covered", list(number())),
+        (
+            "curve",
+            list(object(&[
+                ("v", number()),
+                ("torque", number()),
+                ("std", number()),
+            ])),
+        ),
+        (
+            "nis",
+            object(&[
+                ("mean", number()),
+                ("lower_95", number()),
+                ("upper_95", number()),
+                ("share_inside", number()),
+            ]),
+        ),
+        ("rmse", number()),
+        ("relative_error", number()),
+        ("samples", count()),
+    ]);
+    vec![("joints", list(joint))]
+}
+
+fn lsq() -> Vec<(&'static str, Value)> {
+    let parameter = object(&[
+        ("name", text()),
+        ("theta", number()),
+        ("value", number()),
+        ("std", number()),
+        ("relative_std", number()),
+        ("unit", text()),
+        ("verdict", verdict()),
+        ("negligible", truth()),
+    ]);
+    let joint = object(&[
+        ("joint", text()),
+        ("rmse", number()),
+        ("relative_error", number()),
+    ]);
+    vec![
+        ("parameters", list(parameter)),
+        (
+            "condition",
+            object(&[("raw", number()), ("normalised", number())]),
+        ),
+        ("rank", count()),
+        ("samples", count()),
+        ("effective_samples", number()),
+        ("joints", list(joint)),
+        ("processing", processing()),
+    ]
+}
+
+fn validate() -> Vec<(&'static str, Value)> {
+    let mut fields = errors();
+    fields.push(("processing", processing()));
+    fields
+}
+
+fn diagnose() -> Vec<(&'static str, Value)> {
+    let step = object(&[
+        ("effect", text()),
+        ("family", text()),
+        ("joint", maybe_text()),
+        ("parameters", table(measured())),
+        (
+            "alternatives",
+            json!({"type": "array", "items": text(), "maxItems": 3}),
+        ),
+        ("separate_by", maybe_text()),
+        ("delta_bic", number()),
+        ("cv_gain", number()),
+        ("holdout_before", number()),
+        ("holdout_after", number()),
+        ("holdout_worsened", json!({"type": ["boolean", "null"]})),
+    ]);
+    let side = || {
+        let mut of = object(&errors());
+        of["type"] = json!(["object", "null"]);
+        of
+    };
+    let sides = || object(&[("train", side()), ("holdout", side())]);
+    let candidate = object(&[
+        ("effect", text()),
+        ("joint", maybe_text()),
+        ("score", number()),
+        ("unique_share", number()),
+        ("accepted", truth()),
+        ("reason", text()),
+    ]);
+    vec![
+        (
+            "verdict",
+            one_of(&[
+                "effects-found",
+                "nothing-missing",
+                "unexplained-residual",
+                "data-fault",
+            ]),
+        ),
+        ("steps", list(step)),
+        ("before", sides()),
+        ("after", sides()),
+        (
+            "unexplained",
+            list(object(&[("joint", text()), ("share", number())])),
+        ),
+        ("candidates", list(candidate)),
+        ("processing", processing()),
+    ]
+}
+
+fn inspect() -> Vec<(&'static str, Value)> {
+    let channel = object(&[
+        ("name", text()),
+        ("unit", maybe_text()),
+        ("min", number()),
+        ("max", number()),
+        ("rate_hz", number()),
+    ]);
+    let fault = object(&[
+        ("kind", text()),
+        ("severity", one_of(&["info", "warning", "error"])),
+        ("channel", maybe_text()),
+        ("from_s", number()),
+        ("to_s", number()),
+        ("effect", text()),
+        ("remedy", text()),
+    ]);
+    vec![
+        ("channels", list(channel)),
+        ("rate_hz", number()),
+        ("jitter", number()),
+        (
+            "gaps",
+            list(object(&[("from_s", number()), ("to_s", number())])),
+        ),
+        ("faults", list(fault)),
+    ]
+}
+
+/// Fields of a command's own result.
+fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
+    let part = || json!({"type": ["object", "null"]});
+    match kind {
+        Kind::Friction => ("friction", friction()),
+        Kind::Lsq => ("lsq", lsq()),
+        Kind::Validate => ("validate", validate()),
+        Kind::Diagnose => ("diagnose", diagnose()),
+        Kind::Inspect => ("inspect", inspect()),
+        Kind::Identify => (
+            "identify",
+            vec![
+                ("friction", part()),
+                ("lsq", part()),
+                ("validate", part()),
+                ("diagnose", part()),
+                ("truth", part()),
+                ("files", json!({})),
+            ],
+        ),
+        Kind::Excite => (
+            "excite",
+            vec![
+                (
+                    "condition",
+                    object(&[("raw", number()), ("normalised", number())]),
+                ),
+                ("log_det", number()),
+                ("limits_used", json!({})),
+                ("weakest_direction", json!({})),
+                ("evaluations", count()),
+            ],
+        ),
+        Kind::Simulate => (
+            "simulate",
+            vec![
+                ("effects", json!({"type": "array"})),
+                ("parameters", json!({})),
+            ],
+        ),
+        Kind::Torque => {
+            let joint = object(&[
+                ("joint", text()),
+                ("unit", text()),
+                ("rms", number()),
+                ("peak", number()),
+            ]);
+            (
+                "torque",
+                vec![
+                    ("joints", list(joint)),
+                    ("samples", count()),
+                    ("processing", processing()),
+                ],
+            )
+        }
+        Kind::Export => (
+            "export",
+            vec![
+                ("joints", list(text())),
+                ("files", list(object(&[("file", text()), ("what", text())]))),
+                ("left_out", list(text())),
+            ],
+        ),
+        Kind::New => {
+            let joint = object(&[
+                ("joint", text()),
+                ("position", maybe_text()),
+                ("velocity", maybe_text()),
+                ("torque", maybe_text()),
+            ]);
+            (
+                "new",
+                vec![
+                    ("file", text()),
+                    ("model", one_of(&["single-joint", "serial"])),
+                    ("joints", list(joint)),
+                    ("rate_hz", number()),
+                    ("cutoff_hz", number()),
+                ],
+            )
+        }
+        Kind::Convert
+        | Kind::Robot
+        | Kind::Model
+        | Kind::Campaign
+        | Kind::Trajectory
+        | Kind::Truth => ("convert", Vec::new()),
+    }
+}
+
+/// The schema of a command's document.
+pub(super) fn schema(kind: Kind) -> Value {
+    let (command, own) = fields(kind);
+    let input = object(&[
+        ("name", text()),
+        ("span", maybe_text()),
+        (
+            "sha256",
+            json!({"type": "string", "pattern": "^[0-9a-f]{64}$"}),
+        ),
+        ("samples", count()),
+        ("duration_s", number()),
+    ]);
+    let mut all = vec![
+        ("schema", json!({"const": format!("cft-ident/{command}/1")})),
+        ("version", text()),
+        ("inputs", list(input)),
+        ("warnings", list(text())),
+    ];
+    all.extend(own);
+    let mut found = object(&all);
+    found["$schema"] = "https://json-schema.org/draft/2020-12/schema".into();
+    found["title"] = format!("JSON document of `cft-ident {command}`").into();
+    found
+}

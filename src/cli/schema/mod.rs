@@ -1,0 +1,95 @@
+//! `cft-ident schema`: the JSON schema of every file that is read or written.
+
+mod documents;
+
+use clap::ValueEnum;
+use serde_json::{Value, json};
+
+use super::{CliError, Context, Outcome};
+use crate::config::schema::{campaign, model, robot, trajectory};
+use crate::report::json::Document;
+use crate::simulate::truth::TruthFile;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident schema robot > robot.schema.json
+  cft-ident schema validate";
+
+/// What a schema is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Robot file (TOML)
+    Robot,
+    /// Model file (TOML)
+    Model,
+    /// Campaign file (TOML)
+    Campaign,
+    /// Trajectory file (TOML)
+    Trajectory,
+    /// Truth of a simulated log (TOML)
+    Truth,
+    /// JSON document of `friction`
+    Friction,
+    /// JSON document of `lsq`
+    Lsq,
+    /// JSON document of `validate`
+    Validate,
+    /// JSON document of `diagnose`
+    Diagnose,
+    /// JSON document of `identify`
+    Identify,
+    /// JSON document of `excite`
+    Excite,
+    /// JSON document of `simulate`
+    Simulate,
+    /// JSON document of `inspect`
+    Inspect,
+    /// JSON document of `torque`
+    Torque,
+    /// JSON document of `convert`
+    Convert,
+    /// JSON document of `export`
+    Export,
+    /// JSON document of `new`
+    New,
+}
+
+/// Write the JSON schema of a file, or of the JSON document of a command, to standard output.
+///
+/// A schema of a TOML file is that of its tables as JSON; editors check and complete TOML by it.
+/// Documents may hold more fields than their schema names: those that it names are the contract.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// File, or command whose document
+    #[arg(value_name = "KIND")]
+    pub kind: Kind,
+}
+
+/// The schema of a kind.
+pub fn schema(kind: Kind) -> Value {
+    match kind {
+        Kind::Robot => robot(),
+        Kind::Model => model(),
+        Kind::Campaign => campaign(),
+        Kind::Trajectory => trajectory(),
+        Kind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
+        of_document => documents::schema(of_document),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// None but those of the output.
+pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
+    let found = schema(args.kind);
+    let text = format!("{found:#}\n");
+    let name = args.kind.to_possible_value();
+    let result = json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
+    Ok(Outcome {
+        document: Document::new("schema", &[], &[], &result)?,
+        text,
+        missed: Vec::new(),
+    })
+}

@@ -1,0 +1,69 @@
+//! A model file that takes its links and their inertials from a URDF beside it.
+
+use crate::config::ConfigError;
+use crate::config::document::Document;
+use crate::config::model_file::Parameter;
+use crate::config::robot_file::RobotFile;
+use crate::robot::Robot;
+use crate::robot::serial::newton_euler::{STANDARD, standard_of};
+
+/// Name of the parameter that gives a joint's drive inertia in such a file.
+pub const DRIVE_INERTIA: &str = "drive_inertia";
+
+/// Puts the base parameters that the URDF's inertials and the drive inertias make in the place of
+/// the drive inertias, where the file does not give them itself.
+pub(in crate::config) fn base_parameters(
+    robot: &RobotFile,
+    parameters: &mut Vec<Parameter>,
+    document: &Document,
+) -> Result<(), ConfigError> {
+    let Robot::Serial(serial) = robot.robot() else {
+        return Ok(());
+    };
+    let mut standard = vec![0.0; serial.standard_parameters()];
+    for (i, link) in robot.robot.link.iter().enumerate() {
+        if let Some(body) = &link.inertial {
+            let values = standard_of(body.mass, &body.centre, &body.inertia);
+            standard[i * STANDARD..(i + 1) * STANDARD].copy_from_slice(&values);
+        }
+    }
+    let drives = robot.robot.link.len() * STANDARD;
+    for (index, parameter) in parameters.iter().enumerate() {
+        if parameter.name != DRIVE_INERTIA {
+            continue;
+        }
+        let joint = parameter.joint.as_deref().unwrap_or_default();
+        let place = serial.names().iter().position(|name| name == joint);
+        match place.and_then(|j| standard.get_mut(drives + j)) {
+            Some(value) => *value = parameter.value,
+            None => {
+                return Err(document.value(
+                    &["parameter", &index.to_string(), "joint"],
+                    "is no joint of this robot with a drive inertia",
+                    &format!("this robot has {}", serial.names().join(", ")),
+                ));
+            }
+        }
+    }
+    parameters.retain(|p| p.name != DRIVE_INERTIA);
+    let base = serial.base_of(&standard);
+    for (info, value) in serial.parameters().iter().zip(base) {
+        if parameters
+            .iter()
+            .any(|p| p.joint.is_none() && p.name == info.name)
+        {
+            continue;
+        }
+        parameters.push(Parameter {
+            name: info.name.to_string(),
+            theta: None,
+            joint: None,
+            value,
+            std: None,
+            unit: info.unit.to_string(),
+            meaning: info.meaning.to_string(),
+            verdict: None,
+        });
+    }
+    Ok(())
+}

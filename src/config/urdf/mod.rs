@@ -1,0 +1,159 @@
+//! A URDF file read into the `[[robot.link]]` tables of a robot file.
+//!
+//! | file | what |
+//! |---|---|
+//! | `xml` | the text as elements with lines; the door to the XML reader |
+//! | `parts` | elements as links and joints |
+//! | `beside` | model files that leave links and inertials to a URDF |
+//! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
+//!
+//! Only what torques depend on is read: placements, axes, kinds, mimic joints, inertials (as a
+//! prior) and limits. The crate urdf-rs was tried and not taken: its errors name no line, and a
+//! file of some thousand nested elements ends the process.
+
+pub(super) mod beside;
+mod parts;
+mod tree;
+mod xml;
+
+use std::io::Read;
+use std::path::Path;
+
+use super::ConfigError;
+use super::document::Document;
+use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
+use super::serial_section::LinkSection;
+use crate::log::{remedy, shown};
+use crate::robot::serial::space::{Rotation, product};
+
+/// Largest file. A URDF names its meshes and does not hold them.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// What a URDF gives to a robot file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UrdfChain {
+    /// Moving links from the base outward.
+    pub links: Vec<LinkSection>,
+    /// Limits of the independent joints that have some, in the order of the links.
+    pub limits: Vec<(String, CoordinateLimits)>,
+}
+
+/// The URDF that errors speak of.
+pub(super) struct Place<'a> {
+    file: &'a str,
+}
+
+impl Place<'_> {
+    fn wrong(&self, line: usize, what: &str, problem: &str, remedy: &str) -> ConfigError {
+        ConfigError::Value {
+            file: self.file.to_owned(),
+            line,
+            key: what.to_owned(),
+            problem: problem.to_owned(),
+            remedy: remedy.to_owned(),
+        }
+    }
+}
+
+/// R A R'.
+fn turned(r: &Rotation, a: &Rotation) -> Rotation {
+    let transposed = std::array::from_fn(|i| std::array::from_fn(|j| r[j][i]));
+    product(&product(r, a), &transposed)
+}
+
+impl UrdfChain {
+    /// Reads a URDF from text, up to the link `tip` where one is named; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
+    /// of the link or joint that cannot be used.
+    pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
+        let root = xml::root(text).map_err(|wrong| ConfigError::Syntax {
+            file: file.to_owned(),
+            line: wrong.line,
+            message: wrong.message,
+        })?;
+        let place = Place { file };
+        tree::chain(&parts::parts(&root, &place)?, tip, &place)
+    }
+
+    /// Reads a URDF file.
+    ///
+    /// # Errors
+    /// Those of [`Self::parse`]; [`ConfigError::Read`] where the file cannot be read.
+    pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
+        let file = shown(path);
+        let text = text_of(path).map_err(|source| ConfigError::Read {
+            file: file.clone(),
+            remedy: match source.kind() {
+                std::io::ErrorKind::InvalidData => "give a URDF file in UTF-8, below 16 MB",
+                _ => remedy(&source),
+            }
+            .to_owned(),
+            source,
+        })?;
+        Self::parse(&file, &text, tip)
+    }
+}
+
+/// The text of a file that is not too large.
+fn text_of(path: &Path) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?
+        .take(MOST_BYTES + 1)
+        .read_to_end(&mut bytes)?;
+    let unusable = |what| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(unusable("it has more than 16 MB"));
+    }
+    String::from_utf8(bytes).map_err(|_| unusable("it is no UTF-8 text"))
+}
+
+/// Reads the URDF that a robot file names into its links and limits, so that the file stands alone.
+pub(super) fn resolve(
+    file: &mut RobotFile,
+    document: &Document,
+    folder: Option<&Path>,
+) -> Result<(), ConfigError> {
+    let robot = &mut file.robot;
+    if robot.model != ModelKind::Serial {
+        // the check of the file says that these keys do not belong to the model
+        return Ok(());
+    }
+    let Some(urdf) = &robot.urdf else {
+        return match robot.tip {
+            None => Ok(()),
+            Some(_) => Err(document.value(
+                &["robot", "tip"],
+                "stands without a `urdf`",
+                "delete it, or name the URDF file",
+            )),
+        };
+    };
+    if !robot.link.is_empty() {
+        return Err(document.value(
+            &["robot", "urdf"],
+            "stands beside [[robot.link]] tables",
+            "keep one of the two",
+        ));
+    }
+    let Some(folder) = folder else {
+        return Err(document.value(
+            &["robot", "urdf"],
+            "names a file, but this text is not one of a folder",
+            "read the robot file from the disk, the URDF beside it",
+        ));
+    };
+    let chain = UrdfChain::load(&folder.join(urdf), robot.tip.as_deref())?;
+    robot.link = chain.links;
+    robot.urdf = None;
+    robot.tip = None;
+    for (joint, found) in chain.limits {
+        // what the robot file says stands
+        let said = file.limits.entry(joint).or_default();
+        said.position = said.position.or(found.position);
+        said.speed = said.speed.or(found.speed);
+        said.torque = said.torque.or(found.torque);
+    }
+    Ok(())
+}

@@ -1,0 +1,355 @@
+//! What a URDF says: links with their inertials, joints with their placements.
+
+use std::collections::BTreeMap;
+
+use super::Place;
+use super::xml::Element;
+use crate::config::ConfigError;
+use crate::log::{escape, list, nearest};
+use crate::robot::serial::space::{Rotation, Vector, of_roll_pitch_yaw};
+
+/// A mass with its centre and inertia, in the frame of the link that carries it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    /// \[kg\]
+    pub mass: f64,
+    /// \[m\]
+    pub centre: Vector,
+    /// About the centre, along the link's axes [kg m^2].
+    pub inertia: Rotation,
+}
+
+#[derive(Debug)]
+pub(super) struct Link {
+    pub name: String,
+    pub line: usize,
+    pub body: Option<Body>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Fixed,
+    Revolute,
+    Continuous,
+    Prismatic,
+    Floating,
+    Planar,
+}
+
+/// The names of joint types, in the order of [`Kind`].
+const KINDS: [(&str, Kind); 6] = [
+    ("fixed", Kind::Fixed),
+    ("revolute", Kind::Revolute),
+    ("continuous", Kind::Continuous),
+    ("prismatic", Kind::Prismatic),
+    ("floating", Kind::Floating),
+    ("planar", Kind::Planar),
+];
+
+#[derive(Debug)]
+pub(super) struct Mimic {
+    pub joint: String,
+    pub multiplier: f64,
+    pub offset: f64,
+}
+
+#[derive(Debug)]
+pub(super) struct Joint {
+    pub name: String,
+    pub line: usize,
+    pub kind: Kind,
+    pub parent: String,
+    pub child: String,
+    pub xyz: Vector,
+    pub rpy: Vector,
+    pub axis: Vector,
+    /// Lower and upper end, where they are given.
+    pub position: Option<[f64; 2]>,
+    /// Largest speed, where it is given and above 0.
+    pub speed: Option<f64>,
+    /// Largest torque or force, likewise.
+    pub effort: Option<f64>,
+    pub mimic: Option<Mimic>,
+}
+
+/// A robot as its URDF lists it.
+#[derive(Debug)]
+pub(super) struct Parts {
+    pub links: Vec<Link>,
+    pub joints: Vec<Joint>,
+}
+
+/// Reads what stands in a `<robot>`.
+pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError> {
+    if root.name != "robot" {
+        return Err(place.wrong(
+            root.line,
+            &format!("<{}>", escape(&root.name)),
+            "is not the <robot> of a URDF",
+            "give a URDF file; an SDF or a xacro file is to be converted first",
+        ));
+    }
+    let mut parts = Parts {
+        links: Vec::new(),
+        joints: Vec::new(),
+    };
+    let mut links: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
+    for child in &root.children {
+        let known = match child.name.as_str() {
+            "link" => &mut links,
+            "joint" => &mut joints,
+            name if name.starts_with("xacro:") => {
+                return Err(place.wrong(
+                    child.line,
+                    &format!("<{}>", escape(name)),
+                    "is a macro of xacro, not yet expanded",
+                    "expand it first: `xacro robot.urdf.xacro > robot.urdf`",
+                ));
+            }
+            // materials, transmissions, sensors, gazebo
+            _ => continue,
+        };
+        let name = child.attribute("name").unwrap_or_default();
+        if name.trim().is_empty() {
+            return Err(place.wrong(
+                child.line,
+                &format!("<{}>", child.name),
+                "has no name",
+                "give it one: name=\"...\"",
+            ));
+        }
+        if let Some(line) = known.insert(name, child.line) {
+            return Err(place.wrong(
+                child.line,
+                &format!("{} {}", child.name, escape(name)),
+                &format!("has the name of that of line {line}"),
+                "give each its own name",
+            ));
+        }
+        if child.name == "link" {
+            parts.links.push(link(child, name, place)?);
+        } else {
+            parts.joints.push(joint(child, name, place)?);
+        }
+    }
+    if parts.links.is_empty() {
+        return Err(place.wrong(
+            root.line,
+            "<robot>",
+            "has no <link>",
+            "give the URDF of a whole robot",
+        ));
+    }
+    for joint in &parts.joints {
+        for (what, link) in [("parent", &joint.parent), ("child", &joint.child)] {
+            if !links.contains_key(link.as_str()) {
+                let all = parts.links.iter().map(|l| l.name.as_str());
+                let remedy = match nearest(link, all.clone()) {
+                    Some(near) => format!("did you mean `{}`?", escape(near)),
+                    None => format!("the links are {}", list(all.take(20))),
+                };
+                return Err(place.wrong(
+                    joint.line,
+                    &format!("joint {}", escape(&joint.name)),
+                    &format!("has the {what} `{}`, which is no link", escape(link)),
+                    &remedy,
+                ));
+            }
+        }
+    }
+    Ok(parts)
+}
+
+fn link(element: &Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
+    let at = Reading {
+        place,
+        what: format!("link {}", escape(name)),
+    };
+    let body = match element.child("inertial") {
+        None => None,
+        Some(inertial) => {
+            let (xyz, rpy) = at.origin(inertial)?;
+            let mass = at.number(at.part(inertial, "mass")?, "value", None)?;
+            let tensor = at.part(inertial, "inertia")?;
+            let [xx, xy, xz, yy, yz, zz] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|key| {
+                at.number(
+                    tensor,
+                    key,
+                    (key.as_bytes()[1] != key.as_bytes()[2]).then_some(0.0),
+                )
+            });
+            let (xy, xz, yz) = (xy?, xz?, yz?);
+            let tensor = [[xx?, xy, xz], [xy, yy?, yz], [xz, yz, zz?]];
+            Some(Body {
+                mass,
+                centre: xyz,
+                inertia: super::turned(&of_roll_pitch_yaw(&rpy), &tensor),
+            })
+        }
+    };
+    Ok(Link {
+        name: name.to_owned(),
+        line: element.line,
+        body,
+    })
+}
+
+fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigError> {
+    let at = Reading {
+        place,
+        what: format!("joint {}", escape(name)),
+    };
+    let kind = element.attribute("type").unwrap_or_default();
+    let Some((_, kind)) = KINDS.iter().find(|(known, _)| *known == kind) else {
+        return Err(place.wrong(
+            element.line,
+            &at.what,
+            &format!("has the type `{}`", escape(kind)),
+            "give revolute, continuous, prismatic or fixed",
+        ));
+    };
+    let linked = |what: &str| -> Result<String, ConfigError> {
+        let part = at.part(element, what)?;
+        let link = part.attribute("link");
+        Ok(link.ok_or_else(|| at.lacks(part, "link"))?.to_owned())
+    };
+    let (xyz, rpy) = at.origin(element)?;
+    let axis = match element.child("axis") {
+        // the default of the format
+        None => [1.0, 0.0, 0.0],
+        Some(axis) => at.vector(axis, "xyz", [1.0, 0.0, 0.0])?,
+    };
+    let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
+    if moving && axis.iter().all(|x| x.abs() < 1e-6) {
+        return Err(place.wrong(
+            element.line,
+            &at.what,
+            "has an axis without length",
+            "give an axis, e.g. xyz=\"0 0 1\"",
+        ));
+    }
+    let (mut position, mut speed, mut effort) = (None, None, None);
+    if let Some(limit) = element.child("limit") {
+        let positive = |key| -> Result<Option<f64>, ConfigError> {
+            // 0 stands in many files for a limit that nobody knows
+            Ok(Some(at.number(limit, key, Some(0.0))?).filter(|x| *x > 0.0))
+        };
+        (speed, effort) = (positive("velocity")?, positive("effort")?);
+        let ends = ["lower", "upper"].map(|key| at.number(limit, key, Some(0.0)));
+        let [low, high] = ends;
+        let (low, high) = (low?, high?);
+        if low > high {
+            return Err(place.wrong(
+                limit.line,
+                &at.what,
+                &format!("has the lower limit {low} above the upper {high}"),
+                "exchange the two",
+            ));
+        }
+        if low < high && *kind != Kind::Continuous {
+            position = Some([low, high]);
+        }
+    }
+    let mimic = match element.child("mimic") {
+        None => None,
+        Some(mimic) => Some(Mimic {
+            joint: mimic
+                .attribute("joint")
+                .ok_or_else(|| at.lacks(mimic, "joint"))?
+                .to_owned(),
+            multiplier: at.number(mimic, "multiplier", Some(1.0))?,
+            offset: at.number(mimic, "offset", Some(0.0))?,
+        }),
+    };
+    Ok(Joint {
+        name: name.to_owned(),
+        line: element.line,
+        kind: *kind,
+        parent: linked("parent")?,
+        child: linked("child")?,
+        xyz,
+        rpy,
+        axis,
+        position,
+        speed,
+        effort,
+        mimic,
+    })
+}
+
+/// The reading of one link or joint, which errors name.
+struct Reading<'a> {
+    place: &'a Place<'a>,
+    what: String,
+}
+
+impl Reading<'_> {
+    fn part<'e>(&self, element: &'e Element, name: &str) -> Result<&'e Element, ConfigError> {
+        element.child(name).ok_or_else(|| {
+            self.place.wrong(
+                element.line,
+                &self.what,
+                &format!("has no <{name}>"),
+                &format!("add <{name} .../> to it"),
+            )
+        })
+    }
+
+    fn lacks(&self, element: &Element, key: &str) -> ConfigError {
+        self.place.wrong(
+            element.line,
+            &self.what,
+            &format!("has a <{}> without {key}", element.name),
+            &format!("add {key}=\"...\""),
+        )
+    }
+
+    fn number(
+        &self,
+        element: &Element,
+        key: &str,
+        absent: Option<f64>,
+    ) -> Result<f64, ConfigError> {
+        let Some(text) = element.attribute(key) else {
+            return absent.ok_or_else(|| self.lacks(element, key));
+        };
+        let value = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        value.ok_or_else(|| {
+            self.place.wrong(
+                element.line,
+                &self.what,
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name),
+                "give a finite number with a decimal point",
+            )
+        })
+    }
+
+    fn vector(&self, element: &Element, key: &str, absent: Vector) -> Result<Vector, ConfigError> {
+        let Some(text) = element.attribute(key) else {
+            return Ok(absent);
+        };
+        let numbers: Vec<f64> = text
+            .split_whitespace()
+            .map_while(|word| word.parse().ok().filter(|x: &f64| x.is_finite()))
+            .collect();
+        match numbers[..] {
+            [x, y, z] if text.split_whitespace().count() == 3 => Ok([x, y, z]),
+            _ => Err(self.place.wrong(
+                element.line,
+                &self.what,
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name),
+                "give three finite numbers with spaces between",
+            )),
+        }
+    }
+
+    /// Position [m] and roll, pitch, yaw [rad] of the `<origin>` inside.
+    fn origin(&self, element: &Element) -> Result<(Vector, Vector), ConfigError> {
+        let Some(origin) = element.child("origin") else {
+            return Ok(([0.0; 3], [0.0; 3]));
+        };
+        let at = |key| self.vector(origin, key, [0.0; 3]);
+        Ok((at("xyz")?, at("rpy")?))
+    }
+}

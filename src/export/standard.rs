@@ -1,0 +1,85 @@
+//! Standard parameters of links from base parameters: of all that give the same torques, those
+//! nearest to a prior.
+//!
+//! Base parameters are theta = B x of the standard ones x. The nearest to x0 is
+//! x = x0 + B' (B B')^-1 (theta - B x0); the diagonal of B' (B B')^-1 B is 1 where the data determine
+//! a parameter by itself, and 0 where they say nothing of it.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::config::serial_section::InertialSection;
+use crate::robot::serial::SerialRobot;
+use crate::robot::serial::newton_euler::{STANDARD, standard_of};
+
+/// What torques say of a standard parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told {
+    /// Its value.
+    Alone,
+    /// Only the sum of it and others.
+    InSum,
+    /// Nothing.
+    Nothing,
+}
+
+/// Mass that is taken for a link whose mass nothing tells [kg].
+pub const UNTOLD_MASS: f64 = 1.0;
+
+/// Standard parameters of every link, then of the drives, and what is told of each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Standard {
+    pub values: Vec<f64>,
+    pub told: Vec<Told>,
+}
+
+/// The standard parameters nearest to the priors of the links that give these base parameters.
+/// Without a prior a link is 1 kg in its origin.
+pub fn nearest(robot: &SerialRobot, theta: &[f64], priors: &[Option<InertialSection>]) -> Standard {
+    let p = robot.standard_parameters();
+    let links = robot.chain().links().len();
+    let mut x = DVector::zeros(p);
+    for link in 0..links {
+        match priors.get(link).and_then(Option::as_ref) {
+            Some(body) => {
+                let values = standard_of(body.mass, &body.centre, &body.inertia);
+                for (k, value) in values.into_iter().enumerate() {
+                    x[link * STANDARD + k] = value;
+                }
+            }
+            None => x[link * STANDARD + STANDARD - 1] = UNTOLD_MASS,
+        }
+    }
+    let groupings = robot.groupings();
+    let mut b = DMatrix::zeros(groupings.len(), p);
+    for (row, grouping) in groupings.iter().enumerate() {
+        b[(row, grouping.kept)] = 1.0;
+        for (column, c) in &grouping.terms {
+            b[(row, *column)] += c;
+        }
+    }
+    let theta =
+        DVector::from_iterator(groupings.len(), theta.iter().copied().take(groupings.len()));
+    // every row has a column of its own, so that B B' is positive definite
+    let gram = &b * b.transpose();
+    let mut told = vec![Told::Nothing; p];
+    if let Some(factor) = gram.cholesky() {
+        // once more, for the last digits
+        for _ in 0..2 {
+            let rest = &theta - &b * &x;
+            x += b.transpose() * factor.solve(&rest);
+        }
+        let shares = factor.solve(&b);
+        for (i, told) in told.iter_mut().enumerate() {
+            let share = b.column(i).dot(&shares.column(i));
+            *told = match share {
+                share if share > 1.0 - 1e-9 => Told::Alone,
+                share if share > 1e-9 => Told::InSum,
+                _ => Told::Nothing,
+            };
+        }
+    }
+    Standard {
+        values: x.iter().copied().collect(),
+        told,
+    }
+}

@@ -1,0 +1,325 @@
+//! The URDF of an identified chain, and a model file beside it that holds what a URDF cannot.
+
+use std::fmt::Write;
+
+use super::ExportError;
+use super::standard::{Standard, Told, nearest};
+use crate::config::ModelFile;
+use crate::config::model_file::Parameter;
+use crate::config::robot_file::CoordinateLimits;
+use crate::robot::model::{JointFriction, Model};
+use crate::robot::serial::newton_euler::STANDARD;
+use crate::robot::serial::space::roll_pitch_yaw;
+use crate::robot::serial::{Coordinate, Link, STANDARD_NAMES, SerialRobot};
+use crate::robot::{JointKind, Robot};
+
+/// The two files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    pub urdf: String,
+    pub side: String,
+}
+
+/// The URDF of a model and its side file; `urdf_name` is how the side file names the URDF beside it,
+/// `notes` stand at the head of both.
+///
+/// # Errors
+/// [`ExportError::NotInUrdf`] for robots that no URDF can be of; [`ExportError::NoMass`].
+pub fn urdf(
+    file: &ModelFile,
+    model: &Model,
+    urdf_name: &str,
+    notes: &[String],
+) -> Result<Exported, ExportError> {
+    let robot = match &model.robot {
+        Robot::Serial(robot) => robot,
+        Robot::Cft(_) => {
+            return Err(ExportError::NotInUrdf {
+                what: "the pantograph, whose q3 = d + L4 sin(q4 + q5) + L4 sin q4".to_owned(),
+                remedy: "export it with --c or --rust",
+            });
+        }
+        Robot::SingleJoint(_) => {
+            return Err(ExportError::NotInUrdf {
+                what: "a single joint without a link".to_owned(),
+                remedy: "export it with --c or --rust",
+            });
+        }
+    };
+    let priors: Vec<_> = file
+        .robot
+        .robot
+        .link
+        .iter()
+        .map(|l| l.inertial.clone())
+        .collect();
+    let standard = nearest(robot, &model.theta, &priors);
+    let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
+    for line in notes.iter().map(String::as_str).chain([
+        "",
+        "Inertials: of all that give the identified torques, those nearest to the prior of the robot",
+        "file (1 kg in the origin of a link that has none). What stands over each link says which of",
+        "its numbers the data determine; the others are no measurement. They need not be those of a",
+        "body that can be. Drive inertias, couplings, friction and offsets are in the file beside",
+        "this one; damping and friction here repeat viscous and Coulomb friction where that is the law.",
+        "A limit of 0 is one that is not known.",
+    ]) {
+        // two hyphens would end the comment early
+        let _ = writeln!(out, "  {}", line.replace("--", "- -"));
+    }
+    let _ = writeln!(
+        out,
+        "-->\n<robot name=\"identified\">\n  <link name=\"{}\"/>",
+        root(robot)
+    );
+    for (i, link) in robot.chain().links().iter().enumerate() {
+        joint(&mut out, robot, model, file, i, link)?;
+        body(&mut out, i, link, &standard)?;
+    }
+    out.push_str("</robot>\n");
+    Ok(Exported {
+        urdf: out,
+        side: side_file(file, robot, &standard, urdf_name, notes)?,
+    })
+}
+
+/// Name of the link that stands still.
+fn root(robot: &SerialRobot) -> String {
+    let mut name = "base".to_owned();
+    while robot.chain().links().iter().any(|l| l.name == name) {
+        name.push_str("_frame");
+    }
+    name
+}
+
+/// A text inside an attribute.
+fn quoted(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+/// Numbers that are read back bit for bit.
+fn words(values: &[f64]) -> String {
+    let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
+    all.join(" ")
+}
+
+fn joint(
+    out: &mut String,
+    robot: &SerialRobot,
+    model: &Model,
+    file: &ModelFile,
+    i: usize,
+    link: &Link,
+) -> Result<(), ExportError> {
+    let names = robot.names();
+    let section = file.robot.robot.link.get(i);
+    let mut mimic = None;
+    let mut driven = None;
+    let name = match &link.coordinate {
+        Coordinate::Joint(j) => {
+            driven = Some(*j);
+            names[*j].clone()
+        }
+        Coordinate::Follows(d) => {
+            let several = d.linear.len() > 1 || !d.sines.is_empty();
+            match (&d.linear[..], several) {
+                ([(j, c)], false) => mimic = Some((names[*j].clone(), *c, d.offset)),
+                ([], false) => {}
+                _ => {
+                    return Err(ExportError::NotInUrdf {
+                        what: format!(
+                            "link `{}`, which follows several joints or the sine of one",
+                            link.name
+                        ),
+                        remedy: "export it with --c or --rust",
+                    });
+                }
+            }
+            let mut name = format!("{}_joint", link.name);
+            while names.contains(&name) {
+                name.push_str("_follows");
+            }
+            name
+        }
+    };
+    let limits = driven.and_then(|j| file.robot.limits.get(&names[j]));
+    let none = CoordinateLimits::default();
+    let limits = limits.unwrap_or(&none);
+    // a link that follows nothing is at rest at its offset
+    let rests = driven.is_none() && mimic.is_none();
+    let kind = match (rests, link.kind, limits.position) {
+        (true, ..) => "fixed",
+        (_, JointKind::Prismatic, _) => "prismatic",
+        (_, JointKind::Revolute, Some(_)) => "revolute",
+        (_, JointKind::Revolute, None) => "continuous",
+    };
+    let parent = match link.parent {
+        None => root(robot),
+        Some(parent) => robot.chain().links()[parent].name.clone(),
+    };
+    // what the robot file says in these words is kept to the last digit
+    let said = section.filter(|s| s.xyz.is_some() || s.rpy.is_some());
+    let (mut xyz, mut rpy) = match said {
+        Some(s) => (s.xyz.unwrap_or_default(), s.rpy.unwrap_or_default()),
+        None => (link.origin, roll_pitch_yaw(&link.rotation)),
+    };
+    if rests && let Coordinate::Follows(d) = &link.coordinate {
+        use crate::robot::serial::space::{about, add, product, times, turn};
+        match link.kind {
+            JointKind::Revolute => {
+                rpy = roll_pitch_yaw(&product(&link.rotation, &about(&link.axis, d.offset)));
+            }
+            JointKind::Prismatic => {
+                xyz = add(&xyz, &turn(&link.rotation, &times(d.offset, &link.axis)));
+            }
+        }
+    }
+    let _ = write!(
+        out,
+        "\n  <joint name=\"{}\" type=\"{kind}\">\n    <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    \
+         <origin xyz=\"{}\" rpy=\"{}\"/>\n",
+        quoted(&name),
+        quoted(&parent),
+        quoted(&link.name),
+        words(&xyz),
+        words(&rpy)
+    );
+    if !rests {
+        let _ = writeln!(out, "    <axis xyz=\"{}\"/>", words(&link.axis));
+        if kind != "continuous" || limits.speed.is_some() || limits.torque.is_some() {
+            let ends = limits.position.map_or(String::new(), |[low, high]| {
+                format!("lower=\"{low:?}\" upper=\"{high:?}\" ")
+            });
+            let _ = writeln!(
+                out,
+                "    <limit {ends}effort=\"{:?}\" velocity=\"{:?}\"/>",
+                limits.torque.unwrap_or(0.0),
+                limits.speed.unwrap_or(0.0)
+            );
+        }
+    }
+    if let Some(JointFriction::ViscousCoulomb(law)) = driven.map(|j| &model.friction[j]) {
+        let _ = writeln!(
+            out,
+            "    <dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
+            law.viscous, law.coulomb
+        );
+    }
+    if let Some((joint, factor, offset)) = mimic {
+        let _ = writeln!(
+            out,
+            "    <mimic joint=\"{}\" multiplier=\"{factor:?}\" offset=\"{offset:?}\"/>",
+            quoted(&joint)
+        );
+    }
+    out.push_str("  </joint>\n");
+    Ok(())
+}
+
+fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<(), ExportError> {
+    let range = i * STANDARD..(i + 1) * STANDARD;
+    let values = &standard.values[range.clone()];
+    let told = &standard.told[range];
+    let of = |what: Told| -> String {
+        let names = STANDARD_NAMES.iter().zip(told);
+        let list: Vec<&str> = names
+            .filter(|(_, t)| **t == what)
+            .map(|(n, _)| *n)
+            .collect();
+        match list.is_empty() {
+            true => "none".to_owned(),
+            false => list.join(" "),
+        }
+    };
+    let (m, moment) = (values[9], &values[6..9]);
+    let size = moment.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // a centre of gravity a kilometre away would cost the digits of the inertia
+    if size > 1e3 * m.abs() {
+        return Err(ExportError::NoMass {
+            link: link.name.clone(),
+            mass: m,
+            moment: size,
+        });
+    }
+    let c: [f64; 3] = std::array::from_fn(|k| if m == 0.0 { 0.0 } else { moment[k] / m });
+    let [x, y, z] = c;
+    let inertia = [
+        ("ixx", values[0] - m * (y * y + z * z)),
+        ("ixy", values[1] + m * x * y),
+        ("ixz", values[2] + m * x * z),
+        ("iyy", values[3] - m * (x * x + z * z)),
+        ("iyz", values[4] + m * y * z),
+        ("izz", values[5] - m * (x * x + y * y)),
+    ];
+    let inertia: Vec<String> = inertia
+        .iter()
+        .map(|(k, x)| format!("{k}=\"{x:?}\""))
+        .collect();
+    let _ = write!(
+        out,
+        "  <!-- about the origin of the link: determined {}; only in sums with others {}; not at all {} -->\n  \
+         <link name=\"{}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      \
+         <mass value=\"{m:?}\"/>\n      <inertia {}/>\n    </inertial>\n  </link>\n",
+        of(Told::Alone),
+        of(Told::InSum),
+        of(Told::Nothing),
+        quoted(&link.name),
+        words(&c),
+        inertia.join(" ")
+    );
+    Ok(())
+}
+
+/// A model file that takes links and inertials from the URDF beside it.
+fn side_file(
+    file: &ModelFile,
+    robot: &SerialRobot,
+    standard: &Standard,
+    urdf_name: &str,
+    notes: &[String],
+) -> Result<String, ExportError> {
+    let mut side = file.clone();
+    side.robot.robot.link.clear();
+    side.robot.robot.urdf = Some(urdf_name.to_owned());
+    side.covariance = None;
+    side.effects.clear();
+    // base parameters come out of the URDF; what the drives add to them stands here
+    let base: Vec<&str> = robot
+        .parameters()
+        .iter()
+        .take(robot.groupings().len())
+        .map(|p| &*p.name)
+        .collect();
+    side.parameters
+        .retain(|p| p.joint.is_some() || !base.contains(&p.name.as_str()));
+    let first = robot.chain().links().len() * STANDARD;
+    for (j, value) in standard.values.iter().skip(first).enumerate() {
+        side.parameters.push(Parameter {
+            name: crate::config::DRIVE_INERTIA.to_owned(),
+            theta: None,
+            joint: robot.names().get(j).cloned(),
+            value: *value,
+            std: None,
+            unit: match robot.joint_kind(j) {
+                JointKind::Revolute => "kg m^2",
+                JointKind::Prismatic => "kg",
+            }
+            .to_owned(),
+            meaning: "inertia of the drive at the joint".to_owned(),
+            verdict: None,
+        });
+    }
+    let mut text = String::new();
+    for line in notes {
+        let _ = writeln!(text, "{}", format!("# {line}").trim_end());
+    }
+    text.push_str(
+        "# What the URDF cannot hold: drive inertias, couplings, friction, offsets. A model file: give\n\
+         # it as -m; links and inertials are read from the URDF beside it.\n\n",
+    );
+    text.push_str(&side.sections()?);
+    Ok(text)
+}
