@@ -11,6 +11,7 @@
 //! | [`inertia`] | rows, friction | theta 1..12 with covariance | eq. (39)-(42) |
 //! | [`diagnose`] | model, logs | effects that the model lacks, refined model | |
 //! | [`validate`] | a log that was not used, model | torque errors | Figures 7 and 8 |
+//! | [`compare`] | two models, logs | differences of parameters and errors | Kuensch 1989 |
 //! | [`report`] | results | tables, figures | |
 //! | [`export`] | model | C header, Rust module, URDF | |
 //!
@@ -43,5 +44,7 @@ pub mod report;
 pub mod config;
 pub mod export;
 pub mod output;
+
+pub mod compare;
 
 pub mod cli;

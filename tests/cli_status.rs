@@ -101,6 +101,7 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "lsq no.csv -r configs/emps.toml -o m.toml",
         "validate no.csv -m no.toml",
         "diagnose no.csv -m no.toml",
+        "compare no.toml no.toml",
         "torque no.csv -m no.toml -o t.csv",
         "simulate -r configs/cft.toml --seconds 1 -o a.csv",
         "identify -o run",

@@ -27,6 +27,10 @@ const ROOMS: &[(&str, &[&str])] = &[
         &["math", "robot", "config", "inertia", "simulate"],
     ),
     (
+        "compare",
+        &["robot", "config", "motion", "effect", "verdict"],
+    ),
+    (
         "report",
         &["log", "verdict", "friction", "inertia", "validate"],
     ),
@@ -34,7 +38,8 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "robot", "log", "config", "output", "motion", "effect", "friction",
-            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "report", "export",
+            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "compare",
+            "report", "export",
         ],
     ),
 ];

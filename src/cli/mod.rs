@@ -4,6 +4,7 @@
 //! A command whose `run` is not written yet is not in [`Command`], and so not on offer.
 
 mod campaign;
+pub mod compare;
 pub mod completions;
 pub mod convert;
 pub mod diagnose;
@@ -88,6 +89,7 @@ enum Command {
     Lsq(lsq::Args),
     Validate(validate::Args),
     Diagnose(diagnose::Args),
+    Compare(compare::Args),
     Torque(torque::Args),
     Simulate(simulate::Args),
     Excite(excite::Args),
@@ -109,6 +111,7 @@ impl Command {
             Command::Lsq(args) => lsq::run(args, context),
             Command::Validate(args) => validate::run(args, context),
             Command::Diagnose(args) => diagnose::run(args, context),
+            Command::Compare(args) => compare::run(args, context),
             Command::Torque(args) => torque::run(args, context),
             Command::Simulate(args) => simulate::run(args, context),
             Command::Excite(args) => excite::run(args, context),

@@ -19,29 +19,10 @@ pub fn figure(look: &Look, file: &ModelFile, model: &Refined) -> FrictionFigure 
         .filter_map(|(j, joint)| {
             let law = model.model.friction.get(j)?;
             let [low, high] = look.velocities(j)?;
-            let names: &[&str] = match law {
-                JointFriction::None => return None,
-                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
-                JointFriction::ViscousCoulomb(_) => &ViscousCoulomb::NAMES,
-            };
-            let keys: Vec<String> = names.iter().map(|n| format!("{n}:{joint}")).collect();
-            let covariance = file.covariance_of(&keys);
-            let point = |v: f64| CurvePoint {
-                v,
-                torque: law.torque(v),
-                std: deviation(law, &covariance, v),
-            };
-            let jumps = matches!(law, JointFriction::ViscousCoulomb(_));
-            let curve = speeds(low.abs().max(high.abs()))
-                .map(|v| match v == 0.0 && jumps {
-                    true => CurvePoint {
-                        v: f64::NAN,
-                        torque: f64::NAN,
-                        std: f64::NAN,
-                    },
-                    false => point(v),
-                })
-                .collect();
+            if *law == JointFriction::None {
+                return None;
+            }
+            let curve = curve(file, law, joint, speeds(low.abs().max(high.abs())));
             let unit = machine.robot.joint_kind(j).position_unit();
             Some(FrictionPanel {
                 joint: joint.clone(),
@@ -64,8 +45,39 @@ pub fn figure(look: &Look, file: &ModelFile, model: &Refined) -> FrictionFigure 
     }
 }
 
+/// The curve of a joint's law at these speeds; a law that jumps has a point that is not finite at 0.
+pub fn curve(
+    file: &ModelFile,
+    law: &JointFriction,
+    joint: &str,
+    speeds: impl Iterator<Item = f64>,
+) -> Vec<CurvePoint> {
+    let names: &[&str] = match law {
+        JointFriction::None => return Vec::new(),
+        JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
+        JointFriction::ViscousCoulomb(_) => &ViscousCoulomb::NAMES,
+    };
+    let keys: Vec<String> = names.iter().map(|n| format!("{n}:{joint}")).collect();
+    let covariance = file.covariance_of(&keys);
+    let jumps = matches!(law, JointFriction::ViscousCoulomb(_));
+    speeds
+        .map(|v| match v == 0.0 && jumps {
+            true => CurvePoint {
+                v: f64::NAN,
+                torque: f64::NAN,
+                std: f64::NAN,
+            },
+            false => CurvePoint {
+                v,
+                torque: law.torque(v),
+                std: deviation(law, &covariance, v),
+            },
+        })
+        .collect()
+}
+
 /// From the fastest backward to the fastest forward, closer together towards rest, where laws bend.
-fn speeds(most: f64) -> impl Iterator<Item = f64> {
+pub fn speeds(most: f64) -> impl Iterator<Item = f64> {
     let side = move |k: usize| {
         let share = k as f64 / POINTS as f64;
         most * share * share * share

@@ -1,6 +1,7 @@
 //! The HTML reports: what each section says, and which sections each command has. The verdict comes
 //! first, in words and one table; what it stands on follows; where it came from ends the page.
 
+mod compare;
 mod diagnose;
 mod fit;
 mod friction;
@@ -15,7 +16,9 @@ mod residual;
 mod torque;
 mod validate;
 
+pub(super) use compare::{Compare, compare};
 pub(super) use diagnose::{Diagnose, data_fault, diagnose, figure as diagnose_figure};
+pub(super) use friction::{curve, speeds};
 pub(super) use friction_fit::{FrictionFit, friction_fit};
 pub(super) use identify::{Identify, identify};
 pub(super) use look::Look;

@@ -202,7 +202,10 @@ fn finite(point: &CurvePoint) -> bool {
 }
 
 /// Stretches of consecutive finite points that `wanted` accepts.
-fn runs(curve: &[CurvePoint], wanted: impl Fn(&CurvePoint) -> bool) -> Vec<Vec<CurvePoint>> {
+pub(super) fn runs(
+    curve: &[CurvePoint],
+    wanted: impl Fn(&CurvePoint) -> bool,
+) -> Vec<Vec<CurvePoint>> {
     curve
         .split(|point| !finite(point) || !wanted(point))
         .filter(|run| run.len() > 1)
@@ -211,7 +214,7 @@ fn runs(curve: &[CurvePoint], wanted: impl Fn(&CurvePoint) -> bool) -> Vec<Vec<C
 }
 
 /// Lines between consecutive finite points that `wanted` accepts in pairs.
-fn lines(
+pub(super) fn lines(
     curve: &[CurvePoint],
     wanted: impl Fn(&CurvePoint, &CurvePoint) -> bool,
 ) -> Vec<Vec<[f64; 2]>> {
@@ -231,8 +234,17 @@ fn lines(
     lines
 }
 
+/// Ends of the 95 % band of a point [torque unit]; the torque alone where the band is unknown.
+pub(super) fn spread(point: &CurvePoint) -> [f64; 2] {
+    let half = match point.std.is_finite() {
+        true => WITHIN_95 * point.std,
+        false => 0.0,
+    };
+    [point.torque - half, point.torque + half]
+}
+
 /// The outline of curve plus and minus its 95 % [px].
-fn band(panel: &Panel, run: &[CurvePoint]) -> Vec<[f64; 2]> {
+pub(super) fn band(panel: &Panel, run: &[CurvePoint]) -> Vec<[f64; 2]> {
     let edge = |point: &CurvePoint, side: f64| {
         let torque = point.torque + side * WITHIN_95 * point.std;
         [panel.x.px(point.v), panel.y.px(torque)]

@@ -9,6 +9,7 @@ mod decimate;
 mod friction;
 mod legend;
 mod motion;
+mod overlay;
 mod panel;
 mod png;
 mod residual;
@@ -17,6 +18,7 @@ mod torque;
 
 pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
 pub use motion::{MotionFigure, MotionPanel};
+pub use overlay::{OverlayFigure, OverlayPanel};
 pub use png::{PngError, png};
 pub use residual::{ResidualFigure, ResidualPanel, When};
 pub use torque::{JointTorque, TorqueFigure};

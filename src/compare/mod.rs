@@ -1,0 +1,8 @@
+//! Two models of one robot beside each other: their parameters in standard deviations of the
+//! difference, and their errors on the same rows of the same logs.
+
+mod errors;
+mod parameters;
+
+pub use errors::{Difference, Differences, differences};
+pub use parameters::{Apart, Estimate, Pair, Reason, SideBySide, side_by_side};

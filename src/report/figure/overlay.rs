@@ -1,0 +1,168 @@
+//! Friction curves of two models over each other, joint by joint.
+
+use super::axis;
+use super::colour;
+use super::friction::{CurvePoint, band, lines, runs, spread};
+use super::legend::{self, Key};
+use super::panel::Panel;
+use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+
+/// The friction of one joint by two models.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverlayPanel {
+    /// Name of the joint.
+    pub joint: String,
+    /// `m/s` or `rad/s`.
+    pub speed_unit: String,
+    /// `N` or `Nm`.
+    pub torque_unit: String,
+    /// Both curves in order of `v`; a point that is not finite splits one, and a model without
+    /// friction there has none.
+    pub curves: [Vec<CurvePoint>; 2],
+}
+
+/// A figure of one panel per joint, two beside each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverlayFigure {
+    /// Heading.
+    pub title: String,
+    /// What the legend calls the two models.
+    pub names: [String; 2],
+    /// The joints in reading order.
+    pub panels: Vec<OverlayPanel>,
+}
+
+const WIDTH: f64 = 760.0;
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 14.0;
+const HEAD: f64 = 66.0;
+const NAME: f64 = 20.0;
+const PLOT: f64 = 206.0;
+const BELOW: f64 = 50.0;
+/// Room for one name in the legend [px].
+const LABEL: f64 = 250.0;
+
+/// Told apart by dashes as well as by colour.
+const STROKES: [Stroke; 2] = [
+    Stroke::solid(colour::BLUE, 1.8),
+    Stroke::dashed(colour::VERMILLION, 1.6, "7 3"),
+];
+
+impl OverlayFigure {
+    /// The figure as an SVG document.
+    pub fn svg(&self) -> String {
+        let columns = self.panels.len().clamp(1, 2);
+        let rows = self.panels.len().div_ceil(columns);
+        let row = NAME + PLOT + BELOW;
+        let height = HEAD + row * rows as f64;
+        let joints: Vec<&str> = self.panels.iter().map(|p| p.joint.as_str()).collect();
+        let description = format!(
+            "Friction torque over velocity by two models with 95 % bands, joints {}",
+            joints.join(", ")
+        );
+        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
+        svg.text(
+            [LEFT, 22.0],
+            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
+            Type::new(14.0, Anchor::Start).bold(),
+        );
+        let names = self.names.each_ref().map(|name| fitted(name, 11.0, LABEL));
+        let keys = STROKES.map(Key::Band);
+        legend::draw(
+            &mut svg,
+            [LEFT, 44.0],
+            &[(keys[0], names[0].as_str()), (keys[1], names[1].as_str())],
+        );
+        let column = WIDTH / columns as f64;
+        for (k, panel) in self.panels.iter().enumerate() {
+            let left = column * (k % columns) as f64;
+            let top = HEAD + row * (k / columns) as f64;
+            panel.draw(
+                &mut svg,
+                [left + LEFT, top + NAME, column - LEFT - RIGHT, PLOT],
+            );
+        }
+        svg.finish()
+    }
+}
+
+impl OverlayPanel {
+    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+        let [left, top, ..] = frame;
+        let style = Type::new(11.5, Anchor::Start);
+        svg.heading([left, top - 7.0], &self.joint, "", style);
+        let points = || self.curves.iter().flatten();
+        let speeds = axis::interval(points().map(|p| p.v), 0.03);
+        let torques = axis::interval(points().flat_map(spread), 0.06);
+        let (Some(speeds), Some(torques)) = (speeds, torques) else {
+            Panel::empty(svg, frame, "no friction in either model");
+            return;
+        };
+        let panel = Panel::new(frame, speeds, torques, [4, 6]);
+        panel.grid(svg);
+        svg.clip(frame);
+        for (curve, stroke) in self.curves.iter().zip(STROKES) {
+            for run in runs(curve, |point| point.std.is_finite()) {
+                svg.area(&band(&panel, &run), stroke.colour, 0.18);
+            }
+        }
+        for (curve, stroke) in self.curves.iter().zip(STROKES) {
+            svg.curve(&panel.place(lines(curve, |_, _| true)), stroke);
+        }
+        svg.end_clip();
+        panel.outline(svg);
+        panel.x_numbers(svg);
+        panel.x_title(svg, "velocity", &self.speed_unit);
+        panel.y_title(svg, 46.0, "friction", &self.torque_unit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(height: f64, std: f64) -> Vec<CurvePoint> {
+        [-1.0, -0.5, 0.5, 1.0]
+            .map(|v: f64| CurvePoint {
+                v,
+                torque: height * v.signum(),
+                std,
+            })
+            .to_vec()
+    }
+
+    fn figure(curves: [Vec<CurvePoint>; 2]) -> OverlayFigure {
+        OverlayFigure {
+            title: "t".into(),
+            names: ["A: first.toml".into(), "B: second.toml".into()],
+            panels: vec![OverlayPanel {
+                joint: "q1".into(),
+                speed_unit: "m/s".into(),
+                torque_unit: "N".into(),
+                curves,
+            }],
+        }
+    }
+
+    #[test]
+    fn both_curves_are_drawn_and_named() {
+        let svg = figure([curve(1.0, 0.1), curve(2.0, 0.1)]).svg();
+        for part in [
+            "first.toml",
+            "second.toml",
+            STROKES[0].colour,
+            STROKES[1].colour,
+        ] {
+            assert!(svg.contains(part), "{part}");
+        }
+        assert!(svg.contains("stroke-dasharray"));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_never_reach_the_picture() {
+        let svg = figure([curve(f64::NAN, 0.1), curve(1.0, f64::NAN)]).svg();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        let none = figure([Vec::new(), Vec::new()]).svg();
+        assert!(none.contains("no friction in either model"));
+    }
+}
