@@ -59,7 +59,7 @@ pub fn study(name: &str, usual: u64, one: fn(u64) -> Value) -> (Vec<Value>, Path
     (rows, folder)
 }
 
-fn finished(log: &Path) -> Vec<Value> {
+pub fn finished(log: &Path) -> Vec<Value> {
     let Ok(file) = File::open(log) else {
         return Vec::new();
     };

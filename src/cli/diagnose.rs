@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::diagnose_fault::{self as fault, DataFault};
-use super::diagnose_prior::{information, open};
+use super::diagnose_prior::{information, moved_alone, open};
 use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
@@ -116,7 +116,7 @@ pub fn diagnose(
         (logs.holdout, LogRole::Holdout),
     ];
     let specs: Vec<&LogSpec> = groups.iter().flat_map(|(logs, _)| logs.iter()).collect();
-    let roles = groups
+    let roles: Vec<LogRole> = groups
         .iter()
         .flat_map(|(logs, role)| logs.iter().map(|_| *role))
         .collect();
@@ -126,8 +126,9 @@ pub fn diagnose(
         .map_err(|e| CliError::input(format!("{name}: {e}")))?;
     let open = open(machine, file, &given);
     let rate = 1.0 / (held.summary.dt * parallel.decimation as f64);
+    let alone = moved_alone(&given, &held.stretches, &roles);
     let prior = Prior {
-        information: information(file, &given, &open, keep),
+        information: information(file, &given, &open, keep, &alone),
         centre: given.clone(),
         rows_per_independent: (rate / (2.0 * settings.cutoff_hz)).max(1.0),
     };
@@ -144,6 +145,7 @@ pub fn diagnose(
             .collect(),
         averaged: held.averaged,
         keep,
+        without: Vec::new(),
         limits: Limits::default(),
     };
     let bar = context.progress("search", None);
@@ -331,6 +333,7 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
                 "joint": effect.place.name(robot),
                 "parameters": parameters,
                 "alternatives": alternatives,
+                "separate_command": super::separate::command(effect, robot),
                 "separate_by": if alternatives.is_empty() { Value::Null } else { effect.kind.separate_by.into() },
                 "unique_share": score.map(|s| s.unique_share),
                 "delta_bic": score.map(|s| s.delta_bic),
@@ -372,6 +375,21 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
             })
         })
         .collect();
+    let episodes: Vec<Value> = d
+        .episodes
+        .iter()
+        .map(|e| {
+            json!({
+                "effect": "disturbance",
+                "family": "event",
+                "joint": robot.joint_names()[e.joint],
+                "log": found.logs[e.log],
+                "from_s": e.from_s,
+                "to_s": e.to_s,
+                "over": e.over,
+            })
+        })
+        .collect();
     json!({
         "verdict": verdict(d),
         "steps": steps,
@@ -380,6 +398,7 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
         "unexplained": unexplained,
         "candidates": candidates,
         "set_aside": set_aside,
+        "episodes": episodes,
         "processing": processing(&found.held.summary),
     })
 }
@@ -435,7 +454,21 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
                 names.join(", "),
                 effect.kind.separate_by
             );
+            if let Some(command) = super::separate::command(effect, robot) {
+                out += &format!("     such a motion: {command}\n");
+            }
         }
+    }
+    for e in &d.episodes {
+        out += &format!(
+            "  cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
+             residual)\n",
+            e.from_s,
+            e.to_s,
+            found.logs[e.log],
+            robot.joint_names()[e.joint],
+            e.over
+        );
     }
     let mut table = Table::new(&[
         ("joint", Align::Left),

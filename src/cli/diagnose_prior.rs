@@ -4,8 +4,9 @@ use nalgebra::DMatrix;
 
 use super::machine::Machine;
 use crate::config::ModelFile;
-use crate::diagnose::Open;
-use crate::effect::Refined;
+use crate::diagnose::{LogRole, Open};
+use crate::effect::{Refined, held_joints};
+use crate::motion::Stretch;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
@@ -50,20 +51,43 @@ pub fn open(machine: &Machine, file: &ModelFile, given: &Refined) -> Open {
     }
 }
 
+/// Joints that move in a log in which all others are held.
+pub fn moved_alone(given: &Refined, stretches: &[Stretch], roles: &[LogRole]) -> Vec<bool> {
+    let robot = &given.model.robot;
+    let fitted = stretches.iter().filter(|s| roles[s.log] == LogRole::Train);
+    let fitted: Vec<Stretch> = fitted.cloned().collect();
+    let mut alone = vec![false; robot.joints()];
+    for held in held_joints(robot, &fitted) {
+        let mut moving = (0..held.len()).filter(|j| !held[*j]);
+        if let (Some(j), None, true) = (moving.next(), moving.next(), held.len() > 1) {
+            alone[j] = true;
+        }
+    }
+    alone
+}
+
 /// Standard deviations of the friction stage are taken this many times as large: its model lacked
 /// what is looked for here, too.
 const FRICTION_DOUBT: f64 = 3.0;
 
-/// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it.
-pub fn information(file: &ModelFile, given: &Refined, open: &Open, keep: bool) -> DMatrix<f64> {
+/// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it. The
+/// friction of a joint that is `alone` in a log of its own, the others held, is fitted from that log:
+/// what the friction stage made of it would count twice, and without the effect that is looked for.
+pub fn information(
+    file: &ModelFile,
+    given: &Refined,
+    open: &Open,
+    keep: bool,
+    alone: &[bool],
+) -> DMatrix<f64> {
     let model = &given.model;
     let size = model.parameters();
     let covariance = file.model_covariance(model);
     let mut wanted = vec![keep; size];
     let mut at = model.theta.len();
-    for (law, open) in model.friction.iter().zip(&open.friction) {
+    for ((law, open), alone) in model.friction.iter().zip(&open.friction).zip(alone) {
         for (k, open) in open.iter().enumerate() {
-            if matches!(law, JointFriction::DoubleTanh(_)) {
+            if matches!(law, JointFriction::DoubleTanh(_)) && (keep || !alone) {
                 wanted[at + k] = *open;
             }
         }

@@ -197,7 +197,9 @@ fn execute(
     let mut diagnose_json = Value::Null;
     let mut lacking = String::new();
     let (mut diagnosed, mut at_fault) = (None, None);
-    let training = logs(base, &roles.identification)?;
+    let mut training = logs(base, &roles.identification)?;
+    // friction is fitted again beside an effect, from the logs that it came from
+    training.extend(one_joint.iter().cloned());
     let roles = diagnose::Logs {
         train: &training,
         veto: &[],

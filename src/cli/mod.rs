@@ -19,6 +19,7 @@ pub mod lsq;
 pub mod man;
 pub mod new;
 pub mod schema;
+mod separate;
 pub mod simulate;
 pub mod torque;
 pub mod validate;

@@ -95,7 +95,7 @@ struct Fold {
 impl<'a> Judge<'a> {
     /// Prepares the folds.
     pub fn new(at: &'a Fitted, ground: &'a Ground<'a>) -> Self {
-        let sum = |wanted: &dyn Fn(Role) -> bool| at.base.total(ground.plan, &at.weights, wanted);
+        let sum = |wanted: &dyn Fn(Role) -> bool| at.base.total(&ground.plan, &at.weights, wanted);
         let all = sum(&Role::fitted);
         let prior_pull = &at.pull - &all.score;
         let in_folds = sum(&|r| matches!(r, Role::Fold(_)));
@@ -234,7 +234,7 @@ impl<'a> Judge<'a> {
                 continue;
             }
             for (j, own) in columns[piece.stretch].iter().enumerate() {
-                if !own.is_empty() {
+                if !own.is_empty() && !self.ground.plan.holds(piece.stretch, j) {
                     square += self.at.weights[j].powi(2) * sums[j].square;
                     rows += piece.rows.len() as f64;
                 }

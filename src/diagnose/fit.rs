@@ -2,21 +2,37 @@
 //! step, with the friction stage's covariance as a prior.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::plan::{Plan, Role};
 use super::rows::Base;
 use super::unknowns::{Open, Unknown, Unknowns, step};
-use crate::effect::{Cover, Refined};
+use crate::effect::{Cover, Refined, Torques};
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Everything that a fit works on.
 pub struct Ground<'a> {
     pub stretches: &'a [Stretch],
     pub parallel: &'a Parallel,
-    pub plan: &'a Plan,
+    pub plan: Plan,
     pub open: &'a Open,
     pub prior: &'a Prior,
     pub cover: Cover,
+}
+
+impl Ground<'_> {
+    /// Torques of a model along every stretch; none along those that decide nothing.
+    pub fn torques(&self, model: &Refined) -> Vec<Torques> {
+        let stretches = self.stretches.par_iter().enumerate();
+        let of = |(i, stretch): (usize, &Stretch)| {
+            if self.plan.idle(i) {
+                Torques::default()
+            } else {
+                model.torques(stretch)
+            }
+        };
+        stretches.map(of).collect()
+    }
 }
 
 /// What is known of parameters before: their values and how firmly, in units of independent rows.
@@ -112,6 +128,8 @@ pub struct Fitted {
 
 /// Most Gauss-Newton steps; nearly linear problems take two or three.
 const STEPS: usize = 12;
+/// Steps in which the shapes of effects are held.
+const SHAPES_HELD: usize = 2;
 /// Most halvings of one step.
 const HALVINGS: usize = 6;
 
@@ -122,7 +140,8 @@ const HALVINGS: usize = 6;
 pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
     let mut at = evaluate(start.clone(), ground, None)?;
     for k in 0..STEPS {
-        let (delta, gain) = newton(&at);
+        // an effect that has just come meets parameters fitted without it: its coefficients first
+        let (delta, gain) = newton(&at, k < SHAPES_HELD);
         let mut factor = 1.0;
         let mut next = None;
         for _ in 0..HALVINGS {
@@ -167,7 +186,7 @@ fn evaluate(
         unknowns,
         ground.stretches,
         ground.parallel,
-        ground.plan,
+        &ground.plan,
     )?;
     let weights = match weights {
         Some(w) => w.to_vec(),
@@ -182,14 +201,14 @@ fn reweighted(at: Fitted, ground: &Ground) -> Fitted {
 }
 
 fn weights_of(base: &Base, ground: &Ground) -> Vec<f64> {
-    base.residual_rms(ground.plan)
+    base.residual_rms(&ground.plan)
         .iter()
         .map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 })
         .collect()
 }
 
 fn summed(model: Refined, base: Base, weights: Vec<f64>, ground: &Ground) -> Fitted {
-    let total = base.total(ground.plan, &weights, &Role::fitted);
+    let total = base.total(&ground.plan, &weights, &Role::fitted);
     let (information, pull) = ground.prior.over(&base.unknowns, &model);
     Fitted {
         normal: total.normal + &information,
@@ -212,9 +231,18 @@ impl Fitted {
 }
 
 /// The step to the minimum of the linearised problem, and the squares that it promises to remove.
-fn newton(at: &Fitted) -> (Vec<f64>, f64) {
-    let delta = Inverse::of(&at.normal).solve(&at.pull);
-    let gain = delta.dot(&at.pull);
+fn newton(at: &Fitted, shapes_held: bool) -> (Vec<f64>, f64) {
+    let (mut normal, mut pull) = (at.normal.clone(), at.pull.clone());
+    let list = at.base.unknowns.list.iter().enumerate();
+    for (i, unknown) in list.filter(|_| shapes_held) {
+        if matches!(unknown, Unknown::Shape { .. }) {
+            normal.row_mut(i).fill(0.0);
+            normal.column_mut(i).fill(0.0);
+            pull[i] = 0.0;
+        }
+    }
+    let delta = Inverse::of(&normal).solve(&pull);
+    let gain = delta.dot(&pull);
     (delta.iter().copied().collect(), gain)
 }
 

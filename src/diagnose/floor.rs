@@ -25,6 +25,7 @@ pub fn floor(
     parallel: &Parallel,
     cutoff_hz: f64,
     averaged: bool,
+    held: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
     let joints = stretches.first().map_or(0, Stretch::joints);
     let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
@@ -49,26 +50,33 @@ pub fn floor(
 
     // a block is some periods of the band long
     let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
+    // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the mean
+    // of two neighbours, (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7 times.
+    let gain = if averaged { 7.0 } else { 70.0 };
     let mut floor = Vec::with_capacity(joints);
     for j in 0..joints {
-        let (mut near, mut top) = (Vec::new(), Vec::new());
-        let blocks = |x: &[f64], out: &mut Vec<f64>| {
-            out.extend(x.chunks_exact(block).map(|b| power(b) / block as f64));
+        let middle = |x: &[f64]| {
+            let blocks = x.chunks_exact(block).map(|b| power(b) / block as f64);
+            median(&mut blocks.collect::<Vec<f64>>())
         };
-        for residual in residuals {
+        // logs differ in their noise: each has its own, and they count by their rows
+        let (mut sum, mut rows) = (0.0, 0.0);
+        // friction at rest is no noise; a joint that never moves has nothing else
+        let always = held.iter().all(|h| h[j]);
+        let moving = residuals.iter().zip(held).filter(|(_, h)| always || !h[j]);
+        for (residual, _) in moving {
             let banded = band(&residual[j])?;
             let edge = parallel.trim.min(banded.len() / 4);
-            blocks(&banded[edge..banded.len() - edge], &mut near);
+            let near = middle(&banded[edge..banded.len() - edge]);
             let differences: Vec<f64> = residual[j]
                 .windows(5)
                 .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
                 .collect();
-            blocks(&differences, &mut top);
+            let weight = residual[j].len() as f64;
+            sum += weight * (near / seen).min(middle(&differences) / gain);
+            rows += weight;
         }
-        // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the
-        // mean of two neighbours, (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7 times.
-        let gain = if averaged { 7.0 } else { 70.0 };
-        floor.push(kept * (median(&mut near) / seen).min(median(&mut top) / gain));
+        floor.push(if rows > 0.0 { kept * sum / rows } else { 0.0 });
     }
     Ok(floor)
 }
@@ -113,6 +121,7 @@ mod tests {
                 &parallel,
                 10.0,
                 false,
+                &[vec![false]],
             )
             .unwrap()[0];
             assert!((found / seen - 1.0).abs() < 0.15, "{found} {seen}");

@@ -86,6 +86,10 @@ pub fn errors(
         for piece in own {
             let joint = |j: usize| {
                 let mut s = Sums::default();
+                // what is not fitted is no error of the fit
+                if piece.role != Role::Holdout && plan.holds(index, j) {
+                    return s;
+                }
                 for i in piece.rows.clone() {
                     let (measured, e) = (rows[j][i], rows[j][i] - rows[n + j][i]);
                     s.error += e * e;
@@ -123,7 +127,10 @@ fn summed(model: &Refined, units: &[String], pieces: &[Vec<Sums>]) -> Errors {
             })
             .collect()
     };
-    let mean = |errors: &[f64]| (errors.iter().map(|e| e * e).sum::<f64>() / n as f64).sqrt();
+    let mean = |errors: &[f64]| {
+        let known = || errors.iter().filter(|e| e.is_finite());
+        (known().map(|e| e * e).sum::<f64>() / known().count() as f64).sqrt()
+    };
     let all: Vec<usize> = (0..pieces.len()).collect();
     let found = relative(&all);
 

@@ -11,6 +11,7 @@
 //! veto. All must agree. The holdout decides nothing.
 
 mod candidate;
+mod episode;
 mod evidence;
 mod fit;
 mod floor;
@@ -24,6 +25,7 @@ mod suspect;
 mod unknowns;
 
 pub use candidate::Score;
+pub use episode::Episode;
 pub use evidence::{JointEvidence, evidence};
 pub use fit::Prior;
 pub use measure::{Errors, JointErrors, OverallErrors};

@@ -25,6 +25,8 @@ pub enum Role {
     Between,
     Veto,
     Holdout,
+    /// Cut out: an episode in time that no law of motion repeats.
+    Cut,
 }
 
 impl Role {
@@ -58,6 +60,9 @@ pub struct Plan {
     pub pieces: Vec<Piece>,
     pub folds: usize,
     pub set_aside: Vec<SetAside>,
+    /// Whether each joint is held along each stretch, `[stretch][joint]`: such rows say nothing of
+    /// its friction and are not fitted.
+    pub held: Vec<Vec<bool>>,
 }
 
 /// Folds of the cross-validation, about.
@@ -192,6 +197,25 @@ impl Plan {
     /// Rows that are fitted.
     pub fn fitted_rows(&self) -> usize {
         self.rows_where(Role::fitted)
+    }
+
+    /// Whether joint `j` is held along a stretch.
+    pub fn holds(&self, stretch: usize, j: usize) -> bool {
+        self.held.get(stretch).is_some_and(|held| held[j])
+    }
+
+    /// Whether nothing of a stretch is fitted or may veto.
+    pub fn idle(&self, stretch: usize) -> bool {
+        self.held
+            .get(stretch)
+            .is_some_and(|held| held.iter().all(|h| *h))
+    }
+
+    /// Rows that are fitted to joint `j`.
+    pub fn fitted_rows_of(&self, j: usize) -> usize {
+        let pieces = self.pieces.iter().filter(|p| p.role.fitted());
+        let moving = pieces.filter(|p| !self.holds(p.stretch, j));
+        moving.map(|p| p.rows.len()).sum()
     }
 
     /// Rows of the pieces whose role is asked for.

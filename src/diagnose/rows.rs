@@ -15,7 +15,7 @@ pub struct Filtered {
     pub residual: Vec<Vec<f64>>,
 }
 
-/// Columns of all unknowns and the residual along one stretch.
+/// Columns of all unknowns and the residual along one stretch; zeros for joints that are held.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -24,11 +24,23 @@ pub fn filtered(
     unknowns: &Unknowns,
     stretch: &Stretch,
     parallel: &Parallel,
+    held: &dyn Fn(usize) -> bool,
 ) -> Result<Filtered, MotionError> {
     let plain = &model.model;
     let n = plain.robot.joints();
     let p = plain.theta.len();
     let samples = stretch.len();
+    if (0..n).all(held) {
+        let rows = parallel.rows(samples);
+        let columns = unknowns
+            .columns
+            .iter()
+            .map(|c| vec![vec![0.0; rows]; c.len()]);
+        return Ok(Filtered {
+            columns: columns.collect(),
+            residual: vec![vec![0.0; rows]; n],
+        });
+    }
     let torques = model.torques(stretch);
     let scene = scene(model, stretch, &torques);
     // regressor rows of all joints, once
@@ -49,20 +61,21 @@ pub fn filtered(
         residual: Vec::with_capacity(n),
     };
     for (j, regressor) in regressor.iter_mut().enumerate() {
+        if held(j) {
+            let rows = parallel.rows(samples);
+            out.columns
+                .push(vec![vec![0.0; rows]; unknowns.columns[j].len()]);
+            out.residual.push(vec![0.0; rows]);
+            continue;
+        }
         let late = model.shift(j) / stretch.dt;
         let mut raw: Vec<Vec<f64>> = Vec::with_capacity(unknowns.columns[j].len() + 1);
         let mut effect_columns: Vec<Option<Vec<Vec<f64>>>> = vec![None; model.effects.len()];
+        let mut friction = friction_columns(&plain.friction[j], &stretch.v[j]);
         for &i in &unknowns.columns[j] {
             let mut column = match unknowns.list[i] {
                 Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
-                Unknown::Friction { k, .. } => {
-                    let mut gradient = [0.0; 5];
-                    let mut of = |v: &f64| {
-                        plain.friction[j].gradient(*v, &mut gradient);
-                        gradient[k]
-                    };
-                    stretch.v[j].iter().map(&mut of).collect()
-                }
+                Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
                 Unknown::Offset(_) => vec![1.0; samples],
                 Unknown::Linear { effect, k } => {
                     let columns = effect_columns[effect]
@@ -88,6 +101,19 @@ pub fn filtered(
         out.columns.push(rows);
     }
     Ok(out)
+}
+
+/// Gradient of a friction law along a motion, `[parameter][sample]`.
+fn friction_columns(law: &JointFriction, v: &[f64]) -> Vec<Vec<f64>> {
+    let mut columns = vec![vec![0.0; v.len()]; law.parameters()];
+    let mut gradient = [0.0; 5];
+    for (i, v) in v.iter().enumerate() {
+        law.gradient(*v, &mut gradient);
+        for (column, g) in columns.iter_mut().zip(&gradient) {
+            column[i] = *g;
+        }
+    }
+    columns
 }
 
 /// Speed below which a joint counts as standing, over its rms speed.
@@ -189,7 +215,8 @@ impl Base {
     ) -> Result<Self, MotionError> {
         let filtered = stretches
             .par_iter()
-            .map(|s| filtered(model, &unknowns, s, parallel))
+            .enumerate()
+            .map(|(i, s)| filtered(model, &unknowns, s, parallel, &|j| plan.holds(i, j)))
             .collect::<Result<Vec<_>, _>>()?;
         let sums = plan
             .pieces
@@ -197,10 +224,17 @@ impl Base {
             .map(|piece| {
                 let rows = &filtered[piece.stretch];
                 let joints = rows.columns.iter().zip(&rows.residual);
-                let of_joint = |(columns, residual): (&Vec<Vec<f64>>, &Vec<f64>)| {
+                let of_joint = |(j, (columns, residual)): (usize, (&Vec<Vec<f64>>, &Vec<f64>))| {
                     let range = piece.rows.clone();
                     let e = &residual[range.clone()];
                     let c = columns.len();
+                    if plan.holds(piece.stretch, j) {
+                        return PieceSums {
+                            normal: DMatrix::zeros(c, c),
+                            score: DVector::zeros(c),
+                            square: 0.0,
+                        };
+                    }
                     let mut normal = DMatrix::zeros(c, c);
                     for a in 0..c {
                         for b in 0..=a {
@@ -216,7 +250,7 @@ impl Base {
                         square: dot(e, e),
                     }
                 };
-                joints.map(of_joint).collect()
+                joints.enumerate().map(of_joint).collect()
             })
             .collect();
         Ok(Base {
@@ -239,9 +273,10 @@ impl Base {
 
     /// Root mean square of each joint's residual over the fitted rows.
     pub fn residual_rms(&self, plan: &Plan) -> Vec<f64> {
-        let rows = plan.fitted_rows().max(1) as f64;
         let squares = self.residual_squares(plan);
-        squares.iter().map(|s| (s / rows).sqrt()).collect()
+        let rows = |j| plan.fitted_rows_of(j).max(1) as f64;
+        let joints = squares.iter().enumerate();
+        joints.map(|(j, s)| (s / rows(j)).sqrt()).collect()
     }
 
     /// Weighted normal matrix, score and squared residual over the pieces whose role is wanted.

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::candidate::{Judge, LAG};
+use super::episode::{self, Episode};
 use super::fit::{Fitted, Ground, Inverse, Prior, fit};
 use super::floor::floor;
 use super::measure::{Errors, errors};
@@ -12,7 +13,7 @@ use super::plan::{LogRole, Plan, Role, SetAside};
 use super::search::{Bar, Candidate, Limits, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
-use crate::effect::{Added, Cover, Refined};
+use crate::effect::{Added, Cover, Refined, held_joints};
 use crate::math::long_run::long_run;
 use crate::motion::{MotionError, Parallel, Stretch};
 
@@ -33,6 +34,8 @@ pub struct Case {
     pub averaged: bool,
     /// The given model is held within its covariance.
     pub keep: bool,
+    /// Names of effects that are not tried.
+    pub without: Vec<String>,
     pub limits: Limits,
 }
 
@@ -93,18 +96,22 @@ pub struct Diagnosis {
     /// Candidates of the last round, in which none was accepted.
     pub candidates: Vec<Candidate>,
     pub before: Pair,
+    /// The declared model refitted to these logs, with nothing added.
+    pub refitted: Errors,
     pub after: Pair,
     pub left_before: Vec<Left>,
     pub left: Vec<Left>,
     pub set_aside: Vec<SetAside>,
+    /// Disturbances that were cut out of the logs.
+    pub episodes: Vec<Episode>,
     /// Root mean square of the filtered residual per joint.
     pub residual_std: Vec<f64>,
     /// Logs that were fitted: the first ones.
     pub fitted_logs: usize,
 }
 
-/// Most effects that are added.
-const MOST_STEPS: usize = 8;
+/// Most episodes that are cut out.
+const MOST_EPISODES: usize = 8;
 /// Residual power over the floor's from which on a residual is called structured.
 pub const STRUCTURED: f64 = 2.0;
 /// Share of the torque's power below which structure is not worth a name.
@@ -119,19 +126,21 @@ pub fn diagnose(
     told: &mut dyn FnMut(&str),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
-    let plan = Plan::of(&case.stretches, &case.roles, &case.parallel, case.cutoff_hz);
+    let mut plan = Plan::of(&case.stretches, &case.roles, &case.parallel, case.cutoff_hz);
     let robot = &case.given.model.robot;
     let fitted = fitted_stretches(case);
+    plan.held = held(case, &fitted);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
     let mut ground = Ground {
         stretches: &case.stretches,
         parallel: &case.parallel,
-        plan: &plan,
+        plan,
         open: &case.open,
         prior: &case.prior,
         cover,
     };
     let unknowns = super::unknowns::Unknowns::of(&case.given, &case.open, &ground.cover).len();
+    let plan = &ground.plan;
     if plan.fitted_rows() < 10 * unknowns || plan.folds < 3 {
         return Err(DiagnoseError::TooFewRows {
             rows: plan.fitted_rows(),
@@ -150,39 +159,60 @@ pub fn diagnose(
         }
     }
     // faults of the data come before any physics
-    if let Some(found) = suspicion(&case.given, &case.stretches, &case.parallel, &plan)? {
+    if let Some(found) = suspicion(&case.given, &case.stretches, &case.parallel, &ground.plan)? {
         return Err(DiagnoseError::Channels(found));
     }
     let mut at = fit(&case.given, &ground)?;
-    let declared = at.base.residual_squares(&plan);
+    let mut episodes: Vec<Episode> = Vec::new();
     let mut models = vec![at.model.clone()];
     let mut steps: Vec<Step> = Vec::new();
+    let mut declared = None;
     let mut candidates;
     loop {
         if stop() {
             return Err(DiagnoseError::Interrupted);
         }
+        let found = episode::find(&at.base, &ground.plan);
+        if !found.is_empty() && episodes.len() < MOST_EPISODES && case.limits.steps > 0 {
+            let cut = episode::cut(&found, &mut ground.plan, &case.stretches, &case.parallel);
+            for e in &cut {
+                let joint = &robot.joint_names()[e.joint];
+                told(&format!(
+                    "cut out {:.2}..{:.2} s on {joint}",
+                    e.from_s, e.to_s
+                ));
+            }
+            episodes.extend(cut);
+            at = fit(&at.model, &ground)?;
+            continue;
+        }
+        let plan = &ground.plan;
+        let declared = declared.get_or_insert_with(|| at.base.residual_squares(plan));
         orders::find(&mut ground.cover, &at.model, &fitted, &case.parallel)?;
         let noise = noise(&at.model, case, &fitted)?;
         let bar = Bar {
-            declared: &declared,
+            declared,
             noise: &noise,
         };
-        let mut found = search(&at, &ground, case.keep, &case.limits, &bar, stop)?;
+        let mut found = if case.limits.steps == 0 {
+            Vec::new()
+        } else {
+            search(&at, &ground, case, &bar, stop)?
+        };
         if stop() {
             return Err(DiagnoseError::Interrupted);
         }
         let mut skip = Vec::new();
         let mut next = None;
-        if steps.len() < MOST_STEPS {
+        if steps.len() < case.limits.steps {
             while let Some((chosen, others)) = choose(&found, &skip) {
                 let mut model = at.model.clone();
                 model.effects.push(found[chosen].effect.clone());
                 let fitted = fit(&model, &ground)?;
                 // the joint fit must keep what the linear tests promised
-                let kept = veto_square(&fitted, &plan)
-                    <= case.limits.veto_ratio * veto_square_with(&at, &fitted, &plan);
-                if kept && fitted.square_with(&at.weights, &plan) < at.square {
+                let kept = veto_square(&fitted, &ground.plan)
+                    <= case.limits.veto_ratio * veto_square_with(&at, &fitted, &ground.plan);
+                if kept && fitted.square_with(&at.weights, &ground.plan) < at.square {
                     next = Some((chosen, others, fitted));
                     break;
                 }
@@ -243,6 +273,7 @@ pub fn diagnose(
     candidates.extend(dropped);
 
     // everything is decided: the holdout may be looked at
+    let plan = &ground.plan;
     let wanted = |role: Role| role == Role::Holdout;
     let measure = |model: &Refined, wanted: &dyn Fn(Role) -> bool| {
         errors(
@@ -250,7 +281,7 @@ pub fn diagnose(
             &case.units,
             &case.stretches,
             &case.parallel,
-            &plan,
+            plan,
             wanted,
         )
     };
@@ -272,6 +303,7 @@ pub fn diagnose(
         })
     };
     let before = pair(&case.given)?;
+    let refitted = pair(&models[0])?.train;
     let after = pair(&at.model)?;
     let floor = noise(&at.model, case, &fitted)?;
     let left_before = left(&floor, &before.train);
@@ -280,17 +312,36 @@ pub fn diagnose(
     Ok(Diagnosis {
         unknowns: at.base.unknowns.list.clone(),
         covariance,
-        residual_std: at.base.residual_rms(&plan),
+        residual_std: at.base.residual_rms(plan),
         model: at.model,
         steps,
         candidates,
         before,
+        refitted,
         after,
         left_before,
         left,
         set_aside: plan.set_aside.clone(),
+        episodes,
         fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
     })
+}
+
+/// Joints that are held along each stretch; all of them where a log decides nothing.
+fn held(case: &Case, fitted: &[Stretch]) -> Vec<Vec<bool>> {
+    let robot = &case.given.model.robot;
+    let veto = |s: &&Stretch| case.roles[s.log] == LogRole::Veto;
+    let vetoing: Vec<Stretch> = case.stretches.iter().filter(veto).cloned().collect();
+    let mut of_fitted = held_joints(robot, fitted).into_iter();
+    let mut of_vetoing = held_joints(robot, &vetoing).into_iter();
+    let of = |s: &Stretch| match case.roles[s.log] {
+        LogRole::Train => of_fitted.next(),
+        LogRole::Veto => of_vetoing.next(),
+        LogRole::Holdout => None,
+    };
+    let all = vec![true; robot.joints()];
+    let found = case.stretches.iter().map(of);
+    found.map(|h| h.unwrap_or_else(|| all.clone())).collect()
 }
 
 /// The stretches of logs that are fitted.
@@ -335,11 +386,7 @@ fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize
         model.effects.remove(i);
         let without = fit(&model, ground)?;
         let judge = Judge::new(&without, ground);
-        let torques: Vec<_> = ground
-            .stretches
-            .iter()
-            .map(|s| without.model.torques(s))
-            .collect();
+        let torques = ground.torques(&without.model);
         let columns = super::search::columns(&without.model, ground, &torques, effect)?;
         let score = judge.score(&columns, effect.linear.len(), effect.shape.len());
         let (gain, needed) = match score {
@@ -376,6 +423,7 @@ fn noise(model: &Refined, case: &Case, stretches: &[Stretch]) -> Result<Vec<f64>
         &case.parallel,
         case.cutoff_hz,
         case.averaged,
+        &held_joints(&model.model.robot, stretches),
     )
 }
 
@@ -408,9 +456,11 @@ fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
         if !piece.role.fitted() {
             continue;
         }
-        rows += piece.rows.len() as f64;
         let mut g = DVector::zeros(u);
         for (j, s) in sums.iter().enumerate() {
+            if !ground.plan.holds(piece.stretch, j) {
+                rows += piece.rows.len() as f64;
+            }
             let w = at.weights[j] * at.weights[j];
             for (x, &i) in s.score.iter().zip(&base.unknowns.columns[j]) {
                 g[i] += w * x;
@@ -421,9 +471,8 @@ fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
     let mut middle = long_run(&scores, u, LAG);
     // the prior is data too
     middle += &at.information * ground.prior.rows_per_independent.max(1.0);
-    let total = base.total(ground.plan, &at.weights, &Role::fitted);
-    let joints = base.unknowns.columns.len() as f64;
-    let variance = total.square / (rows * joints).max(1.0);
+    let total = base.total(&ground.plan, &at.weights, &Role::fitted);
+    let variance = total.square / rows.max(1.0);
     for i in 0..u {
         let least = variance * total.normal[(i, i)];
         if middle[(i, i)] < least {

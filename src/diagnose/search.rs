@@ -6,6 +6,7 @@ use super::candidate::{Columns, Judge, Score, spread};
 use super::fit::{Fitted, Ground};
 use super::orders::SCANNED;
 use super::rows::{clear, scene, standing};
+use super::run::Case;
 use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, order_is_whole, shifted};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
@@ -28,6 +29,8 @@ pub struct Limits {
     pub worth: f64,
     /// Least power that it removes, over that of the noise.
     pub over_noise: f64,
+    /// Most effects that are added; with none the given model is fitted and nothing is looked for.
+    pub steps: usize,
 }
 
 impl Default for Limits {
@@ -40,6 +43,7 @@ impl Default for Limits {
             veto_ratio: 1.002,
             worth: 0.01,
             over_noise: 0.25,
+            steps: 8,
         }
     }
 }
@@ -74,21 +78,17 @@ const REFINEMENTS: u64 = 24;
 pub fn search(
     at: &Fitted,
     ground: &Ground,
-    keep: bool,
-    limits: &Limits,
+    case: &Case,
     bar: &Bar,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Candidate>, MotionError> {
-    let torques: Vec<Torques> = ground
-        .stretches
-        .par_iter()
-        .map(|s| at.model.torques(s))
-        .collect();
+    let torques = ground.torques(&at.model);
     let judge = Judge::new(at, ground);
     let robot = &at.model.model.robot;
     let laws = &at.model.model.friction;
     let places: Vec<(&'static Kind, Place)> = KINDS
         .iter()
+        .filter(|kind| !case.without.iter().any(|name| name == kind.name))
         .flat_map(|kind| (kind.places)(robot, laws).into_iter().map(|p| (*kind, p)))
         .collect();
     let tried: Vec<(Candidate, usize)> = places
@@ -97,7 +97,17 @@ pub fn search(
             if stop() {
                 return Ok((refused(kind, place, "interrupted".into()), 0));
             }
-            one(at, ground, &judge, &torques, kind, place, keep)
+            let least = floor_of(at, ground, bar, place) * case.limits.over_noise / at.square;
+            one(
+                at,
+                ground,
+                &judge,
+                &torques,
+                kind,
+                place,
+                case.keep,
+                HOPELESS * least,
+            )
         })
         .collect::<Result<_, MotionError>>()?;
     let shapes: usize = tried.iter().map(|(_, shapes)| shapes).sum();
@@ -109,18 +119,29 @@ pub fn search(
                 .map(|j| at.weights[j].powi(2) * of(j))
                 .sum()
         };
-        let rows = ground.plan.fitted_rows() as f64;
         let whole = over(&|j| bar.declared[j]).max(f64::MIN_POSITIVE);
-        // where the noise is overrated, what is left counts
-        let least = |j: usize| (bar.noise[j] * rows).min(at.weights[j].powi(-2) * rows);
-        let floor = over(&least).max(f64::MIN_POSITIVE);
+        let floor = floor_of(at, ground, bar, candidate.effect.place);
         let worth = |gain: f64| Worth {
             of_declared: gain * at.square / whole,
             of_noise: gain * at.square / floor,
         };
-        decide(candidate, shapes.max(1), limits, &worth);
+        decide(candidate, shapes.max(1), &case.limits, &worth);
     }
     Ok(found)
+}
+
+/// A shape is refined where the best start removes at least this share of what it must.
+const HOPELESS: f64 = 0.2;
+
+/// Weighted square of the noise on the joints of a place, over the fitted rows.
+fn floor_of(at: &Fitted, ground: &Ground, bar: &Bar, place: Place) -> f64 {
+    let joints = (0..bar.noise.len()).filter(|j| place.touches(*j));
+    let of_joint = |j: usize| {
+        let rows = ground.plan.fitted_rows_of(j) as f64;
+        // where the noise is overrated, what is left counts
+        rows * (at.weights[j].powi(2) * bar.noise[j]).min(1.0)
+    };
+    joints.map(of_joint).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// A candidate that was not tried.
@@ -147,7 +168,16 @@ fn one(
     kind: &'static Kind,
     place: Place,
     keep: bool,
+    least: f64,
 ) -> Result<(Candidate, usize), MotionError> {
+    let joints = 0..at.weights.len();
+    if joints
+        .filter(|j| place.touches(*j))
+        .all(|j| ground.cover.joints[j].held)
+    {
+        let reason = "the joint is held in these logs: move it to see what it does";
+        return Ok((refused(kind, place, reason.into()), 0));
+    }
     if kind.role == Role::Kept && !keep {
         let reason = "a fit that is free while carrying it absorbs it; give the model of logs \
                       without it, and --keep";
@@ -195,7 +225,7 @@ fn one(
     let free = !effect.shape.is_empty()
         && kind.name != "coupling"
         && limits.iter().all(|[low, high]| low < high)
-        && best.0 > 1e-3;
+        && best.0 > least;
     if free {
         let scale: Vec<f64> = effect.shape.iter().map(|s| s.abs().max(1e-9)).collect();
         let mut failed = None;
@@ -312,11 +342,11 @@ pub fn columns(
 ) -> Result<Columns, MotionError> {
     let joints = model.model.robot.joints();
     let mut out = Vec::with_capacity(torques.len());
-    for (stretch, torques) in ground.stretches.iter().zip(torques) {
+    for (i, (stretch, torques)) in ground.stretches.iter().zip(torques).enumerate() {
         let scene = scene(model, stretch, torques);
         let mut of_stretch = Vec::with_capacity(joints);
         for j in 0..joints {
-            if !effect.place.touches(j) {
+            if !effect.place.touches(j) || ground.plan.holds(i, j) {
                 of_stretch.push(Vec::new());
                 continue;
             }

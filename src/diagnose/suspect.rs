@@ -34,6 +34,9 @@ pub fn suspicion(
     // products of measured (first n) and reconstructed torques over the fitted rows
     let mut products = vec![vec![0.0; 2 * n]; 2 * n];
     for (index, stretch) in stretches.iter().enumerate() {
+        if plan.idle(index) {
+            continue;
+        }
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
@@ -41,6 +44,9 @@ pub fn suspicion(
         for piece in plan.pieces.iter().filter(own) {
             for (a, products) in products.iter_mut().enumerate() {
                 for (b, sum) in products.iter_mut().enumerate() {
+                    if plan.holds(index, a % n) || plan.holds(index, b % n) {
+                        continue;
+                    }
                     let range = piece.rows.clone();
                     *sum += super::rows::dot(&rows[a][range.clone()], &rows[b][range]);
                 }

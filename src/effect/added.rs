@@ -281,7 +281,7 @@ fn place(
     };
     let Some(joint) = joint else {
         return match name {
-            "delay" | "payload" | "rigid-body-terms" => Ok(Place::All),
+            "delay" | "gravity-tilt" | "payload" | "rigid-body-terms" => Ok(Place::All),
             _ => Err(nowhere()),
         };
     };
@@ -321,7 +321,7 @@ fn place(
                 false => Place::Pair { on, of: at - 1 },
             })
         }
-        "payload" | "rigid-body-terms" | "actuator-friction" => Err(nowhere()),
+        "gravity-tilt" | "payload" | "rigid-body-terms" | "actuator-friction" => Err(nowhere()),
         _ => Ok(Place::Joint(on)),
     }
 }

@@ -21,6 +21,8 @@ pub struct JointCover {
     pub friction_orders: Vec<f64>,
     /// Full travel of the joint, where the robot's limits say it [m or rad].
     pub full_range: Option<f64>,
+    /// The joint is held in every log.
+    pub held: bool,
 }
 
 /// What the logs cover.
@@ -47,10 +49,18 @@ impl Cover {
             dt: stretches.first().map_or(1.0, |s| s.dt),
             cutoff_hz,
         };
+        let held = held_joints(robot, stretches);
         for (j, joint) in cover.joints.iter_mut().enumerate() {
             let mut position = [f64::INFINITY, f64::NEG_INFINITY];
             let (mut square, mut count) = (0.0, 0usize);
-            for s in stretches {
+            joint.held = held.iter().all(|h| h[j]);
+            let moving: Vec<&Stretch> = stretches
+                .iter()
+                .zip(&held)
+                .filter(|(_, h)| joint.held || !h[j])
+                .map(|(s, _)| s)
+                .collect();
+            for s in &moving {
                 for (q, v) in s.q[j].iter().zip(&s.v[j]) {
                     position = [position[0].min(*q), position[1].max(*q)];
                     joint.speed = [joint.speed[0].min(*v), joint.speed[1].max(*v)];
@@ -60,7 +70,7 @@ impl Cover {
             }
             joint.speed_rms = (square / count.max(1) as f64).sqrt();
             let least = 1e-3 * (position[1] - position[0]);
-            joint.reversals = stretches.iter().map(|s| reversals(&s.q[j], least)).sum();
+            joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least)).sum();
             joint.position = position;
             joint.full_range = full_range(robot, j);
         }
@@ -119,6 +129,35 @@ impl JointCover {
     pub fn both_ways(&self) -> bool {
         self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
     }
+}
+
+/// Travel below which a joint counts as held, over its travel in all logs or its full range: what a
+/// controller gives way, which friction at rest hides.
+const HELD: f64 = 0.01;
+
+/// Whether each joint is held along each stretch, `[stretch][joint]`: one-joint logs are recognised
+/// by it. A torque at rest is anything up to static friction, and no law of v says which.
+pub fn held_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
+    let travel = |s: &Stretch, j: usize| {
+        let ends = s.q[j]
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |e, q| {
+                [e[0].min(*q), e[1].max(*q)]
+            });
+        (ends[1] - ends[0]).max(0.0)
+    };
+    let n = robot.joints();
+    let travels: Vec<Vec<f64>> = stretches
+        .iter()
+        .map(|s| (0..n).map(|j| travel(s, j)).collect())
+        .collect();
+    let widest = |j: usize| {
+        let seen = travels.iter().map(|t| t[j]).fold(0.0, f64::max);
+        seen.max(full_range(robot, j).unwrap_or(0.0))
+    };
+    let widest: Vec<f64> = (0..n).map(widest).collect();
+    let held = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < HELD * w).collect();
+    travels.iter().map(held).collect()
 }
 
 /// Share of a joint's range that a smooth function of position must be seen over.

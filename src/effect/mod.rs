@@ -17,6 +17,7 @@ mod drift;
 mod drive_efficiency;
 mod elasticity;
 mod gain;
+mod gravity_tilt;
 mod load_friction;
 mod nonlinear_viscous;
 mod payload;
@@ -32,7 +33,7 @@ mod torque_offset;
 mod warm_up;
 
 pub use added::{Added, EffectError, Told};
-pub use cover::{Cover, JointCover};
+pub use cover::{Cover, JointCover, held_joints};
 pub use refined::{Refined, Torques, shifted};
 
 use crate::motion::Stretch;
@@ -265,6 +266,7 @@ impl std::fmt::Debug for Kind {
 pub const KINDS: &[&Kind] = &[
     &delay::KIND,
     &torque_offset::KIND,
+    &gravity_tilt::KIND,
     &gain::KIND,
     &asymmetric_friction::KIND,
     &stribeck::KIND,

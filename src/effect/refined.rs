@@ -12,7 +12,7 @@ pub struct Refined {
 }
 
 /// Torques along one stretch, `[joint][sample]`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Torques {
     /// Model and effects, before any shift in time.
     pub hat: Vec<Vec<f64>>,

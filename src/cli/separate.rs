@@ -1,0 +1,73 @@
+//! The experiment that separates an effect from its like, as a command to type: the motion is simulated
+//! with the model, and `--reference` runs the same one on the robot.
+
+use crate::effect::{Added, Place};
+use crate::robot::Robot;
+
+/// Longest ladder over a joint's range that a person waits for \[s\].
+const LADDER_S: u32 = 60;
+/// Long enough for friction to warm up \[s\].
+const WARM_S: u32 = 600;
+
+/// A motion of one joint or motor alone, both ways at ten speeds over its range, where such a motion
+/// separates the effect; none where it takes a payload, a standstill or other sensors.
+pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
+    let ladder = [
+        "torque-offset",
+        "asymmetric-friction",
+        "stribeck",
+        "nonlinear-viscous",
+        "position-friction",
+        "ripple",
+        "spring",
+        "counterbalance",
+        "actuator-friction",
+        "rotor-inertia",
+        "coupling",
+    ];
+    let seconds = match effect.kind.name {
+        "warm-up" => WARM_S,
+        name if ladder.contains(&name) => LADDER_S,
+        _ => return None,
+    };
+    let moves = match effect.place {
+        // the other joint alone
+        Place::Pair { of, .. } => robot.joint_names().get(of)?.clone(),
+        Place::Joint(j) => robot.joint_names().get(j)?.clone(),
+        // y_r hangs on the first motor, x_r on the second
+        Place::Actuator(0) => "x_c2".to_owned(),
+        Place::Actuator(_) => "x_c1".to_owned(),
+        Place::All => return None,
+    };
+    Some(format!(
+        "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move {moves} --seconds {seconds} \
+         -o separate.csv"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::kind;
+    use crate::robot::cft::{Setup, Structure};
+
+    #[test]
+    fn a_screw_is_moved_by_its_motor_and_a_coupling_by_the_other_joint() {
+        let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+        let told = |name: &str, place: Place| {
+            let kind = kind(name).unwrap();
+            let effect = Added {
+                kind,
+                place,
+                shape: vec![0.0; kind.shape.len()],
+                linear: vec![0.0; kind.linear.len()],
+            };
+            command(&effect, &robot)
+        };
+        let friction = told("actuator-friction", Place::Actuator(0)).unwrap();
+        assert!(friction.contains("--move x_c2 "), "{friction}");
+        let coupling = told("coupling", Place::Pair { on: 1, of: 3 }).unwrap();
+        assert!(coupling.contains("--move q5 "), "{coupling}");
+        assert_eq!(told("delay", Place::All), None);
+    }
+}

@@ -1,0 +1,101 @@
+//! Disturbances: episodes in time whose residual stands far above that of all the rest, as of somebody
+//! who pushes. What depends on the motion comes again with the motion; an episode does not. It is cut
+//! out, and said so: no law is fitted to it.
+
+use super::plan::{Plan, Role};
+use super::rows::Base;
+use crate::motion::{Parallel, Stretch};
+
+/// An episode that was cut out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Episode {
+    pub log: usize,
+    /// The joint on which it stands out most.
+    pub joint: usize,
+    pub from_s: f64,
+    pub to_s: f64,
+    /// Mean squared residual over that of the middle piece of the joint.
+    pub over: f64,
+}
+
+/// Mean squared residual of a piece, over that of the middle one, from which on it stands out.
+const STANDS_OUT: f64 = 100.0;
+/// The same of the highest piece that does not stand out, at most: a distribution with a tail is no
+/// episode.
+const REST: f64 = 15.0;
+/// Most of a joint's rows that an episode may hold.
+const MOST: f64 = 0.05;
+/// Most runs of neighbouring pieces.
+const RUNS: usize = 3;
+
+/// Pieces that stand out, with joint and by how much: index in the plan.
+pub fn find(base: &Base, plan: &Plan) -> Vec<(usize, usize, f64)> {
+    let joints = base.unknowns.columns.len();
+    let mut found: Vec<(usize, usize, f64)> = Vec::new();
+    for j in 0..joints {
+        // an episode among the rows that may veto would veto what is right
+        let looked_at = |i: &usize| {
+            let piece = &plan.pieces[*i];
+            let used = piece.role.fitted() || piece.role == Role::Veto;
+            used && !plan.holds(piece.stretch, j)
+        };
+        let pieces: Vec<usize> = (0..plan.pieces.len()).filter(looked_at).collect();
+        let mean = |i: usize| base.sums[i][j].square / plan.pieces[i].rows.len().max(1) as f64;
+        let mut all: Vec<f64> = pieces.iter().map(|i| mean(*i)).collect();
+        all.sort_by(f64::total_cmp);
+        let Some(&middle) = all.get(all.len() / 2).filter(|m| **m > 0.0) else {
+            continue;
+        };
+        let out: Vec<usize> = pieces
+            .iter()
+            .copied()
+            .filter(|i| mean(*i) > REST * middle)
+            .collect();
+        let rows = |of: &[usize]| of.iter().map(|i| plan.pieces[*i].rows.len()).sum::<usize>();
+        let runs = 1 + out.windows(2).filter(|w| w[1] > w[0] + 1).count();
+        let highest = out.iter().map(|i| mean(*i)).fold(0.0, f64::max);
+        let few = rows(&out) as f64 <= MOST * rows(&pieces) as f64 && runs <= RUNS;
+        if highest > STANDS_OUT * middle && few {
+            found.extend(out.into_iter().map(|i| (i, j, mean(i) / middle)));
+        }
+    }
+    found
+}
+
+/// Takes the pieces, and their neighbours into which the filter carries them, out of the plan.
+pub fn cut(
+    found: &[(usize, usize, f64)],
+    plan: &mut Plan,
+    stretches: &[Stretch],
+    parallel: &Parallel,
+) -> Vec<Episode> {
+    let mut episodes: Vec<Episode> = Vec::new();
+    let mut last = None;
+    for &(i, joint, over) in found {
+        let piece = plan.pieces[i].clone();
+        let stretch = &stretches[piece.stretch];
+        let time = |row: usize| stretch.began + stretch.dt * parallel.sample_of(row) as f64;
+        let (from_s, to_s) = (time(piece.rows.start), time(piece.rows.end));
+        match episodes.last_mut() {
+            Some(e) if last == Some((i, joint)) => {
+                e.to_s = to_s;
+                e.over = e.over.max(over);
+            }
+            _ => episodes.push(Episode {
+                log: stretch.log,
+                joint,
+                from_s,
+                to_s,
+                over,
+            }),
+        }
+        last = Some((i + 1, joint));
+        for k in i.saturating_sub(1)..=(i + 1).min(plan.pieces.len() - 1) {
+            let near = &mut plan.pieces[k];
+            if near.stretch == piece.stretch && near.role != Role::Holdout {
+                near.role = Role::Cut;
+            }
+        }
+    }
+    episodes
+}
