@@ -25,6 +25,7 @@ pub const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
 /// Runs `one` for every seed that is not yet in target/NAME.jsonl, where each leaves its line as
 /// soon as it is done: a stopped study goes on where it was. Arguments are SEEDS and FOLDER, which
 /// comes back with all lines in the order of their seeds.
+#[allow(dead_code)] // each study uses its share
 pub fn study(name: &str, usual: u64, one: fn(u64) -> Value) -> (Vec<Value>, PathBuf) {
     let mut arguments = std::env::args().skip(1);
     let seeds: u64 = arguments
@@ -70,6 +71,7 @@ pub fn finished(log: &Path) -> Vec<Value> {
 }
 
 /// Writes FOLDER/NAME.json, from which the documents have their table, and shows it.
+#[allow(dead_code)] // each study uses its share
 pub fn write_summary(
     folder: &Path,
     name: &str,

@@ -333,7 +333,9 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
                 "joint": effect.place.name(robot),
                 "parameters": parameters,
                 "alternatives": alternatives,
-                "separate_command": super::separate::command(effect, robot),
+                "separate_command": (!alternatives.is_empty())
+                    .then(|| super::separate::command(effect, robot))
+                    .flatten(),
                 "separate_by": if alternatives.is_empty() { Value::Null } else { effect.kind.separate_by.into() },
                 "unique_share": score.map(|s| s.unique_share),
                 "delta_bic": score.map(|s| s.delta_bic),

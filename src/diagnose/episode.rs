@@ -24,7 +24,7 @@ const STANDS_OUT: f64 = 100.0;
 /// episode.
 const REST: f64 = 15.0;
 /// Most of a joint's rows that an episode may hold.
-const MOST: f64 = 0.05;
+const MOST: f64 = 0.1;
 /// Most runs of neighbouring pieces.
 const RUNS: usize = 3;
 

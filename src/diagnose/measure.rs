@@ -86,8 +86,7 @@ pub fn errors(
         for piece in own {
             let joint = |j: usize| {
                 let mut s = Sums::default();
-                // what is not fitted is no error of the fit
-                if piece.role != Role::Holdout && plan.holds(index, j) {
+                if plan.rests(index, j) {
                     return s;
                 }
                 for i in piece.rows.clone() {

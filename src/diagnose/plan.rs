@@ -63,6 +63,9 @@ pub struct Plan {
     /// Whether each joint is held along each stretch, `[stretch][joint]`: such rows say nothing of
     /// its friction and are not fitted.
     pub held: Vec<Vec<bool>>,
+    /// The same along every stretch, those that decide nothing too: what is at rest has no error that a
+    /// law of motion answers for.
+    pub rest: Vec<Vec<bool>>,
 }
 
 /// Folds of the cross-validation, about.
@@ -202,6 +205,11 @@ impl Plan {
     /// Whether joint `j` is held along a stretch.
     pub fn holds(&self, stretch: usize, j: usize) -> bool {
         self.held.get(stretch).is_some_and(|held| held[j])
+    }
+
+    /// Whether joint `j` rests along a stretch, whatever the stretch is for.
+    pub fn rests(&self, stretch: usize, j: usize) -> bool {
+        self.rest.get(stretch).is_some_and(|rest| rest[j])
     }
 
     /// Whether nothing of a stretch is fitted or may veto.

@@ -130,6 +130,7 @@ pub fn diagnose(
     let robot = &case.given.model.robot;
     let fitted = fitted_stretches(case);
     plan.held = held(case, &fitted);
+    plan.rest = held_joints(robot, &case.stretches);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
     let mut ground = Ground {
         stretches: &case.stretches,

@@ -103,8 +103,7 @@ pub fn search(
                 ground,
                 &judge,
                 &torques,
-                kind,
-                place,
+                (kind, place),
                 case.keep,
                 HOPELESS * least,
             )
@@ -165,8 +164,7 @@ fn one(
     ground: &Ground,
     judge: &Judge,
     torques: &[Torques],
-    kind: &'static Kind,
-    place: Place,
+    (kind, place): (&'static Kind, Place),
     keep: bool,
     least: f64,
 ) -> Result<(Candidate, usize), MotionError> {

@@ -110,6 +110,15 @@ impl Added {
                 (vec![sigma0 / fc], vec![fc, get("sigma1")?])
             }
             "elasticity" => (Vec::new(), vec![1.0 / get("stiffness")?]),
+            "payload" => {
+                let [mass, mx, my, mz] = [get("mass")?, get("mx")?, get("my")?, get("mz")?];
+                // a point where nothing is said of its extent
+                let own = values.get("inertia").map_or(Ok(0.0), |_| get("inertia"))?;
+                (
+                    Vec::new(),
+                    vec![mass, mx, my, mz, own + (mx * mx + mz * mz) / mass],
+                )
+            }
             _ => (numbers(kind.shape)?, numbers(kind.linear)?),
         };
         Ok(Added {
@@ -240,6 +249,19 @@ impl Added {
                     vec![-1.0 / (c * c)],
                     Unit::Stiffness,
                 ));
+            }
+            "payload" => {
+                let [mass, mx, _, mz, second] = [0, 1, 2, 3, 4].map(|i| self.linear[i]);
+                for (i, key) in self.kind.linear.iter().take(4).enumerate() {
+                    out.push(told(key.name, self.linear[i], unit_vector(i), key.unit));
+                }
+                let far = (mx * mx + mz * mz) / mass;
+                let slopes = vec![far / mass, -2.0 * mx / mass, 0.0, -2.0 * mz / mass, 1.0];
+                let unit = Unit::Text("kg m^2");
+                // robots whose columns have no second moment leave it at rest
+                if second != 0.0 {
+                    out.push(told("inertia", second - far, slopes, unit));
+                }
             }
             _ => {
                 let keys = self.kind.shape.iter().chain(self.kind.linear);

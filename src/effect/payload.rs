@@ -1,5 +1,6 @@
-//! `payload`: a body on the last link: mass and first moments. A fit whose logs carried it absorbs
-//! it: it is looked for only with the model held.
+//! `payload`: a body on the last link: mass, first moments, and its second moment about the vertical
+//! axis of the link's frame, about which alone a tool that stays level turns. A fit whose logs carried it
+//! absorbs it: it is looked for only with the model held.
 
 use super::{Family, Key, Kind, Role, Unit, all_joints, no_limits, no_shape};
 use crate::robot::Robot;
@@ -18,6 +19,8 @@ pub const KIND: Kind = Kind {
         Key::new("mx", Unit::Text("kg m")),
         Key::new("my", Unit::Text("kg m")),
         Key::new("mz", Unit::Text("kg m")),
+        // told, in files and tables, as that about the body's own centre
+        Key::new("inertia", Unit::Text("kg m^2")),
     ],
     places: all_joints,
     starts: no_shape,
@@ -59,9 +62,10 @@ pub const KIND: Kind = Kind {
     separate_by: "identify unloaded, then diagnose loaded logs with --keep",
 };
 
-/// Base parameters of a unit mass and of unit first moments in the frame of the last link.
-fn bodies() -> [[f64; 22]; 4] {
-    let place = [(3, 3), (0, 3), (1, 3), (2, 3)];
+/// Base parameters of a unit mass, unit first moments and a unit second moment along x in the frame of
+/// the last link.
+fn bodies() -> [[f64; 22]; 5] {
+    let place = [(3, 3), (0, 3), (1, 3), (2, 3), (0, 0)];
     place.map(|(r, c)| {
         let mut links = [PseudoInertia([[0.0; 4]; 4]); 8];
         links[7].0[r][c] = 1.0;

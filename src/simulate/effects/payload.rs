@@ -1,4 +1,5 @@
-//! `payload`: a point mass on the last link, at (mx, my, mz)/mass in that link's frame.
+//! `payload`: a body on the last link, its centre at (mx, my, mz)/mass in that link's frame, with the
+//! inertia of its own about the vertical axis; a point mass without.
 //!
 //! On the CFT robot the last link is link 8, its frame's x outward, y up, z to the side, its origin at the
 //! wrist under the arm; the mass's path p(q) gives m J^T J, m J^T dJ/dt v and m g dp_z/dq. A single joint
@@ -18,12 +19,13 @@ pub const KIND: Kind = Kind {
         Key::size("mx", Unit::Fixed("kg m"), |_| L8),
         Key::size("my", Unit::Fixed("kg m"), |_| 0.0),
         Key::size("mz", Unit::Fixed("kg m"), |_| 0.0),
+        Key::size("inertia", Unit::Fixed("kg m^2"), |_| 0.0),
     ],
     build,
 };
 
 fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
-    let [mass, mx, my, mz] = [values[0], values[1], values[2], values[3]];
+    let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     if mass <= 0.0 {
         return Err(SimulateError::EffectNumber {
             effect: KIND.name.to_owned(),
@@ -37,11 +39,12 @@ fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateE
             mass,
             outward: mx / mass,
             sideways: mz / mass,
+            inertia,
         }),
         Machine::SingleJoint(truth) => Built::plant(Added {
             inertia: match truth.kind {
                 JointKind::Prismatic => mass,
-                JointKind::Revolute => (mx * mx + my * my) / mass,
+                JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
             },
         }),
     }
@@ -53,6 +56,8 @@ struct Carried {
     /// Place in the frame of link 8 \[m\]; its height does not matter, for the tool stays level.
     outward: f64,
     sideways: f64,
+    /// About the vertical axis through its own centre; the tool stays level [kg m^2].
+    inertia: f64,
 }
 
 impl Effect for Carried {
@@ -85,6 +90,7 @@ impl Effect for Carried {
             along * c2 - across * s2,
             -(L4 + L6) * c4 * v4 * v4 - L5 * c * w * w + GRAVITY,
         ];
+        mass[4 + 1] += self.inertia;
         for i in 0..v.len() {
             for (row, bias) in jacobian.iter().zip(turned) {
                 torque[i] += self.mass * row[i] * bias;
