@@ -434,7 +434,7 @@ impl Campaign {
         let names: Vec<String> = robot
             .parameters()
             .iter()
-            .map(|p| p.name.to_owned())
+            .map(|p| p.name.to_string())
             .collect();
         let ladder = |j: usize, specs: &[EffectSpec]| {
             let plan = OneJointMove::new(j, SECONDS, Some(seed));

@@ -32,7 +32,9 @@ pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
     };
     let moves = match effect.place {
         // the other joint alone
-        Place::Pair { of, .. } | Place::Geared { other: of, .. } => robot.joint_names().get(of)?.clone(),
+        Place::Pair { of, .. } | Place::Geared { other: of, .. } => {
+            robot.joint_names().get(of)?.clone()
+        }
         Place::Joint(j) => robot.joint_names().get(j)?.clone(),
         // y_r hangs on the first motor, x_r on the second
         Place::Actuator(0) => "x_c2".to_owned(),
