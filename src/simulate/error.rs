@@ -44,8 +44,8 @@ pub enum SimulateError {
     },
     /// Parameters of no physical robot.
     #[error(
-        "the inertia matrix is not positive definite at (x_c1, x_c2, x_c3, x_c4) = {x:.4?}; no physical robot \
-         has these theta_1..theta_12, so take others"
+        "the inertia matrix is not positive definite at the pose {x:.4?}; no physical robot has these inertial \
+         parameters, so take others: an unconstrained fit can be so, one with `lsq --feasible` is not"
     )]
     NotPositiveDefinite { x: Vec<f64> },
     /// Volts to play back that are no series.

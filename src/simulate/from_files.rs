@@ -19,7 +19,7 @@ use crate::robot::cft::{COORDINATES, JOINTS, Limits, Setup};
 /// Time within which a Fourier series reaches full speed, where its file does not say \[s\].
 const BLEND: f64 = 2.0;
 /// Duration of a ladder where none is given \[s\].
-const SECONDS: f64 = 20.0;
+pub(super) const SECONDS: f64 = 20.0;
 /// Ratio of the fastest to the slowest plateau of a single joint's ladder.
 const SPEED_RATIO: f64 = 300.0;
 
@@ -310,7 +310,7 @@ pub fn single_joint_ladder(
     })
 }
 
-fn fourier<const J: usize>(
+pub(super) fn fourier<const J: usize>(
     file: &trajectory::Fourier,
     frame: Frame,
     names: [&str; J],
@@ -350,7 +350,7 @@ fn fourier<const J: usize>(
     })
 }
 
-fn points<const J: usize>(file: &trajectory::Points, frame: Frame) -> Outcome<J> {
+pub(super) fn points<const J: usize>(file: &trajectory::Points, frame: Frame) -> Outcome<J> {
     let mut list = Vec::with_capacity(file.points.len());
     let first = file.points.first().map_or(0.0, |point| point.t);
     for (k, point) in file.points.iter().enumerate() {

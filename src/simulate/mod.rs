@@ -28,6 +28,8 @@ pub mod recording;
 pub mod reference;
 pub mod run;
 pub mod sensors;
+pub mod serial;
+mod serial_experiment;
 pub mod settings;
 pub mod single_joint;
 pub mod truth;

@@ -10,6 +10,7 @@ use super::plant::Plant;
 use super::recording::{Ending, LimitEvent, Recording, Status};
 use super::reference::{Path, Reference};
 use super::run::{Drive, Start, run};
+use super::serial_experiment;
 use super::settings::Settings;
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
@@ -113,9 +114,16 @@ pub fn simulate_from(
     match order.robot.robot.model {
         ModelKind::Cft => cft(order, initial),
         ModelKind::SingleJoint => single(order, initial),
-        ModelKind::Serial => Err(SimulateError::Unsupported {
-            what: "a serial chain; the simulator has `cft` and `single-joint`".to_owned(),
-        }),
+        ModelKind::Serial => match order.robot.joint_names().len() {
+            1 => serial::<1>(order, initial),
+            2 => serial::<2>(order, initial),
+            3 => serial::<3>(order, initial),
+            4 => serial::<4>(order, initial),
+            5 => serial::<5>(order, initial),
+            6 => serial::<6>(order, initial),
+            7 => serial::<7>(order, initial),
+            _ => serial::<8>(order, initial),
+        },
     }
 }
 
@@ -218,6 +226,30 @@ fn single(
     };
     let mut outcome = execute(order, &truth, driven)?;
     outcome.truth.model = "single-joint".to_owned();
+    outcome.truth.parameters = truth.parameters();
+    outcome.truth.effects = values;
+    Ok(outcome)
+}
+
+fn serial<const J: usize>(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+) -> Result<SimulatedLog, SimulateError> {
+    let truth = serial_experiment::truth::<J>(order)?;
+    let (effects, values) = built_effects(order, &Sites::serial(truth.sites()))?;
+    let reference = serial_experiment::reference(order, &truth)?;
+    let control = from_files::control(order.robot, truth.control())?;
+    let saturation = order.robot.control.saturation_v.unwrap_or(f64::INFINITY);
+    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
+    let driven = Driven {
+        effects,
+        start,
+        reference,
+        control,
+        saturation: Some(saturation),
+    };
+    let mut outcome = execute(order, &truth, driven)?;
+    outcome.truth.model = "serial".to_owned();
     outcome.truth.parameters = truth.parameters();
     outcome.truth.effects = values;
     Ok(outcome)

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cft::CftTruth;
 use super::effects::EffectValue;
+use super::serial::SerialTruth;
 use super::single_joint::{SingleJointFriction, SingleJointTruth};
 use crate::config::model_file::Parameter;
 use crate::robot::cft::{EXTENDED, JOINTS};
@@ -102,6 +103,21 @@ impl CftTruth {
                 own.theta = Some((13 + 4 * k + j) as u32);
                 parameters.push(own);
             }
+        }
+        parameters
+    }
+}
+
+impl<const J: usize> SerialTruth<J> {
+    /// Every true parameter: base parameters, then friction and offset joint by joint.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let (robot, theta) = self.rigid_body();
+        let infos = robot.parameters().iter().zip(theta);
+        let mut parameters: Vec<Parameter> =
+            infos.map(|(info, value)| inertial(info, *value)).collect();
+        for joint in &self.joints {
+            // the joint's own, less the inertia that stands in the base parameters
+            parameters.extend(joint.parameters().into_iter().skip(1));
         }
         parameters
     }

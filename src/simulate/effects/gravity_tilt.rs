@@ -35,6 +35,10 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
                 force: -truth.inertia * gx,
             })
         }
+        Machine::Serial { .. } => Err(site.refuse(
+            KIND.name,
+            "a serial robot has its gravity in `[robot] gravity`; simulate a model with another one",
+        )),
         Machine::SingleJoint(_) => Err(site.refuse(
             KIND.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \

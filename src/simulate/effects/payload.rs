@@ -24,7 +24,7 @@ pub const KIND: Kind = Kind {
     build,
 };
 
-fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     if mass <= 0.0 {
         return Err(SimulateError::EffectNumber {
@@ -41,6 +41,10 @@ fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateE
             sideways: mz / mass,
             inertia,
         }),
+        Machine::Serial { .. } => Err(site.refuse(
+            KIND.name,
+            "a serial robot carries it in the base parameters of its last link; change those in the model",
+        )),
         Machine::SingleJoint(truth) => Built::plant(Added {
             inertia: match truth.kind {
                 JointKind::Prismatic => mass,

@@ -99,6 +99,11 @@ impl Site {
 pub enum Machine<'a> {
     Cft(&'a CftTruth),
     SingleJoint(&'a SingleJointTruth),
+    /// A serial robot: its joints, and which of them turn, one bit each.
+    Serial {
+        joints: usize,
+        turning: u8,
+    },
 }
 
 impl Machine<'_> {
@@ -107,6 +112,7 @@ impl Machine<'_> {
         match self {
             Self::Cft(_) => 4,
             Self::SingleJoint(_) => 1,
+            Self::Serial { joints, .. } => *joints,
         }
     }
 
@@ -115,6 +121,7 @@ impl Machine<'_> {
         match self {
             Self::Cft(_) => joint > 0,
             Self::SingleJoint(truth) => truth.kind == JointKind::Revolute,
+            Self::Serial { turning, .. } => turning & (1 << joint) != 0,
         }
     }
 }
@@ -202,6 +209,26 @@ impl<'a> Sites<'a> {
             screws,
             whole: vec![whole],
         })
+    }
+
+    /// The places of a serial robot, one a joint.
+    pub fn serial(joints: Vec<Site>) -> Self {
+        let turning = joints.iter().enumerate();
+        let turning = turning.fold(0, |bits, (j, site)| bits | (u8::from(site.turns) << j));
+        let whole = joints.first().map(|first| Site {
+            place: Place::Whole,
+            name: String::new(),
+            ..first.clone()
+        });
+        Self {
+            machine: Machine::Serial {
+                joints: joints.len(),
+                turning,
+            },
+            joints,
+            screws: Vec::new(),
+            whole: whole.into_iter().collect(),
+        }
     }
 
     /// The places of a single joint, scaled with its friction at one m/s or rad/s.
