@@ -202,11 +202,6 @@ fn the_robot_section_says_what_it_needs() {
 #[test]
 fn friction_that_cannot_be_is_refused() {
     robot_refused(
-        CFT,
-        "[friction]\nfitted_with_inertias = true\n",
-        &["r.toml:5", "not linear", "viscous-coulomb"],
-    );
-    robot_refused(
         SINGLE,
         "[friction]\noffset = true\n",
         &["r.toml:6", "fitted_with_inertias = true"],

@@ -21,6 +21,8 @@ fn order<'a>(robot: &'a RobotFile, motion: Motion<'a>) -> Order<'a> {
         motion,
         seconds: Some(20.0),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         seed: 1,
     }
 }
@@ -257,6 +259,8 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
         covariance: None,
         residual_std: Default::default(),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         provenance: Default::default(),
     };
     let heavy = simulate(&Order {
@@ -323,6 +327,8 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         covariance: None,
         residual_std: Default::default(),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         provenance: Default::default(),
     };
     let ordered = Order {

@@ -19,6 +19,7 @@ pub fn render(words: &[&str]) -> Rendered {
         ["curve", result, published] => curve(&json(result)?, &json(published)?),
         ["study", study] => self::study(&json(study)?),
         ["steps", diagnosis] => steps(&json(diagnosis)?),
+        ["estimators", validations @ ..] => estimators(validations),
         ["before-after", diagnoses @ ..] => before_after(diagnoses),
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
@@ -161,6 +162,32 @@ fn steps(diagnosis: &Value) -> Rendered {
         "after",
         "<not separated from",
     ];
+    Ok(table(&columns, &lines))
+}
+
+/// Relative errors by joint of validations named LOG_est_ESTIMATOR, one row each.
+fn estimators(names: &[&str]) -> Rendered {
+    let mut lines = Vec::new();
+    let mut columns = vec!["<estimator".to_owned(), "<evaluated on".to_owned()];
+    for (i, name) in names.iter().enumerate() {
+        let result = json(name)?;
+        let joints = rows(&result["joints"]);
+        if i == 0 {
+            columns.extend(joints.iter().map(|j| text(&j["joint"]).to_owned()));
+            columns.push("mean".to_owned());
+        }
+        let estimator = name.rsplit_once("_est_").map_or(*name, |(_, e)| e);
+        let input = &result["inputs"][0];
+        let log = match input["span"].as_str() {
+            Some(span) => format!("{}@{span}", text(&input["name"])),
+            None => text(&input["name"]).to_owned(),
+        };
+        let mut line = vec![estimator.replace('_', " "), log];
+        line.extend(joints.iter().map(|j| percent(number(&j["relative_error"]))));
+        line.push(percent(number(&result["overall"]["mean_relative_error"])));
+        lines.push(line);
+    }
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     Ok(table(&columns, &lines))
 }
 

@@ -295,6 +295,8 @@ pub fn new_model(machine: &Machine, command: &str, inputs: &[Provenance]) -> Mod
         covariance: None,
         residual_std: BTreeMap::new(),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: BTreeMap::new(),
         provenance: ModelProvenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command.to_owned(),

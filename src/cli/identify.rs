@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use serde_json::{Value, json};
 
+use super::estimate::Estimator;
 use super::machine::Machine;
 use super::pages::{self, Look};
 use super::refined::{held_for_pictures, refined};
@@ -15,7 +16,6 @@ use super::{
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
-use crate::inertia::solve;
 use crate::log::{LogSpec, Provenance};
 use crate::output::write_whole;
 use crate::report::json::Document;
@@ -116,14 +116,11 @@ fn execute(
     mut warnings: Vec<String>,
 ) -> Result<Outcome, CliError> {
     let estimator = match campaign.settings.estimator {
-        EstimatorKind::Wls => solve::Estimator::Wls,
-        EstimatorKind::Ols => solve::Estimator::Ols,
-        other => {
-            return Err(CliError::input(format!(
-                "[settings] estimator: {other:?} is not one of wls, ols"
-            ))
-            .hint("set `estimator = \"wls\"`, or leave it out"));
-        }
+        EstimatorKind::Wls => Estimator::Wls,
+        EstimatorKind::Ols => Estimator::Ols,
+        EstimatorKind::Irls => Estimator::Irls,
+        EstimatorKind::Oe => Estimator::Oe,
+        EstimatorKind::Iv => Estimator::Iv,
     };
     let robot = resolve(base, &campaign.robot);
     let machine = Machine::load(&robot.to_string_lossy())?;
@@ -160,6 +157,7 @@ fn execute(
         &logs(base, &roles.identification)?,
         known.as_ref().map(|model| ("friction.toml", model)),
         estimator,
+        campaign.settings.feasible,
         context,
     )?;
     let model = lsq::into_model(&machine, &fitted, known.as_ref());

@@ -2,29 +2,31 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-
+use super::estimate::{Account, Estimated, Estimator, Passes, estimate};
+use super::feasible::{Physical, physical};
+pub use super::fitted::{json, processing, quality, text};
 use super::friction::new_model;
-use super::machine::{Machine, narrowed, run_error, summary_warnings};
+use super::machine::Machine;
 use super::pages::{self, Look};
 use super::refined::{held_for_pictures, refined};
 use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
-use crate::config::robot_file::FrictionLawKind;
-use crate::inertia::accumulate::Sums;
+use crate::config::robot_file::{FrictionLawKind, ModelKind};
 use crate::inertia::columns::{Columns, KnownFriction, Own};
-use crate::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
-use crate::inertia::solve::{Fit, FitError, fit};
+use crate::inertia::essential::{Essential, essential};
+use crate::inertia::instruments::Reference;
+use crate::inertia::robust::Status;
+use crate::inertia::solve::{Fit, factor, residual_of, weights_of};
 use crate::inertia::verdict::verdict;
-use crate::inertia::{accumulate, add_processing, solve};
-use crate::log::{Block, LogSpec, Provenance};
-use crate::motion::{Settings, Summary};
+use crate::log::{LogSpec, Provenance};
+use crate::motion::Summary;
 use crate::report::json::Document;
-use crate::report::{number, summary};
+use crate::report::number;
+use crate::robot::Robot;
 use crate::robot::friction::DoubleTanh;
-use crate::verdict::{IDENTIFIED, Verdict};
+use crate::verdict::Verdict;
 
 const EXAMPLE: &str = "\
 Example:
@@ -46,9 +48,12 @@ pub struct Args {
     /// Model file that holds the friction, as `friction` writes it
     #[arg(short, long, value_name = "FRICTION.toml")]
     pub model: Option<PathBuf>,
-    /// How the rows are weighted
+    /// How parameters are estimated from the rows
     #[arg(long, value_enum, default_value_t = Estimator::Wls)]
     pub estimator: Estimator,
+    /// Only parameters of links that can exist; the model file then holds the links too
+    #[arg(long)]
+    pub feasible: bool,
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
@@ -57,28 +62,13 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-/// The weighting of the rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Estimator {
-    /// Rows weighted by each joint's noise, in two steps
-    Wls,
-    /// All rows alike
-    Ols,
-}
-
-impl From<Estimator> for solve::Estimator {
-    fn from(estimator: Estimator) -> Self {
-        match estimator {
-            Estimator::Wls => solve::Estimator::Wls,
-            Estimator::Ols => solve::Estimator::Ols,
-        }
-    }
-}
-
 /// One unknown of the fit with what the data say about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unknown {
+    /// Short name, that of the model file.
     pub name: String,
+    /// The combination of standard parameters that it stands for, where that is its name.
+    pub grouping: Option<String>,
     pub theta: Option<u32>,
     pub joint: Option<String>,
     pub unit: String,
@@ -93,6 +83,14 @@ pub struct Unknown {
 pub struct Identified {
     pub columns: Columns,
     pub fit: Fit,
+    /// What the estimator did.
+    pub account: Account,
+    /// Links that can exist, where they were asked for.
+    pub physical: Option<Physical>,
+    /// Which unknowns the data are really about.
+    pub essential: Essential,
+    /// Relative residual per joint with those alone.
+    pub essential_error: Vec<f64>,
     pub unknowns: Vec<Unknown>,
     pub summary: Summary,
     pub inputs: Vec<Provenance>,
@@ -104,78 +102,68 @@ pub fn identify(
     machine: &Machine,
     logs: &[LogSpec],
     friction: Option<(&str, &ModelFile)>,
-    estimator: solve::Estimator,
+    estimator: Estimator,
+    feasible: bool,
     context: &Context,
 ) -> Result<Identified, CliError> {
-    let columns = columns(machine, friction)?;
+    let law = friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh;
+    if law && !matches!(estimator, Estimator::Wls | Estimator::Oe) {
+        return Err(CliError::usage(format!(
+            "{} is linear, and the double-tanh law of friction is not",
+            estimator.name()
+        ))
+        .hint("take `--estimator oe`, which refines the law with the inertias")
+        .hint("or give the friction with -m, or set `law = \"viscous-coulomb\"`"));
+    }
+    let mut passes = Passes::new(machine, logs, context);
+    let linear = columns(machine, friction)?;
+    let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    let (essential, essential_error) = essentials(&estimated)?;
     let mut warnings = Vec::new();
+    let physical = match feasible {
+        true => Some(physical(machine, &mut estimated)?),
+        false => None,
+    };
+    warnings.extend(physical.iter().flat_map(Physical::warnings));
+    let Estimated {
+        columns,
+        fit,
+        account,
+        ..
+    } = estimated;
     if friction.is_none() {
-        warnings.push(
-            "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it".to_owned(),
-        );
+        warnings.push(if law {
+            "friction is fitted together with the inertias, for there are no one-joint logs of it: linear columns first, then the law of (18) by refinement".to_owned()
+        } else {
+            "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it".to_owned()
+        });
     }
-    let bar = context.progress(
-        "least squares",
-        Some(2 * logs.len() as u64 + u64::from(GRIDS)),
-    );
-    let settings = machine.settings();
-    let mut inputs = Vec::new();
-    let mut reduce = |settings: &Settings, first: bool| {
-        let mut total: Option<(Sums, Summary)> = None;
-        for spec in logs {
-            let mut log = machine.open(spec, context)?;
-            let (sums, summary) = accumulate(&machine.robot, &columns, settings, &mut |block| {
-                log.read(block)
-            })
-            .map_err(|e| run_error(spec, e))?;
-            if first {
-                warnings.extend(log.warnings());
-                warnings.extend(summary_warnings(spec, &summary));
-                inputs.push(log.provenance()?);
-            }
-            total = Some(match total {
-                None => (sums, summary),
-                Some((mut all, summary)) => {
-                    all.merge(sums);
-                    (all, summary)
-                }
-            });
-            bar.advance(1);
-        }
-        total.ok_or_else(|| CliError::usage("no log is given"))
-    };
-    let solved = |sums: &Sums| {
-        fit(sums, estimator).map_err(|e| match e {
-            FitError::Math(_) => CliError::input(e),
-            FitError::TooFewRows { .. } | FitError::NothingExcited => CliError::undetermined(e),
-        })
-    };
-    let (sums, summary) = reduce(&settings, true)?;
-    let mut fit = solved(&sums)?;
-    // once more with a narrower position filter: what that moves is part of the uncertainty
-    let (again, _) = reduce(&narrowed(&settings, 1.0 / summary.dt), false)?;
-    add_processing(&mut fit, &solved(&again)?);
-    if machine.robot.knows_encoders() {
-        let mut shifted = Vec::new();
-        for grid in 0..GRIDS {
-            let mut all: Option<Sums> = None;
-            for spec in logs {
-                let mut log = machine.open(spec, context)?;
-                let mut read = |block: &mut Block| log.read(block);
-                let sums = accumulate_shifted(&machine.robot, &columns, &settings, grid, &mut read)
-                    .map_err(|e| run_error(spec, e))?;
-                match (&mut all, sums) {
-                    (Some(all), Some(sums)) => all.merge(sums),
-                    (none, sums) => *none = sums,
-                }
-            }
-            if let Some(sums) = all {
-                shifted.push(solved(&sums)?);
-            }
-            bar.advance(1);
-        }
-        add_scatter(&mut fit, &shifted);
+    if estimator == Estimator::Oe && !account.law_refined {
+        warnings
+            .push("no parameter of this model is nonlinear: oe gives what wls gives".to_owned());
     }
+    if let Some(simulated) = &account.simulated {
+        if simulated.reference == Reference::Smoothed {
+            warnings.push("iv: no log channel is named as the reference, so the measured position, smoothed to half the cut-off, stands for it; a part of its noise stays in the instruments. Name the channel: `reference = \"COLUMN\"` in [log.joint.NAME]".to_owned());
+        }
+        if simulated.indefinite > 0.0 {
+            warnings.push(format!(
+                "iv: at {} of the simulated steps the fit's mass matrix is not positive definite, and each joint moved by itself; `--feasible` gives one that is",
+                number::percent(simulated.indefinite)
+            ));
+        }
+    }
+    if account.status == Status::IterationLimit {
+        warnings.push(format!(
+            "{} did not settle in {} passes over the logs; its last result stands",
+            estimator.name(),
+            account.iterations
+        ));
+    }
+    warnings.extend(std::mem::take(&mut passes.warnings));
+    let summary = passes.summary.take();
+    let summary = summary.ok_or_else(|| CliError::usage("no log is given"))?;
+    let inputs = std::mem::take(&mut passes.inputs);
     let unknowns = unknowns(machine, &columns, &fit);
     for c in &fit.confounded {
         let words: Vec<String> = c
@@ -201,11 +189,36 @@ pub fn identify(
     Ok(Identified {
         columns,
         fit,
+        account,
+        physical,
+        essential,
+        essential_error,
         unknowns,
         summary,
         inputs,
         warnings,
     })
+}
+
+/// The essential unknowns, and the relative residual of each joint with those alone.
+fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), CliError> {
+    let (fit, basis) = (&estimated.fit, &estimated.basis);
+    let weights = weights_of(
+        &basis.sums,
+        &residual_of(&basis.sums, &(&fit.theta - &basis.shift))?,
+    );
+    let factor = factor(&basis.sums, &weights)?;
+    // targets without the laws that the rows are linear about: a parameter is absent at 0
+    let mut whole = factor.clone();
+    let u = factor.ncols() - 1;
+    let target = factor.column(u) + factor.columns(0, u) * &basis.shift;
+    whole.set_column(u, &target);
+    let rows = (fit.rows * basis.sums.columns.joints as u64) as f64;
+    let found = essential(&whole, rows, fit.effective_rows / fit.rows as f64)?;
+    let residual = residual_of(&basis.sums, &(&found.theta - &basis.shift))?;
+    let pairs = residual.iter().zip(&fit.torque_rms);
+    let error = pairs.map(|(s, t)| if *t > 0.0 { s / t } else { f64::NAN });
+    Ok((found, error.collect()))
 }
 
 /// Which columns this robot's rows have.
@@ -256,8 +269,10 @@ fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
     for (i, info) in robot.parameters().iter().enumerate() {
         let value = fit.theta[i];
         let (std, verdict, negligible) = rate(i, value);
+        let grouped = matches!(robot, Robot::Serial(serial) if i < serial.groupings().len());
         out.push(Unknown {
             name: info.name.to_string(),
+            grouping: grouped.then(|| info.meaning.to_string()),
             theta: info.theta,
             joint: None,
             unit: inertia_unit(robot, &info.unit, machine.file.torque_unit(0)),
@@ -275,6 +290,7 @@ fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
             let (std, verdict, negligible) = rate(i, value);
             out.push(Unknown {
                 name: own.name().to_owned(),
+                grouping: None,
                 theta: None,
                 joint: Some(joint.clone()),
                 unit: friction_unit(robot, j, own.name(), machine.file.torque_unit(j)),
@@ -290,7 +306,8 @@ fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
 }
 
 impl Unknown {
-    fn relative_std(&self) -> f64 {
+    /// Standard deviation over the size of the value.
+    pub fn relative_std(&self) -> f64 {
         self.std / self.value.abs()
     }
 
@@ -323,7 +340,10 @@ pub fn into_model(
     let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
     let mut joint_of = Vec::new();
     if let Some(friction) = friction {
-        for (j, joint) in robot.joint_names().iter().enumerate() {
+        let known = &found.columns.known;
+        let names = robot.joint_names().iter().enumerate();
+        // where it was refined it is among what was fitted
+        for (j, joint) in names.filter(|(j, _)| known[*j].is_some()) {
             for (k, name) in DoubleTanh::NAMES.iter().enumerate() {
                 if let Some(p) = friction.find(name, Some(joint)) {
                     keys.push(p.key());
@@ -358,116 +378,10 @@ pub fn into_model(
     for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
         model.residual_std.insert(joint.clone(), *std);
     }
+    if let Some(physical) = &found.physical {
+        physical.into_model(machine, &mut model);
+    }
     model
-}
-
-/// The JSON fields of the command.
-pub fn json(machine: &Machine, found: &Identified) -> Value {
-    let fit = &found.fit;
-    let parameters: Vec<Value> = found
-        .unknowns
-        .iter()
-        .map(|u| {
-            let known = u.verdict != Verdict::NotIdentifiable;
-            json!({
-                "name": u.name,
-                "theta": u.theta,
-                "joint": u.joint,
-                "value": known.then_some(u.value),
-                "std": known.then_some(u.std),
-                "relative_std": known.then(|| u.relative_std()),
-                "unit": u.unit,
-                "verdict": u.verdict,
-                "negligible": u.negligible,
-            })
-        })
-        .collect();
-    let joints: Vec<Value> = (0..machine.robot.joints())
-        .map(|j| {
-            json!({
-                "joint": machine.robot.joint_names()[j],
-                "unit": machine.file.torque_unit(j),
-                "rmse": fit.residual_std[j],
-                "relative_error": fit.relative_error[j],
-            })
-        })
-        .collect();
-    json!({
-        "parameters": parameters,
-        "condition": fit.condition,
-        "rank": fit.rank,
-        "samples": fit.rows * machine.robot.joints() as u64,
-        "effective_samples": fit.effective_rows * machine.robot.joints() as f64,
-        "joints": joints,
-        "processing": processing(&found.summary),
-    })
-}
-
-/// What was done to the logs before the fit.
-pub fn processing(summary: &Summary) -> Value {
-    json!({
-        "cutoff_hz": summary.cutoff_hz,
-        "decimation": summary.decimation,
-        "position_cutoff_hz": summary.q_cutoff_hz,
-    })
-}
-
-/// The tables for a person.
-pub fn text(machine: &Machine, found: &Identified) -> String {
-    let rows: Vec<summary::Parameter> = found
-        .unknowns
-        .iter()
-        .map(|u| {
-            let known = u.verdict != Verdict::NotIdentifiable;
-            summary::Parameter {
-                joint: u.joint.as_deref().unwrap_or(""),
-                name: &u.name,
-                theta: None,
-                value: if known { u.value } else { f64::NAN },
-                std: if known { u.std } else { f64::NAN },
-                unit: &u.unit,
-                verdict: if u.negligible && u.relative_std() > IDENTIFIED {
-                    "negligible"
-                } else {
-                    u.verdict.word()
-                },
-                truth: None,
-            }
-        })
-        .collect();
-    format!(
-        "{}\n{}",
-        summary::parameters("parameters", &rows),
-        quality(machine, found)
-    )
-}
-
-/// Condition, rank, independent rows and residual of the fit, in two lines.
-pub fn quality(machine: &Machine, found: &Identified) -> String {
-    let fit = &found.fit;
-    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
-    let mut out = format!(
-        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
-        condition(fit.condition.raw),
-        condition(fit.condition.normalised),
-        fit.rank,
-        found.unknowns.len(),
-        fit.rows,
-        fit.effective_rows,
-    );
-    let errors: Vec<String> = (0..machine.robot.joints())
-        .map(|j| {
-            format!(
-                "{} {} ({} {})",
-                machine.robot.joint_names()[j],
-                number::percent(fit.relative_error[j]),
-                number::significant(fit.residual_std[j], 3),
-                machine.file.torque_unit(j)
-            )
-        })
-        .collect();
-    out += &format!("residual of the fit: {}\n", errors.join(", "));
-    out
 }
 
 /// Runs the command.
@@ -491,6 +405,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         }
     };
     if friction.is_none()
+        && machine.file.robot.model == ModelKind::Cft
         && !machine.file.friction.fitted_with_inertias
         && machine.file.friction_law() == FrictionLawKind::DoubleTanh
     {
@@ -501,7 +416,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = friction
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
-    let found = identify(&machine, &args.logs, known, args.estimator.into(), context)?;
+    let found = identify(
+        &machine,
+        &args.logs,
+        known,
+        args.estimator,
+        args.feasible,
+        context,
+    )?;
     let model = into_model(&machine, &found, known.map(|k| k.1));
     let document = Document::new(
         "lsq",

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::context::Context;
 use super::error::CliError;
+use super::reference::Reference;
 use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
@@ -237,6 +238,14 @@ impl Machine {
         context: &'a Context,
     ) -> Result<Open<'a>, CliError> {
         self.open_as(spec, &self.file.layout().without_torques(), context)
+    }
+
+    /// The references of a log, where the robot file names one for every joint.
+    pub fn open_reference(&self, spec: &LogSpec) -> Result<Option<Reference>, CliError> {
+        match self.file.reference_layout() {
+            Some(layout) => Ok(Some(Reference::new(Reader::open(spec, &layout)?))),
+            None => Ok(None),
+        }
     }
 
     /// Opens a log with every torque at the time and pose of its row.

@@ -28,13 +28,17 @@ mod arguments;
 mod columns;
 mod context;
 mod error;
+mod estimate;
 mod exit;
+mod feasible;
 mod files;
+mod fitted;
 pub mod machine;
 mod outcome;
 mod outputs;
 mod pages;
-pub mod refined;
+pub mod reference;
+mod refined;
 mod typed;
 
 use std::ffi::OsString;
@@ -249,7 +253,7 @@ mod tests {
         assert_eq!(args.joint.as_deref(), Some("q4"));
         let args: super::lsq::Args =
             parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
-        assert_eq!(args.estimator, super::lsq::Estimator::Ols);
+        assert_eq!(args.estimator, super::estimate::Estimator::Ols);
         assert_eq!(args.logs[0].span.label().as_deref(), Some("0..70%"));
         let args: super::validate::Args =
             parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")

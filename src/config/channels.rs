@@ -58,6 +58,21 @@ impl RobotFile {
         }
     }
 
+    /// The layout of a log's references as if they were its positions; `None` where a joint has none,
+    /// or where logs are of actuators or of motors behind gears.
+    pub fn reference_layout(&self) -> Option<Layout> {
+        let mut layout = self.layout().without_torques();
+        if layout.channels != Channels::Joint || layout.conversion.is_some() {
+            return None;
+        }
+        for (joint, position) in layout.joints.iter().zip(&mut layout.positions) {
+            position.column = self.log.joint.get(joint)?.reference.clone()?;
+            position.key = Some(format!("[log.joint.{joint}] reference"));
+        }
+        layout.velocities.clear();
+        Some(layout)
+    }
+
     fn joint_layout(&self) -> Layout {
         let robot = self.robot();
         let plain = JointChannels::default();

@@ -138,13 +138,6 @@ pub(super) fn plain_name(
 fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let friction = &file.friction;
     let law = file.friction_law();
-    if friction.fitted_with_inertias && law == FrictionLawKind::DoubleTanh {
-        return Err(document.value(
-            &["friction", "fitted_with_inertias"],
-            "is true, but the double-tanh law is not linear in its slopes",
-            "set `law = \"viscous-coulomb\"`, or identify friction first with `cft-ident friction`",
-        ));
-    }
     if friction.offset && !friction.fitted_with_inertias {
         return Err(document.value(
             &["friction", "offset"],

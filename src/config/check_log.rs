@@ -41,6 +41,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         let named = [
             ("position", &channels.position),
             ("velocity", &channels.velocity),
+            ("reference", &channels.reference),
             ("torque", &channels.torque),
         ];
         for (key, column) in named {

@@ -193,6 +193,14 @@ pub struct JointChannels {
     )]
     #[schemars(with = "Option<NameOrNumber>")]
     pub velocity: Option<String>,
+    /// Column of the position that the controller was asked for, in the unit, sign and scale of the
+    /// position; `lsq --estimator iv` simulates along it where every joint has one.
+    #[serde(
+        default,
+        deserialize_with = "column",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub reference: Option<String>,
     /// Column of the torque; `tau_NAME` where absent.
     #[serde(
         default,

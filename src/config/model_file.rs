@@ -87,6 +87,21 @@ pub struct Effect {
     pub parameters: BTreeMap<String, EffectParameter>,
 }
 
+/// Mass properties of a link that can exist, as `lsq --feasible` finds them: keys as in `inertial` of
+/// a robot file's link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkBody {
+    /// Name of the link.
+    pub name: String,
+    /// \[kg\]
+    pub mass: f64,
+    /// Centre of gravity in the link's frame \[m\].
+    pub centre: [f64; 3],
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity, along the link's axes \[kg m^2\].
+    pub inertia: [f64; 6],
+}
+
 /// Where a model came from. No clock time and no path: the same inputs give the same bytes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -117,6 +132,10 @@ pub struct ModelFile {
     pub residual_std: BTreeMap<String, f64>,
     /// Effects added to the declared model.
     pub effects: Vec<Effect>,
+    /// Links that can exist and give these parameters, where they were asked for.
+    pub links: Vec<LinkBody>,
+    /// Inertia of the drives beside them, by joint [kg m^2 or kg].
+    pub drive_inertia: BTreeMap<String, f64>,
     /// Where it came from.
     pub provenance: ModelProvenance,
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::document::Document;
 use super::log_section::LogSection;
-use super::model_file::{Covariance, Effect, ModelFile, ModelProvenance, Parameter};
+use super::model_file::{Covariance, Effect, LinkBody, ModelFile, ModelProvenance, Parameter};
 use super::robot_file::ModelKind;
 use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
@@ -43,6 +43,10 @@ pub(super) struct ModelToml {
     residual_std: BTreeMap<String, f64>,
     #[serde(default)]
     effect: Vec<Effect>,
+    #[serde(default)]
+    link: Vec<LinkBody>,
+    #[serde(default)]
+    drive_inertia: BTreeMap<String, f64>,
     provenance: Option<ModelProvenance>,
 }
 
@@ -99,6 +103,8 @@ impl ModelFile {
             covariance: raw.covariance,
             residual_std: raw.residual_std,
             effects: raw.effect,
+            links: raw.link,
+            drive_inertia: raw.drive_inertia,
             provenance: raw.provenance.unwrap_or_default(),
         };
         model.check_parameters(&document)?;
@@ -164,6 +170,17 @@ impl ModelFile {
                 })
                 .map_err(unwritable)?,
             );
+        }
+        if !self.links.is_empty() {
+            text.push_str("\n# Links that can exist and give the parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
+        }
+        for link in &self.links {
+            text.push_str("\n[[link]]\n");
+            text.push_str(&toml::to_string(link).map_err(unwritable)?);
+        }
+        if !self.drive_inertia.is_empty() {
+            text.push_str("\n# Inertias of the drives beside them.\n[drive_inertia]\n");
+            text.push_str(&toml::to_string(&self.drive_inertia).map_err(unwritable)?);
         }
         text.push('\n');
         let provenance = ProvenanceTable {
@@ -246,6 +263,16 @@ impl ModelFile {
                 ));
             }
             document.not_negative(&["residual_std", joint], Some(*std))?;
+        }
+        for (index, link) in self.links.iter().enumerate() {
+            let index_text = index.to_string();
+            let at = |key| ["link", index_text.as_str(), key];
+            document.finite(&at("mass"), &[link.mass])?;
+            document.finite(&at("centre"), &link.centre)?;
+            document.finite(&at("inertia"), &link.inertia)?;
+        }
+        for (joint, inertia) in &self.drive_inertia {
+            document.not_negative(&["drive_inertia", joint], Some(*inertia))?;
         }
         for (index, effect) in self.effects.iter().enumerate() {
             let index_text = index.to_string();

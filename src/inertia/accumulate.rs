@@ -169,6 +169,56 @@ impl Sums {
         self.rows += other.rows;
     }
 
+    /// The same rows with the parameters of the known friction among the unknowns.
+    pub fn with_free_friction(mut self) -> Sums {
+        self.columns = self.columns.with_free_friction();
+        self
+    }
+
+    /// The same rows with those of each joint's own terms alone that `keep` names by their place.
+    pub fn with_own(&self, keep: &[Vec<usize>]) -> Sums {
+        let (n, p) = (self.columns.joints, self.columns.shared);
+        let mut columns = self.columns.clone();
+        let mut places: Vec<Vec<usize>> = Vec::with_capacity(n);
+        for (j, keep) in keep.iter().enumerate().take(n) {
+            columns.own[j] = keep.iter().map(|k| self.columns.own[j][*k]).collect();
+            let rest = p + self.columns.own[j].len()..self.columns.of_joint(j);
+            places.push(
+                (0..p)
+                    .chain(keep.iter().map(|k| p + k))
+                    .chain(rest)
+                    .collect(),
+            );
+        }
+        let chosen = |r: &DMatrix<f64>, j: usize| r.select_columns(&places[j]);
+        let blocks = self.blocks.iter().map(|b| Block {
+            stretch: b.stretch,
+            rows: b.rows,
+            r: b.r.iter().enumerate().map(|(j, r)| chosen(r, j)).collect(),
+        });
+        Sums {
+            blocks: blocks.collect(),
+            columns,
+            torque_square: self.torque_square.clone(),
+            rows: self.rows,
+        }
+    }
+
+    /// The same rows in one block: enough for a fit, too little for its covariance.
+    pub fn in_one_block(&self) -> Sums {
+        let r = (0..self.columns.joints).map(|j| self.joint(j)).collect();
+        Sums {
+            columns: self.columns.clone(),
+            blocks: vec![Block {
+                stretch: 0,
+                rows: self.rows,
+                r,
+            }],
+            torque_square: self.torque_square.clone(),
+            rows: self.rows,
+        }
+    }
+
     /// R factor of all rows of joint j.
     pub fn joint(&self, j: usize) -> DMatrix<f64> {
         merged(

@@ -5,7 +5,7 @@ use crate::robot::Robot;
 use crate::robot::friction::DoubleTanh;
 
 /// A linear term that belongs to one joint and is fitted with the inertias.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Own {
     /// Fv v.
     Viscous,
@@ -13,6 +13,11 @@ pub enum Own {
     Coulomb,
     /// A constant torque.
     Offset,
+    /// Fc tanh(w v) with w known [s/m or s/rad]: one of several by which a law (18) is begun.
+    Saturating(f64),
+    /// Change of the parameter of this index of a friction law (order of [`DoubleTanh::NAMES`]);
+    /// the law's gradient is its column.
+    Law(usize),
 }
 
 impl Own {
@@ -22,10 +27,12 @@ impl Own {
             Own::Viscous => "viscous",
             Own::Coulomb => "coulomb",
             Own::Offset => "offset",
+            Own::Saturating(_) => "coulomb",
+            Own::Law(k) => DoubleTanh::NAMES[k],
         }
     }
 
-    /// Its column at velocity v.
+    /// Its column at velocity v; 0 for a law's, which [`Columns::fill`] writes by its gradient.
     #[inline]
     pub fn column(self, v: f64) -> f64 {
         match self {
@@ -33,6 +40,8 @@ impl Own {
             // sgn with sgn(0) = 0
             Own::Coulomb => f64::from(i8::from(v > 0.0) - i8::from(v < 0.0)),
             Own::Offset => 1.0,
+            Own::Saturating(slope) => (slope * v).tanh(),
+            Own::Law(_) => 0.0,
         }
     }
 }
@@ -100,6 +109,23 @@ impl Columns {
     /// Channels per sample over all joints, measured torques included.
     pub fn channels(&self) -> usize {
         self.offset(self.joints) + self.joints
+    }
+
+    /// The same columns with the parameters of the known friction among the unknowns: their
+    /// gradient, which stands after the own terms, becomes own terms. Rows need no change.
+    pub fn with_free_friction(&self) -> Columns {
+        let mut own = self.own.clone();
+        for (own, known) in own.iter_mut().zip(&self.known) {
+            if known.is_some() {
+                own.extend((0..GRADIENT).map(Own::Law));
+            }
+        }
+        Columns {
+            joints: self.joints,
+            shared: self.shared,
+            own,
+            known: vec![None; self.joints],
+        }
     }
 
     /// Fills the channels of one sample.

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::Sums;
 use super::columns::GRADIENT;
-use super::solve::{Solution, of_joint, parts};
+use super::solve::{Solution, Told, of_joint, parts};
 use crate::math::long_run::long_run;
 
 /// The two parts and their sum.
@@ -24,12 +24,17 @@ pub(super) fn covariance(
     sums: &Sums,
     joints: &[DMatrix<f64>],
     solution: &Solution,
-    weights: &[f64],
+    told: Told,
     residual: &[f64],
 ) -> (Covariances, DMatrix<f64>, Vec<Option<DMatrix<f64>>>) {
     let columns = &sums.columns;
+    let weights = told.weights;
     let u = columns.unknowns();
     let rows = sums.rows as f64;
+    let known = told.prior.map_or(DMatrix::zeros(u, u), |prior| {
+        let rows = prior.rows.columns(0, u);
+        rows.tr_mul(&rows) * prior.variance
+    });
     // textbook: each joint's residual variance over its weighted normal matrix
     let mut meat = DMatrix::zeros(u, u);
     for (j, r) in joints.iter().enumerate() {
@@ -43,7 +48,7 @@ pub(super) fn covariance(
         }
     }
     let freedom = rows / (rows - u as f64 / columns.joints as f64).max(1.0);
-    let textbook = &solution.inverse * meat * &solution.inverse * freedom;
+    let textbook = &solution.inverse * (meat + &known) * &solution.inverse * freedom;
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
     let scores: Vec<(usize, DVector<f64>)> = sums
@@ -62,7 +67,7 @@ pub(super) fn covariance(
         })
         .collect();
     let sandwich = &solution.inverse
-        * long_run(&scores, u, bandwidth(&scores, u))
+        * (long_run(&scores, u, bandwidth(&scores, u)) + known)
         * &solution.inverse
         * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
@@ -96,7 +101,7 @@ const LEAST_LAG: f64 = 4.0;
 
 /// Andrews' automatic bandwidth for Bartlett's kernel from first-order autoregressions of each
 /// score, equal weights after normalisation.
-fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
+pub(super) fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
     let n = scores.len();
     let (mut above, mut below) = (0.0, 0.0);
     for i in 0..u {
@@ -123,7 +128,7 @@ fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
 }
 
 /// Scales rows and columns of a covariance so that no variance is below that of `floor`.
-fn at_least(mut c: DMatrix<f64>, floor: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn at_least(mut c: DMatrix<f64>, floor: &DMatrix<f64>) -> DMatrix<f64> {
     let up: Vec<f64> = (0..c.nrows())
         .map(|i| {
             let (have, need) = (c[(i, i)], floor[(i, i)]);

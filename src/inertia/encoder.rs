@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 
 use super::accumulate::Sums;
 use super::columns::Columns;
+use super::robust::Weigher;
 use super::solve::Fit;
 use crate::log::Block;
 use crate::motion::{self, RunError, Settings};
@@ -41,6 +42,7 @@ fn shifts(grid: u32) -> [f64; 4] {
 pub fn accumulate_shifted<E: Send>(
     robot: &Robot,
     columns: &Columns,
+    weigher: Option<&mut Weigher>,
     settings: &Settings,
     grid: u32,
     source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
@@ -88,7 +90,8 @@ pub fn accumulate_shifted<E: Send>(
             let _ = sender.send(block);
             ran.map(|_| ())
         });
-        let second = super::accumulate(robot, columns, settings, &mut next(&receiver));
+        let second =
+            super::accumulate_weighted(robot, columns, weigher, settings, &mut next(&receiver));
         drop(receiver);
         match first.join() {
             Ok(Err(error)) => return Err(error),
@@ -104,7 +107,7 @@ pub fn accumulate_shifted<E: Send>(
 }
 
 /// The blocks of the first pass, as a source of the second.
-fn next(
+pub(super) fn next(
     receiver: &Receiver<Block>,
 ) -> impl FnMut(&mut Block) -> Result<bool, std::convert::Infallible> + '_ {
     move |block| {

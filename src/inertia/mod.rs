@@ -1,12 +1,20 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits, `covariance` says how sure it is.
+//! `accumulate` folds them into R factors, `solve` fits, `covariance` says how sure it is. `robust`,
+//! `refine` and `instruments` (along motions of `closed_loop`) are estimators that read the logs
+//! several times; `essential` and `feasible` work on the R factor of a fit.
 
 pub mod accumulate;
+pub mod closed_loop;
 pub mod columns;
 mod covariance;
 pub mod encoder;
+pub mod essential;
+pub mod feasible;
+pub mod instruments;
+pub mod refine;
+pub mod robust;
 pub mod solve;
 pub mod verdict;
 
@@ -16,6 +24,7 @@ use crate::robot::Robot;
 
 use accumulate::{Accumulator, Sums};
 use columns::Columns;
+use robust::Weigher;
 
 /// Length of the blocks whose scores make the covariance, to begin with [s].
 const BLOCK_SECONDS: f64 = 0.25;
@@ -30,6 +39,20 @@ pub fn accumulate<E>(
     settings: &Settings,
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
 ) -> Result<(Sums, Summary), RunError<E>> {
+    accumulate_weighted(robot, columns, None, settings, source)
+}
+
+/// The same with each row weighted by its residual, where a weigher is given.
+///
+/// # Errors
+/// Those of the source and of [`motion::run`].
+pub fn accumulate_weighted<E>(
+    robot: &Robot,
+    columns: &Columns,
+    mut weigher: Option<&mut Weigher>,
+    settings: &Settings,
+    source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+) -> Result<(Sums, Summary), RunError<E>> {
     let mut sums = Accumulator::new(columns.clone(), BLOCK_SECONDS);
     let summary = motion::run(
         source,
@@ -38,7 +61,13 @@ pub fn accumulate<E>(
         None,
         columns.channels(),
         &|s, out| columns.fill(robot, s.q, s.v, s.a, s.tau, out),
-        &mut |row| sums.add(row.segment, row.t, row.filtered),
+        &mut |row| {
+            let channels = match &mut weigher {
+                Some(weigher) => weigher.weigh(columns, row.filtered),
+                None => row.filtered,
+            };
+            sums.add(row.segment, row.t, channels);
+        },
     )?;
     Ok((sums.finish(), summary))
 }

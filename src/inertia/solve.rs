@@ -32,6 +32,10 @@ pub enum FitError {
         "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero"
     )]
     NothingExcited,
+    #[error(
+        "the prior of {link} is no body that can exist: its pseudo-inertia is not positive definite; correct `mass` and `inertia` in its `inertial`, or leave `inertial` out"
+    )]
+    Prior { link: String },
     #[error(transparent)]
     Math(#[from] crate::math::MathError),
 }
@@ -80,46 +84,119 @@ pub struct Fit {
     pub effective_rows: f64,
 }
 
+/// What a fit is told besides the rows.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Told<'a> {
+    /// Weight of each joint's rows [1/N or 1/Nm].
+    pub weights: &'a [f64],
+    /// Per joint, by which part of X'X the score falls where theta grows: 1 for least squares, the
+    /// mean of psi' over that of the row weights for a robust fit.
+    pub slope: Option<&'a [f64]>,
+    /// What is known of the unknowns beforehand.
+    pub prior: Option<&'a Prior>,
+}
+
+/// What is known of the unknowns beforehand, as rows of unit noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// k x (unknowns + 1), the target last.
+    pub rows: DMatrix<f64>,
+    /// Variance of the rows' noise: above 1 where they are given more weight than one row of data,
+    /// as they must among correlated rows.
+    pub variance: f64,
+}
+
 /// Fits all unknowns of the sums.
+///
+/// # Errors
+/// [`FitError`].
 pub fn fit(sums: &Sums, estimator: Estimator) -> Result<Fit, FitError> {
-    let columns = &sums.columns;
-    let (n, u) = (columns.joints, columns.unknowns());
+    let joints = joints(sums)?;
+    let mut weights = vec![1.0; sums.columns.joints];
+    if estimator == Estimator::Wls {
+        // noise of each joint from the step before; two steps settle it
+        for _ in 0..2 {
+            let theta = solve(sums, &joints, &weights, None)?.theta;
+            weights = weights_of(sums, &residual_std(sums, &joints, &theta));
+        }
+    }
+    let told = Told {
+        weights: &weights,
+        ..Told::default()
+    };
+    finish(sums, &joints, told)
+}
+
+/// Fits all unknowns of the sums with weights and prior given.
+///
+/// # Errors
+/// [`FitError`].
+pub fn fit_told(sums: &Sums, told: Told) -> Result<Fit, FitError> {
+    finish(sums, &joints(sums)?, told)
+}
+
+/// Weight of each joint's rows from the standard deviation of its residual [N or Nm].
+pub fn weights_of(sums: &Sums, residual: &[f64]) -> Vec<f64> {
+    let of = |(s, t): (&f64, &f64)| {
+        let floor = 1e-9 * (t / sums.rows as f64).sqrt();
+        match s.max(floor) {
+            0.0 => 0.0,
+            s => 1.0 / s,
+        }
+    };
+    residual.iter().zip(&sums.torque_square).map(of).collect()
+}
+
+/// R factor of each joint, where there are rows enough.
+fn joints(sums: &Sums) -> Result<Vec<DMatrix<f64>>, FitError> {
+    let u = sums.columns.unknowns();
     if sums.rows < 2 * u as u64 {
         return Err(FitError::TooFewRows {
             rows: sums.rows,
             unknowns: u,
         });
     }
-    let joints: Vec<DMatrix<f64>> = (0..n).map(|j| sums.joint(j)).collect();
-    let condition_factor = stacked(sums, &joints, &vec![1.0; n]);
-    let whole = condition_factor.columns(0, u).into_owned();
-    let (condition, rank) = conditions(&whole)?;
+    Ok((0..sums.columns.joints).map(|j| sums.joint(j)).collect())
+}
 
-    let ones = vec![1.0; n];
-    let (mut solution, mut weights) = (solve(sums, &joints, &ones)?, ones);
-    if estimator == Estimator::Wls {
-        // noise of each joint from the step before; two steps settle it
-        for _ in 0..2 {
-            weights = residual_std(sums, &joints, &solution.theta)
-                .iter()
-                .zip(&sums.torque_square)
-                .map(|(s, t)| {
-                    let floor = 1e-9 * (t / sums.rows as f64).sqrt();
-                    if *s > floor {
-                        1.0 / s
-                    } else if floor > 0.0 {
-                        1.0 / floor
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
-            solution = solve(sums, &joints, &weights)?;
-        }
+/// Lowest weighted sum of squares that any values of the unknowns reach, prior included.
+pub fn least_square(sums: &Sums, told: Told) -> Result<f64, FitError> {
+    let r = stacked(sums, &joints(sums)?, told.weights, told.prior);
+    let u = r.ncols() - 1;
+    Ok(r[(u, u)] * r[(u, u)])
+}
+
+/// R factor of all joints' rows, unknowns and target, each joint times its weight.
+///
+/// # Errors
+/// [`FitError::TooFewRows`].
+pub fn factor(sums: &Sums, weights: &[f64]) -> Result<DMatrix<f64>, FitError> {
+    Ok(stacked(sums, &joints(sums)?, weights, None))
+}
+
+/// Residual of each joint under other values of the unknowns [N or Nm].
+pub fn residual_of(sums: &Sums, theta: &DVector<f64>) -> Result<Vec<f64>, FitError> {
+    Ok(residual_std(sums, &joints(sums)?, theta))
+}
+
+fn finish(sums: &Sums, joints: &[DMatrix<f64>], told: Told) -> Result<Fit, FitError> {
+    let columns = &sums.columns;
+    let (n, u) = (columns.joints, columns.unknowns());
+    let whole = stacked(sums, joints, &vec![1.0; n], None);
+    let (condition, rank) = conditions(&whole.columns(0, u).into_owned())?;
+    let weights = told.weights;
+    let mut solution = solve(sums, joints, weights, told.prior)?;
+    let residual = residual_std(sums, joints, &solution.theta);
+    if let Some(slope) = told.slope {
+        let bread: Vec<f64> = weights
+            .iter()
+            .zip(slope)
+            .map(|(w, s)| w * s.sqrt())
+            .collect();
+        solution.inverse = solve(sums, joints, &bread, told.prior)?.inverse;
     }
-    let residual = residual_std(sums, &joints, &solution.theta);
     let (covariance, textbook, sensitivity) =
-        super::covariance::covariance(sums, &joints, &solution, &weights, &residual);
+        super::covariance::covariance(sums, joints, &solution, told, &residual);
     let rows = sums.rows as f64;
     let torque_rms: Vec<f64> = sums
         .torque_square
@@ -173,8 +250,13 @@ pub(super) struct Solution {
     pub confounded: Vec<Confounded>,
 }
 
-/// R factor of all joints' rows, unknowns and target, each joint times its weight.
-fn stacked(sums: &Sums, joints: &[DMatrix<f64>], weights: &[f64]) -> DMatrix<f64> {
+/// R factor of all joints' rows, unknowns and target, each joint times its weight, and of a prior.
+pub(super) fn stacked(
+    sums: &Sums,
+    joints: &[DMatrix<f64>],
+    weights: &[f64],
+    prior: Option<&Prior>,
+) -> DMatrix<f64> {
     let columns = &sums.columns;
     let u = columns.unknowns();
     let mut factor = RFactor::new(u + 1);
@@ -189,6 +271,10 @@ fn stacked(sums: &Sums, joints: &[DMatrix<f64>], weights: &[f64]) -> DMatrix<f64
             row[u] = weights[j] * r[(i, r.ncols() - 1)];
             factor.fold(&row);
         }
+    }
+    for known in prior.iter().flat_map(|prior| prior.rows.row_iter()) {
+        row.iter_mut().zip(&known).for_each(|(row, x)| *row = *x);
+        factor.fold(&row);
     }
     factor.r()
 }
@@ -228,9 +314,14 @@ const RANK_TOLERANCE: f64 = 1e-8;
 /// Share of an unknown in an open direction from which on it counts as not determined.
 const SHARE: f64 = 1e-3;
 
-fn solve(sums: &Sums, joints: &[DMatrix<f64>], weights: &[f64]) -> Result<Solution, FitError> {
+fn solve(
+    sums: &Sums,
+    joints: &[DMatrix<f64>],
+    weights: &[f64],
+    prior: Option<&Prior>,
+) -> Result<Solution, FitError> {
     let u = sums.columns.unknowns();
-    let r = stacked(sums, joints, weights);
+    let r = stacked(sums, joints, weights, prior);
     let x = r.columns(0, u);
     let scale: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
     let unscale = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };

@@ -6,6 +6,7 @@ pub mod cft;
 pub mod friction;
 pub mod model;
 pub mod serial;
+pub mod standard;
 
 use cft::regressor::{regressor12, regressor22};
 use cft::{Setup, Structure};

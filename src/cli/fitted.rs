@@ -1,0 +1,191 @@
+//! What `lsq` says of a fit: its document's fields, and the tables for a person.
+
+use serde_json::{Value, json};
+
+use super::lsq::Identified;
+use super::machine::Machine;
+use crate::motion::Summary;
+use crate::report::table::WIDTH;
+use crate::report::{number, summary};
+use crate::verdict::{IDENTIFIED, Verdict};
+
+/// The JSON fields of the command.
+pub fn json(machine: &Machine, found: &Identified) -> Value {
+    let fit = &found.fit;
+    let parameters: Vec<Value> = found
+        .unknowns
+        .iter()
+        .zip(&found.essential.essential)
+        .map(|(u, essential)| {
+            let known = u.verdict != Verdict::NotIdentifiable;
+            json!({
+                "name": u.grouping.as_ref().unwrap_or(&u.name),
+                "key": u.name,
+                "theta": u.theta,
+                "joint": u.joint,
+                "value": known.then_some(u.value),
+                "std": known.then_some(u.std),
+                "relative_std": known.then(|| u.relative_std()),
+                "unit": u.unit,
+                "verdict": u.verdict,
+                "negligible": u.negligible,
+                "essential": essential,
+            })
+        })
+        .collect();
+    let joints: Vec<Value> = (0..machine.robot.joints())
+        .map(|j| {
+            json!({
+                "joint": machine.robot.joint_names()[j],
+                "unit": machine.file.torque_unit(j),
+                "rmse": fit.residual_std[j],
+                "relative_error": fit.relative_error[j],
+            })
+        })
+        .collect();
+    let essential: Vec<Value> = found
+        .essential_error
+        .iter()
+        .zip(machine.robot.joint_names())
+        .map(|(error, joint)| json!({ "joint": joint, "relative_error": error }))
+        .collect();
+    json!({
+        "parameters": parameters,
+        "essential": { "count": found.essential_count(), "joints": essential },
+        "feasible": found.physical.as_ref().map(|p| p.json(machine)),
+        "condition": fit.condition,
+        "rank": fit.rank,
+        "samples": fit.rows * machine.robot.joints() as u64,
+        "effective_samples": fit.effective_rows * machine.robot.joints() as f64,
+        "joints": joints,
+        "estimator": found.account.json(machine),
+        "processing": processing(&found.summary),
+    })
+}
+
+/// What was done to the logs before the fit.
+pub fn processing(summary: &Summary) -> Value {
+    json!({
+        "cutoff_hz": summary.cutoff_hz,
+        "decimation": summary.decimation,
+        "position_cutoff_hz": summary.q_cutoff_hz,
+    })
+}
+
+/// The tables for a person.
+pub fn text(machine: &Machine, found: &Identified) -> String {
+    let rows: Vec<summary::Parameter> = found
+        .unknowns
+        .iter()
+        .map(|u| {
+            let known = u.verdict != Verdict::NotIdentifiable;
+            summary::Parameter {
+                joint: u.joint.as_deref().unwrap_or(""),
+                name: &u.name,
+                theta: None,
+                value: if known { u.value } else { f64::NAN },
+                std: if known { u.std } else { f64::NAN },
+                unit: &u.unit,
+                verdict: if u.negligible && u.relative_std() > IDENTIFIED {
+                    "negligible"
+                } else {
+                    u.verdict.word()
+                },
+                truth: None,
+            }
+        })
+        .collect();
+    let mut out = format!(
+        "{}{}\n{}",
+        summary::parameters("parameters", &rows),
+        groupings(found),
+        quality(machine, found)
+    );
+    if let Some(physical) = &found.physical {
+        out += &physical.text(machine);
+    }
+    out
+}
+
+/// What the short names of base parameters stand for; nothing where they are names already.
+fn groupings(found: &Identified) -> String {
+    let grouped = found.unknowns.iter().filter_map(|u| {
+        let grouping = u.grouping.as_ref()?;
+        (*grouping != u.name).then(|| wrapped(grouping, 4))
+    });
+    let lines: Vec<String> = grouped.collect();
+    match lines.is_empty() {
+        true => String::new(),
+        false => format!(
+            "\nparameters that stand for combinations\n{}",
+            lines.concat()
+        ),
+    }
+}
+
+/// A text of words in lines that fit a terminal, those after the first further in.
+fn wrapped(text: &str, indent: usize) -> String {
+    let mut out = String::new();
+    let mut line = String::from("  ");
+    for word in text.split(' ') {
+        if line.trim().is_empty() || line.len() + 1 + word.len() <= WIDTH {
+            if !line.trim().is_empty() {
+                line.push(' ');
+            }
+        } else {
+            out += &format!("{line}\n");
+            line = " ".repeat(indent);
+        }
+        line += word;
+    }
+    out + &format!("{line}\n")
+}
+
+impl Identified {
+    /// Number of essential unknowns.
+    fn essential_count(&self) -> usize {
+        self.essential.essential.iter().filter(|e| **e).count()
+    }
+}
+
+/// Condition, rank, independent rows and residual of the fit, in two lines.
+pub fn quality(machine: &Machine, found: &Identified) -> String {
+    let fit = &found.fit;
+    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
+    let mut out = format!(
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
+        condition(fit.condition.raw),
+        condition(fit.condition.normalised),
+        fit.rank,
+        found.unknowns.len(),
+        fit.rows,
+        fit.effective_rows,
+    );
+    let errors: Vec<String> = (0..machine.robot.joints())
+        .map(|j| {
+            format!(
+                "{} {} ({} {})",
+                machine.robot.joint_names()[j],
+                number::percent(fit.relative_error[j]),
+                number::significant(fit.residual_std[j], 3),
+                machine.file.torque_unit(j)
+            )
+        })
+        .collect();
+    out += &format!("residual of the fit: {}\n", errors.join(", "));
+    out += &found.account.text(machine);
+    let alone: Vec<String> = machine
+        .robot
+        .joint_names()
+        .iter()
+        .zip(&found.essential_error)
+        .map(|(joint, error)| format!("{joint} {}", number::percent(*error)))
+        .collect();
+    out += &format!(
+        "{} of {} parameters are essential; residual with them alone: {}\n",
+        found.essential_count(),
+        found.unknowns.len(),
+        alone.join(", ")
+    );
+    out
+}

@@ -1,0 +1,283 @@
+//! The direct dynamics of a fit, in closed loop along a reference: where instruments come from.
+//!
+//! One implicit Euler step a sample: (M + h D + h^2 K) a = K (q_r - q - h v) + D (v_r - v) - c - F(v),
+//! M and c from the fit's own parameters, M by differences of the regressor: column i is
+//! Y(q, 0, e_i) theta - Y(q, 0, 0) theta. Feedback is proportional and derivative, its gains those of
+//! a natural frequency at critical damping. The step is of first order only: instruments have to move
+//! as the robot does, not to be exact.
+
+use super::columns::{Columns, Own};
+use crate::robot::Robot;
+use crate::robot::serial::chain::MOST_JOINTS;
+
+/// Most entries of a regressor on the stack.
+const MOST: usize = crate::robot::serial::MOST_ENTRIES;
+/// The frequency of the loop stays below this share of the sampling rate.
+const FASTEST: f64 = 0.1;
+/// Frequency of the loop over the cut-off of the rows.
+const ABOVE_CUTOFF: f64 = 3.0;
+/// Least inertia of a joint, as a share of the largest.
+const LEAST: f64 = 1e-6;
+
+/// Gains of the loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains {
+    /// Natural frequency [rad/s].
+    pub frequency: f64,
+    /// Per joint: K [N/m or Nm/rad].
+    pub proportional: Vec<f64>,
+    /// Per joint: D [N s/m or Nm s/rad].
+    pub derivative: Vec<f64>,
+}
+
+/// A robot under the parameters of a fit.
+#[derive(Debug, Clone)]
+pub struct ClosedLoop<'a> {
+    robot: &'a Robot,
+    columns: &'a Columns,
+    theta: Vec<f64>,
+    pub gains: Gains,
+    q: [f64; MOST_JOINTS],
+    v: [f64; MOST_JOINTS],
+    /// Steps at which the fit's mass matrix was not positive definite.
+    pub indefinite: u64,
+}
+
+impl<'a> ClosedLoop<'a> {
+    /// A loop about pose `q`, for rows up to `cutoff_hz` sampled with step `h` [s]. `theta` as in
+    /// `columns`.
+    pub fn new(
+        robot: &'a Robot,
+        columns: &'a Columns,
+        theta: Vec<f64>,
+        q: &[f64],
+        cutoff_hz: f64,
+        h: f64,
+    ) -> Self {
+        let n = columns.joints;
+        let frequency = std::f64::consts::TAU * (ABOVE_CUTOFF * cutoff_hz).min(FASTEST / h);
+        let mut new = ClosedLoop {
+            robot,
+            columns,
+            theta,
+            gains: Gains {
+                frequency,
+                proportional: Vec::new(),
+                derivative: Vec::new(),
+            },
+            q: [0.0; MOST_JOINTS],
+            v: [0.0; MOST_JOINTS],
+            indefinite: 0,
+        };
+        let mut mass = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+        let mut bias = [0.0; MOST_JOINTS];
+        new.balance(q, &[0.0; MOST_JOINTS][..n], &mut mass, &mut bias);
+        let largest = (0..n)
+            .map(|i| mass[i][i].abs())
+            .fold(f64::MIN_POSITIVE, f64::max);
+        for (i, row) in mass.iter().enumerate().take(n) {
+            let inertia = row[i].abs().max(LEAST * largest);
+            new.gains.proportional.push(inertia * frequency * frequency);
+            new.gains.derivative.push(2.0 * inertia * frequency);
+        }
+        new
+    }
+
+    /// Puts the robot at a pose with a velocity.
+    pub fn place(&mut self, q: &[f64], v: &[f64]) {
+        let n = self.columns.joints;
+        self.q[..n].copy_from_slice(&q[..n]);
+        self.v[..n].copy_from_slice(&v[..n]);
+    }
+
+    /// Torque of the shared parameters at a state.
+    fn inertial(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64; MOST_JOINTS]) {
+        let (n, p) = (self.columns.joints, self.columns.shared);
+        let mut buffer = [0.0; MOST];
+        let y = &mut buffer[..n * p];
+        self.robot.regressor(q, v, a, y);
+        for (j, out) in out.iter_mut().enumerate().take(n) {
+            let row = y[j * p..(j + 1) * p].iter();
+            *out = row.zip(&self.theta).map(|(y, t)| y * t).sum();
+        }
+    }
+
+    /// Mass matrix and the torque that needs no acceleration, friction aside.
+    fn balance(
+        &self,
+        q: &[f64],
+        v: &[f64],
+        mass: &mut [[f64; MOST_JOINTS]; MOST_JOINTS],
+        bias: &mut [f64; MOST_JOINTS],
+    ) {
+        let n = self.columns.joints;
+        let rest = [0.0; MOST_JOINTS];
+        let mut still = [0.0; MOST_JOINTS];
+        self.inertial(q, &rest[..n], &rest[..n], &mut still);
+        for i in 0..n {
+            let mut unit = rest;
+            unit[i] = 1.0;
+            let mut column = [0.0; MOST_JOINTS];
+            self.inertial(q, &rest[..n], &unit[..n], &mut column);
+            for j in 0..n {
+                mass[j][i] = column[j] - still[j];
+            }
+        }
+        self.inertial(q, v, &rest[..n], bias);
+    }
+
+    /// Friction of joint j at speed v and its slope; a sign that jumps is smoothed over `width`.
+    fn friction(&self, j: usize, v: f64, width: f64) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        if let Some(known) = &self.columns.known[j] {
+            sum = [known.law.torque(v), known.law.slope(v)];
+        }
+        let first = self.columns.first_own(j);
+        for (k, own) in self.columns.own[j].iter().enumerate() {
+            let size = self.theta[first + k];
+            match own {
+                Own::Viscous => {
+                    sum[0] += size * v;
+                    sum[1] += size;
+                }
+                Own::Coulomb => {
+                    let t = (v / width).tanh();
+                    sum[0] += size * t;
+                    sum[1] += size * (1.0 - t * t) / width;
+                }
+                Own::Offset | Own::Saturating(_) | Own::Law(_) => sum[0] += size * own.column(v),
+            }
+        }
+        sum
+    }
+
+    /// Advances by h towards the reference at the end of the step; the new pose.
+    pub fn step(&mut self, h: f64, q_ref: &[f64], v_ref: &[f64]) -> &[f64] {
+        let n = self.columns.joints;
+        let mut mass = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+        let mut bias = [0.0; MOST_JOINTS];
+        let (q, v) = (self.q, self.v);
+        self.balance(&q[..n], &v[..n], &mut mass, &mut bias);
+        let mut force = [0.0; MOST_JOINTS];
+        for j in 0..n {
+            let (k, d) = (self.gains.proportional[j], self.gains.derivative[j]);
+            let inertia = d / (2.0 * self.gains.frequency);
+            let coulomb: f64 = self.columns.own[j]
+                .iter()
+                .enumerate()
+                .filter(|(_, own)| **own == Own::Coulomb)
+                .map(|(i, _)| self.theta[self.columns.first_own(j) + i].abs())
+                .sum();
+            let width = (2.0 * h * coulomb / inertia).max(1e-9);
+            let [friction, slope] = self.friction(j, v[j], width);
+            force[j] =
+                k * (q_ref[j] - q[j] - h * v[j]) + d * (v_ref[j] - v[j]) - bias[j] - friction;
+            mass[j][j] += h * (d + slope.max(0.0)) + h * h * k;
+        }
+        let diagonal: [f64; MOST_JOINTS] = std::array::from_fn(|j| mass[j][j]);
+        if !solve(&mut mass, &mut force, n) {
+            // a fit may have a mass matrix that no robot has: each joint by itself, then
+            self.indefinite += 1;
+            for j in 0..n {
+                let (k, d) = (self.gains.proportional[j], self.gains.derivative[j]);
+                let least = d / (2.0 * self.gains.frequency) + h * d + h * h * k;
+                force[j] /= diagonal[j].max(least);
+            }
+        }
+        for j in 0..n {
+            self.v[j] += h * force[j];
+            self.q[j] += h * self.v[j];
+        }
+        &self.q[..n]
+    }
+}
+
+/// Solves a x = b in place by Cholesky's factor of the symmetric part; false, with b as it was,
+/// where that is not positive definite.
+fn solve(a: &mut [[f64; MOST_JOINTS]; MOST_JOINTS], b: &mut [f64; MOST_JOINTS], n: usize) -> bool {
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k]).sum();
+            let entry = 0.5 * (a[i][j] + a[j][i]);
+            if i == j {
+                let rest = a[i][i] - sum;
+                if rest.is_nan() || rest <= 0.0 {
+                    return false;
+                }
+                a[i][i] = rest.sqrt();
+            } else {
+                a[i][j] = (entry - sum) / a[j][j];
+                // the mirror entry is not read again below the diagonal
+            }
+        }
+    }
+    let mut x = *b;
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| a[i][k] * x[k]).sum();
+        x[i] = (x[i] - sum) / a[i][i];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| a[k][i] * x[k]).sum();
+        x[i] = (x[i] - sum) / a[i][i];
+    }
+    *b = x;
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::JointKind;
+
+    #[test]
+    fn a_joint_follows_its_reference_and_lags_by_what_friction_and_inertia_ask() {
+        let robot = Robot::single_joint("q1", JointKind::Prismatic);
+        let columns = Columns {
+            joints: 1,
+            shared: 1,
+            own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]],
+            known: vec![None],
+        };
+        let h = 1e-3;
+        let theta = vec![95.0, 200.0, 20.0, -3.0];
+        let mut joint = ClosedLoop::new(&robot, &columns, theta, &[0.0], 40.0, h);
+        let w: f64 = 4.0;
+        joint.place(&[0.0], &[0.1 * w]);
+        let mut worst: f64 = 0.0;
+        for k in 1..5000 {
+            let t = f64::from(k) * h;
+            let (q, v) = (0.1 * (w * t).sin(), 0.1 * w * (w * t).cos());
+            let found = joint.step(h, &[q], &[v])[0];
+            if k > 100 {
+                worst = worst.max((found - q).abs());
+            }
+        }
+        // the feedback alone carries the force: at most 250 N over K
+        let stiffness = joint.gains.proportional[0];
+        assert!((stiffness / (95.0 * (628.318_53_f64).powi(2)) - 1.0).abs() < 1e-6);
+        assert!(worst < 300.0 / stiffness + 1e-6, "{worst}");
+        assert!(worst > 50.0 / stiffness, "{worst}");
+        assert_eq!(joint.indefinite, 0);
+    }
+
+    #[test]
+    fn a_symmetric_system_is_solved_and_an_indefinite_one_is_refused() {
+        let mut a = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+        let entries = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
+        for i in 0..3 {
+            a[i][..3].copy_from_slice(&entries[i]);
+        }
+        let x = [1.0, -2.0, 3.0];
+        let mut b = [0.0; MOST_JOINTS];
+        for i in 0..3 {
+            b[i] = (0..3).map(|k| entries[i][k] * x[k]).sum();
+        }
+        assert!(solve(&mut a, &mut b, 3));
+        for i in 0..3 {
+            assert!((b[i] - x[i]).abs() < 1e-13, "{i}: {}", b[i]);
+        }
+        let mut a = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+        (a[0][0], a[1][1], a[0][1], a[1][0]) = (1.0, 1.0, 2.0, 2.0);
+        assert!(!solve(&mut a, &mut b, 2));
+    }
+}

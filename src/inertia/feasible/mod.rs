@@ -1,0 +1,474 @@
+//! Link parameters that can exist: positive definite pseudo-inertias and drive inertias above zero.
+//!
+//! The fit's R factor says how much the torques suffer for any parameters, so the nearest feasible
+//! ones are found on it, without reading a log again: least squares over ten free numbers a link
+//! ([`log_cholesky`]) and the logarithm of each drive's inertia, damped as Levenberg and Marquardt
+//! do. What torques do not tell is filled by a prior: the mass properties that the robot file gives,
+//! or a plain body, with a small weight in the same ten numbers.
+
+pub mod log_cholesky;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::robust::Status;
+use super::solve::FitError;
+use crate::math::rfactor::RFactor;
+use crate::robot::standard::{Body, STANDARD, StandardMap, pseudo_inertia};
+use log_cholesky::LogCholesky;
+
+/// Weight of the prior: a number off by 1 (a factor e in mass or size) costs as much as one
+/// independent row of data that is off by a tenth of its noise.
+pub const PRIOR_WEIGHT: f64 = 0.01;
+/// The body that stands where a robot file gives none: 2 kg about the frame's origin, with a radius
+/// of gyration of 0.1 m along each axis.
+pub const PLAIN: Body = Body {
+    mass: 2.0,
+    centre: [0.0; 3],
+    inertia: [0.04, 0.0, 0.0, 0.04, 0.0, 0.04],
+};
+/// Inertia of a drive before data [kg m^2 or kg].
+pub const PLAIN_DRIVE: f64 = 0.1;
+/// A step that lowers the cost by less than this share is the last.
+const SETTLED: f64 = 1e-10;
+const MOST: usize = 500;
+/// A number changes by at most this in one step.
+const FARTHEST: f64 = 2.0;
+
+/// What the search is given.
+#[derive(Debug, Clone)]
+pub struct Task<'a> {
+    pub map: &'a StandardMap,
+    /// Prior of each link, where there is one.
+    pub bodies: &'a [Option<Body>],
+    /// R factor of the weighted rows: shared parameters first, then other unknowns, then the target.
+    pub factor: &'a DMatrix<f64>,
+    /// Independent rows over rows, by which correlated rows are counted for what they are worth.
+    pub worth: f64,
+}
+
+/// Parameters that can exist.
+#[derive(Debug, Clone)]
+pub struct Feasible {
+    /// All unknowns, in the order of the factor's columns.
+    pub theta: DVector<f64>,
+    /// Standard parameters of each link.
+    pub links: Vec<[f64; STANDARD]>,
+    /// Inertia of each drive of the map [kg m^2 or kg].
+    pub drives: Vec<f64>,
+    /// Whether each link's prior comes from the robot file.
+    pub given: Vec<bool>,
+    pub status: Status,
+    pub iterations: usize,
+}
+
+/// Least squares over links that can exist.
+///
+/// # Errors
+/// [`FitError::Prior`] where a given prior is no body that can exist.
+pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
+    let links = task.map.links.len();
+    let drives = task.map.drives.len();
+    let size = STANDARD * links + drives;
+    let mut prior = DVector::zeros(size);
+    let mut given = vec![false; links];
+    for i in 0..links {
+        let body = task.bodies.get(i).copied().flatten();
+        given[i] = body.is_some();
+        let x = log_cholesky::of(&pseudo_inertia(&body.unwrap_or(PLAIN).standard()));
+        let x = x.ok_or_else(|| FitError::Prior {
+            link: task.map.links[i].clone(),
+        })?;
+        prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
+    }
+    prior
+        .rows_mut(STANDARD * links, drives)
+        .fill(PLAIN_DRIVE.ln());
+
+    let reduced = Reduced::of(task);
+    let mut x = prior.clone();
+    let (mut damping, mut iterations) = (1e-3, 0);
+    let mut status = Status::IterationLimit;
+    let (mut lowest, mut jacobian, mut residual) = reduced.at(task.map, &x, &prior);
+    while iterations < MOST {
+        iterations += 1;
+        let step = damped_step(&jacobian, &residual, damping);
+        let next = &x + step.map(|s| s.clamp(-FARTHEST, FARTHEST));
+        let (cost, j, r) = reduced.at(task.map, &next, &prior);
+        if cost < lowest {
+            let gained = lowest - cost;
+            (x, jacobian, residual) = (next, j, r);
+            damping = (damping / 5.0f64).max(1e-12);
+            let before = std::mem::replace(&mut lowest, cost);
+            if gained <= SETTLED * before {
+                status = Status::Converged;
+                break;
+            }
+        } else if damping < 1e12 {
+            damping *= 4.0;
+        } else {
+            status = Status::Converged;
+            break;
+        }
+    }
+    let (standard, _) = standard_at(&x, links, drives);
+    let mapped = &task.map.matrix * &standard;
+    Ok(Feasible {
+        theta: reduced.complete(&mapped),
+        links: (0..links)
+            .map(|i| std::array::from_fn(|k| standard[STANDARD * i + k]))
+            .collect(),
+        drives: standard
+            .rows(STANDARD * links, drives)
+            .iter()
+            .copied()
+            .collect(),
+        given,
+        status,
+        iterations,
+    })
+}
+
+/// Standard parameters at the search's numbers, and the derivatives.
+fn standard_at(x: &DVector<f64>, links: usize, drives: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let size = STANDARD * links + drives;
+    let mut s = DVector::zeros(size);
+    let mut slopes = DMatrix::zeros(size, size);
+    for i in 0..links {
+        let at = STANDARD * i;
+        let own: LogCholesky = std::array::from_fn(|k| x[at + k]);
+        let (values, columns) = log_cholesky::standard(&own);
+        for k in 0..STANDARD {
+            s[at + k] = values[k];
+            for (r, v) in columns[k].iter().enumerate() {
+                slopes[(at + r, at + k)] = *v;
+            }
+        }
+    }
+    for k in STANDARD * links..size {
+        s[k] = x[k].exp();
+        slopes[(k, k)] = s[k];
+    }
+    (s, slopes)
+}
+
+/// The factor with the unknowns that no link has a part in solved for.
+struct Reduced {
+    /// Columns of the factor: free ones first, then mapped ones.
+    order: Vec<usize>,
+    free: usize,
+    r: DMatrix<f64>,
+    worth: f64,
+}
+
+impl Reduced {
+    fn of(task: &Task) -> Self {
+        let u = task.factor.ncols() - 1;
+        let p = task.map.matrix.nrows();
+        let mapped = |c: &usize| *c < p && task.map.matrix.row(*c).amax() > 0.0;
+        let (mapped, mut order): (Vec<usize>, Vec<usize>) = (0..u).partition(mapped);
+        let free = order.len();
+        order.extend(mapped);
+        let mut factor = RFactor::new(u + 1);
+        let mut row = vec![0.0; u + 1];
+        for i in 0..task.factor.nrows() {
+            for (k, c) in order.iter().enumerate() {
+                row[k] = task.factor[(i, *c)];
+            }
+            row[u] = task.factor[(i, u)];
+            factor.fold(&row);
+        }
+        Reduced {
+            order,
+            free,
+            r: factor.r(),
+            worth: task.worth,
+        }
+    }
+
+    /// Cost, Jacobian and residual: data first, prior below.
+    fn at(
+        &self,
+        map: &StandardMap,
+        x: &DVector<f64>,
+        prior: &DVector<f64>,
+    ) -> (f64, DMatrix<f64>, DVector<f64>) {
+        let drives = map.drives.len();
+        let (s, slopes) = standard_at(x, map.links.len(), drives);
+        let u = self.order.len();
+        let m = u - self.free;
+        let chosen = map.matrix.select_rows(&self.order[self.free..]);
+        let block = self.r.view((self.free, self.free), (m, m)) * self.worth.sqrt();
+        let to_rows = block * chosen;
+        let target = self.r.view((self.free, u), (m, 1)) * self.worth.sqrt();
+        let off = &to_rows * s - target;
+        let data = to_rows * slopes;
+        let weight = PRIOR_WEIGHT.sqrt();
+        let n = x.len();
+        let mut jacobian = DMatrix::zeros(m + n, n);
+        jacobian.view_mut((0, 0), (m, n)).copy_from(&data);
+        let mut residual = DVector::zeros(m + n);
+        residual.rows_mut(0, m).copy_from(&off);
+        for k in 0..n {
+            jacobian[(m + k, k)] = weight;
+            residual[m + k] = weight * (x[k] - prior[k]);
+        }
+        (residual.norm_squared(), jacobian, residual)
+    }
+
+    /// All unknowns from the shared parameters of the map.
+    fn complete(&self, shared: &DVector<f64>) -> DVector<f64> {
+        let u = self.order.len();
+        let m = u - self.free;
+        let known = DVector::from_fn(m, |k, _| shared[self.order[self.free + k]]);
+        let rest = self.r.view((0, u), (self.free, 1))
+            - self.r.view((0, self.free), (self.free, m)) * &known;
+        let mut theta = DVector::zeros(u);
+        // back substitution; a column that no row excites stays at 0
+        let largest = (0..self.free)
+            .map(|i| self.r[(i, i)].abs())
+            .fold(0.0, f64::max);
+        let mut free = vec![0.0; self.free];
+        for i in (0..self.free).rev() {
+            let beyond: f64 = (i + 1..self.free).map(|k| self.r[(i, k)] * free[k]).sum();
+            if self.r[(i, i)].abs() > 1e-12 * largest {
+                free[i] = (rest[i] - beyond) / self.r[(i, i)];
+            }
+            theta[self.order[i]] = free[i];
+        }
+        for (k, c) in self.order[self.free..].iter().enumerate() {
+            theta[*c] = known[k];
+        }
+        theta
+    }
+}
+
+/// Least-squares step with the columns' own size as damping.
+fn damped_step(jacobian: &DMatrix<f64>, residual: &DVector<f64>, damping: f64) -> DVector<f64> {
+    let n = jacobian.ncols();
+    let mut factor = RFactor::new(n + 1);
+    let mut row = vec![0.0; n + 1];
+    for i in 0..jacobian.nrows() {
+        for (c, x) in row.iter_mut().enumerate().take(n) {
+            *x = jacobian[(i, c)];
+        }
+        row[n] = -residual[i];
+        factor.fold(&row);
+    }
+    for c in 0..n {
+        row.fill(0.0);
+        row[c] = damping.sqrt() * jacobian.column(c).norm();
+        factor.fold(&row);
+    }
+    let r = factor.r();
+    let right = r.view((0, n), (n, 1)).column(0).into_owned();
+    let square = r.view((0, 0), (n, n)).into_owned();
+    square
+        .solve_upper_triangular(&right)
+        .unwrap_or_else(|| DVector::zeros(n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::JointKind;
+    use crate::robot::Robot;
+    use crate::robot::cft::{Setup, Structure};
+    use crate::robot::serial::{Chain, Coordinate, Link, SerialRobot};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Three turning links of which the second hangs across.
+    fn arm() -> Robot {
+        let joints = ["q1", "q2", "q3"];
+        let link = |i: usize, alpha: f64, a: f64| {
+            let (rotation, origin) = Link::of_row(a, alpha, 0.1 * i as f64, 0.0);
+            Link {
+                name: format!("link_{}", i + 1),
+                parent: i.checked_sub(1),
+                rotation,
+                origin,
+                axis: [0.0, 0.0, 1.0],
+                kind: JointKind::Revolute,
+                coordinate: Coordinate::Joint(i),
+            }
+        };
+        let links = vec![link(0, 0.0, 0.0), link(1, -1.57, 0.1), link(2, 0.0, 0.4)];
+        let chain = Chain::new(links, 3, [0.0, 0.0, -9.81]).unwrap();
+        let names = joints.map(str::to_owned).to_vec();
+        Robot::serial(SerialRobot::new(chain, names, true, Vec::new()).unwrap())
+    }
+
+    fn draw(chance: &mut ChaCha8Rng) -> f64 {
+        (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0
+    }
+
+    /// R factor of rows at random states with this noise, for shared parameters `theta` and one
+    /// offset of 0.5.
+    fn factor(robot: &Robot, theta: &DVector<f64>, rows: usize, noise: f64) -> DMatrix<f64> {
+        let mut chance = ChaCha8Rng::seed_from_u64(21);
+        let (n, p) = (robot.joints(), theta.len());
+        let mut all = RFactor::new(p + 2);
+        let mut y = vec![0.0; n * p];
+        for _ in 0..rows {
+            let mut state =
+                |scale: f64| -> Vec<f64> { (0..n).map(|_| scale * draw(&mut chance)).collect() };
+            let (q, v, a) = (state(0.4), state(1.0), state(3.0));
+            robot.regressor(&q, &v, &a, &mut y);
+            for j in 0..n {
+                let mut row = y[j * p..(j + 1) * p].to_vec();
+                let tau: f64 = row.iter().zip(theta.iter()).map(|(y, t)| y * t).sum();
+                row.push(1.0);
+                row.push(tau + 0.5 + noise * draw(&mut chance));
+                row.iter_mut().for_each(|x| *x /= noise.max(1e-3));
+                all.fold(&row);
+            }
+        }
+        all.r()
+    }
+
+    fn cost(factor: &DMatrix<f64>, theta: &DVector<f64>) -> f64 {
+        let u = theta.len();
+        (factor.column(u) - factor.columns(0, u) * theta).norm_squared()
+    }
+
+    fn bodies(count: usize) -> DVector<f64> {
+        let body = |i: usize| Body {
+            mass: 4.0 - 0.3 * i as f64,
+            centre: [0.05, -0.02 * i as f64, 0.08],
+            inertia: [0.03, 0.001, -0.002, 0.04, 0.003, 0.02],
+        };
+        DVector::from_vec((0..count).flat_map(|i| body(i).standard()).collect())
+    }
+
+    fn all_exist(found: &Feasible) -> bool {
+        let exists = |s: &[f64; STANDARD]| pseudo_inertia(s).symmetric_eigenvalues().min() > 0.0;
+        found.links.iter().all(exists) && found.drives.iter().all(|d| *d > 0.0)
+    }
+
+    /// Free fit and feasible fit of some rows: their costs and the latter.
+    fn both(
+        robot: &Robot,
+        truth: &DVector<f64>,
+        rows: usize,
+        noise: f64,
+    ) -> (f64, f64, Feasible, DVector<f64>) {
+        let map = robot.standard_map();
+        let factor = factor(robot, truth, rows, noise);
+        let u = truth.len() + 1;
+        let square = factor.view((0, 0), (u, u)).into_owned();
+        let free = square
+            .solve_upper_triangular(&factor.column(u).rows(0, u).into_owned())
+            .unwrap();
+        let none = vec![None; map.links.len()];
+        let task = Task {
+            map: &map,
+            bodies: &none,
+            factor: &factor,
+            worth: 1.0,
+        };
+        let found = feasible(&task).unwrap();
+        (
+            cost(&factor, &free),
+            cost(&factor, &found.theta),
+            found,
+            free,
+        )
+    }
+
+    /// Nearest squared distance of parameters to what can exist, without a prior to speak of.
+    fn beyond(robot: &Robot, free: &DVector<f64>) -> f64 {
+        let p = robot.parameters().len();
+        let mut factor = DMatrix::zeros(p + 1, p + 1);
+        for i in 0..p {
+            factor[(i, i)] = 1e4;
+            factor[(i, p)] = 1e4 * free[i];
+        }
+        let map = robot.standard_map();
+        let none = vec![None; map.links.len()];
+        let task = Task {
+            map: &map,
+            bodies: &none,
+            factor: &factor,
+            worth: 1.0,
+        };
+        let found = feasible(&task).unwrap();
+        (found.theta - free.rows(0, p)).norm()
+    }
+
+    #[test]
+    fn where_the_truth_can_exist_the_fit_hardly_suffers() {
+        for robot in [
+            arm(),
+            Robot::cft(Setup::default(), Structure::Full22),
+            Robot::cft(Setup::default(), Structure::Printed12),
+        ] {
+            let map = robot.standard_map();
+            let mut standard = bodies(map.links.len());
+            standard.extend(map.drives.iter().map(|_| 0.2));
+            let truth = &map.matrix * standard;
+            let (before, after, found, _) = both(&robot, &truth, 400, 0.5);
+            assert!(all_exist(&found));
+            // 22 parameters that are fitted freely save about 22 of the noise's own 1200 or more
+            assert!(after < before + 30.0, "{before} {after}");
+            let own = truth.len();
+            assert!((found.theta[own] - 0.5).abs() < 0.1, "{}", found.theta[own]);
+        }
+    }
+
+    #[test]
+    fn rows_whose_free_fit_cannot_exist_give_links_that_do() {
+        for robot in [arm(), Robot::cft(Setup::default(), Structure::Full22)] {
+            let map = robot.standard_map();
+            let mut standard = bodies(map.links.len());
+            standard.extend(map.drives.iter().map(|_| 0.01));
+            let truth = &map.matrix * standard;
+            // few rows and much noise: some moment of inertia comes out below zero
+            let (before, after, found, free) = both(&robot, &truth, 12, 8.0);
+            assert!(beyond(&robot, &free) > 0.01, "{}", beyond(&robot, &free));
+            assert!(all_exist(&found));
+            assert!(after > before && after < before + 60.0, "{before} {after}");
+        }
+    }
+
+    #[test]
+    fn a_prior_fills_what_torques_do_not_tell() {
+        let robot = arm();
+        let map = robot.standard_map();
+        let mut standard = bodies(3);
+        standard.extend([PLAIN_DRIVE; 3]);
+        let truth = &map.matrix * &standard;
+        let factor = factor(&robot, &truth, 400, 1e-3);
+        let given: Vec<Option<Body>> = (0..3)
+            .map(|i| {
+                Some(Body::of(&std::array::from_fn(|k| {
+                    standard[STANDARD * i + k]
+                })))
+            })
+            .collect();
+        let task = Task {
+            map: &map,
+            bodies: &given,
+            factor: &factor,
+            worth: 1.0,
+        };
+        let found = feasible(&task).unwrap();
+        for (i, link) in found.links.iter().enumerate() {
+            let mass = standard[STANDARD * i + 9];
+            assert!((link[9] / mass - 1.0).abs() < 0.05, "{} {mass}", link[9]);
+        }
+        let wrong = Body {
+            inertia: [1.0, 0.0, 0.0, 0.1, 0.0, 0.1],
+            ..PLAIN
+        };
+        let wrong = vec![Some(wrong); 3];
+        let task = Task {
+            bodies: &wrong,
+            ..task
+        };
+        let error = feasible(&task).unwrap_err().to_string();
+        assert!(
+            error.contains("link_1") && error.contains("`inertial`"),
+            "{error}"
+        );
+    }
+}

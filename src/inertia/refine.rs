@@ -1,0 +1,533 @@
+//! All parameters at once, the friction law's slopes among them: least torque prediction error.
+//!
+//! The model tau = Y theta + F(v; phi) is linear in theta and not in phi, the parameters of law
+//! (18). Each pass over the logs gives, at the present phi, the R factor of [Y, dF/dphi, tau - F]:
+//! a Gauss-Newton step is a linear fit on it, damped as Levenberg (1944) and Marquardt (1963) do,
+//! and the next pass says whether the step was good. theta is solved anew in each, so that only phi
+//! is searched (variable projection: Golub and Pereyra 1973). The friction that was known before
+//! enters with its covariance, as rows of unit noise.
+//!
+//! Without such a start the law is begun by columns that are linear: v and tanh(w_k v) for eight
+//! slopes w_k, of which every joint takes the two that explain most.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::accumulate::Sums;
+use super::columns::{Columns, GRADIENT, KnownFriction, Own};
+use super::robust::Status;
+use super::solve::{
+    Estimator, Fit, FitError, Prior, Told, fit, fit_told, least_square, weights_of,
+};
+use crate::math::rank;
+use crate::robot::friction::DoubleTanh;
+
+/// A step that promises to lower the cost by less than this share of it is the last.
+const SETTLED: f64 = 1e-9;
+/// Most passes over the logs.
+const MOST: usize = 40;
+/// Damping to begin with, and its bounds.
+const DAMPING: [f64; 3] = [1e-3, 1e-9, 1e6];
+/// Slopes of the columns that begin a law, times the joint's rms speed.
+const SLOPES: [f64; 8] = [0.7, 1.5, 3.3, 7.0, 15.0, 33.0, 70.0, 150.0];
+/// A slope may change by this factor in one step.
+const FARTHEST: f64 = 4.0;
+/// No slope is steeper than this over the rms speed: tanh is a sign there.
+const STEEPEST: f64 = 1e4;
+
+/// A refined fit.
+#[derive(Debug, Clone)]
+pub struct Refined {
+    /// The columns with the friction as it was refined; its covariance is that of before.
+    pub columns: Columns,
+    /// All unknowns in the order of [`Columns::with_free_friction`].
+    pub fit: Fit,
+    pub status: Status,
+    /// Passes over the logs.
+    pub iterations: usize,
+    /// Relative residual per joint before the refinement.
+    pub before: Vec<f64>,
+    /// The rows of the last pass, the laws' changes among the unknowns.
+    pub sums: Sums,
+    weights: Vec<f64>,
+    prior: Option<Prior>,
+}
+
+impl Refined {
+    /// The fit of other sums of [`Self::columns`], linear about the refined friction.
+    ///
+    /// # Errors
+    /// [`FitError`].
+    pub fn solve(&self, sums: Sums) -> Result<Fit, FitError> {
+        let sums = sums.with_free_friction();
+        let told = Told {
+            weights: &self.weights,
+            slope: None,
+            prior: self.prior.as_ref(),
+        };
+        let mut fit = fit_told(&sums, told)?;
+        add_laws(&self.columns, &mut fit.theta);
+        Ok(fit)
+    }
+}
+
+impl Refined {
+    /// What the unknowns of [`Self::sums`] lack to those of [`Self::fit`]: the laws as they stand.
+    pub fn shift(&self) -> DVector<f64> {
+        let mut shift = DVector::zeros(self.fit.theta.len());
+        add_laws(&self.columns, &mut shift);
+        shift
+    }
+}
+
+/// Adds the laws' parameters to their changes.
+fn add_laws(columns: &Columns, theta: &mut DVector<f64>) {
+    let free = columns.with_free_friction();
+    for (j, known) in columns.known.iter().enumerate() {
+        if let Some(known) = known {
+            let first = free.first_own(j) + columns.own[j].len();
+            for (k, p) in known.law.parameters().into_iter().enumerate() {
+                theta[first + k] += p;
+            }
+        }
+    }
+}
+
+/// Rows of the friction that was known before: L (phi - phi_0) of unit noise, L'L the inverse of its
+/// covariance, times the root of `strength`. `None` where nothing was known.
+fn prior(before: &Columns, now: &Columns, strength: f64) -> Result<Option<Prior>, FitError> {
+    let free = now.with_free_friction();
+    let u = free.unknowns();
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for (j, known) in before.known.iter().enumerate() {
+        let (Some(known), Some(present)) = (known, &now.known[j]) else {
+            continue;
+        };
+        let size: Vec<f64> = (0..GRADIENT)
+            .map(|k| known.covariance[k][k].max(0.0).sqrt())
+            .collect();
+        // correlations, so that parameters of all units compare
+        let scaled = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| match size[a] * size[b] {
+            s if s > 0.0 => known.covariance[a][b] / s,
+            _ => 0.0,
+        });
+        let svd = rank::svd(&scaled)?;
+        let off: Vec<f64> = present
+            .law
+            .parameters()
+            .iter()
+            .zip(known.law.parameters())
+            .map(|(now, before)| before - now)
+            .collect();
+        let first = free.first_own(j) + now.own[j].len();
+        for (i, s) in svd.s.iter().enumerate().filter(|(_, s)| **s > 1e-10) {
+            let mut row = vec![0.0; u + 1];
+            for k in (0..GRADIENT).filter(|k| size[*k] > 0.0) {
+                row[first + k] = (strength / s).sqrt() * svd.v[(k, i)] / size[k];
+                row[u] += row[first + k] * off[k];
+            }
+            rows.push(row);
+        }
+    }
+    Ok((!rows.is_empty()).then(|| Prior {
+        rows: DMatrix::from_fn(rows.len(), u + 1, |r, c| rows[r][c]),
+        variance: strength,
+    }))
+}
+
+/// Rows that hold the law's parameters where they are: `damping` parts of their own columns.
+fn damped(sums: &Sums, weights: &[f64], prior: Option<&Prior>, damping: f64) -> Prior {
+    let u = sums.columns.unknowns();
+    let mut rows = prior.map_or(DMatrix::zeros(0, u + 1), |p| p.rows.clone());
+    for (j, own) in sums.columns.own.iter().enumerate() {
+        let r = sums.joint(j);
+        for (k, _) in own
+            .iter()
+            .enumerate()
+            .filter(|(_, o)| matches!(o, Own::Law(_)))
+        {
+            let size = weights[j] * r.column(sums.columns.shared + k).norm();
+            let at = rows.nrows();
+            rows = rows.insert_row(at, 0.0);
+            rows[(at, sums.columns.first_own(j) + k)] = damping.sqrt() * size;
+        }
+    }
+    Prior {
+        rows,
+        variance: 1.0,
+    }
+}
+
+/// Places of each joint's own terms that are no part of a law.
+fn without_law(columns: &Columns) -> Vec<Vec<usize>> {
+    let linear = |own: &Vec<Own>| {
+        let all = own.iter().enumerate();
+        let kept = all.filter(|(_, o)| !matches!(o, Own::Law(_)));
+        kept.map(|(k, _)| k).collect()
+    };
+    columns.own.iter().map(linear).collect()
+}
+
+/// Least cost that the linear parameters reach with the law as it stands.
+fn cost(sums: &Sums, weights: &[f64], prior: Option<&Prior>) -> Result<f64, FitError> {
+    let u = sums.columns.unknowns();
+    let told = Told {
+        weights,
+        ..Told::default()
+    };
+    let known = prior.map_or(0.0, |p| p.rows.column(u).norm_squared());
+    Ok(least_square(&sums.with_own(&without_law(&sums.columns)), told)? + known)
+}
+
+/// Fits all parameters, from the friction in `start` and drawn to it by its covariance. `pass`
+/// reads the logs once.
+///
+/// # Errors
+/// Those of `pass`, and [`FitError`].
+pub fn refine<E: From<FitError>>(
+    start: Columns,
+    pass: &mut dyn FnMut(&Columns) -> Result<Sums, E>,
+) -> Result<Refined, E> {
+    let speeds = |sums: &Sums| -> Vec<f64> {
+        let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
+        let speed = |(j, own)| match place(own) {
+            Some(k) => {
+                sums.joint(j).column(sums.columns.shared + k).norm() / (sums.rows as f64).sqrt()
+            }
+            None => 0.0,
+        };
+        sums.columns.own.iter().enumerate().map(speed).collect()
+    };
+    let mut now = sorted(start.clone());
+    let mut sums = pass(&now)?.with_free_friction();
+    let linear = |sums: &Sums| fit(&sums.with_own(&without_law(&sums.columns)), Estimator::Wls);
+    let first = linear(&sums)?;
+    // correlated rows hold less than their number says: what was known must not drown among them
+    let strength = (first.rows as f64 / first.effective_rows).max(1.0);
+    let before = first.relative_error.clone();
+    let mut weights = weights_of(&sums, &first.residual_std);
+    let mut known = prior(&start, &now, strength)?;
+    let mut lowest = cost(&sums, &weights, known.as_ref())?;
+    let (mut damping, mut iterations) = (DAMPING[0], 1);
+    let mut status = Status::IterationLimit;
+    let speed = speeds(&sums);
+    while iterations < MOST {
+        let held = damped(&sums, &weights, known.as_ref(), damping);
+        let told = Told {
+            weights: &weights,
+            slope: None,
+            prior: Some(&held),
+        };
+        let promised = lowest - least_square(&sums, told)?;
+        // a cost of one a row is one of the noise: far below it there is none
+        if promised <= SETTLED * lowest || lowest <= 1e-6 * sums.rows as f64 {
+            status = Status::Converged;
+            break;
+        }
+        let step = fit_told(&sums, told)?.theta;
+        let next = sorted(moved(&now, &step, &speed));
+        let trial = pass(&next)?.with_free_friction();
+        iterations += 1;
+        let trial_known = prior(&start, &next, strength)?;
+        let found = cost(&trial, &weights, trial_known.as_ref())?;
+        if found < lowest {
+            (now, sums, known) = (next, trial, trial_known);
+            weights = weights_of(&sums, &linear(&sums)?.residual_std);
+            lowest = cost(&sums, &weights, known.as_ref())?;
+            damping = (damping / 10.0).max(DAMPING[1]);
+        } else if damping < DAMPING[2] {
+            damping *= 10.0;
+        } else {
+            // no step is short enough to be of use: the lowest point that rounding lets be seen
+            status = Status::Converged;
+            break;
+        }
+    }
+    let at_end = linear(&sums)?;
+    let mut refined = Refined {
+        columns: now,
+        fit: at_end.clone(),
+        status,
+        iterations,
+        before,
+        sums,
+        weights,
+        prior: known,
+    };
+    let told = Told {
+        weights: &refined.weights,
+        slope: None,
+        prior: refined.prior.as_ref(),
+    };
+    let mut fit = fit_told(&refined.sums, told)?;
+    // the values are those of the last step that was taken; the fit about them gives the covariance
+    fit.theta.fill(0.0);
+    let linear_columns = &refined.columns;
+    for c in 0..linear_columns.shared {
+        fit.theta[c] = at_end.theta[c];
+    }
+    for j in 0..linear_columns.joints {
+        for k in 0..linear_columns.own[j].len() {
+            fit.theta[refined.sums.columns.first_own(j) + k] =
+                at_end.theta[linear_columns.first_own(j) + k];
+        }
+    }
+    add_laws(&refined.columns, &mut fit.theta);
+    fit.residual_std = at_end.residual_std;
+    fit.relative_error = at_end.relative_error;
+    refined.fit = fit;
+    Ok(refined)
+}
+
+/// The steeper part first.
+fn sorted(mut columns: Columns) -> Columns {
+    for known in columns.known.iter_mut().flatten() {
+        let law = &mut known.law;
+        if law.slope_1 < law.slope_2 {
+            std::mem::swap(&mut law.slope_1, &mut law.slope_2);
+            std::mem::swap(&mut law.coulomb_1, &mut law.coulomb_2);
+            for row in &mut known.covariance {
+                row.swap(1, 2);
+                row.swap(3, 4);
+            }
+            known.covariance.swap(1, 2);
+            known.covariance.swap(3, 4);
+        }
+    }
+    columns
+}
+
+/// The columns with their laws moved by a step of the unknowns; slopes stay positive and in bounds.
+fn moved(columns: &Columns, step: &DVector<f64>, speed: &[f64]) -> Columns {
+    let free = columns.with_free_friction();
+    let mut next = columns.clone();
+    for (j, known) in next.known.iter_mut().enumerate() {
+        let Some(known) = known else { continue };
+        let first = free.first_own(j) + columns.own[j].len();
+        let mut p = known.law.parameters();
+        for (k, p) in p.iter_mut().enumerate() {
+            let wanted = *p + step[first + k];
+            *p = if k >= 3 {
+                let steepest = if speed[j] > 0.0 {
+                    STEEPEST / speed[j]
+                } else {
+                    f64::MAX
+                };
+                let (low, high) = (*p / FARTHEST, *p * FARTHEST);
+                wanted.clamp(low.min(high), high.max(low)).min(steepest)
+            } else {
+                wanted
+            };
+        }
+        known.law = DoubleTanh::from_parameters(p);
+    }
+    next
+}
+
+/// Begins the law of every joint whose own terms name viscous friction: the columns with the laws
+/// as known friction of no covariance, without those terms. Also the linear fit that came first.
+///
+/// # Errors
+/// Those of `pass`, and [`FitError`].
+pub fn begin<E: From<FitError>>(
+    linear: &Columns,
+    pass: &mut dyn FnMut(&Columns) -> Result<Sums, E>,
+) -> Result<Columns, E> {
+    let viscous = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Viscous);
+    let first = pass(linear)?;
+    let plain = fit(&first, Estimator::Wls)?;
+    let mut many = linear.clone();
+    let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
+    for j in 0..linear.joints {
+        let Some(k) = viscous(&linear.own[j]) else {
+            continue;
+        };
+        let speed = plain.column_rms[(j, linear.first_own(j) + k)];
+        let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
+        slopes[j] = SLOPES.map(|s| s * unit);
+        many.own[j].retain(|o| *o != Own::Coulomb);
+        many.own[j].extend(slopes[j].map(Own::Saturating));
+    }
+    let sums = pass(&many)?;
+    let weights = weights_of(&sums, &plain.residual_std);
+    let base = |j: usize| -> Vec<usize> {
+        let all = many.own[j].iter().enumerate();
+        all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
+            .map(|(k, _)| k)
+            .collect()
+    };
+    let keep = |j: usize, pair: [usize; 2]| -> Vec<usize> {
+        let mut keep = base(j);
+        if viscous(&many.own[j]).is_some() {
+            let first = many.own[j].len() - SLOPES.len();
+            keep.extend(pair.map(|k| first + k));
+        }
+        keep
+    };
+    // one block of each joint's R factor is all that a choice needs
+    let small = sums.in_one_block();
+    let mut pairs = vec![[SLOPES.len() - 2, 2]; linear.joints];
+    let told = Told {
+        weights: &weights,
+        ..Told::default()
+    };
+    for j in 0..linear.joints {
+        if viscous(&linear.own[j]).is_none() {
+            continue;
+        }
+        let mut best = (f64::INFINITY, pairs[j]);
+        for steep in 1..SLOPES.len() {
+            for flat in 0..steep {
+                pairs[j] = [steep, flat];
+                let chosen: Vec<Vec<usize>> =
+                    (0..linear.joints).map(|i| keep(i, pairs[i])).collect();
+                let square = least_square(&small.with_own(&chosen), told)?;
+                if square < best.0 {
+                    best = (square, pairs[j]);
+                }
+            }
+        }
+        pairs[j] = best.1;
+    }
+    let chosen: Vec<Vec<usize>> = (0..linear.joints).map(|j| keep(j, pairs[j])).collect();
+    let found = fit_told(&small.with_own(&chosen), told)?;
+    let mut start = linear.clone();
+    for j in 0..linear.joints {
+        let Some(k) = viscous(&linear.own[j]) else {
+            continue;
+        };
+        let chosen = small.with_own(&chosen).columns;
+        let at = |k: usize| found.theta[chosen.first_own(j) + k];
+        let last = chosen.own[j].len();
+        let [steep, flat] = pairs[j].map(|k| slopes[j][k]);
+        let viscous = base(j).iter().position(|b| *b == k).unwrap_or_default();
+        start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
+        start.known[j] = Some(KnownFriction {
+            law: DoubleTanh::from_parameters([
+                at(viscous),
+                at(last - 2),
+                at(last - 1),
+                steep,
+                flat,
+            ]),
+            covariance: [[0.0; GRADIENT]; GRADIENT],
+        });
+    }
+    Ok(start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::accumulate::Accumulator;
+    use super::*;
+    use crate::robot::{JointKind, Robot};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const INERTIA: f64 = 3.0;
+    const LAW: [f64; 5] = [2.0, 1.4, -0.5, 60.0, 6.0];
+
+    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> Columns {
+        Columns {
+            joints: 1,
+            shared: 1,
+            own: vec![own],
+            known: vec![known],
+        }
+    }
+
+    /// Rows of a joint with inertia and law, of which every speed is seen often.
+    fn read(columns: &Columns, noise: f64, seed: u64) -> Result<Sums, FitError> {
+        let robot = Robot::single_joint("q1", JointKind::Prismatic);
+        let law = DoubleTanh::from_parameters(LAW);
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
+        let mut all = Accumulator::new(columns.clone(), 0.25);
+        let mut channels = vec![0.0; columns.channels()];
+        for k in 0..6000 {
+            let t = f64::from(k) * 0.01;
+            let v = 0.6 * (0.9 * t).sin() * (0.13 * t).cos();
+            let a = draw();
+            let tau = INERTIA * a + law.torque(v) + 0.3 + noise * draw();
+            columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
+            all.add(0, t, &channels);
+        }
+        Ok(all.finish())
+    }
+
+    #[test]
+    fn gradient_columns_are_the_derivatives_of_the_predicted_torque() {
+        use num_dual::{DualNum, DualVec64, gradient};
+        let law = DoubleTanh::from_parameters(LAW);
+        for v in [-0.7, -0.02, 0.003, 0.1, 0.4] {
+            let exact = law.gradient(v);
+            let torque = |p: nalgebra::SVector<DualVec64<nalgebra::Const<5>>, 5>| {
+                let [b, f1, f2, w1, w2] = [0, 1, 2, 3, 4].map(|k| p[k].clone());
+                b * v + f1 * (w1 * v).tanh() + f2 * (w2 * v).tanh()
+            };
+            let (_, dual) = gradient(torque, &nalgebra::SVector::from(LAW));
+            for k in 0..5 {
+                assert!(
+                    (exact[k] - dual[k]).abs() < 1e-12,
+                    "{k} at {v}: {} {}",
+                    exact[k],
+                    dual[k]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_law_without_one_joint_logs_is_found_with_the_inertia() {
+        let linear = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
+        let mut passes = 0;
+        let mut pass = |c: &Columns| {
+            passes += 1;
+            read(c, 0.0, 1)
+        };
+        let start = begin(&linear, &mut pass).unwrap();
+        let found = refine(start, &mut pass).unwrap();
+        assert_eq!(found.status, Status::Converged);
+        let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
+        for (i, truth) in truth.into_iter().enumerate() {
+            let off = (found.fit.theta[i] / truth - 1.0).abs();
+            assert!(off < 1e-6, "unknown {i}: {} {truth}", found.fit.theta[i]);
+        }
+        assert!(passes < 25, "{passes}");
+    }
+
+    #[test]
+    fn intervals_of_a_refined_law_cover() {
+        let linear = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
+        let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
+        let mut covered = [0; 7];
+        for seed in 0..60 {
+            let mut pass = |c: &Columns| read(c, 0.05, seed);
+            let start = begin(&linear, &mut pass).unwrap();
+            let found = refine(start, &mut pass).unwrap();
+            for (i, truth) in truth.into_iter().enumerate() {
+                let std = found.fit.covariance[(i, i)].sqrt();
+                covered[i] += u32::from((found.fit.theta[i] - truth).abs() < 1.96 * std);
+            }
+        }
+        // of 60 draws of 0.95 fewer than 50 come in 0.1 % of all tests
+        assert!(covered.iter().all(|c| *c >= 50), "{covered:?}");
+    }
+
+    #[test]
+    fn friction_that_was_known_well_stays_and_friction_known_badly_moves() {
+        let mut off = LAW;
+        off[0] *= 1.1;
+        for (sure, stays) in [(1e-7, true), (0.3, false)] {
+            let mut covariance = [[0.0; 5]; 5];
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] = (sure * LAW[k]).powi(2);
+            }
+            let law = DoubleTanh::from_parameters(off);
+            let known = columns(vec![Own::Offset], Some(KnownFriction { law, covariance }));
+            let found = refine(known, &mut |c: &Columns| read(c, 0.02, 5)).unwrap();
+            let viscous = found.fit.theta[2];
+            let near = if stays { off[0] } else { LAW[0] };
+            assert!((viscous - near).abs() < 0.02, "{sure}: {viscous}");
+        }
+    }
+}
