@@ -10,6 +10,7 @@ use crate::inertia::accumulate::Sums;
 use crate::inertia::closed_loop::Gains;
 use crate::inertia::columns::Columns;
 use crate::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
+use crate::inertia::feasible::nearest;
 use crate::inertia::instruments::{self, Instrumental, Reference};
 use crate::inertia::refine::{self, Refined};
 use crate::inertia::robust::{self, Robust, Status, Weigher};
@@ -78,7 +79,7 @@ pub struct Account {
 pub struct Simulated {
     pub gains: Gains,
     pub reference: Reference,
-    /// Share of the steps without a positive definite mass matrix.
+    /// Share of the steps at which the simulation failed a joint.
     pub indefinite: f64,
 }
 
@@ -114,7 +115,7 @@ impl Account {
                 Reference::Smoothed => json!("smoothed"),
             };
             out["loop_frequency"] = json!(simulated.gains.frequency);
-            out["indefinite_mass_share"] = json!(simulated.indefinite);
+            out["failed_steps_share"] = json!(simulated.indefinite);
             let gains = simulated
                 .gains
                 .proportional
@@ -346,7 +347,8 @@ enum Solver {
     Linear(solve::Estimator),
     Robust(Box<Weigher>),
     Refined(Box<Refined>),
-    Instrumental(Box<Fit>),
+    /// The fit, and the parameters that were simulated.
+    Instrumental(Box<(Fit, DVector<f64>)>),
 }
 
 impl Solver {
@@ -429,18 +431,24 @@ pub fn estimate(
             passes.bar.label("instrumental variables");
             let sums = passes.read(&settings, &columns, None)?;
             let plain = fit(&sums, solve::Estimator::Wls)?;
+            let map = passes.machine.robot.standard_map();
+            let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
+            let worth = plain.effective_rows / plain.rows as f64;
+            let mut simulate_by = plain.theta.clone();
             let Instrumental {
                 fit,
                 status,
                 iterations,
             } = instruments::iterate(&columns, &plain, &mut |theta| {
-                let (sums, simulated) = passes.read_instruments(&settings, &columns, theta)?;
+                simulate_by = nearest(&map, &whole, worth, theta)?;
+                let (sums, simulated) =
+                    passes.read_instruments(&settings, &columns, &simulate_by)?;
                 account.simulated = Some(simulated);
                 Ok::<_, CliError>(sums)
             })?;
             account.status = status;
             account.iterations = iterations;
-            let solver = Solver::Instrumental(Box::new(fit.clone()));
+            let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));
             (fit, sums.in_one_block(), solver)
         }
         Estimator::Ols | Estimator::Wls | Estimator::Oe => {
@@ -461,7 +469,8 @@ pub fn estimate(
     let mut weigher = solver.weigher();
     let again = match &solver {
         Solver::Instrumental(found) => {
-            let (sums, _) = passes.read_instruments(&narrow, read, &found.theta)?;
+            let (found, simulated) = &**found;
+            let (sums, _) = passes.read_instruments(&narrow, read, simulated)?;
             instruments::again(read, found, &sums)?
         }
         _ => {

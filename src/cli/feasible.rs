@@ -53,12 +53,19 @@ pub fn physical(machine: &Machine, estimated: &mut Estimated) -> Result<Physical
         factor: &factor(&basis.sums, &weights)?,
         worth: fit.effective_rows / fit.rows as f64,
     })?;
+    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let bound = residual_of(&basis.sums, &found.theta)?;
     let before = fit.relative_error.clone();
-    fit.residual_std = residual_of(&basis.sums, &found.theta)?;
-    let pairs = fit.residual_std.iter().zip(&fit.torque_rms);
-    fit.relative_error = pairs
-        .map(|(s, t)| if *t > 0.0 { s / t } else { f64::NAN })
-        .collect();
+    for j in 0..bound.len() {
+        let growth = if free[j] > 0.0 {
+            bound[j] / free[j]
+        } else {
+            1.0
+        };
+        fit.residual_std[j] *= growth;
+        fit.relative_error[j] *= growth;
+    }
     fit.theta = &found.theta + &basis.shift;
     Ok(Physical {
         map,

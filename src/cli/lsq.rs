@@ -148,7 +148,7 @@ pub fn identify(
         }
         if simulated.indefinite > 0.0 {
             warnings.push(format!(
-                "iv: at {} of the simulated steps the fit's mass matrix is not positive definite, and each joint moved by itself; `--feasible` gives one that is",
+                "iv: at {} of the simulated steps the motion could not be computed or went astray, and joints were moved by themselves or put back; instruments are poorer for it",
                 number::percent(simulated.indefinite)
             ));
         }
@@ -215,9 +215,14 @@ fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), CliError> 
     whole.set_column(u, &target);
     let rows = (fit.rows * basis.sums.columns.joints as u64) as f64;
     let found = essential(&whole, rows, fit.effective_rows / fit.rows as f64)?;
-    let residual = residual_of(&basis.sums, &(&found.theta - &basis.shift))?;
-    let pairs = residual.iter().zip(&fit.torque_rms);
-    let error = pairs.map(|(s, t)| if *t > 0.0 { s / t } else { f64::NAN });
+    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let whole = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let alone = residual_of(&basis.sums, &(&found.theta - &basis.shift))?;
+    let growth = alone
+        .iter()
+        .zip(&whole)
+        .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
+    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e);
     Ok((found, error.collect()))
 }
 

@@ -16,6 +16,8 @@ const MOST: usize = crate::robot::serial::MOST_ENTRIES;
 const FASTEST: f64 = 0.1;
 /// Frequency of the loop over the cut-off of the rows.
 const ABOVE_CUTOFF: f64 = 3.0;
+/// A joint this far from its reference [m or rad] is put back there.
+const ASTRAY: f64 = 0.5;
 /// Least inertia of a joint, as a share of the largest.
 const LEAST: f64 = 1e-6;
 
@@ -39,7 +41,7 @@ pub struct ClosedLoop<'a> {
     pub gains: Gains,
     q: [f64; MOST_JOINTS],
     v: [f64; MOST_JOINTS],
-    /// Steps at which the fit's mass matrix was not positive definite.
+    /// Steps at which the mass matrix was not positive definite, or a joint went astray.
     pub indefinite: u64,
 }
 
@@ -187,6 +189,12 @@ impl<'a> ClosedLoop<'a> {
         for j in 0..n {
             self.v[j] += h * force[j];
             self.q[j] += h * self.v[j];
+        }
+        // not a number counts as astray
+        let near = |j: usize| (self.q[j] - q_ref[j]).abs() < ASTRAY;
+        if !(0..n).all(near) {
+            self.indefinite += 1;
+            self.place(q_ref, v_ref);
         }
         &self.q[..n]
     }

@@ -62,7 +62,7 @@ pub struct Reading {
     pub sums: Sums,
     pub summary: Summary,
     pub gains: Gains,
-    /// Share of the steps at which the fit's mass matrix was not positive definite.
+    /// Share of the steps at which the mass matrix was not positive definite, or a joint went astray.
     pub indefinite: f64,
 }
 

@@ -21,8 +21,9 @@ use super::solve::{
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
 
-/// A step that promises to lower the cost by less than this share of it is the last.
-const SETTLED: f64 = 1e-9;
+/// A step that promises or brings less than this share of the cost is the last: far less than what
+/// one independent row is worth.
+const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
 const MOST: usize = 40;
 /// Damping to begin with, and its bounds.
@@ -230,10 +231,15 @@ pub fn refine<E: From<FitError>>(
         let trial_known = prior(&start, &next, strength)?;
         let found = cost(&trial, &weights, trial_known.as_ref())?;
         if found < lowest {
+            let little = lowest - found <= SETTLED * lowest;
             (now, sums, known) = (next, trial, trial_known);
             weights = weights_of(&sums, &linear(&sums)?.residual_std);
             lowest = cost(&sums, &weights, known.as_ref())?;
             damping = (damping / 10.0).max(DAMPING[1]);
+            if little {
+                status = Status::Converged;
+                break;
+            }
         } else if damping < DAMPING[2] {
             damping *= 10.0;
         } else {

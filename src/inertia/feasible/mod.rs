@@ -29,8 +29,11 @@ pub const PLAIN: Body = Body {
 /// Inertia of a drive before data [kg m^2 or kg].
 pub const PLAIN_DRIVE: f64 = 0.1;
 /// A step that lowers the cost by less than this share is the last.
-const SETTLED: f64 = 1e-10;
-const MOST: usize = 500;
+const SETTLED: f64 = 1e-7;
+/// Most steps under each weight of the prior.
+const MOST: usize = 150;
+/// Weights of the prior on the way to [`PRIOR_WEIGHT`].
+const WEIGHTS: [f64; 7] = [1e4, 1e3, 100.0, 10.0, 1.0, 0.1, PRIOR_WEIGHT];
 /// A number changes by at most this in one step.
 const FARTHEST: f64 = 2.0;
 
@@ -86,28 +89,34 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
 
     let reduced = Reduced::of(task);
     let mut x = prior.clone();
-    let (mut damping, mut iterations) = (1e-3, 0);
+    let mut iterations = 0;
     let mut status = Status::IterationLimit;
-    let (mut lowest, mut jacobian, mut residual) = reduced.at(task.map, &x, &prior);
-    while iterations < MOST {
-        iterations += 1;
-        let step = damped_step(&jacobian, &residual, damping);
-        let next = &x + step.map(|s| s.clamp(-FARTHEST, FARTHEST));
-        let (cost, j, r) = reduced.at(task.map, &next, &prior);
-        if cost < lowest {
-            let gained = lowest - cost;
-            (x, jacobian, residual) = (next, j, r);
-            damping = (damping / 5.0f64).max(1e-12);
-            let before = std::mem::replace(&mut lowest, cost);
-            if gained <= SETTLED * before {
+    // from the prior outward: a search that begins without it runs along the border of what can
+    // exist, where its numbers go to infinity and it hardly moves
+    for weight in WEIGHTS {
+        let (mut damping, limit) = (1e-3, iterations + MOST);
+        let (mut lowest, mut jacobian, mut residual) = reduced.at(task.map, &x, &prior, weight);
+        status = Status::IterationLimit;
+        while iterations < limit {
+            iterations += 1;
+            let step = damped_step(&jacobian, &residual, damping);
+            let next = &x + step.map(|s| s.clamp(-FARTHEST, FARTHEST));
+            let (cost, j, r) = reduced.at(task.map, &next, &prior, weight);
+            if cost < lowest {
+                let gained = lowest - cost;
+                (x, jacobian, residual) = (next, j, r);
+                damping = (damping / 5.0f64).max(1e-12);
+                lowest = cost;
+                if gained <= SETTLED * cost {
+                    status = Status::Converged;
+                    break;
+                }
+            } else if damping < 1e12 {
+                damping *= 4.0;
+            } else {
                 status = Status::Converged;
                 break;
             }
-        } else if damping < 1e12 {
-            damping *= 4.0;
-        } else {
-            status = Status::Converged;
-            break;
         }
     }
     let (standard, _) = standard_at(&x, links, drives);
@@ -126,6 +135,31 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
         status,
         iterations,
     })
+}
+
+/// The unknowns that can exist and give nearly the torques of `theta` on the rows of `factor`: for
+/// simulations, which a mass matrix that is not positive definite lets run away.
+///
+/// # Errors
+/// [`FitError`].
+pub fn nearest(
+    map: &StandardMap,
+    factor: &DMatrix<f64>,
+    worth: f64,
+    theta: &DVector<f64>,
+) -> Result<DVector<f64>, FitError> {
+    let u = theta.len();
+    let mut factor = factor.clone();
+    let torque = factor.columns(0, u) * theta;
+    factor.set_column(u, &torque);
+    let bodies = vec![None; map.links.len()];
+    let task = Task {
+        map,
+        bodies: &bodies,
+        factor: &factor,
+        worth,
+    };
+    Ok(feasible(&task)?.theta)
 }
 
 /// Standard parameters at the search's numbers, and the derivatives.
@@ -191,6 +225,7 @@ impl Reduced {
         map: &StandardMap,
         x: &DVector<f64>,
         prior: &DVector<f64>,
+        weight: f64,
     ) -> (f64, DMatrix<f64>, DVector<f64>) {
         let drives = map.drives.len();
         let (s, slopes) = standard_at(x, map.links.len(), drives);
@@ -202,7 +237,7 @@ impl Reduced {
         let target = self.r.view((self.free, u), (m, 1)) * self.worth.sqrt();
         let off = &to_rows * s - target;
         let data = to_rows * slopes;
-        let weight = PRIOR_WEIGHT.sqrt();
+        let weight = weight.sqrt();
         let n = x.len();
         let mut jacobian = DMatrix::zeros(m + n, n);
         jacobian.view_mut((0, 0), (m, n)).copy_from(&data);
