@@ -141,7 +141,7 @@ fn campaign(seed: u64) -> Value {
     let shifted: Vec<_> = (0..GRIDS)
         .map(|grid| {
             let mut read = source(&log);
-            let found = accumulate_shifted(&robot, &columns, &processing(), grid, &mut read);
+            let found = accumulate_shifted(&robot, &columns, None, &processing(), grid, &mut read);
             let sums = found.expect("a log").expect("its encoders are known");
             cft_ident::inertia::solve::fit(&sums, Estimator::Wls).expect("a fit")
         })

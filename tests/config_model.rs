@@ -60,6 +60,8 @@ fn model(values: &[f64]) -> ModelFile {
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
         robot,
+        links: Vec::new(),
+        drive_inertia: BTreeMap::new(),
         parameters,
         covariance: Some(Covariance {
             names,

@@ -21,8 +21,6 @@ fn order<'a>(robot: &'a RobotFile, motion: Motion<'a>) -> Order<'a> {
         motion,
         seconds: Some(20.0),
         effects: Vec::new(),
-        links: Vec::new(),
-        drive_inertia: Default::default(),
         seed: 1,
     }
 }

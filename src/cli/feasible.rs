@@ -76,7 +76,7 @@ pub fn physical(machine: &Machine, estimated: &mut Estimated) -> Result<Physical
 }
 
 impl Physical {
-    fn joint<'a>(machine: &'a Machine, j: usize) -> &'a str {
+    fn joint(machine: &Machine, j: usize) -> &str {
         machine
             .robot
             .joint_names()
@@ -204,7 +204,7 @@ impl Physical {
     }
 
     /// Writes the links into a model.
-    pub fn into_model(&self, machine: &Machine, model: &mut ModelFile) {
+    pub fn write_into(&self, machine: &Machine, model: &mut ModelFile) {
         model.links = self
             .bodies()
             .map(|(name, body, _)| LinkBody {

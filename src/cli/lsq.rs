@@ -384,7 +384,7 @@ pub fn into_model(
         model.residual_std.insert(joint.clone(), *std);
     }
     if let Some(physical) = &found.physical {
-        physical.into_model(machine, &mut model);
+        physical.write_into(machine, &mut model);
     }
     model
 }

@@ -161,7 +161,7 @@ impl<'a> ClosedLoop<'a> {
         let (q, v) = (self.q, self.v);
         self.balance(&q[..n], &v[..n], &mut mass, &mut bias);
         let mut force = [0.0; MOST_JOINTS];
-        for j in 0..n {
+        for (j, force) in force.iter_mut().enumerate().take(n) {
             let (k, d) = (self.gains.proportional[j], self.gains.derivative[j]);
             let inertia = d / (2.0 * self.gains.frequency);
             let coulomb: f64 = self.columns.own[j]
@@ -172,8 +172,7 @@ impl<'a> ClosedLoop<'a> {
                 .sum();
             let width = (2.0 * h * coulomb / inertia).max(1e-9);
             let [friction, slope] = self.friction(j, v[j], width);
-            force[j] =
-                k * (q_ref[j] - q[j] - h * v[j]) + d * (v_ref[j] - v[j]) - bias[j] - friction;
+            *force = k * (q_ref[j] - q[j] - h * v[j]) + d * (v_ref[j] - v[j]) - bias[j] - friction;
             mass[j][j] += h * (d + slope.max(0.0)) + h * h * k;
         }
         let diagonal: [f64; MOST_JOINTS] = std::array::from_fn(|j| mass[j][j]);
@@ -186,8 +185,8 @@ impl<'a> ClosedLoop<'a> {
                 force[j] /= diagonal[j].max(least);
             }
         }
-        for j in 0..n {
-            self.v[j] += h * force[j];
+        for (j, a) in force.iter().enumerate().take(n) {
+            self.v[j] += h * a;
             self.q[j] += h * self.v[j];
         }
         // not a number counts as astray

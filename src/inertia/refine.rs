@@ -343,15 +343,15 @@ pub fn begin<E: From<FitError>>(
     let plain = fit(&first, Estimator::Wls)?;
     let mut many = linear.clone();
     let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
-    for j in 0..linear.joints {
+    for (j, slopes) in slopes.iter_mut().enumerate() {
         let Some(k) = viscous(&linear.own[j]) else {
             continue;
         };
         let speed = plain.column_rms[(j, linear.first_own(j) + k)];
         let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
-        slopes[j] = SLOPES.map(|s| s * unit);
+        *slopes = SLOPES.map(|s| s * unit);
         many.own[j].retain(|o| *o != Own::Coulomb);
-        many.own[j].extend(slopes[j].map(Own::Saturating));
+        many.own[j].extend(slopes.map(Own::Saturating));
     }
     let sums = pass(&many)?;
     let weights = weights_of(&sums, &plain.residual_std);
@@ -467,7 +467,7 @@ mod tests {
         for v in [-0.7, -0.02, 0.003, 0.1, 0.4] {
             let exact = law.gradient(v);
             let torque = |p: nalgebra::SVector<DualVec64<nalgebra::Const<5>>, 5>| {
-                let [b, f1, f2, w1, w2] = [0, 1, 2, 3, 4].map(|k| p[k].clone());
+                let [b, f1, f2, w1, w2] = [0, 1, 2, 3, 4].map(|k| p[k]);
                 b * v + f1 * (w1 * v).tanh() + f2 * (w2 * v).tanh()
             };
             let (_, dual) = gradient(torque, &nalgebra::SVector::from(LAW));

@@ -41,6 +41,8 @@ impl Log {
             motion,
             seconds: Some(seconds),
             effects: Vec::new(),
+            links: Vec::new(),
+            drive_inertia: Default::default(),
             seed: 11,
         })
         .unwrap();
@@ -111,6 +113,8 @@ pub fn write_model(path: &Path) {
         motion: Motion::Usual,
         seconds: Some(0.1),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         seed: 11,
     });
     let model = ModelFile {
@@ -119,6 +123,8 @@ pub fn write_model(path: &Path) {
         covariance: None,
         residual_std: BTreeMap::new(),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         provenance: ModelProvenance::default(),
     };
     std::fs::write(path, model.to_toml().unwrap()).unwrap();

@@ -219,6 +219,8 @@ fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
         covariance: None,
         residual_std: BTreeMap::new(),
         effects,
+        links: Vec::new(),
+        drive_inertia: BTreeMap::new(),
         provenance: Default::default(),
     }
 }

@@ -29,9 +29,9 @@ pub const PLAIN: Body = Body {
 /// Inertia of a drive before data [kg m^2 or kg].
 pub const PLAIN_DRIVE: f64 = 0.1;
 /// A step that lowers the cost by less than this share is the last.
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-6;
 /// Most steps under each weight of the prior.
-const MOST: usize = 150;
+const MOST: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
 const WEIGHTS: [f64; 7] = [1e4, 1e3, 100.0, 10.0, 1.0, 0.1, PRIOR_WEIGHT];
 /// A number changes by at most this in one step.
@@ -73,14 +73,12 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
     let drives = task.map.drives.len();
     let size = STANDARD * links + drives;
     let mut prior = DVector::zeros(size);
-    let mut given = vec![false; links];
-    for i in 0..links {
+    let mut given = Vec::with_capacity(links);
+    for (i, name) in task.map.links.iter().enumerate() {
         let body = task.bodies.get(i).copied().flatten();
-        given[i] = body.is_some();
+        given.push(body.is_some());
         let x = log_cholesky::of(&pseudo_inertia(&body.unwrap_or(PLAIN).standard()));
-        let x = x.ok_or_else(|| FitError::Prior {
-            link: task.map.links[i].clone(),
-        })?;
+        let x = x.ok_or_else(|| FitError::Prior { link: name.clone() })?;
         prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
     }
     prior
