@@ -337,6 +337,8 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         covariance: None,
         residual_std: Default::default(),
         effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
         provenance: ModelProvenance::default(),
     }
 }

@@ -89,7 +89,7 @@ pub struct Effect {
 
 /// Mass properties of a link that can exist, as `lsq --feasible` finds them: keys as in `inertial` of
 /// a robot file's link.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinkBody {
     /// Name of the link.

@@ -41,8 +41,6 @@ impl Log {
             motion,
             seconds: Some(seconds),
             effects: Vec::new(),
-            links: Vec::new(),
-            drive_inertia: Default::default(),
             seed: 11,
         })
         .unwrap();
@@ -113,8 +111,6 @@ pub fn write_model(path: &Path) {
         motion: Motion::Usual,
         seconds: Some(0.1),
         effects: Vec::new(),
-        links: Vec::new(),
-        drive_inertia: Default::default(),
         seed: 11,
     });
     let model = ModelFile {
