@@ -1,9 +1,9 @@
 //! Over all measured logs: what `diagnose` adds does not make the torque of unseen data worse than the
 //! declared model by more than its interval. A further set is one line in [`SETS`].
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+mod measured_support;
 
+use measured_support::{run, shared};
 use serde_json::Value;
 
 /// A measured set: robot file, logs that are fitted, logs that decide nothing; paths below
@@ -55,32 +55,10 @@ const fn set(
     }
 }
 
-fn run(folder: &Path, arguments: &[String]) -> Value {
-    let output = Command::new(env!("CARGO_BIN_EXE_cft-ident"))
-        .current_dir(folder)
-        .args(arguments)
-        .args(["--json", "-", "-q"])
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {said}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
 /// Paths of the logs; none, said aloud, where one is not there.
 fn logs(names: &[&str]) -> Option<Vec<String>> {
-    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    names
-        .iter()
-        .map(|name| {
-            let file = name.split('@').next().unwrap_or(name);
-            if !data.join(file).exists() {
-                println!("SKIPPED: {file} is not there (docs/data.md says where it is from)");
-                return None;
-            }
-            Some(data.join(name).to_string_lossy().into_owned())
-        })
-        .collect()
+    let path = |name: &&str| Some(shared(name)?.to_string_lossy().into_owned());
+    names.iter().map(path).collect()
 }
 
 #[test]

@@ -7,7 +7,7 @@ use cft_ident::export::{self, Note, Program};
 use cft_ident::robot::Robot;
 use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident::robot::model::{JointFriction, Model};
-use cft_ident::robot::serial::newton_euler::standard_of;
+use cft_ident::robot::standard::Body;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
@@ -354,7 +354,12 @@ fn bodies(model: &Model, seed: u64) -> Vec<f64> {
         let centre: [f64; 3] = std::array::from_fn(|_| draw.one(0.2));
         let small: [f64; 3] = std::array::from_fn(|_| draw.one(0.002));
         let inertia = [0.03, small[0], small[1], 0.04, small[2], 0.05];
-        standard.extend(standard_of(3.0 + draw.one(1.0), &centre, &inertia));
+        let body = Body {
+            mass: 3.0 + draw.one(1.0),
+            centre,
+            inertia,
+        };
+        standard.extend(body.standard());
     }
     standard.extend((standard.len()..robot.standard_parameters()).map(|_| 0.1 + draw.one(0.05)));
     let mut theta = robot.base_of(&standard);

@@ -1,40 +1,10 @@
 //! Measured machines through the commands, beside the numbers published with their logs. Skipped
 //! aloud where ../shared/data is not there.
 
-use std::path::{Path, PathBuf};
+mod measured_support;
 
-use assert_cmd::Command;
+use measured_support::{run, shared};
 use serde_json::Value;
-
-/// A measured log, or `None` with a word about it.
-fn shared(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!(
-        "SKIPPED: {} is not there (docs/data.md says where it is from)",
-        path.display()
-    );
-    None
-}
-
-/// Runs a command in `folder` that must succeed, and gives its JSON document.
-#[track_caller]
-fn run(folder: &Path, words: &[&str]) -> Value {
-    let output = Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{words:?}: {message}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
 
 fn number(value: &Value) -> f64 {
     value

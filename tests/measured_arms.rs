@@ -1,38 +1,10 @@
 //! Measured arms through `lsq` and `validate`, beside what others got from the same logs; and what the
 //! committed diagnoses of them say. Skipped aloud where ../shared/data is not there.
 
-use std::path::{Path, PathBuf};
+mod measured_support;
 
-use assert_cmd::Command;
+use measured_support::{run, shared};
 use serde_json::Value;
-
-fn shared(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!(
-        "SKIPPED: {} is not there (docs/data.md says where it is from)",
-        path.display()
-    );
-    None
-}
-
-#[track_caller]
-fn run(folder: &Path, words: &[&str]) -> Value {
-    let output = Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{words:?}: {message}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
 
 /// Fits on one span and judges on another: errors per joint in per cent, and the document.
 fn fitted(robot: &str, more: &[&str], log: &str, fit: &str, unseen: &str) -> (Vec<f64>, Value) {

@@ -1,8 +1,8 @@
 //! URDF files as robots: placements, lumping, mimic joints and limits, against Pinocchio.
 
 use cft_ident::config::RobotFile;
-use cft_ident::robot::serial::newton_euler::STANDARD;
 use cft_ident::robot::serial::{SerialRobot, space};
+use cft_ident::robot::standard::STANDARD;
 use cft_ident::robot::{JointKind, Robot};
 use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;

@@ -10,7 +10,7 @@ use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::refined::{Held, hold, in_file, refined};
-use super::{CliError, Context, Outcome, arguments, files, pages};
+use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
@@ -516,13 +516,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|l| l.path.as_path())
         .chain([args.model.as_path()])
         .collect();
-    let outputs: Vec<&Path> = args
-        .output
-        .iter()
-        .chain(&args.plot)
-        .chain(&args.report)
-        .map(PathBuf::as_path)
-        .collect();
+    let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model)?;
     let (name, file) = (given.name, given.value);
@@ -548,7 +542,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         Found::DataFault(fault) => {
             if let Some(path) = &args.report {
                 let page = pages::data_fault(&of, &fault, context)?;
-                super::outputs::write_text(path, &page)?;
+                outputs::write_text(path, &page)?;
             }
             return Ok(Outcome {
                 text: fault::text(&fault),
@@ -568,15 +562,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if !args.plot.is_empty() || args.report.is_some() {
         let figure = pages::diagnose_figure(&machine, &found)?.svg();
         for path in &args.plot {
-            super::outputs::write_picture(path, &figure)?;
+            outputs::write_picture(path, &figure)?;
         }
         if let Some(path) = &args.report {
             let page = pages::diagnose(&of, &found, &figure, context)?;
-            super::outputs::write_text(path, &page)?;
+            outputs::write_text(path, &page)?;
         }
     }
     if let Some(path) = &args.output {
-        super::outputs::write_text(path, &into_model(&machine, &file, &found).to_toml()?)?;
+        outputs::write_text(path, &into_model(&machine, &file, &found).to_toml()?)?;
         text += &format!("written: {}\n", path.display());
     }
     Ok(Outcome {

@@ -34,11 +34,7 @@ pub fn physical(machine: &Machine, estimated: &mut Estimated) -> Result<Physical
     let map = machine.robot.standard_map();
     let body = |i: usize| {
         let given = machine.file.robot.link.get(i)?.inertial.as_ref()?;
-        Some(Body {
-            mass: given.mass,
-            centre: given.centre,
-            inertia: given.inertia,
-        })
+        Some(given.body())
     };
     let bodies: Vec<Option<Body>> = (0..map.links.len()).map(body).collect();
     let basis = &estimated.basis;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::machine::Machine;
-use super::{CliError, Context, Outcome, arguments, files, pages};
+use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_theta, friction_unit};
 use crate::config::model_file::{ModelProvenance, Parameter};
@@ -451,8 +451,7 @@ pub fn figure(machine: &Machine, found: &Identified) -> FrictionFigure {
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    let mut outputs: Vec<&Path> = vec![&args.output];
-    outputs.extend(args.plot.iter().chain(&args.report).map(PathBuf::as_path));
+    let outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = Machine::new(&args.robot, robot.value);
@@ -491,13 +490,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         };
         let page = pages::friction_fit(&page, context)?;
         context.check()?;
-        super::outputs::write_text(path, &page)?;
+        outputs::write_text(path, &page)?;
     }
     context.check()?;
     for path in &args.plot {
-        super::outputs::write_picture(path, &figure(&machine, &found).svg())?;
+        outputs::write_picture(path, &figure(&machine, &found).svg())?;
     }
-    super::outputs::write_text(&args.output, &model.to_toml()?)?;
+    outputs::write_text(&args.output, &model.to_toml()?)?;
     text += &format!("written: {}\n", args.output.display());
     Ok(Outcome {
         text,

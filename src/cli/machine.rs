@@ -348,8 +348,12 @@ impl Machine {
         })
     }
 
-    /// Travel of a joint by the file's limits; a turn, or a metre, where it has none.
+    /// Travel of a joint by its machine, else by the file's limits; a turn, or a metre, where neither
+    /// has one.
     fn range(&self, j: usize, name: &str) -> f64 {
+        if let Some(range) = self.robot.full_travel(j) {
+            return range;
+        }
         let limits = self.file.limits.get(name).and_then(|l| l.position);
         match (limits, self.robot.joint_kind(j)) {
             (Some([low, high]), _) => high - low,
@@ -360,18 +364,12 @@ impl Machine {
 
     /// Full travel of each joint, by which motions of metres and radians are compared.
     pub fn ranges(&self) -> Vec<f64> {
-        match &self.robot {
-            // spans of x_c4 and x_c3 (Table 5), and what x_c1, x_c2 leave to q4 and q5
-            Robot::Cft(robot) => {
-                let spans = robot.setup.limits().spans();
-                vec![spans[3], spans[2], 2.2, 1.7]
-            }
-            Robot::SingleJoint(_) => vec![f64::MIN_POSITIVE; 1],
-            Robot::Serial(_) => {
-                let names = self.robot.joint_names().iter().enumerate();
-                names.map(|(j, name)| self.range(j, name)).collect()
-            }
+        if let Robot::SingleJoint(_) = self.robot {
+            return vec![f64::MIN_POSITIVE];
         }
+        let names = self.robot.joint_names().iter().enumerate();
+        let range = |(j, name): (usize, &String)| self.range(j, name);
+        names.map(range).collect()
     }
 }
 

@@ -33,6 +33,16 @@ pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError>
     Ok(())
 }
 
+/// The files that a command writes, where they are asked for.
+pub(super) fn listed<'a>(
+    output: Option<&'a Path>,
+    plot: &'a [PathBuf],
+    report: Option<&'a Path>,
+) -> Vec<&'a Path> {
+    let plot = plot.iter().map(PathBuf::as_path);
+    output.into_iter().chain(plot).chain(report).collect()
+}
+
 /// Writes a text file whole or not at all.
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), CliError> {
     Ok(write_whole(path, |file| file.write_all(text.as_bytes()))?)

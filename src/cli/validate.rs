@@ -8,7 +8,7 @@ use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
 use super::pages::{self, Look};
 use super::refined::{held_for_pictures, hold, refined};
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, files, outputs};
 use crate::effect::Refined;
 use crate::log::{Instant, LogSpec, Provenance};
 use crate::output::LogWriter;
@@ -241,13 +241,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|l| l.path.as_path())
         .chain([args.model.as_path()])
         .collect();
-    let outputs: Vec<&Path> = args
-        .output
-        .iter()
-        .chain(&args.plot)
-        .chain(&args.report)
-        .map(PathBuf::as_path)
-        .collect();
+    let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model)?;
     let (name, file) = (given.name, given.value);
@@ -314,10 +308,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     context.check()?;
     if let Some((path, page)) = &page {
-        super::outputs::write_text(path, page)?;
+        outputs::write_text(path, page)?;
     }
     for path in &args.plot {
-        super::outputs::write_picture(path, &figure(&machine, validation, &title).svg())?;
+        outputs::write_picture(path, &figure(&machine, validation, &title).svg())?;
     }
     if let Some(file) = residual {
         file.commit()?;

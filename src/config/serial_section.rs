@@ -12,6 +12,7 @@ use crate::log::{list, nearest};
 use crate::robot::serial::{
     Chain, ChainError, Coordinate, Coupling, Dependence, Link, SerialRobot, Sine,
 };
+use crate::robot::standard::Body;
 use crate::robot::{JointKind, Robot};
 
 /// A sine in a dependent coordinate: amplitude sin(phase + sum of `of`).
@@ -52,6 +53,17 @@ pub struct InertialSection {
     pub centre: [f64; 3],
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity, along the link's axes \[kg m^2\].
     pub inertia: [f64; 6],
+}
+
+impl InertialSection {
+    /// The same as the physical model has it.
+    pub fn body(&self) -> Body {
+        Body {
+            mass: self.mass,
+            centre: self.centre,
+            inertia: self.inertia,
+        }
+    }
 }
 
 /// One moving link and the joint before it: a modified Denavit-Hartenberg row (`a`, `alpha`, `d`,

@@ -390,7 +390,14 @@ fn decide(candidate: &mut Candidate, tried: usize, limits: &Limits, worth: &dyn 
     } else if !physical {
         "its coefficient has a sign that the effect cannot have".to_owned()
     } else if corrected > limits.false_alarm {
-        format!("chance gives as much: p = {corrected:.2e} among all candidates")
+        format!(
+            "chance gives as much: p = {} among all candidates",
+            match corrected {
+                // by Bonferroni's bound, which may pass 1
+                p if p >= 1.0 => "1".to_owned(),
+                p => format!("{p:.2e}"),
+            }
+        )
     } else if worth(s.gain).of_declared < limits.worth || worth(s.gain).of_noise < limits.over_noise
     {
         format!(

@@ -72,7 +72,7 @@ impl Cover {
             let least = 1e-3 * (position[1] - position[0]);
             joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least)).sum();
             joint.position = position;
-            joint.full_range = full_range(robot, j);
+            joint.full_range = robot.full_travel(j);
         }
         for s in stretches {
             let end = s.began + s.dt * s.len() as f64;
@@ -153,7 +153,7 @@ pub fn held_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
         .collect();
     let widest = |j: usize| {
         let seen = travels.iter().map(|t| t[j]).fold(0.0, f64::max);
-        seen.max(full_range(robot, j).unwrap_or(0.0))
+        seen.max(robot.full_travel(j).unwrap_or(0.0))
     };
     let widest: Vec<f64> = (0..n).map(widest).collect();
     let held = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < HELD * w).collect();
@@ -162,17 +162,6 @@ pub fn held_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
 
 /// Share of a joint's range that a smooth function of position must be seen over.
 const WIDE: f64 = 0.5;
-
-/// Full travel of a joint by Table 5: q1 by x_c4, q2 by x_c3, q4 and q5 as x_c1 and x_c2 leave them.
-fn full_range(robot: &Robot, j: usize) -> Option<f64> {
-    match robot {
-        Robot::Cft(robot) => {
-            let spans = robot.setup.limits().spans();
-            [spans[3], spans[2], 2.2, 1.7].get(j).copied()
-        }
-        Robot::SingleJoint(_) | Robot::Serial(_) => None,
-    }
-}
 
 /// Turning points with at least `least` between them.
 fn reversals(q: &[f64], least: f64) -> usize {

@@ -37,6 +37,7 @@ pub use cover::{Cover, JointCover, held_joints};
 pub use refined::{Refined, Torques, shifted};
 
 use crate::motion::Stretch;
+use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
 use crate::robot::{JointKind, Robot};
 
@@ -292,12 +293,6 @@ pub const KINDS: &[&Kind] = &[
 /// The kind of a name.
 pub fn kind(name: &str) -> Option<&'static Kind> {
     KINDS.iter().find(|k| k.name == name).copied()
-}
-
-/// Sign with sign(0) = 0.
-#[inline]
-fn sign(v: f64) -> f64 {
-    f64::from(i8::from(v > 0.0) - i8::from(v < 0.0))
 }
 
 /// Whether a periodic effect's order can be that of its place; see `ripple`.

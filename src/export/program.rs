@@ -2,9 +2,9 @@
 
 use crate::robot::cft::{self, linkage};
 use crate::robot::model::{JointFriction, Model};
-use crate::robot::serial::newton_euler::STANDARD;
 use crate::robot::serial::space::UNTURNED;
 use crate::robot::serial::{Chain, ChainError, Coordinate, Coupling, Link};
+use crate::robot::standard::STANDARD;
 use crate::robot::{JointKind, Robot};
 
 /// Chain, link parameters, drives, friction and offsets of a model.

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::config::serial_section::InertialSection;
 use crate::robot::serial::SerialRobot;
-use crate::robot::serial::newton_euler::{STANDARD, standard_of};
+use crate::robot::standard::STANDARD;
 
 /// What torques say of a standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,9 +40,8 @@ pub fn nearest(robot: &SerialRobot, theta: &[f64], priors: &[Option<InertialSect
     let mut x = DVector::zeros(p);
     for link in 0..links {
         match priors.get(link).and_then(Option::as_ref) {
-            Some(body) => {
-                let values = standard_of(body.mass, &body.centre, &body.inertia);
-                for (k, value) in values.into_iter().enumerate() {
+            Some(prior) => {
+                for (k, value) in prior.body().standard().into_iter().enumerate() {
                     x[link * STANDARD + k] = value;
                 }
             }

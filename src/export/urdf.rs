@@ -8,9 +8,9 @@ use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::CoordinateLimits;
 use crate::robot::model::{JointFriction, Model};
-use crate::robot::serial::newton_euler::STANDARD;
 use crate::robot::serial::space::roll_pitch_yaw;
 use crate::robot::serial::{Coordinate, Link, STANDARD_NAMES, SerialRobot};
+use crate::robot::standard::{Body, STANDARD};
 use crate::robot::{JointKind, Robot};
 
 /// The two files.
@@ -221,7 +221,7 @@ fn joint(
 
 fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<(), ExportError> {
     let range = i * STANDARD..(i + 1) * STANDARD;
-    let values = &standard.values[range.clone()];
+    let values: [f64; STANDARD] = std::array::from_fn(|k| standard.values[range.start + k]);
     let told = &standard.told[range];
     let of = |what: Told| -> String {
         let names = STANDARD_NAMES.iter().zip(told);
@@ -244,18 +244,11 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
             moment: size,
         });
     }
-    let c: [f64; 3] = std::array::from_fn(|k| if m == 0.0 { 0.0 } else { moment[k] / m });
-    let [x, y, z] = c;
-    let inertia = [
-        ("ixx", values[0] - m * (y * y + z * z)),
-        ("ixy", values[1] + m * x * y),
-        ("ixz", values[2] + m * x * z),
-        ("iyy", values[3] - m * (x * x + z * z)),
-        ("iyz", values[4] + m * y * z),
-        ("izz", values[5] - m * (x * x + y * y)),
-    ];
-    let inertia: Vec<String> = inertia
+    let body = Body::of(&values);
+    let keys = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+    let inertia: Vec<String> = keys
         .iter()
+        .zip(body.inertia)
         .map(|(k, x)| format!("{k}=\"{x:?}\""))
         .collect();
     let _ = write!(
@@ -267,7 +260,7 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
         of(Told::InSum),
         of(Told::Nothing),
         quoted(&link.name),
-        words(&c),
+        words(&body.centre),
         inertia.join(" ")
     );
     Ok(())

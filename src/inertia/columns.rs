@@ -2,7 +2,7 @@
 //! gradient of its known friction, and the target.
 
 use crate::robot::Robot;
-use crate::robot::friction::DoubleTanh;
+use crate::robot::friction::{DoubleTanh, sign};
 
 /// A linear term that belongs to one joint and is fitted with the inertias.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,8 +37,7 @@ impl Own {
     pub fn column(self, v: f64) -> f64 {
         match self {
             Own::Viscous => v,
-            // sgn with sgn(0) = 0
-            Own::Coulomb => f64::from(i8::from(v > 0.0) - i8::from(v < 0.0)),
+            Own::Coulomb => sign(v),
             Own::Offset => 1.0,
             Own::Saturating(slope) => (slope * v).tanh(),
             Own::Law(_) => 0.0,

@@ -127,12 +127,6 @@ impl ViscousCoulomb {
 
 /// Sign with sign(0) = 0, unlike `f64::signum`.
 #[inline]
-fn sign(v: f64) -> f64 {
-    if v > 0.0 {
-        1.0
-    } else if v < 0.0 {
-        -1.0
-    } else {
-        0.0
-    }
+pub fn sign(v: f64) -> f64 {
+    f64::from(i8::from(v > 0.0) - i8::from(v < 0.0))
 }

@@ -170,6 +170,18 @@ impl Robot {
         }
     }
 
+    /// Full travel of joint i by Table 5 of the CFT robot's report: q1 by x_c4, q2 by x_c3, q4 and q5
+    /// as x_c1 and x_c2 leave them \[m or rad\]. Of other robots only their files know it.
+    pub fn full_travel(&self, i: usize) -> Option<f64> {
+        match self {
+            Self::Cft(robot) => {
+                let spans = robot.setup.limits().spans();
+                [spans[3], spans[2], 2.2, 1.7].get(i).copied()
+            }
+            Self::SingleJoint(_) | Self::Serial(_) => None,
+        }
+    }
+
     /// Unit of joint i's force or torque: "N" or "Nm".
     pub fn joint_unit(&self, i: usize) -> &'static str {
         self.joint_kind(i).torque_unit()

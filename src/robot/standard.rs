@@ -1,6 +1,6 @@
 //! From the standard parameters of links and drives to the parameters that torques can tell.
 
-use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3};
+use nalgebra::{DMatrix, Matrix4};
 
 use super::Robot;
 use super::cft::Structure;
@@ -83,43 +83,41 @@ pub struct Body {
 }
 
 impl Body {
-    /// The body of standard parameters with a mass above 0.
+    /// The body of standard parameters; without a mass its centre is the origin.
     pub fn of(s: &[f64; STANDARD]) -> Self {
         let [xx, xy, xz, yy, yz, zz, mx, my, mz, m] = *s;
-        let c = Vector3::new(mx, my, mz) / m;
-        let about = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-            - (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * m;
+        let [x, y, z] = match m {
+            0.0 => [0.0; 3],
+            _ => [mx / m, my / m, mz / m],
+        };
         Body {
             mass: m,
-            centre: [c.x, c.y, c.z],
+            centre: [x, y, z],
             inertia: [
-                about[(0, 0)],
-                about[(0, 1)],
-                about[(0, 2)],
-                about[(1, 1)],
-                about[(1, 2)],
-                about[(2, 2)],
+                xx - m * (y * y + z * z),
+                xy + m * x * y,
+                xz + m * x * z,
+                yy - m * (x * x + z * z),
+                yz + m * y * z,
+                zz - m * (x * x + y * y),
             ],
         }
     }
 
     /// Its standard parameters (Steiner).
     pub fn standard(&self) -> [f64; STANDARD] {
-        let c = Vector3::from(self.centre);
+        let (m, [x, y, z]) = (self.mass, self.centre);
         let [xx, xy, xz, yy, yz, zz] = self.inertia;
-        let m = self.mass;
-        let about = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-            + (Matrix3::identity() * c.norm_squared() - c * c.transpose()) * m;
         [
-            about[(0, 0)],
-            about[(0, 1)],
-            about[(0, 2)],
-            about[(1, 1)],
-            about[(1, 2)],
-            about[(2, 2)],
-            m * c.x,
-            m * c.y,
-            m * c.z,
+            xx + m * (y * y + z * z),
+            xy - m * x * y,
+            xz - m * x * z,
+            yy + m * (x * x + z * z),
+            yz - m * y * z,
+            zz + m * (x * x + y * y),
+            m * x,
+            m * y,
+            m * z,
             m,
         ]
     }
@@ -209,6 +207,9 @@ mod tests {
             assert!((a - b).abs() < 1e-15, "{a} {b}");
         }
         let s = body.standard();
+        let hollow = [0.03, 0.0, 0.0, 0.04, 0.0, 0.05, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(Body::of(&hollow).centre, [0.0; 3]);
+        assert_eq!(Body::of(&hollow).standard(), hollow);
         let round = standard_of(&pseudo_inertia(&s));
         for (a, b) in round.iter().zip(&s) {
             assert!((a - b).abs() < 1e-15, "{a} {b}");

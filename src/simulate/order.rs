@@ -14,6 +14,7 @@ use super::serial_experiment;
 use super::settings::Settings;
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
+use crate::config::model_file::Parameter;
 use crate::config::robot_file::{ModelKind, RobotFile};
 use crate::config::{ModelFile, Trajectory};
 use crate::log::{Channel, Channels};
@@ -158,6 +159,8 @@ fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLo
     let control = from_files::control(order.robot, Control::cft(setup))?;
     let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
     let driven = Driven {
+        parameters: truth.parameters(),
+        values,
         effects,
         start,
         reference,
@@ -165,10 +168,7 @@ fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLo
         saturation: None,
     };
     let mut outcome = execute(order, &plant, driven)?;
-    outcome.truth.model = "cft".to_owned();
     outcome.truth.setup = Some(setup.name().to_owned());
-    outcome.truth.parameters = truth.parameters();
-    outcome.truth.effects = values;
     Ok(outcome)
 }
 
@@ -218,17 +218,15 @@ fn single(
     let saturation = saturation.unwrap_or(f64::INFINITY);
     let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
     let driven = Driven {
+        parameters: truth.parameters(),
+        values,
         effects,
         start,
         reference,
         control,
         saturation: Some(saturation),
     };
-    let mut outcome = execute(order, &truth, driven)?;
-    outcome.truth.model = "single-joint".to_owned();
-    outcome.truth.parameters = truth.parameters();
-    outcome.truth.effects = values;
-    Ok(outcome)
+    execute(order, &truth, driven)
 }
 
 fn serial<const J: usize>(
@@ -242,17 +240,15 @@ fn serial<const J: usize>(
     let saturation = order.robot.control.saturation_v.unwrap_or(f64::INFINITY);
     let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
     let driven = Driven {
+        parameters: truth.parameters(),
+        values,
         effects,
         start,
         reference,
         control,
         saturation: Some(saturation),
     };
-    let mut outcome = execute(order, &truth, driven)?;
-    outcome.truth.model = "serial".to_owned();
-    outcome.truth.parameters = truth.parameters();
-    outcome.truth.effects = values;
-    Ok(outcome)
+    execute(order, &truth, driven)
 }
 
 /// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
@@ -298,6 +294,9 @@ fn built_effects(
 
 /// What the plant is run with.
 struct Driven<const J: usize> {
+    /// What is true of the plant, and of the effects.
+    parameters: Vec<Parameter>,
+    values: Vec<EffectValue>,
     effects: Effects,
     start: Start<J>,
     /// `None` where volts are played back.
@@ -314,6 +313,8 @@ fn execute<P: Plant<J>, const J: usize>(
     driven: Driven<J>,
 ) -> Result<SimulatedLog, SimulateError> {
     let Driven {
+        parameters,
+        values: effect_values,
         effects,
         start,
         reference,
@@ -372,7 +373,7 @@ fn execute<P: Plant<J>, const J: usize>(
     Ok(SimulatedLog {
         header,
         values,
-        truth: truth_of(order, &recording, Vec::new()),
+        truth: truth_of(order, &recording, parameters, effect_values),
         saturated: saturated.collect(),
         ending: recording.ending,
         limits: recording.limits,
@@ -382,6 +383,7 @@ fn execute<P: Plant<J>, const J: usize>(
 fn truth_of<const J: usize>(
     order: &Order,
     recording: &Recording<J>,
+    parameters: Vec<Parameter>,
     effects: Vec<EffectValue>,
 ) -> TruthFile {
     let mut ending = match recording.ending {
@@ -397,12 +399,17 @@ fn truth_of<const J: usize>(
     TruthFile {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: order.seed,
-        model: String::new(),
+        model: match order.robot.robot.model {
+            ModelKind::Cft => "cft",
+            ModelKind::SingleJoint => "single-joint",
+            ModelKind::Serial => "serial",
+        }
+        .to_owned(),
         setup: None,
         ending,
         volt_noise: recording.volt_noise.to_vec(),
         torque_noise: recording.torque_noise.to_vec(),
-        parameters: Vec::new(),
+        parameters,
         effects,
     }
 }

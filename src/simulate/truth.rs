@@ -22,7 +22,7 @@ pub struct TruthFile {
     pub version: String,
     /// Seed of everything that chance decided.
     pub seed: u64,
-    /// "cft" or "single-joint".
+    /// "cft", "single-joint" or "serial".
     pub model: String,
     /// Set-up of the CFT robot.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -13,7 +13,7 @@ use super::lsq::processing;
 use super::machine::Machine;
 use super::pages::{self, Look, curve, speeds};
 use super::refined::{Held, hold, refined};
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, arguments, files, outputs};
 use crate::compare::{self, Differences, Pair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::Refined;
@@ -452,12 +452,7 @@ fn json_of_logs(of: &Compared, tried: &Tried) -> Value {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = args.logs.iter().map(|l| l.path.as_path());
     let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();
-    let outputs: Vec<&Path> = args
-        .plot
-        .iter()
-        .chain(&args.report)
-        .map(PathBuf::as_path)
-        .collect();
+    let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let of = compare(&args.a, &args.b, &args.logs, context)?;
     let names: Vec<String> = args.logs.iter().map(|l| escape(&l.name())).collect();
@@ -498,10 +493,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     context.check()?;
     if let Some((path, page)) = &page {
-        super::outputs::write_text(path, page)?;
+        outputs::write_text(path, page)?;
     }
     for path in &args.plot {
-        super::outputs::write_picture(path, &of.figure().svg())?;
+        outputs::write_picture(path, &of.figure().svg())?;
     }
     Ok(Outcome {
         text: tables::text(&of, &title),

@@ -5,7 +5,7 @@ use crate::config::document::Document;
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::RobotFile;
 use crate::robot::Robot;
-use crate::robot::serial::newton_euler::{STANDARD, standard_of};
+use crate::robot::standard::STANDARD;
 
 /// Name of the parameter that gives a joint's drive inertia in such a file.
 pub const DRIVE_INERTIA: &str = "drive_inertia";
@@ -22,8 +22,8 @@ pub(in crate::config) fn base_parameters(
     };
     let mut standard = vec![0.0; serial.standard_parameters()];
     for (i, link) in robot.robot.link.iter().enumerate() {
-        if let Some(body) = &link.inertial {
-            let values = standard_of(body.mass, &body.centre, &body.inertia);
+        if let Some(given) = &link.inertial {
+            let values = given.body().standard();
             standard[i * STANDARD..(i + 1) * STANDARD].copy_from_slice(&values);
         }
     }

@@ -378,6 +378,17 @@ mod tests {
         found.links.iter().all(exists) && found.drives.iter().all(|d| *d > 0.0)
     }
 
+    fn without_priors(map: &StandardMap, factor: &DMatrix<f64>) -> Feasible {
+        let bodies = vec![None; map.links.len()];
+        let task = Task {
+            map,
+            bodies: &bodies,
+            factor,
+            worth: 1.0,
+        };
+        feasible(&task).unwrap()
+    }
+
     /// Free fit and feasible fit of some rows: their costs and the latter.
     fn both(
         robot: &Robot,
@@ -392,14 +403,7 @@ mod tests {
         let free = square
             .solve_upper_triangular(&factor.column(u).rows(0, u).into_owned())
             .unwrap();
-        let none = vec![None; map.links.len()];
-        let task = Task {
-            map: &map,
-            bodies: &none,
-            factor: &factor,
-            worth: 1.0,
-        };
-        let found = feasible(&task).unwrap();
+        let found = without_priors(&map, &factor);
         (
             cost(&factor, &free),
             cost(&factor, &found.theta),
@@ -417,14 +421,7 @@ mod tests {
             factor[(i, p)] = 1e4 * free[i];
         }
         let map = robot.standard_map();
-        let none = vec![None; map.links.len()];
-        let task = Task {
-            map: &map,
-            bodies: &none,
-            factor: &factor,
-            worth: 1.0,
-        };
-        let found = feasible(&task).unwrap();
+        let found = without_priors(&map, &factor);
         (found.theta - free.rows(0, p)).norm()
     }
 

@@ -3,7 +3,8 @@
 
 use super::axis;
 use super::colour;
-use super::legend::{self, Key};
+use super::joint_grid::{self, Heading};
+use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
 
@@ -52,14 +53,6 @@ pub struct FrictionFigure {
     pub panels: Vec<FrictionPanel>,
 }
 
-const WIDTH: f64 = 760.0;
-const LEFT: f64 = 64.0;
-const RIGHT: f64 = 14.0;
-const HEAD: f64 = 66.0;
-const NAME: f64 = 20.0;
-const PLOT: f64 = 206.0;
-const BELOW: f64 = 50.0;
-
 /// Radius of a plateau's dot [px].
 const DOT: f64 = 2.3;
 
@@ -70,10 +63,6 @@ const TRUTH: Stroke = Stroke::dashed(colour::VERMILLION, 1.3, "7 2.5 1.5 2.5");
 impl FrictionFigure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        let columns = self.panels.len().clamp(1, 2);
-        let rows = self.panels.len().div_ceil(columns);
-        let row = NAME + PLOT + BELOW;
-        let height = HEAD + row * rows as f64;
         let names: Vec<&str> = self
             .panels
             .iter()
@@ -83,21 +72,12 @@ impl FrictionFigure {
             "Friction torque over velocity with its 95 % band, joints {}",
             names.join(", ")
         );
-        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
-        svg.text(
-            [LEFT, 22.0],
-            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
-            Type::new(14.0, Anchor::Start).bold(),
-        );
-        legend::draw(&mut svg, [LEFT, 44.0], &self.entries());
-        let column = WIDTH / columns as f64;
-        for (k, panel) in self.panels.iter().enumerate() {
-            let left = column * (k % columns) as f64;
-            let top = HEAD + row * (k / columns) as f64;
-            let frame = [left + LEFT, top + NAME, column - LEFT - RIGHT, PLOT];
-            panel.draw(&mut svg, frame);
-        }
-        svg.finish()
+        let heading = Heading {
+            title: &self.title,
+            description: &description,
+            legend: &self.entries(),
+        };
+        joint_grid::draw(&heading, &self.panels, FrictionPanel::draw)
     }
 
     /// Only what is drawn is in the legend.

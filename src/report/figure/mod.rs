@@ -7,6 +7,7 @@
 mod axis;
 mod decimate;
 mod friction;
+mod joint_grid;
 mod legend;
 mod motion;
 mod overlay;

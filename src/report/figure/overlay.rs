@@ -3,7 +3,8 @@
 use super::axis;
 use super::colour;
 use super::friction::{CurvePoint, band, lines, runs, spread};
-use super::legend::{self, Key};
+use super::joint_grid::{self, Heading};
+use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted};
 
@@ -32,13 +33,6 @@ pub struct OverlayFigure {
     pub panels: Vec<OverlayPanel>,
 }
 
-const WIDTH: f64 = 760.0;
-const LEFT: f64 = 64.0;
-const RIGHT: f64 = 14.0;
-const HEAD: f64 = 66.0;
-const NAME: f64 = 20.0;
-const PLOT: f64 = 206.0;
-const BELOW: f64 = 50.0;
 /// Room for one name in the legend [px].
 const LABEL: f64 = 250.0;
 
@@ -51,38 +45,19 @@ const STROKES: [Stroke; 2] = [
 impl OverlayFigure {
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
-        let columns = self.panels.len().clamp(1, 2);
-        let rows = self.panels.len().div_ceil(columns);
-        let row = NAME + PLOT + BELOW;
-        let height = HEAD + row * rows as f64;
         let joints: Vec<&str> = self.panels.iter().map(|p| p.joint.as_str()).collect();
         let description = format!(
             "Friction torque over velocity by two models with 95 % bands, joints {}",
             joints.join(", ")
         );
-        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
-        svg.text(
-            [LEFT, 22.0],
-            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
-            Type::new(14.0, Anchor::Start).bold(),
-        );
         let names = self.names.each_ref().map(|name| fitted(name, 11.0, LABEL));
         let keys = STROKES.map(Key::Band);
-        legend::draw(
-            &mut svg,
-            [LEFT, 44.0],
-            &[(keys[0], names[0].as_str()), (keys[1], names[1].as_str())],
-        );
-        let column = WIDTH / columns as f64;
-        for (k, panel) in self.panels.iter().enumerate() {
-            let left = column * (k % columns) as f64;
-            let top = HEAD + row * (k / columns) as f64;
-            panel.draw(
-                &mut svg,
-                [left + LEFT, top + NAME, column - LEFT - RIGHT, PLOT],
-            );
-        }
-        svg.finish()
+        let heading = Heading {
+            title: &self.title,
+            description: &description,
+            legend: &[(keys[0], names[0].as_str()), (keys[1], names[1].as_str())],
+        };
+        joint_grid::draw(&heading, &self.panels, OverlayPanel::draw)
     }
 }
 

@@ -7,8 +7,9 @@
 //! run and is that of Khalil and Dombre: a link's mass goes into the link before it.
 
 use super::chain::{Chain, Coordinate, Link, MOST_JOINTS};
-use super::newton_euler::{STANDARD, walk};
+use super::newton_euler::walk;
 use crate::robot::JointKind;
+use crate::robot::standard::STANDARD;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -19,11 +19,13 @@ use std::borrow::Cow;
 
 pub use base::Grouping;
 pub use chain::{Chain, ChainError, Coordinate, Dependence, Link, Sine};
-use newton_euler::{STANDARD, walk};
+use newton_euler::walk;
 
+use super::friction::sign;
+use super::standard::STANDARD;
 use super::{JointKind, ParameterInfo};
 
-/// Names of a link's standard parameters, in the order of [`newton_euler::STANDARD`].
+/// Names of a link's standard parameters, in the order of [`STANDARD`].
 pub const STANDARD_NAMES: [&str; STANDARD] = [
     "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mx", "my", "mz", "m",
 ];
@@ -211,7 +213,7 @@ impl SerialRobot {
             let at = self.coupled + OF_COUPLING.len() * k;
             let (m, o) = (c.motor, c.other);
             let turning = v[m] + c.ratio * v[o];
-            let sign = f64::from(i8::from(turning > 0.0) - i8::from(turning < 0.0));
+            let sign = sign(turning);
             for (row, inertia, viscous, coulomb) in [
                 (m, c.ratio * a[o], c.ratio * v[o], sign),
                 (o, c.ratio * a[m], c.ratio * v[m], c.ratio * sign),

@@ -16,28 +16,7 @@
 use super::chain::{Chain, MOST_JOINTS, MOST_LINKS};
 use super::space::{Vector, about, add, cross, dot, product, times, turn, turn_back};
 use crate::robot::JointKind;
-
-/// Standard parameters of a link: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of its frame
-/// [kg m^2], mx, my, mz [kg m], m [kg].
-pub const STANDARD: usize = 10;
-
-/// Standard parameters of a body: its mass [kg], centre of gravity [m], and Ixx, Ixy, Ixz, Iyy, Iyz,
-/// Izz about that centre along the axes of the link [kg m^2].
-pub fn standard_of(m: f64, centre: &Vector, inertia: &[f64; 6]) -> [f64; STANDARD] {
-    let ([x, y, z], [xx, xy, xz, yy, yz, zz]) = (*centre, *inertia);
-    [
-        xx + m * (y * y + z * z),
-        xy - m * x * y,
-        xz - m * x * z,
-        yy + m * (x * x + z * z),
-        yz - m * y * z,
-        zz + m * (x * x + y * y),
-        m * x,
-        m * y,
-        m * z,
-        m,
-    ]
-}
+use crate::robot::standard::STANDARD;
 
 /// Motion of a link, in its own frame.
 #[derive(Clone, Copy)]
