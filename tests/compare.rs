@@ -1,11 +1,15 @@
 //! `compare` through the command line: two small models whose differences are known by hand.
 
+mod schema_support;
+
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use cft_ident::cli::schema::{Kind, schema};
 use predicates::str::{contains, is_empty};
+use schema_support::wrong;
 use serde_json::Value;
 
 const ROBOT: &str = r#"
@@ -88,6 +92,20 @@ fn json(folder: &Path, line: &str) -> Value {
         .assert()
         .code(0);
     serde_json::from_slice(&run.get_output().stdout).unwrap()
+}
+
+#[test]
+fn the_document_has_its_schema_with_logs_and_without() {
+    let folder = bench();
+    let schema = schema(Kind::Compare);
+    for line in ["compare a.toml b.toml", "compare a.toml b.toml log.csv"] {
+        let told = json(folder.path(), line);
+        assert_eq!(wrong(&told, &schema, &schema, ""), None, "{line}");
+        assert_eq!(told["logs"].is_null(), !line.ends_with("log.csv"));
+    }
+    let mut less = json(folder.path(), "compare a.toml b.toml");
+    less["parameters"][0]["a"] = Value::Null;
+    assert!(wrong(&less, &schema, &schema, "").is_some());
 }
 
 #[test]

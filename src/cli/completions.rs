@@ -9,7 +9,8 @@ use crate::report::json::Document;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident completions bash > ~/.local/share/bash-completion/completions/cft-ident
+  cft-ident completions bash \\
+    > ~/.local/share/bash-completion/completions/cft-ident
   cft-ident completions zsh > ~/.zfunc/_cft-ident
   cft-ident completions fish > ~/.config/fish/completions/cft-ident.fish";
 

@@ -2,14 +2,14 @@
 //! asked to stop, and the progress bar.
 
 use std::ffi::OsString;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::error::{CliError, indented};
+use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
 
 /// The circumstances of a run.
@@ -23,14 +23,16 @@ pub struct Context {
 }
 
 impl Context {
-    /// A context that draws bars when standard error is a terminal and `quiet` is false.
+    /// A context that draws bars when standard error is a terminal that can move its cursor and
+    /// `quiet` is false.
     /// `json` is the file of the JSON document; `interrupted` is set from outside when the run is to
     /// stop.
     pub fn new(quiet: bool, json: Option<&Path>, interrupted: Arc<AtomicBool>) -> Self {
+        let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
         Context {
             quiet,
             json: json.map(Path::to_path_buf),
-            bars: !quiet && std::io::stderr().is_terminal(),
+            bars: !quiet && std::io::stderr().is_terminal() && !dumb,
             interrupted,
             command: String::new(),
         }
@@ -82,8 +84,7 @@ impl Context {
     /// A line on standard error for the person who waits; `-q` silences it.
     pub fn note(&self, text: &str) {
         if !self.quiet {
-            // A closed standard error is no reason to lose a result.
-            let _ = writeln!(std::io::stderr(), "{}", indented(text));
+            tell(&mut std::io::stderr(), &indented(text));
         }
     }
 

@@ -13,9 +13,9 @@ use crate::report::number;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident convert run.csv run.mcap
-  cft-ident convert bag_0.mcap bag_1.mcap run.csv.zst
-  cft-ident convert drives.csv run.mcap -r configs/cft.toml";
+  cft-ident convert unseen.csv unseen.mcap
+  cft-ident convert unseen.csv joints.csv.zst -r configs/cft.toml
+  cft-ident convert bag_0.mcap bag_1.mcap run.csv.gz";
 
 /// Write logs in another form: CSV or MCAP, each also compressed with gzip or zstd.
 ///

@@ -10,7 +10,7 @@ use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::refined::{Held, hold, in_file, refined};
-use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
+use super::{CliError, Context, Outcome, arguments, files, outputs, pages, typed};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
@@ -20,15 +20,15 @@ use crate::log::LogSpec;
 use crate::motion::Parallel;
 use crate::report::json::Document;
 use crate::report::number;
-use crate::report::table::{Align, Table};
+use crate::report::table::{Align, Table, hanging};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident diagnose id.csv -m model.toml --holdout unseen.csv -o refined.toml
-  cft-ident diagnose loaded.csv -m unloaded.toml --keep";
+  cft-ident diagnose identification.csv -m model.toml --holdout unseen.csv
+  cft-ident diagnose loaded.csv -m refined.toml --keep -o loaded.toml";
 
 /// Trace the torque residual to effects that the model lacks, add them, and refit.
 ///
@@ -405,6 +405,9 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
     })
 }
 
+/// Margin of what is said of an effect.
+const MARGIN: &str = "     ";
+
 /// The tables for a person.
 pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
     let d = &found.diagnosis;
@@ -418,20 +421,21 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
     };
     for (i, step) in d.steps.iter().enumerate() {
         let effect: &Added = &d.model.effects[step.effect];
-        out += &format!(
-            "  {}. {} ({}): {}\n",
-            i + 1,
+        let found = format!(
+            "{} ({}): {}",
             effect.title(robot),
             effect.family().name(),
             in_words(machine, d, step.effect)
         );
+        out += &hanging(&format!("{:>3}. ", i + 1), &found, 7);
         if let Some(s) = &step.candidate.score {
-            out += &format!(
-                "     removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows\n",
+            let told = format!(
+                "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows",
                 number::percent(s.cv_gain),
                 s.delta_bic,
                 s.effective_rows
             );
+            out += &hanging(MARGIN, &told, 7);
         }
         if let Some([before, after]) = step.holdout {
             let worse = if after > before {
@@ -440,7 +444,7 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
                 ""
             };
             out += &format!(
-                "     data that decided nothing: {} before, {} after{worse}\n",
+                "{MARGIN}data that decided nothing: {} before, {} after{worse}\n",
                 number::percent(before),
                 number::percent(after)
             );
@@ -451,55 +455,56 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
                 .iter()
                 .map(|c| c.effect.title(robot))
                 .collect();
-            out += &format!(
-                "     these data do not separate it from {}; {} would\n",
+            let told = format!(
+                "these data do not separate it from {}; {} would",
                 names.join(", "),
                 effect.kind.separate_by
             );
+            out += &hanging(MARGIN, &told, 7);
             if let Some(command) = super::separate::command(effect, robot) {
-                out += &format!("     such a motion: {command}\n");
+                out += &format!("{MARGIN}such a motion:\n{}", typed::folded(&command, 7));
             }
         }
     }
     for e in &d.episodes {
-        out += &format!(
-            "  cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
-             residual)\n",
+        let told = format!(
+            "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
+             residual)",
             e.from_s,
             e.to_s,
             found.logs[e.log],
             robot.joint_names()[e.joint],
             e.over
         );
+        out += &hanging("  ", &told, 4);
     }
     let mut table = Table::new(&[
         ("joint", Align::Left),
-        ("fitted before", Align::Decimal),
+        ("fitted", Align::Decimal),
         ("after", Align::Decimal),
-        ("unseen before", Align::Decimal),
+        ("unseen", Align::Decimal),
         ("after", Align::Decimal),
-        ("95 %", Align::Left),
+        ("its 95 %", Align::Right),
         ("above noise", Align::Decimal),
     ])
-    .caption("relative torque error, before and after");
-    let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
+    .caption("relative torque error [%] on fitted and on unseen data, before and after");
+    let hundred = number::hundredths;
+    let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
     for (j, joint) in robot.joint_names().iter().enumerate() {
         let of = |errors: &Errors| errors.joints[j].relative_error;
         let unseen = |p: &diagnose::Pair| p.holdout.as_ref().map(of);
-        let interval = d.after.holdout.as_ref().map_or(String::new(), |e| {
+        let interval = d.after.holdout.as_ref().map(|e| {
             let [low, high] = e.joints[j].interval_95;
-            let low = number::percent(low);
-            format!("{}..{}", low.trim_end_matches(" %"), number::percent(high))
-                .replace(' ', "\u{a0}")
+            format!("{}..{}", hundred(low), hundred(high))
         });
         table.row([
             joint.as_str(),
-            &number::percent(of(&d.before.train)),
-            &number::percent(of(&d.after.train)),
-            &percent(unseen(&d.before)),
-            &percent(unseen(&d.after)),
-            &interval,
-            &number::percent(d.left[j].share),
+            &hundred(of(&d.before.train)),
+            &hundred(of(&d.after.train)),
+            &known(unseen(&d.before)),
+            &known(unseen(&d.after)),
+            interval.as_deref().unwrap_or(number::ABSENT),
+            &hundred(d.left[j].share),
         ]);
     }
     out += &format!("{table}");

@@ -6,12 +6,14 @@
 
 use std::error::Error;
 use std::fmt;
+use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
 use crate::config::ConfigError;
 use crate::log::LogError;
 use crate::output::OutputError;
 use crate::report::json::JsonError;
+use crate::report::table::folded;
 use crate::simulate::SimulateError;
 
 /// An error ready to be shown: `error: ...`, then the places, then `hint: ...`.
@@ -157,6 +159,16 @@ pub fn with_sources(error: &(dyn Error + 'static)) -> String {
         source = inner.source();
     }
     text
+}
+
+/// Says something on standard error. A terminal gets lines that fit it; a file or a pipe gets one
+/// line for each message, as a script looks for it.
+pub(super) fn tell(stderr: &mut dyn Write, text: &str) {
+    // A closed standard error is no reason to lose a result.
+    let _ = match std::io::stderr().is_terminal() {
+        true => write!(stderr, "{}", folded(text)),
+        false => writeln!(stderr, "{text}"),
+    };
 }
 
 /// Later lines of a message are indented, and control characters that a file's text may carry into

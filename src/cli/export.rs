@@ -15,7 +15,8 @@ use crate::report::table::{Align, Table};
 const EXAMPLE: &str = "\
 Example:
   cft-ident export -m model.toml --c feedforward.h
-  cft-ident export -m model.toml --rust feedforward.rs --urdf arm.urdf";
+  cft-ident export -m model.toml --rust feedforward.rs
+  cft-ident export -m myarm-model.toml --urdf myarm-identified.urdf";
 
 /// Write a model for other programs: a C header, a Rust module, a URDF.
 ///

@@ -13,7 +13,7 @@ use crate::inertia::feasible::{Feasible, PRIOR_WEIGHT, Task, feasible};
 use crate::inertia::robust::Status;
 use crate::inertia::solve::{factor, residual_of, weights_of};
 use crate::report::number;
-use crate::report::table::{Align, Table};
+use crate::report::table::{Align, Table, hanging, unbroken};
 use crate::robot::standard::{Body, StandardMap, pseudo_inertia};
 
 /// Links that can exist, and what they cost.
@@ -187,15 +187,16 @@ impl Physical {
             .zip(&self.after)
             .enumerate()
             .map(|(j, (before, after))| {
-                format!(
+                unbroken(&format!(
                     "{} {} to {}",
                     Self::joint(machine, j),
                     number::percent(*before),
                     number::percent(*after)
-                )
+                ))
             })
             .collect();
-        out += &format!("the fit suffers: {}\n", change.join(", "));
+        let told = format!("the fit suffers: {}", change.join(", "));
+        out += &hanging("", &told, 2);
         out
     }
 

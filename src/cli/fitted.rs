@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::lsq::Identified;
 use super::machine::Machine;
 use crate::motion::Summary;
-use crate::report::table::WIDTH;
+use crate::report::table::{hanging, unbroken};
 use crate::report::{number, summary};
 use crate::verdict::{IDENTIFIED, Verdict};
 
@@ -111,7 +111,7 @@ pub fn text(machine: &Machine, found: &Identified) -> String {
 fn groupings(found: &Identified) -> String {
     let grouped = found.unknowns.iter().filter_map(|u| {
         let grouping = u.grouping.as_ref()?;
-        (*grouping != u.name).then(|| wrapped(grouping, 4))
+        (*grouping != u.name).then(|| hanging("  ", grouping, 4))
     });
     let lines: Vec<String> = grouped.collect();
     match lines.is_empty() {
@@ -123,24 +123,6 @@ fn groupings(found: &Identified) -> String {
     }
 }
 
-/// A text of words in lines that fit a terminal, those after the first further in.
-fn wrapped(text: &str, indent: usize) -> String {
-    let mut out = String::new();
-    let mut line = String::from("  ");
-    for word in text.split(' ') {
-        if line.trim().is_empty() || line.len() + 1 + word.len() <= WIDTH {
-            if !line.trim().is_empty() {
-                line.push(' ');
-            }
-        } else {
-            out += &format!("{line}\n");
-            line = " ".repeat(indent);
-        }
-        line += word;
-    }
-    out + &format!("{line}\n")
-}
-
 impl Identified {
     /// Number of essential unknowns.
     fn essential_count(&self) -> usize {
@@ -148,12 +130,12 @@ impl Identified {
     }
 }
 
-/// Condition, rank, independent rows and residual of the fit, in two lines.
+/// Condition, rank, independent rows and residual of the fit, and what is essential.
 pub fn quality(machine: &Machine, found: &Identified) -> String {
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
-    let mut out = format!(
-        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones\n",
+    let told = format!(
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones",
         condition(fit.condition.raw),
         condition(fit.condition.normalised),
         fit.rank,
@@ -161,31 +143,34 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
         fit.rows,
         fit.effective_rows,
     );
+    let mut out = hanging("", &told, 2);
     let errors: Vec<String> = (0..machine.robot.joints())
         .map(|j| {
-            format!(
+            unbroken(&format!(
                 "{} {} ({} {})",
                 machine.robot.joint_names()[j],
                 number::percent(fit.relative_error[j]),
                 number::significant(fit.residual_std[j], 3),
                 machine.file.torque_unit(j)
-            )
+            ))
         })
         .collect();
-    out += &format!("residual of the fit: {}\n", errors.join(", "));
+    let told = format!("residual of the fit: {}", errors.join(", "));
+    out += &hanging("", &told, 2);
     out += &found.account.text(machine);
     let alone: Vec<String> = machine
         .robot
         .joint_names()
         .iter()
         .zip(&found.essential_error)
-        .map(|(joint, error)| format!("{joint} {}", number::percent(*error)))
+        .map(|(joint, error)| unbroken(&format!("{joint} {}", number::percent(*error))))
         .collect();
-    out += &format!(
-        "{} of {} parameters are essential; residual with them alone: {}\n",
+    let told = format!(
+        "{} of {} parameters are essential; residual with them alone: {}",
         found.essential_count(),
         found.unknowns.len(),
         alone.join(", ")
     );
+    out += &hanging("", &told, 2);
     out
 }

@@ -16,7 +16,7 @@ use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::inputs::Inputs;
 use crate::friction::passes::{Ending, Given};
 use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
-use crate::log::{LogSpec, Provenance};
+use crate::log::{LogSpec, Provenance, did_you_mean};
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::report::json::Document;
 use crate::report::{number, summary};
@@ -26,14 +26,14 @@ use crate::verdict::Verdict;
 const EXAMPLE: &str = "\
 Example:
   cft-ident friction q1.csv q2.csv q4.csv q5.csv -r configs/cft.toml -o f.toml
-  cft-ident friction q4b.csv -r configs/cft.toml --joint q4 -m f.toml -o g.toml";
+  cft-ident friction q4.csv -r configs/cft.toml --joint q4 -m f.toml -o g.toml";
 
 /// Estimate the friction of single joints by a continuous-discrete extended Kalman filter.
 ///
 /// Each log is a one-joint experiment: the joint moves over its range at several speeds and with
 /// reversals, the others stay nearly still. Several logs of one joint are used together.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident friction [OPTIONS] -r ROBOT.toml -o MODEL.toml LOG...")]
 pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
@@ -80,8 +80,10 @@ pub fn identify(
     let named = match joint {
         None => None,
         Some(name) => Some(names.iter().position(|n| n == name).ok_or_else(|| {
+            let known = names.join(", ");
+            let near = did_you_mean(name, &known);
             CliError::usage(format!("the robot has no joint `{name}`"))
-                .hint(format!("its joints are {}", names.join(", ")))
+                .hint(format!("{near}its joints are {known}"))
         })?),
     };
     let bar = context.progress("reading logs", None);

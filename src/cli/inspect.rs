@@ -18,8 +18,8 @@ use crate::robot::model::Model;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident inspect run.csv
-  cft-ident inspect run.csv@0..70% -r configs/cft.toml --json -";
+  cft-ident inspect unseen.csv
+  cft-ident inspect unseen.csv@0..70% -r configs/cft.toml --json -";
 
 /// Say what logs hold and what is wrong with them.
 ///
@@ -265,7 +265,7 @@ fn text(log: &Inspected) -> String {
             found.gaps.len()
         );
     }
-    out += "\n\n";
+    out = table::hanging("", &out, 2) + "\n";
     out += &channels(found).to_string();
     if !found.joints.is_empty() {
         out += &format!("\n{}", joints(found));
@@ -318,10 +318,17 @@ fn joints(found: &Findings) -> table::Table {
         ("moving", Align::Decimal),
         ("condition", Align::Decimal),
     ];
-    if found.joints.iter().any(|joint| joint.unit.is_some()) {
+    let known = found.joints.iter().any(|joint| joint.unit.is_some());
+    if known {
         columns.push(("unit", Align::Left));
     }
-    let mut table = table::Table::new(&columns);
+    let unit = match known {
+        true => "unit",
+        false => "unit of the log",
+    };
+    let mut table = table::Table::new(&columns).caption(&format!(
+        "motion: travel [{unit}], greatest speed [{unit}/s] and acceleration [{unit}/s^2]"
+    ));
     for joint in &found.joints {
         table.row([
             escape(&joint.joint),

@@ -30,14 +30,14 @@ use crate::verdict::Verdict;
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident lsq id.csv -r configs/cft.toml -m friction.toml -o model.toml
+  cft-ident lsq identification.csv -r robot.toml -m friction.toml -o m.toml
   cft-ident lsq emps_id.csv -r configs/emps.toml -o emps.toml --json -";
 
 /// Fit the inertial parameters by linear least squares, friction taken from a model file.
 ///
 /// Where the robot file says that friction is fitted together with the inertias, -m is left out.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident lsq [OPTIONS] -r ROBOT.toml -o MODEL.toml LOG...")]
 pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]

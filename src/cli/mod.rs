@@ -51,6 +51,7 @@ use std::time::Duration;
 use clap::{Parser, Subcommand};
 
 use crate::output;
+use crate::report::table::{WIDTH, folded};
 
 pub use arguments::Destination;
 pub use context::{Context, Progress};
@@ -58,9 +59,13 @@ pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;
 
+const EXAMPLES: &str = "\
+The help of each command ends with examples. Their files are those that
+`cft-ident identify` leaves in cft-ident-run/.";
+
 /// Identification of robot dynamics from logged joint positions and torques.
 #[derive(Debug, Parser)]
-#[command(name = "cft-ident", version, max_term_width = 80)]
+#[command(name = "cft-ident", version, max_term_width = 80, after_help = EXAMPLES)]
 pub struct Cli {
     #[command(flatten)]
     common: Common,
@@ -180,7 +185,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
         Ok(cli) => cli,
         Err(answer) => {
             // Help and version are answers on standard output, the rest are errors.
-            let _ = answer.print();
+            let text = answer.render().to_string();
+            let long = |line: &str| line.chars().count() > WIDTH;
+            match answer.use_stderr() && text.lines().any(long) {
+                // a long list of values, which the parser leaves in one line
+                true => error::tell(&mut std::io::stderr(), folded(&text).trim_end()),
+                false => drop(answer.print()),
+            }
             return match answer.use_stderr() {
                 true => Exit::Usage,
                 false => Exit::Success,
@@ -190,7 +201,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     match execute(&cli, &arguments, interrupted) {
         Ok(exit) => exit,
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "{error}");
+            error::tell(&mut std::io::stderr(), &error.to_string());
             error.exit()
         }
     }

@@ -5,7 +5,7 @@
 use std::io::{self, Write};
 
 use super::Destination;
-use super::error::{CliError, indented};
+use super::error::{CliError, indented, tell};
 use super::exit::Exit;
 use crate::report::json::Document;
 
@@ -29,9 +29,8 @@ pub(super) fn show(
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
-    // A closed standard error is no reason to lose a result, so its errors are dropped.
     for warning in outcome.document.warnings() {
-        let _ = writeln!(stderr, "warning: {}", indented(warning));
+        tell(stderr, &format!("warning: {}", indented(warning)));
     }
     match json {
         Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
@@ -42,7 +41,7 @@ pub(super) fn show(
         None => write_for_a_person(stdout, &outcome.text)?,
     }
     for limit in &outcome.missed {
-        let _ = writeln!(stderr, "limit missed: {}", indented(limit));
+        tell(stderr, &format!("limit missed: {}", indented(limit)));
     }
     Ok(if outcome.missed.is_empty() {
         Exit::Success

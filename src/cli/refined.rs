@@ -4,8 +4,8 @@ use super::machine::{Machine, run_error, summary_warnings};
 use super::{CliError, Context};
 use crate::config::ModelFile;
 use crate::config::model_file::{Effect, EffectParameter};
-use crate::effect::{Added, Refined, Told};
-use crate::log::{Instant, LogSpec, Provenance};
+use crate::effect::{Added, EffectError, Refined, Told};
+use crate::log::{Instant, LogSpec, Provenance, did_you_mean};
 use crate::motion::{Stretch, Summary, stretches};
 
 /// The model of a file with its effects; `name` names the file in errors.
@@ -21,8 +21,15 @@ pub fn refined(file: &ModelFile, name: &str) -> Result<Refined, CliError> {
                 .map(|(k, p)| (k.clone(), p.value))
                 .collect();
             Added::of_keys(&model.robot, &e.name, e.joint.as_deref(), &values).map_err(|error| {
-                CliError::input(format!("{name}: {error}"))
-                    .hint("correct the [[effect]] table, or take it out")
+                let told = CliError::input(format!("{name}: {error}"));
+                let near = match &error {
+                    EffectError::Unknown { name, known } => did_you_mean(name, known),
+                    EffectError::Joint { joint, known, .. } => did_you_mean(joint, known),
+                    _ => String::new(),
+                };
+                told.hint(format!(
+                    "{near}correct the [[effect]] table, or take it out"
+                ))
             })
         })
         .collect::<Result<_, _>>()?;

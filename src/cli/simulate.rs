@@ -20,7 +20,7 @@ use crate::simulate::{
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o q4.csv";
+  cft-ident simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv";
 
 /// Simulate the robot under control and write its log.
 ///
@@ -28,7 +28,7 @@ Example:
 /// The truth (parameters, effects, seed) goes to a file of its own beside the log: LOG's stem with
 /// .truth.toml.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident simulate [OPTIONS] -r ROBOT.toml -o LOG.csv|.mcap")]
 pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]

@@ -18,11 +18,11 @@ use crate::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident torque planned.csv -m model.toml -o feedforward.csv";
+  cft-ident torque unseen.csv -m model.toml -o feedforward.csv";
 
 /// Write the feed-forward torque along a motion, with its prediction band.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident torque [OPTIONS] -m MODEL.toml -o OUT.csv|.mcap LOG")]
 pub struct Args {
     /// Log or trajectory of q; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(value_name = "LOG")]

@@ -14,6 +14,7 @@ use crate::log::{Instant, LogSpec, Provenance};
 use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
+use crate::report::table::{hanging, unbroken};
 use crate::report::{number, summary};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
 
@@ -146,13 +147,23 @@ pub fn text(machine: &Machine, validation: &Validation, caption: &str) -> String
     let raw: Vec<String> = validation
         .joints
         .iter()
-        .map(|e| format!("{} {}", e.joint, number::percent(e.relative_error_raw)))
+        .map(|e| {
+            unbroken(&format!(
+                "{} {}",
+                e.joint,
+                number::percent(e.relative_error_raw)
+            ))
+        })
         .collect();
-    format!(
-        "{}\nover joints {}; before the parallel filter: {}\n",
-        summary::torque_errors(caption, &rows),
+    let overall = format!(
+        "over joints {}; before the parallel filter: {}",
         number::percent(validation.overall.mean_relative_error),
         raw.join(", ")
+    );
+    format!(
+        "{}\n{}",
+        summary::torque_errors(caption, &rows),
+        hanging("", &overall, 2)
     )
 }
 

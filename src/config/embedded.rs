@@ -8,7 +8,7 @@ use super::model_file::ModelFile;
 use super::robot_file::RobotFile;
 use super::trajectory::Trajectory;
 use super::{ConfigError, check, urdf};
-use crate::log::{list, remedy, shown};
+use crate::log::{did_you_mean, list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
 pub const EMBEDDED: [(&str, &str); 11] = [
@@ -63,12 +63,13 @@ pub fn text(path: &Path) -> Result<String, ConfigError> {
         if let Some(text) = embedded(path) {
             return Ok(text.to_owned());
         }
+        let known = list(EMBEDDED.iter().map(|(name, _)| *name));
         return Err(ConfigError::Read {
             file: shown(path),
             remedy: format!(
-                "{}; these come with the tool: {}",
+                "{}; {}these come with the tool: {known}",
                 remedy(&error),
-                list(EMBEDDED.iter().map(|(name, _)| *name))
+                did_you_mean(&shown(path), &known),
             ),
             source: error,
         });

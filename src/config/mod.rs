@@ -21,6 +21,7 @@ pub mod trajectory;
 mod trajectory_text;
 mod urdf;
 
+pub(crate) use crate::log::did_you_mean;
 pub use campaign::Campaign;
 pub use embedded::{EMBEDDED, embedded, text};
 pub use error::ConfigError;

@@ -36,7 +36,7 @@ pub use motion::Motion;
 pub use objective::{NoValue, Prior};
 pub use start::usual_torque;
 
-use crate::config::ConfigError;
+use crate::config::{ConfigError, did_you_mean};
 use crate::simulate::SimulateError;
 
 /// Why no motion came out. Each message says what to change.
@@ -84,7 +84,10 @@ pub enum ExciteError {
     VoltsOfJoint { joint: String },
     #[error("the series is written in other coordinates than the design's; write it in {wanted}")]
     OtherCoordinates { wanted: String },
-    #[error("the machine has no coordinate {name}; its coordinates are {known}")]
+    #[error(
+        "the machine has no coordinate {name}; {}its coordinates are {known}",
+        did_you_mean(name, known)
+    )]
     UnknownCoordinate { name: String, known: String },
     #[error("joint {joint} has no friction in the model; give one with -m that has")]
     NoLaw { joint: String },

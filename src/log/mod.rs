@@ -39,5 +39,5 @@ pub use table::{Table, TableBlock};
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;
-pub(crate) use names::list;
+pub(crate) use names::{did_you_mean, list};
 pub(crate) use source::{remedy, shown};

@@ -40,6 +40,14 @@ pub fn nearest<'k>(name: &str, known: impl IntoIterator<Item = &'k str>) -> Opti
     best.map(|(_, candidate)| candidate)
 }
 
+/// "did you mean `x`? " where one of the known names is near, else nothing; `known` is their list as a
+/// message has it, parted by commas.
+pub(crate) fn did_you_mean(name: &str, known: &str) -> String {
+    nearest(name, known.split(", "))
+        .map(|near| format!("did you mean `{near}`? "))
+        .unwrap_or_default()
+}
+
 /// Nearness of two names in 0..1: by their common beginning, or by a few slips of the finger.
 fn similarity(a: &str, b: &str) -> f64 {
     let slips = strsim::osa_distance(a, b);
@@ -84,5 +92,10 @@ mod tests {
         assert_eq!(nearest("Q_Q1", ["q_q1", "q_q2"]), Some("q_q1"));
         assert_eq!(nearest("ctf", ["single-joint", "cft"]), Some("cft"));
         assert_eq!(nearest("banana", ["cutoff_hz", "order"]), None);
+        assert_eq!(
+            did_you_mean("paylod", "gain, payload"),
+            "did you mean `payload`? "
+        );
+        assert_eq!(did_you_mean("banana", "gain, payload"), "");
     }
 }

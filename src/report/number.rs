@@ -56,10 +56,15 @@ pub fn plus_minus(value: f64, std: f64) -> String {
 /// A fraction as percent with three significant digits: `0.0523` is `5.23 %`.
 pub fn percent(fraction: f64) -> String {
     if fraction.is_finite() {
-        format!("{} %", significant(100.0 * fraction, 3))
+        format!("{} %", hundredths(fraction))
     } else {
         ABSENT.into()
     }
+}
+
+/// The same where the header of a column says `%`: `0.0523` is `5.23`.
+pub fn hundredths(fraction: f64) -> String {
+    significant(100.0 * fraction, 3)
 }
 
 /// Power of ten of the leading digit, once `value` is rounded to `digits` digits.

@@ -9,7 +9,8 @@ use std::fmt;
 pub const WIDTH: usize = 80;
 /// A column of words is not wrapped below this.
 const NARROWEST: usize = 10;
-const GAP: &str = "  ";
+/// Columns between two of a table: the most, and the least where it would be too wide.
+const GAPS: [usize; 2] = [2, 1];
 
 /// Where the cells of a column line up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,9 +76,9 @@ impl Table {
         self.rows.is_empty()
     }
 
-    /// Widths of the columns, after words were narrowed to fit [`WIDTH`].
-    fn widths(&self, cells: &[Vec<String>]) -> Vec<usize> {
-        let mut widths: Vec<usize> = (0..self.columns.len())
+    /// Widths of the columns and the gap between them, after words were narrowed to fit [`WIDTH`].
+    fn widths(&self, cells: &[Vec<String>]) -> (Vec<usize>, usize) {
+        let natural: Vec<usize> = (0..self.columns.len())
             .map(|j| {
                 let header = length(&self.columns[j].0);
                 cells
@@ -86,10 +87,23 @@ impl Table {
                     .fold(header, usize::max)
             })
             .collect();
-        let total = |widths: &[usize]| {
-            widths.iter().sum::<usize>() + GAP.len() * widths.len().saturating_sub(1)
+        let [wide, narrow] = GAPS;
+        let fits = |widths: &[usize], gap: usize| {
+            widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= WIDTH
         };
-        while total(&widths) > WIDTH {
+        let widths = self.narrowed(natural.clone(), |widths| fits(widths, wide));
+        match fits(&widths, wide) {
+            true => (widths, wide),
+            false => (
+                self.narrowed(natural, |widths| fits(widths, narrow)),
+                narrow,
+            ),
+        }
+    }
+
+    /// Columns of words, narrowed until all fit or none can give more.
+    fn narrowed(&self, mut widths: Vec<usize>, fits: impl Fn(&[usize]) -> bool) -> Vec<usize> {
+        while !fits(&widths) {
             // The widest column of words gives first, down to the longest of them.
             let widest = (0..widths.len())
                 .filter(|&j| self.columns[j].1 == Align::Left)
@@ -112,16 +126,16 @@ impl fmt::Display for Table {
                 line_up(&mut rows, j);
             }
         }
-        let widths = self.widths(&rows);
+        let (widths, gap) = self.widths(&rows);
         if let Some(caption) = &self.caption {
-            for line in wrapped(caption, WIDTH) {
+            for line in flowed(caption, WIDTH) {
                 writeln!(f, "{line}")?;
             }
         }
         let headers: Vec<String> = self.columns.iter().map(|(name, _)| name.clone()).collect();
-        self.write_line(f, &headers, &widths)?;
+        self.write_line(f, &headers, &widths, gap)?;
         let rules: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
-        self.write_line(f, &rules, &widths)?;
+        self.write_line(f, &rules, &widths, gap)?;
         for row in &rows {
             let parts: Vec<Vec<String>> = row
                 .iter()
@@ -138,7 +152,7 @@ impl fmt::Display for Table {
                     .iter()
                     .map(|part| part.get(line).cloned().unwrap_or_default())
                     .collect();
-                self.write_line(f, &cells, &widths)?;
+                self.write_line(f, &cells, &widths, gap)?;
             }
         }
         Ok(())
@@ -151,11 +165,12 @@ impl Table {
         f: &mut fmt::Formatter<'_>,
         cells: &[String],
         widths: &[usize],
+        gap: usize,
     ) -> fmt::Result {
         let mut line = String::new();
         for (j, cell) in cells.iter().enumerate() {
             if j > 0 {
-                line.push_str(GAP);
+                line.push_str(&" ".repeat(gap));
             }
             let padding = " ".repeat(widths[j].saturating_sub(length(cell)));
             match self.columns[j].1 {
@@ -190,40 +205,118 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
 
 /// `text` as lines that are indented by `indent` columns and fit [`WIDTH`], each with its line end.
 pub fn paragraph(text: &str, indent: usize) -> String {
-    let lines = wrapped(&printable(text), WIDTH.saturating_sub(indent));
-    let margin = " ".repeat(indent);
+    hanging(&" ".repeat(indent), text, indent)
+}
+
+/// `head` and `text` as lines that fit [`WIDTH`], those after the first indented by `indent` columns,
+/// each with its line end.
+pub fn hanging(head: &str, text: &str, indent: usize) -> String {
+    let room = WIDTH.saturating_sub(indent.max(length(head)));
+    let lines = flowed(&printable(text), room);
+    let mut out = String::new();
+    for (i, line) in lines.iter().enumerate() {
+        match i {
+            0 => out.push_str(head),
+            _ => out.push_str(&" ".repeat(indent)),
+        }
+        out.push_str(line);
+        out.push('\n');
+    }
+    out
+}
+
+/// `text` for a terminal: a line that is too long goes on below, further in.
+pub fn folded(text: &str) -> String {
+    let fold = |line: &str| {
+        if length(line) <= WIDTH {
+            return format!("{line}\n");
+        }
+        let words = line.trim_start();
+        let margin = length(line) - length(words);
+        hanging(&" ".repeat(margin), words, margin + 2)
+    };
+    text.lines().map(fold).collect()
+}
+
+/// A space at which no line ends; shown as a common one.
+const UNBROKEN: char = '\u{a0}';
+
+/// `text` as one word, which the end of a line does not part.
+pub fn unbroken(text: &str) -> String {
+    text.replace(' ', UNBROKEN.encode_utf8(&mut [0; 2]))
+}
+
+/// Whether the end of a line may not part these words: a number and its unit, or the two sides of a
+/// sign between numbers.
+fn belong_together(before: &str, after: &str) -> bool {
+    const UNITS: [&str; 16] = [
+        "%", "N", "Nm", "kg", "m", "s", "ms", "rad", "deg", "V", "A", "Hz", "kHz", "1", "2",
+        "speed",
+    ];
+    let ended = |word: &str| word.ends_with([',', ';', ':', ')']);
+    let is_unit = |word: &str| {
+        let word = word.trim_end_matches([',', ';', ':', '.', ')']);
+        let named = !word.starts_with(|c: char| c.is_ascii_digit()) || word.starts_with("1/");
+        named && word.split(['/', '^']).all(|part| UNITS.contains(&part))
+    };
+    let is_number = |word: &str| {
+        let word = word.trim_start_matches(['(', '-', '+']);
+        word.starts_with(|c: char| c.is_ascii_digit()) && !ended(word)
+    };
+    let is_sign = |word: &str| matches!(word, "±" | "=");
+    is_sign(before)
+        || is_sign(after)
+        || is_unit(after) && (is_number(before) || is_unit(before) && !ended(before))
+}
+
+/// Words that the end of a line does not part, with a space between them, where a line holds them.
+fn groups(text: &str, width: usize) -> Vec<String> {
+    let mut groups: Vec<String> = Vec::new();
+    let mut last = "";
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        let fits = |group: &str| length(group) + 1 + length(word) <= width;
+        match groups.last_mut() {
+            Some(group) if belong_together(last, word) && fits(group) => {
+                group.push(' ');
+                group.push_str(word);
+            }
+            _ => groups.push(word.to_owned()),
+        }
+        last = word;
+    }
+    groups
+}
+
+/// `text` in lines of at most `width` characters, broken at spaces but not between a number and its
+/// unit; a word that alone is longer stays whole, for it may be a path.
+fn flowed(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for group in groups(text, width) {
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => *line = group,
+            Some(line) if length(line) + 1 + length(&group) <= width => {
+                line.push(' ');
+                line.push_str(&group);
+            }
+            _ => lines.push(group),
+        }
+    }
     lines
         .iter()
-        .map(|line| format!("{margin}{line}\n"))
+        .map(|line| line.replace(UNBROKEN, " "))
         .collect()
 }
 
-/// `text` in lines of at most `width` characters, broken at spaces, and inside a word only where the
-/// word alone is too long.
+/// The same for the cell of a table: a word that is longer is cut.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let width = width.max(1);
-    let mut lines = vec![String::new()];
-    for word in text.split(' ').filter(|word| !word.is_empty()) {
-        let mut rest: Vec<char> = word.chars().collect();
-        while let Some(line) = lines.last_mut() {
-            let used = length(line);
-            let room = if used == 0 {
-                width
-            } else {
-                width.saturating_sub(used + 1)
-            };
-            if rest.len() <= room {
-                if used > 0 {
-                    line.push(' ');
-                }
-                line.extend(&rest);
-                break;
-            }
-            if used == 0 {
-                line.extend(rest.drain(..width));
-            }
-            lines.push(String::new());
+    let mut lines = Vec::new();
+    for line in flowed(text, width) {
+        let mut rest = line.as_str();
+        while let Some((end, _)) = rest.char_indices().nth(width.max(1)) {
+            lines.push(rest[..end].to_owned());
+            rest = &rest[end..];
         }
+        lines.push(rest.to_owned());
     }
     lines
 }
@@ -299,6 +392,62 @@ slope_2       16         -
     fn a_word_longer_than_its_column_is_cut_and_kept_whole_in_sum() {
         assert_eq!(wrapped("ab cdefgh i", 3), ["ab", "cde", "fgh", "i"]);
         assert_eq!(wrapped("", 3), [""]);
+    }
+
+    #[test]
+    fn the_end_of_a_line_parts_no_number_from_its_unit() {
+        let text =
+            "sin = 1.153 ± 0.023 N, viscous 9.00 ± 0.01 Nm s/rad, q1 13.2 % (2.99 Nm), 39.00 s";
+        for width in 30..60 {
+            let lines = flowed(text, width);
+            assert_eq!(lines.join(" "), text);
+            for line in &lines {
+                assert!(line.chars().count() <= width);
+                let start = line.split(' ').next().unwrap();
+                assert!(
+                    !["=", "±", "N,", "%", "Nm", "Nm),", "s/rad,", "s"].contains(&start),
+                    "{lines:?}"
+                );
+                assert!(!line.ends_with(['=', '±']), "{lines:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_do_not_fit_move_together_before_they_leave_the_terminal() {
+        let mut table = Table::new(&[("a", Align::Right); 8]);
+        table.row(["123456789"; 8]);
+        let text = table.to_string();
+        assert!(text.lines().all(|line| line.len() == 79), "{text}");
+    }
+
+    #[test]
+    fn what_is_unbroken_stays_in_one_line_with_common_spaces() {
+        let list = [unbroken("q1 1.04 %"), unbroken("q2 0.134 %")].join(", ");
+        assert_eq!(flowed(&list, 15), ["q1 1.04 %,", "q2 0.134 %"]);
+    }
+
+    #[test]
+    fn later_lines_of_a_hanging_text_stand_below_it() {
+        let told = hanging("  1. ", &"word ".repeat(20), 5);
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines.len(), 2);
+        assert!(lines[0].starts_with("  1. word") && lines[1].starts_with("     word"));
+        assert!(lines.iter().all(|line| line.len() <= WIDTH));
+    }
+
+    #[test]
+    fn a_message_is_folded_and_a_path_in_it_stays_whole() {
+        let path = format!("/{}/log.csv", "folder".repeat(14));
+        let told = folded(&format!(
+            "error: no data\nhint: {} {path}\n",
+            "look ".repeat(20)
+        ));
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines[0], "error: no data");
+        assert!(lines[1].starts_with("hint: look") && lines[1].len() <= WIDTH);
+        assert!(lines[2].starts_with("  look"));
+        assert_eq!(lines[3].trim_start(), path);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What keeps a simulation from starting or ending.
 
 use crate::config::ConfigError;
+use crate::log::did_you_mean;
 use crate::robot::RobotError;
 
 /// Errors of the room `simulate`.
@@ -57,17 +58,26 @@ pub enum SimulateError {
     )]
     EffectSyntax { text: String, part: String },
     /// An effect that is not known.
-    #[error("there is no effect `{name}` in the simulator; it has {known}")]
+    #[error(
+        "there is no effect `{name}` in the simulator; {}it has {known}",
+        did_you_mean(name, known)
+    )]
     UnknownEffect { name: String, known: String },
     /// A key that the effect does not have.
-    #[error("effect `{effect}` has no key `{key}`; its keys are {known}")]
+    #[error(
+        "effect `{effect}` has no key `{key}`; {}its keys are {known}",
+        did_you_mean(key, known)
+    )]
     UnknownKey {
         effect: String,
         key: String,
         known: String,
     },
     /// A joint that the robot does not have.
-    #[error("the robot has no joint `{name}`; its joints are {known}")]
+    #[error(
+        "the robot has no joint `{name}`; {}its joints are {known}",
+        did_you_mean(name, known)
+    )]
     UnknownJoint { name: String, known: String },
     /// An effect that has nothing to sit on.
     #[error("effect `{effect}` has no place at {place}: {why}")]

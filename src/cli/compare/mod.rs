@@ -27,8 +27,8 @@ use crate::validate::{Reconstruction, Validation};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident compare before.toml after.toml
-  cft-ident compare a.toml b.toml unseen.csv --report compare.html";
+  cft-ident compare model.toml refined.toml
+  cft-ident compare model.toml refined.toml unseen.csv --report compare.html";
 
 /// Set two models of one robot side by side, and on the same logs.
 ///

@@ -91,7 +91,7 @@ pub fn error_table(tried: &Tried, machine: &Machine, logs: &str) -> Table {
         ("closer", Align::Left),
     ])
     .caption(&format!("relative torque error of {logs} [%], and its rms"));
-    let hundred = |x: f64| number::significant(100.0 * x, 3);
+    let hundred = number::hundredths;
     let cells = |a: f64, b: f64, d: &Difference| {
         let interval = d
             .interval_95

@@ -11,7 +11,7 @@ use crate::excite::usage::Use;
 use crate::excite::{Given, Motion};
 use crate::report::figure::{MotionFigure, MotionPanel};
 use crate::report::number;
-use crate::report::table::{Align, Table};
+use crate::report::table::{Align, Table, hanging, unbroken};
 
 /// Share of the torque's power that its band holds.
 const BAND: f64 = 0.99;
@@ -289,12 +289,13 @@ impl Judged {
             let bands: Vec<String> = joints
                 .iter()
                 .zip(band)
-                .map(|(joint, hz)| format!("{joint} {} Hz", number::significant(*hz, 2)))
+                .map(|(joint, hz)| unbroken(&format!("{joint} {} Hz", number::significant(*hz, 2))))
                 .collect();
-            text += &format!(
-                "99 % of the torque's power lies below: {}\n",
+            let told = format!(
+                "99 % of the torque's power lies below: {}",
                 bands.join(", ")
             );
+            text += &hanging("", &told, 2);
         }
         text
     }

@@ -33,7 +33,7 @@ use judge::{Friction, Judged, judge};
 const EXAMPLE: &str = "\
 Example:
   cft-ident excite -r configs/cft.toml -o excitation.toml --plot excitation.svg
-  cft-ident excite -r configs/cft.toml --joint q4 -o q4.toml
+  cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
   cft-ident excite --check configs/table3.toml";
 
 /// Design a motion for identification that keeps every limit, or check one that is there.

@@ -57,6 +57,20 @@ fn measured() -> Value {
     object(&[("value", number()), ("std", number()), ("unit", text())])
 }
 
+/// A file that was read, by its content.
+fn input() -> Value {
+    object(&[
+        ("name", text()),
+        ("span", maybe_text()),
+        (
+            "sha256",
+            json!({"type": "string", "pattern": "^[0-9a-f]{64}$"}),
+        ),
+        ("samples", count()),
+        ("duration_s", number()),
+    ])
+}
+
 fn processing() -> Value {
     object(&[("cutoff_hz", number()), ("decimation", number())])
 }
@@ -218,6 +232,103 @@ fn diagnose() -> Vec<(&'static str, Value)> {
     ]
 }
 
+fn compare() -> Vec<(&'static str, Value)> {
+    let model = object(&[
+        ("name", text()),
+        ("version", text()),
+        ("command", text()),
+        ("inputs", list(input())),
+    ]);
+    let side = || {
+        object(&[
+            ("value", number()),
+            ("std", number()),
+            ("verdict", verdict()),
+        ])
+    };
+    let parameter = object(&[
+        ("name", text()),
+        ("joint", maybe_text()),
+        ("theta", number()),
+        ("unit", text()),
+        ("a", side()),
+        ("b", side()),
+        ("difference", number()),
+        ("difference_std", number()),
+        ("deviation", number()),
+    ]);
+    let alone = || {
+        list(object(&[
+            ("name", text()),
+            ("joint", maybe_text()),
+            ("value", number()),
+            ("std", number()),
+            ("unit", text()),
+            ("reason", one_of(&["absent", "other-unit", "other-meaning"])),
+        ]))
+    };
+    let curve = object(&[
+        ("v", number()),
+        ("a", number()),
+        ("a_std", number()),
+        ("b", number()),
+        ("b_std", number()),
+    ]);
+    let friction = object(&[
+        ("joint", text()),
+        ("speed_unit", text()),
+        ("torque_unit", text()),
+        ("speeds_from", one_of(&["logs", "limits", "assumed"])),
+        ("curve", list(curve)),
+    ]);
+    let error = || {
+        object(&[
+            ("rmse", number()),
+            ("relative_error", number()),
+            ("relative_error_raw", number()),
+            ("max_abs", number()),
+            ("r2", number()),
+            ("samples", count()),
+        ])
+    };
+    let interval = || json!({"type": ["array", "null"], "items": number()});
+    let joint = object(&[
+        ("joint", text()),
+        ("unit", text()),
+        ("a", error()),
+        ("b", error()),
+        ("difference", number()),
+        ("interval_95", interval()),
+    ]);
+    let all = || {
+        object(&[
+            ("relative_error", number()),
+            ("mean_relative_error", number()),
+        ])
+    };
+    let overall = object(&[
+        ("a", all()),
+        ("b", all()),
+        ("difference", number()),
+        ("interval_95", interval()),
+    ]);
+    // without a log there is nothing to reconstruct
+    let mut logs = object(&[
+        ("joints", list(joint)),
+        ("overall", overall),
+        ("processing", processing()),
+    ]);
+    logs["type"] = json!(["object", "null"]);
+    vec![
+        ("models", list(model)),
+        ("parameters", list(parameter)),
+        ("only_in_a", alone()),
+        ("only_in_b", alone()),
+        ("friction", list(friction)),
+        ("logs", logs),
+    ]
+}
+
 fn inspect() -> Vec<(&'static str, Value)> {
     let channel = object(&[
         ("name", text()),
@@ -255,6 +366,7 @@ fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
         Kind::Lsq => ("lsq", lsq()),
         Kind::Validate => ("validate", validate()),
         Kind::Diagnose => ("diagnose", diagnose()),
+        Kind::Compare => ("compare", compare()),
         Kind::Inspect => ("inspect", inspect()),
         Kind::Identify => (
             "identify",
@@ -341,20 +453,10 @@ fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
 /// The schema of a command's document.
 pub(super) fn schema(kind: Kind) -> Value {
     let (command, own) = fields(kind);
-    let input = object(&[
-        ("name", text()),
-        ("span", maybe_text()),
-        (
-            "sha256",
-            json!({"type": "string", "pattern": "^[0-9a-f]{64}$"}),
-        ),
-        ("samples", count()),
-        ("duration_s", number()),
-    ]);
     let mut all = vec![
         ("schema", json!({"const": format!("cft-ident/{command}/1")})),
         ("version", text()),
-        ("inputs", list(input)),
+        ("inputs", list(input())),
         ("warnings", list(text())),
     ];
     all.extend(own);

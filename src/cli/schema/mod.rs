@@ -36,6 +36,8 @@ pub enum Kind {
     Validate,
     /// JSON document of `diagnose`
     Diagnose,
+    /// JSON document of `compare`
+    Compare,
     /// JSON document of `identify`
     Identify,
     /// JSON document of `excite`
