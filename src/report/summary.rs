@@ -39,7 +39,7 @@ pub fn parameters(caption: &str, rows: &[Parameter]) -> Table {
     }
     columns.extend([("value", Align::Decimal), ("std", Align::Decimal)]);
     if truths {
-        columns.extend([("truth", Align::Decimal), ("off by", Align::Decimal)]);
+        columns.extend([("truth", Align::Decimal), ("off [std]", Align::Decimal)]);
     }
     columns.extend([("unit", Align::Left), ("verdict", Align::Left)]);
     let mut table = Table::new(&columns).caption(caption);
@@ -58,7 +58,7 @@ pub fn parameters(caption: &str, rows: &[Parameter]) -> Table {
             cells.push(number::value_and_std(truth, row.std).0);
             let deviation = (row.value - truth) / row.std;
             cells.push(match deviation.is_finite() {
-                true => format!("{deviation:+.1} std"),
+                true => format!("{deviation:+.1}"),
                 false => ABSENT.into(),
             });
         }
@@ -147,10 +147,10 @@ mod tests {
         ];
         let expected = "\
 Friction
-joint  parameter  theta   value   std  truth    off by  unit   verdict
------  ---------  -----  ------  ----  -----  --------  -----  -----------
-q1     viscous       13   52.41  0.31  52.10  +1.0 std  N s/m  identified
-q1     slope_1       16  812.00     -      -         -  s/m    lower-bound
+joint  parameter  theta   value   std  truth  off [std]  unit   verdict
+-----  ---------  -----  ------  ----  -----  ---------  -----  -----------
+q1     viscous       13   52.41  0.31  52.10       +1.0  N s/m  identified
+q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
 ";
         assert_eq!(parameters("Friction", &rows).to_string(), expected);
         let plain = Parameter {

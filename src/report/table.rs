@@ -307,14 +307,16 @@ fn flowed(text: &str, width: usize) -> Vec<String> {
         .collect()
 }
 
-/// The same for the cell of a table: a word that is longer is cut.
+/// The same for the cell of a table: a word that is longer is cut, after a part of it where one ends.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for line in flowed(text, width) {
         let mut rest = line.as_str();
         while let Some((end, _)) = rest.char_indices().nth(width.max(1)) {
-            lines.push(rest[..end].to_owned());
-            rest = &rest[end..];
+            let part = rest[..end].rfind(['_', '/', '.', '-']).map(|at| at + 1);
+            let (line, after) = rest.split_at(part.unwrap_or(end));
+            lines.push(line.to_owned());
+            rest = after;
         }
         lines.push(rest.to_owned());
     }
@@ -392,6 +394,7 @@ slope_2       16         -
     fn a_word_longer_than_its_column_is_cut_and_kept_whole_in_sum() {
         assert_eq!(wrapped("ab cdefgh i", 3), ["ab", "cde", "fgh", "i"]);
         assert_eq!(wrapped("", 3), [""]);
+        assert_eq!(wrapped("tau_elbow_joint", 11), ["tau_elbow_", "joint"]);
     }
 
     #[test]
