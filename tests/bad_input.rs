@@ -440,3 +440,17 @@ fn data_that_determine_nothing_end_with_status_4_and_write_nothing() {
     let line = "friction still.csv -r slide.toml --joint slide -o out.toml";
     bench.refuses(line, 4, &words);
 }
+
+#[test]
+fn a_one_joint_log_that_the_friction_filter_cannot_hold_is_refused_with_a_span_to_take() {
+    let bench = Bench::new();
+    let mut text = String::from("t,q_slide,tau_slide\n");
+    for k in 0..2_000_001_u32 {
+        let there = k % 2000;
+        let q = if there < 1000 { there } else { 2000 - there };
+        let _ = writeln!(text, "{}.{:03},{q},{}", k / 1000, k % 1000, 7 * k % 1001);
+    }
+    bench.file("long.csv", &text);
+    let words = ["long.csv: more than 2000000 rows", "FILE@0..600s"];
+    bench.refuses("friction long.csv -r slide.toml -o f.toml", 3, &words);
+}

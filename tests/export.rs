@@ -1,7 +1,7 @@
 //! Exported models give the torques of the model: the C header as cc compiles it, the Rust module as
 //! rustc does, the URDF as it is read back.
 
-use cft_ident::config::model_file::{ModelProvenance, Parameter};
+use cft_ident::config::model_file::{LinkBody, ModelProvenance, Parameter};
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::export::{self, Note, Program};
 use cft_ident::robot::Robot;
@@ -412,6 +412,147 @@ fn a_urdf_with_its_side_file_is_the_same_model() {
         let alone = ModelFile::parse("alone.toml", &back.to_toml().unwrap()).unwrap();
         assert_eq!(alone.model("alone.toml").unwrap(), again);
     }
+}
+
+/// Writes URDF and side file, and reads the side file back.
+fn there_and_back(file: &ModelFile, model: &Model) -> (String, ModelFile) {
+    let folder = tempfile::tempdir().unwrap();
+    let made = export::urdf::urdf(file, model, "arm.urdf", &[]).unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), &made.urdf).unwrap();
+    std::fs::write(folder.path().join("arm.toml"), &made.side).unwrap();
+    let back = ModelFile::load(&folder.path().join("arm.toml")).unwrap();
+    (made.urdf, back)
+}
+
+#[test]
+fn links_of_a_feasible_fit_go_into_the_urdf_as_they_are() {
+    let panda = include_str!("../configs/panda.toml");
+    let panda = RobotFile::parse("panda.toml", panda).unwrap();
+    let mut model = model(panda.robot(), false, 9);
+    let Robot::Serial(robot) = &model.robot else {
+        panic!("a serial robot");
+    };
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(31));
+    let links: Vec<LinkBody> = robot
+        .chain()
+        .links()
+        .iter()
+        .map(|link| LinkBody {
+            name: link.name.clone(),
+            mass: 2.0 + draw.one(1.0),
+            centre: std::array::from_fn(|_| draw.one(0.1)),
+            inertia: [0.03, draw.one(0.002), 0.0, 0.04, draw.one(0.002), 0.05],
+        })
+        .collect();
+    let mut standard: Vec<f64> = links
+        .iter()
+        .flat_map(|l| {
+            let body = Body {
+                mass: l.mass,
+                centre: l.centre,
+                inertia: l.inertia,
+            };
+            body.standard()
+        })
+        .collect();
+    let mut drives = std::collections::BTreeMap::new();
+    if robot.drive_inertia() {
+        for name in robot.names() {
+            drives.insert(name.clone(), 0.2 + draw.one(0.1));
+            standard.push(drives[name]);
+        }
+    }
+    model.theta = robot.base_of(&standard);
+    let mut file = file_of(panda, &model);
+    file.links = links.clone();
+    file.drive_inertia = drives;
+    let (urdf, back) = there_and_back(&file, &model);
+    assert!(
+        urdf.contains("of links that can exist and give the"),
+        "{urdf}"
+    );
+    for (link, found) in links.iter().zip(&back.robot.robot.link) {
+        let found = found.inertial.as_ref().unwrap();
+        assert!((found.mass - link.mass).abs() < 1e-9, "{}", link.name);
+        for (x, y) in found.centre.iter().zip(&link.centre) {
+            assert!((x - y).abs() < 1e-9, "{}", link.name);
+        }
+        for (x, y) in found.inertia.iter().zip(&link.inertia) {
+            assert!((x - y).abs() < 1e-9, "{}", link.name);
+        }
+    }
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+    // parameters that were changed since: the torques are theirs, and the head says so
+    model.theta[0] *= 1.1;
+    let changed = ModelFile {
+        parameters: file_of(file.robot.clone(), &model).parameters,
+        ..file
+    };
+    let (urdf, back) = there_and_back(&changed, &model);
+    assert!(urdf.contains("changed after they were found"), "{urdf}");
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn frames_that_are_fixed_to_links_are_kept() {
+    let mut model = model(gantry().robot(), false, 9);
+    model.theta = bodies(&model, 13);
+    let file = file_of(gantry(), &model);
+    let frame = |file: &ModelFile, name: &str| {
+        let frames = &file.robot.robot.frame;
+        frames.iter().find(|f| f.name == name).cloned().unwrap()
+    };
+    let names: Vec<&str> = file
+        .robot
+        .robot
+        .frame
+        .iter()
+        .map(|f| f.name.as_str())
+        .collect();
+    assert_eq!(names, ["motor", "hand"]);
+    let hand = frame(&file, "hand");
+    assert_eq!(hand.link, "fore");
+    assert_eq!((hand.xyz, hand.rpy), ([0.0, -0.3, 0.01], [0.0, 0.3, 0.0]));
+    let (urdf, back) = there_and_back(&file, &model);
+    assert!(urdf.contains("<link name=\"hand\"/>"), "{urdf}");
+    assert_eq!(back.robot.robot.frame, file.robot.robot.frame);
+    // and the frames of a model file of its own, without the URDF
+    let alone = ModelFile::parse("alone.toml", &file.to_toml().unwrap()).unwrap();
+    assert_eq!(alone.robot.robot.frame, file.robot.robot.frame);
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn a_single_joint_is_a_chain_of_one_link_that_can_be() {
+    for kind in ["prismatic", "revolute"] {
+        let text = format!(
+            "[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"{kind}\"\n\
+             [limits.x]\nposition = [-1.0, 2.0]\n"
+        );
+        let robot = RobotFile::parse("robot.toml", &text).unwrap();
+        let mut model = model(robot.robot(), false, 6);
+        model.theta = vec![0.37];
+        let (urdf, back) = there_and_back(&file_of(robot, &model), &model);
+        assert!(
+            urdf.contains(&format!("<joint name=\"x\" type=\"{kind}\">")),
+            "{urdf}"
+        );
+        let body = back.robot.robot.link[0].inertial.clone().unwrap();
+        assert!(body.mass > 0.0 && body.inertia[0] > 0.0, "{body:?}");
+        let again = back.model("arm.toml").unwrap();
+        assert_eq!(again.robot.joint_names(), ["x"]);
+        let worst = difference(&model, &again);
+        assert!(worst < 1e-12, "{kind}: {worst:e}");
+    }
+    let current = "[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"revolute\"\n\
+                   [log.joint.x]\ntorque_unit = \"A\"\n";
+    let robot = RobotFile::parse("robot.toml", current).unwrap();
+    let model = model(robot.robot(), false, 6);
+    let error = export::urdf::urdf(&file_of(robot, &model), &model, "a.urdf", &[]).unwrap_err();
+    assert!(error.to_string().contains("torque_scale"), "{error}");
 }
 
 #[test]

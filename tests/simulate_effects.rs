@@ -10,6 +10,8 @@ mod load_and_memory;
 mod missing;
 #[path = "simulate_effects/orders.rs"]
 mod orders;
+#[path = "simulate_effects/serial.rs"]
+mod serial;
 #[path = "simulate_effects/static_torques.rs"]
 mod static_torques;
 

@@ -2,6 +2,8 @@
 
 use cft_ident::config::{RobotFile, UrdfChain};
 use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -282,6 +284,143 @@ const PIECES: [&str; 18] = [
     "<axis xyz=\"0 1 0\"/>",
     "<!--",
 ];
+
+/// What stands where a word of a good file stood.
+const WORDS: [&str; 26] = [
+    "",
+    " ",
+    "0",
+    "-0",
+    "1",
+    "-1",
+    "1e-320",
+    "1e308",
+    "-1e308",
+    "1e999",
+    "nan",
+    "inf",
+    "0x1",
+    "1 2",
+    "1 2 3",
+    "1 2 3 4",
+    "stand",
+    "world",
+    "elbow",
+    "hand",
+    "base",
+    "revolute",
+    "prismatic",
+    "fixed",
+    "floating",
+    "\u{1F980}\u{301}",
+];
+
+/// A good file with some of its words, lines and letters changed.
+fn mutated(good: &str, draw: &mut ChaCha8Rng) -> String {
+    let mut text = good.to_owned();
+    for _ in 0..draw.random_range(1..5) {
+        let edges: Vec<usize> = text
+            .char_indices()
+            .filter(|(_, c)| matches!(c, '"' | '<' | '>' | '=' | ' ' | '/'))
+            .map(|(at, _)| at)
+            .collect();
+        if edges.len() < 4 {
+            break;
+        }
+        let first = draw.random_range(0..edges.len() - 1);
+        let word = edges[first] + 1..edges[first + 1];
+        let lines: Vec<&str> = text.lines().collect();
+        let mut line = || draw.random_range(0..lines.len());
+        let (from, to) = (line(), line());
+        match draw.random_range(0..10) {
+            0..5 => text.replace_range(word, WORDS[draw.random_range(0..WORDS.len())]),
+            5 => {
+                // a line somewhere else, and where it was
+                let mut out = lines.clone();
+                out.insert(to, lines[from]);
+                text = out.join("\n");
+            }
+            6 => {
+                let mut out = lines.clone();
+                out.remove(from);
+                text = out.join("\n");
+            }
+            7 => {
+                let mut out = lines.clone();
+                out.swap(from, to);
+                text = out.join("\n");
+            }
+            8 => {
+                // as many levels as there are lines
+                let many = "<link name=\"deep\">".repeat(draw.random_range(1..2000));
+                text.insert_str(edges[first], &many);
+            }
+            _ => {
+                let letter = char::from(draw.random_range(0..128_u8));
+                text.insert(edges[first], letter);
+            }
+        }
+    }
+    text
+}
+
+/// Reads a mutated file as a URDF, as a robot, and back; whether it was a robot.
+fn read(text: &str, folder: &Path) -> bool {
+    let chain = match UrdfChain::parse("r.urdf", text, None) {
+        Ok(chain) => chain,
+        Err(error) => {
+            let said = error.to_string();
+            assert!(said.starts_with("r.urdf:"), "{said}");
+            assert!(said.len() < 2000, "{said}");
+            return false;
+        }
+    };
+    assert!(!chain.links.is_empty());
+    let _ = UrdfChain::parse("r.urdf", text, chain.links[0].name.as_deref());
+    std::fs::write(folder.join("r.urdf"), text).unwrap();
+    let robot = "[robot]\nmodel = \"serial\"\nurdf = \"r.urdf\"\n";
+    let file = match RobotFile::parse_in("r.toml", robot, Some(folder)) {
+        Ok(file) => file,
+        Err(error) => {
+            let said = error.to_string();
+            assert!(said.starts_with("r.toml:") && said.contains("; "), "{said}");
+            return false;
+        }
+    };
+    let robot = file.robot();
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let mut y = vec![0.0; n * p];
+    robot.regressor(&vec![0.1; n], &vec![0.2; n], &vec![0.3; n], &mut y);
+    // without the URDF the file is the same robot
+    let again = toml::to_string(&file).unwrap();
+    assert_eq!(RobotFile::parse("r.toml", &again).unwrap(), file);
+    true
+}
+
+/// Mutations that are tried; `URDF_MUTATIONS` in the environment asks for more.
+#[test]
+fn no_mutation_of_a_good_file_panics_and_what_is_read_is_a_robot() {
+    let asked = std::env::var("URDF_MUTATIONS").ok();
+    let count: u64 = asked.and_then(|n| n.parse().ok()).unwrap_or(3000);
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = [
+        include_str!("../fixtures/urdf/gantry.urdf").to_owned(),
+        arm(""),
+    ];
+    assert!(seeds.iter().all(|seed| read(seed, folder.path())));
+    let mut robots = 0;
+    for seed in 0..count {
+        let mut draw = ChaCha8Rng::seed_from_u64(seed);
+        let text = mutated(&seeds[usize::from(seed % 4 == 0)], &mut draw);
+        let result = std::panic::catch_unwind(|| read(&text, folder.path()));
+        match result {
+            Ok(robot) => robots += u64::from(robot),
+            Err(_) => panic!("mutation {seed}:\n{text}"),
+        }
+    }
+    eprintln!("{robots} of {count} are robots");
+    assert!(robots > count / 10 && robots < count, "{robots} of {count}");
+}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]

@@ -35,7 +35,7 @@ pub struct Args {
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// URDF to write, with FILE.toml beside it (serial robots)
+    /// URDF to write, with FILE.toml beside it (serial robots and single joints)
     #[arg(long, value_name = "FILE.urdf", group = "into", value_parser = arguments::urdf_file)]
     pub urdf: Option<PathBuf>,
     /// C99 header to write

@@ -2,12 +2,12 @@
 
 use serde_json::{Value, json};
 
-use super::lsq::Identified;
+use super::lsq::{Identified, Unknown};
 use super::machine::Machine;
 use crate::motion::Summary;
 use crate::report::table::{hanging, unbroken};
 use crate::report::{number, summary};
-use crate::verdict::{IDENTIFIED, Verdict};
+use crate::verdict::{IDENTIFIED, Verdict, WEAK};
 
 /// The JSON fields of the command.
 pub fn json(machine: &Machine, found: &Identified) -> Value {
@@ -130,6 +130,32 @@ impl Identified {
     }
 }
 
+/// What rank and verdicts say together, where a parameter is called not identifiable: that no torque
+/// tells of it, or that what tells of it drowns in the noise.
+fn open_directions(found: &Identified) -> String {
+    let unknowns = &found.unknowns;
+    let named = |u: &&Unknown| u.verdict == Verdict::NotIdentifiable;
+    let all = unknowns.iter().filter(named).count();
+    let missing = unknowns.len().saturating_sub(found.fit.rank);
+    if all == 0 {
+        return String::new();
+    }
+    let noise = format!(
+        "a standard deviation above {:.0} % of the value",
+        100.0 * WEAK
+    );
+    let why = match missing {
+        0 => format!(
+            "the torques tell of every combination; {all} not-identifiable are so for their noise, with {noise}"
+        ),
+        _ => format!(
+            "the torques tell nothing of {missing} combinations; the {all} not-identifiable are in these, or have \
+             {noise}"
+        ),
+    };
+    hanging("", &why, 2)
+}
+
 /// Condition, rank, independent rows and residual of the fit, and what is essential.
 pub fn quality(machine: &Machine, found: &Identified) -> String {
     let fit = &found.fit;
@@ -144,6 +170,7 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
         fit.effective_rows,
     );
     let mut out = hanging("", &told, 2);
+    out += &open_directions(found);
     let errors: Vec<String> = (0..machine.robot.joints())
         .map(|j| {
             unbroken(&format!(

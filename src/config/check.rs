@@ -42,6 +42,7 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             ("tip", robot.tip.is_some()),
             ("coupling", !robot.coupling.is_empty()),
             ("link", !robot.link.is_empty()),
+            ("frame", !robot.frame.is_empty()),
         ] {
             if given {
                 return Err(foreign(key, "serial"));

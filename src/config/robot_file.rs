@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::log_section::LogSection;
-use super::serial_section::{CouplingSection, LinkSection};
+use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::robot::cft::{self, Setup, Structure};
 use crate::robot::{JointKind, Robot};
 
@@ -59,6 +59,9 @@ pub struct RobotSection {
     /// Moving links of a serial chain, from the base outward.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub link: Vec<LinkSection>,
+    /// Frames that are fixed to them and carry nothing, for exports.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub frame: Vec<FrameSection>,
 }
 
 /// `[friction] law`.

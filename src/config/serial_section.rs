@@ -1,6 +1,6 @@
 //! The parts of `[robot]` that describe a serial chain: `[[robot.link]]` and `[[robot.coupling]]`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -110,6 +110,22 @@ pub struct LinkSection {
     /// Prior of its mass properties.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inertial: Option<InertialSection>,
+}
+
+/// A frame that is fixed to a moving link and carries nothing: a flange, a tool, a camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FrameSection {
+    /// Name of the frame.
+    pub name: String,
+    /// Name of the link that it is fixed to.
+    pub link: String,
+    /// Position in the link's frame \[m\].
+    #[serde(default)]
+    pub xyz: [f64; 3],
+    /// Roll, pitch and yaw in the link's frame \[rad\].
+    #[serde(default)]
+    pub rpy: [f64; 3],
 }
 
 /// Two joints whose gear trains are coupled: the motor of the first turns with the second too.
@@ -363,7 +379,7 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
         super::check::plain_name(document, &["robot", "model"], &name)?;
     }
     match section.serial() {
-        Ok(_) => Ok(()),
+        Ok(_) => frames(section, document),
         Err(misfit) => {
             let index = misfit.link.map(|i| i.to_string());
             let path = match &index {
@@ -373,4 +389,41 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
             Err(document.value(&path, &misfit.problem, &misfit.remedy))
         }
     }
+}
+
+/// Refuses frames that hang on nothing or share a name.
+fn frames(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
+    let links = section.link_names();
+    let mut taken: BTreeSet<&str> = links.iter().map(String::as_str).collect();
+    taken.insert(BASE);
+    for (i, frame) in section.frame.iter().enumerate() {
+        let index = i.to_string();
+        let at = |key| ["robot", "frame", index.as_str(), key];
+        if !links.contains(&frame.link) {
+            let near = nearest(&frame.link, links.iter().map(String::as_str));
+            let remedy = match near {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!(
+                    "the links are {}",
+                    list(links.iter().map(String::as_str).take(20))
+                ),
+            };
+            return Err(document.value(&at("link"), "is no moving link of this robot", &remedy));
+        }
+        if !taken.insert(&frame.name) {
+            let remedy = "give each frame a name of its own";
+            return Err(document.value(
+                &at("name"),
+                "is the name of a link or frame before it",
+                remedy,
+            ));
+        }
+        let finite = |x: &[f64; 3]| x.iter().all(|x| x.is_finite());
+        for (key, numbers) in [("xyz", &frame.xyz), ("rpy", &frame.rpy)] {
+            if !finite(numbers) {
+                return Err(document.value(&at(key), "is not finite", "give three numbers"));
+            }
+        }
+    }
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Family, Kind, Place, Role, Scene, Unit, kind};
+use super::{Family, Kind, Place, Role, Scene, Unit, kind_on};
 use crate::robot::Robot;
 
 /// Why an effect of a model file cannot be used.
@@ -70,9 +70,9 @@ impl Added {
         joint: Option<&str>,
         values: &BTreeMap<String, f64>,
     ) -> Result<Self, EffectError> {
-        let kind = kind(name).ok_or_else(|| EffectError::Unknown {
+        let kind = kind_on(robot, name).ok_or_else(|| EffectError::Unknown {
             name: name.to_owned(),
-            known: list(super::KINDS.iter().map(|k| k.name)),
+            known: list(super::names()),
         })?;
         let keys = kind.shape.iter().chain(kind.linear).map(|k| k.name);
         let get = |key: &str| -> Result<f64, EffectError> {
@@ -110,6 +110,22 @@ impl Added {
                 (vec![sigma0 / fc], vec![fc, get("sigma1")?])
             }
             "elasticity" => (Vec::new(), vec![1.0 / get("stiffness")?]),
+            "payload" if !kind.shape.is_empty() => {
+                let mass = get("mass")?;
+                if mass == 0.0 {
+                    return Err(EffectError::Value {
+                        name: name.to_owned(),
+                        key: "mass".to_owned(),
+                        value: mass,
+                    });
+                }
+                let own = values.get("inertia").map_or(Ok(0.0), |_| get("inertia"))?;
+                let centre = ["mx", "my", "mz"].map(|key| get(key).map(|moment| moment / mass));
+                (
+                    centre.into_iter().collect::<Result<_, _>>()?,
+                    vec![mass, own],
+                )
+            }
             "payload" => {
                 let [mass, mx, my, mz] = [get("mass")?, get("mx")?, get("my")?, get("mz")?];
                 // a point where nothing is said of its extent
@@ -249,6 +265,18 @@ impl Added {
                     vec![-1.0 / (c * c)],
                     Unit::Stiffness,
                 ));
+            }
+            "payload" if !self.shape.is_empty() => {
+                let mass = self.linear[0];
+                out.push(told("mass", mass, unit_vector(3), Unit::Text("kg")));
+                for (i, key) in ["mx", "my", "mz"].into_iter().enumerate() {
+                    let mut slopes = unit_vector(i);
+                    slopes[i] = mass;
+                    slopes[3] = self.shape[i];
+                    out.push(told(key, mass * self.shape[i], slopes, Unit::Text("kg m")));
+                }
+                let unit = Unit::Text("kg m^2");
+                out.push(told("inertia", self.linear[1], unit_vector(4), unit));
             }
             "payload" => {
                 let [mass, mx, _, mz, second] = [0, 1, 2, 3, 4].map(|i| self.linear[i]);

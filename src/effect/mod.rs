@@ -9,6 +9,7 @@ mod actuator_friction;
 mod added;
 mod asymmetric_friction;
 mod backlash;
+mod carried;
 mod counterbalance;
 mod coupling;
 mod cover;
@@ -286,13 +287,29 @@ pub const KINDS: &[&Kind] = &[
     &coupling::KIND,
     &elasticity::KIND,
     &payload::KIND,
+    &carried::KIND,
     &warm_up::KIND,
     &drift::KIND,
 ];
 
-/// The kind of a name.
+/// The kind of a name: the first, where robots of several kinds have one each.
 pub fn kind(name: &str) -> Option<&'static Kind> {
     KINDS.iter().find(|k| k.name == name).copied()
+}
+
+/// The kind of a name on a robot: that with the robot's own columns where there are several.
+pub fn kind_on(robot: &Robot, name: &str) -> Option<&'static Kind> {
+    match (name, robot) {
+        ("payload", Robot::Serial(_)) => Some(&carried::KIND),
+        _ => kind(name),
+    }
+}
+
+/// Names of all effects, each once.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    let repeated = |i: usize| i > 0 && KINDS[i - 1].name == KINDS[i].name;
+    let kinds = KINDS.iter().enumerate();
+    kinds.filter_map(move |(i, kind)| (!repeated(i)).then_some(kind.name))
 }
 
 /// Whether a periodic effect's order can be that of its place; see `ripple`.
@@ -303,11 +320,6 @@ pub fn order_is_whole(cover: &Cover, place: Place, order: f64) -> bool {
 /// Every joint.
 fn every_joint(robot: &Robot, _: &[JointFriction]) -> Vec<Place> {
     (0..robot.joints()).map(Place::Joint).collect()
-}
-
-/// All joints as one.
-fn all_joints(_: &Robot, _: &[JointFriction]) -> Vec<Place> {
-    vec![Place::All]
 }
 
 /// An effect without a shape fits any data.

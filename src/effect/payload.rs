@@ -1,13 +1,14 @@
-//! `payload`: a body on the last link: mass, first moments, and its second moment about the vertical
-//! axis of the link's frame, about which alone a tool that stays level turns. A fit whose logs carried it
-//! absorbs it: it is looked for only with the model held.
+//! `payload` of the CFT robot and of a single joint: a body on the last link: mass, first moments, and its
+//! second moment about the vertical axis of the link's frame, about which alone a tool that stays level
+//! turns. A fit whose logs carried it absorbs it: it is looked for only with the model held.
 
-use super::{Family, Key, Kind, Role, Unit, all_joints, no_limits, no_shape};
+use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
 use crate::robot::Robot;
 use crate::robot::cft::links::{PseudoInertia, base_parameters};
 use crate::robot::cft::regressor::regressor22;
-use crate::robot::serial::chain::MOST_JOINTS;
-use crate::robot::serial::newton_euler::walk;
+
+/// What parts a payload from the inertias that a fit finds.
+pub(super) const SEPARATE_BY: &str = "identify unloaded, then diagnose loaded logs with --keep";
 
 pub const KIND: Kind = Kind {
     name: "payload",
@@ -22,7 +23,10 @@ pub const KIND: Kind = Kind {
         // told, in files and tables, as that about the body's own centre
         Key::new("inertia", Unit::Text("kg m^2")),
     ],
-    places: all_joints,
+    places: |robot, _| match robot {
+        Robot::Serial(_) => Vec::new(),
+        Robot::Cft(_) | Robot::SingleJoint(_) => vec![Place::All],
+    },
     starts: no_shape,
     limits: no_limits,
     columns: |scene, _, _, joint, out| {
@@ -41,25 +45,10 @@ pub const KIND: Kind = Kind {
                 }
             }
             Robot::SingleJoint(_) => out[0].copy_from_slice(&s.a[joint]),
-            Robot::Serial(robot) => {
-                let n = robot.chain().joints();
-                let mut state = [[0.0; MOST_JOINTS]; 3];
-                let last = robot.chain().links().len() - 1;
-                for k in 0..s.len() {
-                    let [q, v, a] = &mut state;
-                    s.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
-                    walk(robot.chain(), &*q, &*v, &*a, |link, on, row| {
-                        if link == last && on == joint {
-                            for (column, c) in out.iter_mut().zip([9, 6, 7, 8]) {
-                                column[k] = row[c];
-                            }
-                        }
-                    });
-                }
-            }
+            Robot::Serial(_) => {}
         }
     },
-    separate_by: "identify unloaded, then diagnose loaded logs with --keep",
+    separate_by: SEPARATE_BY,
 };
 
 /// Base parameters of a unit mass, unit first moments and a unit second moment along x in the frame of

@@ -7,6 +7,7 @@
 //! | [`header`] | the C99 header |
 //! | [`module`] | the Rust module |
 //! | [`standard`] | standard parameters of links from base parameters |
+//! | `single` | a single joint as a chain of one link |
 //! | [`urdf`] | the URDF, and what it cannot hold beside it |
 
 mod code;
@@ -14,6 +15,7 @@ pub mod header;
 pub mod module;
 pub mod note;
 pub mod program;
+mod single;
 pub mod standard;
 pub mod urdf;
 

@@ -30,14 +30,27 @@ pub const UNTOLD_MASS: f64 = 1.0;
 pub struct Standard {
     pub values: Vec<f64>,
     pub told: Vec<Told>,
+    /// Whether the priors give these torques as they are.
+    pub is_prior: bool,
 }
 
-/// The standard parameters nearest to the priors of the links that give these base parameters.
-/// Without a prior a link is 1 kg in its origin.
-pub fn nearest(robot: &SerialRobot, theta: &[f64], priors: &[Option<InertialSection>]) -> Standard {
+/// A change below this share of the largest number is rounding.
+const SAME: f64 = 1e-9;
+
+/// The standard parameters nearest to the priors of the links and drives that give these base
+/// parameters. Without a prior a link is 1 kg in its origin, and a drive has no inertia.
+pub fn nearest(
+    robot: &SerialRobot,
+    theta: &[f64],
+    priors: &[Option<InertialSection>],
+    drives: &[f64],
+) -> Standard {
     let p = robot.standard_parameters();
     let links = robot.chain().links().len();
     let mut x = DVector::zeros(p);
+    for (x, drive) in x.iter_mut().skip(links * STANDARD).zip(drives) {
+        *x = *drive;
+    }
     for link in 0..links {
         match priors.get(link).and_then(Option::as_ref) {
             Some(prior) => {
@@ -48,6 +61,7 @@ pub fn nearest(robot: &SerialRobot, theta: &[f64], priors: &[Option<InertialSect
             None => x[link * STANDARD + STANDARD - 1] = UNTOLD_MASS,
         }
     }
+    let prior = x.clone();
     let groupings = robot.groupings();
     let mut b = DMatrix::zeros(groupings.len(), p);
     for (row, grouping) in groupings.iter().enumerate() {
@@ -77,8 +91,10 @@ pub fn nearest(robot: &SerialRobot, theta: &[f64], priors: &[Option<InertialSect
             };
         }
     }
+    let moved = (&x - &prior).amax() / prior.amax().max(f64::MIN_POSITIVE);
     Standard {
         values: x.iter().copied().collect(),
         told,
+        is_prior: moved < SAME,
     }
 }

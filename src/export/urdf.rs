@@ -1,12 +1,14 @@
 //! The URDF of an identified chain, and a model file beside it that holds what a URDF cannot.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::ExportError;
 use super::standard::{Standard, Told, nearest};
+use super::{ExportError, single};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::CoordinateLimits;
+use crate::config::serial_section::InertialSection;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::serial::space::roll_pitch_yaw;
 use crate::robot::serial::{Coordinate, Link, STANDARD_NAMES, SerialRobot};
@@ -35,47 +37,47 @@ pub fn urdf(
         Robot::Serial(robot) => robot,
         Robot::Cft(_) => {
             return Err(ExportError::NotInUrdf {
-                what: "the pantograph, whose q3 = d + L4 sin(q4 + q5) + L4 sin q4".to_owned(),
+                what: "the pantograph: its q3 = d + L4 sin(q4 + q5) + L4 sin q4 is no multiple of another \
+                       joint, which is all that <mimic> can say"
+                    .to_owned(),
                 remedy: "export it with --c or --rust",
             });
         }
-        Robot::SingleJoint(_) => {
-            return Err(ExportError::NotInUrdf {
-                what: "a single joint without a link".to_owned(),
-                remedy: "export it with --c or --rust",
-            });
+        Robot::SingleJoint(joint) => {
+            let (file, model) = single::chain(file, model, joint.kind)?;
+            return urdf(&file, &model, urdf_name, notes);
         }
     };
-    let priors: Vec<_> = file
-        .robot
-        .robot
-        .link
-        .iter()
-        .map(|l| l.inertial.clone())
-        .collect();
-    let standard = nearest(robot, &model.theta, &priors);
+    let found = feasible(file, robot);
+    let (priors, drives) = match &found {
+        Some((bodies, drives)) => (bodies.clone(), drives.as_slice()),
+        None => {
+            let links = file.robot.robot.link.iter();
+            (links.map(|l| l.inertial.clone()).collect(), &[][..])
+        }
+    };
+    let standard = nearest(robot, &model.theta, &priors, drives);
+    let of_inertials = match (&found, standard.is_prior) {
+        (Some(_), true) => &FEASIBLE[..],
+        (Some(_), false) => &NEAR_FEASIBLE,
+        (None, _) => &NEAREST,
+    };
     let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
-    for line in notes.iter().map(String::as_str).chain([
-        "",
-        "Inertials: of all that give the identified torques, those nearest to the prior of the robot",
-        "file (1 kg in the origin of a link that has none). What stands over each link says which of",
-        "its numbers the data determine; the others are no measurement. They need not be those of a",
-        "body that can be. Drive inertias, couplings, friction and offsets are in the file beside",
-        "this one; damping and friction here repeat viscous and Coulomb friction where that is the law.",
-        "A limit of 0 is one that is not known.",
-    ]) {
+    let lines = notes.iter().map(String::as_str).chain([""]);
+    for line in lines.chain(of_inertials.iter().copied()).chain(IN_GENERAL) {
         // two hyphens would end the comment early
         let _ = writeln!(out, "  {}", line.replace("--", "- -"));
     }
     let _ = writeln!(
         out,
         "-->\n<robot name=\"identified\">\n  <link name=\"{}\"/>",
-        root(robot)
+        root(robot, file)
     );
     for (i, link) in robot.chain().links().iter().enumerate() {
         joint(&mut out, robot, model, file, i, link)?;
         body(&mut out, i, link, &standard)?;
     }
+    frames(&mut out, robot, file);
     out.push_str("</robot>\n");
     Ok(Exported {
         urdf: out,
@@ -83,10 +85,88 @@ pub fn urdf(
     })
 }
 
+/// What the head says of inertials that are nearest to the robot file's.
+const NEAREST: [&str; 3] = [
+    "Inertials: of all that give the identified torques, those nearest to the prior of the robot",
+    "file (1 kg in the origin of a link that has none). They need not be those of a body that can",
+    "be: `lsq --feasible` finds links that can.",
+];
+/// Of those of a feasible fit.
+const FEASIBLE: [&str; 2] = [
+    "Inertials: those of the [[link]] tables of the model, of links that can exist and give the",
+    "identified torques, as `lsq --feasible` found them.",
+];
+/// Of a feasible fit whose parameters were changed afterwards.
+const NEAR_FEASIBLE: [&str; 3] = [
+    "Inertials: of all that give the torques of the model's parameters, those nearest to its",
+    "[[link]] tables, which give other torques: the parameters were changed after they were found.",
+    "They need not be those of a body that can be.",
+];
+/// Of everything.
+const IN_GENERAL: [&str; 4] = [
+    "What stands over each link says which of its numbers the data determine; the others are no",
+    "measurement. Drive inertias, couplings, friction and offsets are in the file beside this one;",
+    "damping and friction here repeat viscous and Coulomb friction where that is the law. Inertia",
+    "of fixed frames is in the link that they hang on. A limit of 0 is one that is not known.",
+];
+
+/// Bodies and drives of a feasible fit, where the model has them for every link.
+fn feasible(
+    file: &ModelFile,
+    robot: &SerialRobot,
+) -> Option<(Vec<Option<InertialSection>>, Vec<f64>)> {
+    let bodies = robot.chain().links().iter().map(|link| {
+        let body = file.links.iter().find(|body| body.name == link.name)?;
+        Some(InertialSection {
+            mass: body.mass,
+            centre: body.centre,
+            inertia: body.inertia,
+        })
+    });
+    let bodies: Vec<Option<InertialSection>> = bodies.collect();
+    let drives = match robot.drive_inertia() {
+        true => {
+            let names = robot.names().iter();
+            names
+                .map(|name| file.drive_inertia.get(name).copied())
+                .collect()
+        }
+        false => Some(Vec::new()),
+    };
+    bodies
+        .iter()
+        .all(Option::is_some)
+        .then_some((bodies, drives?))
+}
+
+/// Frames that are fixed to links, each as a link without inertia.
+fn frames(out: &mut String, robot: &SerialRobot, file: &ModelFile) {
+    let mut taken: BTreeSet<String> = robot.names().iter().cloned().collect();
+    for frame in &file.robot.robot.frame {
+        let mut joint = format!("{}_fixed", frame.name);
+        while !taken.insert(joint.clone()) {
+            joint.push_str("_frame");
+        }
+        let _ = write!(
+            out,
+            "\n  <joint name=\"{}\" type=\"fixed\">\n    <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    \
+             <origin xyz=\"{}\" rpy=\"{}\"/>\n  </joint>\n  <link name=\"{2}\"/>\n",
+            quoted(&joint),
+            quoted(&frame.link),
+            quoted(&frame.name),
+            words(&frame.xyz),
+            words(&frame.rpy),
+        );
+    }
+}
+
 /// Name of the link that stands still.
-fn root(robot: &SerialRobot) -> String {
+fn root(robot: &SerialRobot, file: &ModelFile) -> String {
     let mut name = "base".to_owned();
-    while robot.chain().links().iter().any(|l| l.name == name) {
+    let frames = &file.robot.robot.frame;
+    while robot.chain().links().iter().any(|l| l.name == name)
+        || frames.iter().any(|f| f.name == name)
+    {
         name.push_str("_frame");
     }
     name
@@ -157,7 +237,7 @@ fn joint(
         (_, JointKind::Revolute, None) => "continuous",
     };
     let parent = match link.parent {
-        None => root(robot),
+        None => root(robot, file),
         Some(parent) => robot.chain().links()[parent].name.clone(),
     };
     // what the robot file says in these words is kept to the last digit
@@ -277,6 +357,9 @@ fn side_file(
     let mut side = file.clone();
     side.robot.robot.link.clear();
     side.robot.robot.urdf = Some(urdf_name.to_owned());
+    side.robot.robot.frame.clear();
+    side.links.clear();
+    side.drive_inertia.clear();
     side.covariance = None;
     side.effects.clear();
     // base parameters come out of the URDF; what the drives add to them stands here

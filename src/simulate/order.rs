@@ -234,7 +234,9 @@ fn serial<const J: usize>(
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
     let truth = serial_experiment::truth::<J>(order)?;
-    let (effects, values) = built_effects(order, &Sites::serial(truth.sites()))?;
+    let (robot, theta) = truth.rigid_body();
+    let places = Sites::serial(robot, theta, truth.sites());
+    let (effects, values) = built_effects(order, &places)?;
     let reference = serial_experiment::reference(order, &truth)?;
     let control = from_files::control(order.robot, truth.control())?;
     let saturation = order.robot.control.saturation_v.unwrap_or(f64::INFINITY);

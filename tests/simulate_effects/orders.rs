@@ -364,6 +364,7 @@ fn the_page_of_effects_says_what_the_simulator_takes() {
             [false, false] => "no",
         };
         assert_eq!(cells[5], single, "{}", kind.name);
+        assert_eq!(cells[6], super::serial::places(kind), "{}", kind.name);
     }
 }
 

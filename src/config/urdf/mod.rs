@@ -22,7 +22,7 @@ use std::path::Path;
 use super::ConfigError;
 use super::document::Document;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
-use super::serial_section::LinkSection;
+use super::serial_section::{FrameSection, LinkSection};
 use crate::log::{remedy, shown};
 use crate::robot::serial::space::{Rotation, product};
 
@@ -36,6 +36,8 @@ pub struct UrdfChain {
     pub links: Vec<LinkSection>,
     /// Limits of the independent joints that have some, in the order of the links.
     pub limits: Vec<(String, CoordinateLimits)>,
+    /// Links that fixed joints hang on moving ones, by their placement alone.
+    pub frames: Vec<FrameSection>,
 }
 
 /// The URDF that errors speak of.
@@ -146,6 +148,7 @@ pub(super) fn resolve(
     };
     let chain = UrdfChain::load(&folder.join(urdf), robot.tip.as_deref())?;
     robot.link = chain.links;
+    robot.frame.splice(0..0, chain.frames);
     robot.urdf = None;
     robot.tip = None;
     for (joint, found) in chain.limits {

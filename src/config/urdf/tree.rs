@@ -1,13 +1,15 @@
 //! From links and joints to moving links: fixed joints are lumped, mimic joints follow.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::parts::{Body, Joint, Kind, Parts};
 use super::{Place, UrdfChain, turned};
 use crate::config::ConfigError;
 use crate::config::check::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
-use crate::config::serial_section::{BASE, FollowsSection, InertialSection, LinkSection};
+use crate::config::serial_section::{
+    BASE, FollowsSection, FrameSection, InertialSection, LinkSection,
+};
 use crate::log::{escape, list, nearest};
 use crate::robot::JointKind;
 use crate::robot::serial::space::{
@@ -24,6 +26,8 @@ struct Seat {
     on: Option<usize>,
     rotation: Rotation,
     origin: Vector,
+    /// The rotation in the words of the file, where one joint alone says it.
+    rpy: Option<Vector>,
 }
 
 /// A moving link that is being gathered.
@@ -76,6 +80,7 @@ pub(super) fn chain(
     };
     let mut seats: Vec<Option<Seat>> = vec![None; parts.links.len()];
     let mut moving: Vec<Moving> = Vec::new();
+    let mut fixed: Vec<(&str, Seat)> = Vec::new();
     // links to visit, the next one last; a link stands here once, for it has one joint before it
     let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(
         None,
@@ -84,6 +89,7 @@ pub(super) fn chain(
             on: None,
             rotation: UNTURNED,
             origin: [0.0; 3],
+            rpy: None,
         },
     )];
     while let Some((joint, link, parent)) = next.pop() {
@@ -97,6 +103,9 @@ pub(super) fn chain(
                 centre: add(&seat.origin, &turn(&seat.rotation, &body.centre)),
                 inertia: turned(&seat.rotation, &body.inertia),
             });
+        }
+        if joint.is_some_and(|j| parts.joints[j].kind == Kind::Fixed) && seat.on.is_some() {
+            fixed.push((&parts.links[link].name, seat));
         }
         seats[link] = Some(seat);
         for &(j, child) in behind[link].iter().rev() {
@@ -122,7 +131,34 @@ pub(super) fn chain(
             "give at least one revolute, continuous or prismatic joint, or a `tip` behind one",
         ));
     }
-    finish(moving, place)
+    // link by link, so that the order of an exported file is that of its source
+    fixed.sort_by_key(|(_, seat)| seat.on);
+    let frames = frames(&fixed, &moving);
+    finish(moving, frames, place)
+}
+
+/// The frames that are fixed to moving links. A name that a moving link has taken gets an ending.
+fn frames(fixed: &[(&str, Seat)], moving: &[Moving]) -> Vec<FrameSection> {
+    let links = moving.iter().filter_map(|m| m.section.name.as_deref());
+    let mut taken: BTreeSet<String> = links.map(str::to_owned).collect();
+    taken.insert(BASE.to_owned());
+    let mut frames = Vec::with_capacity(fixed.len());
+    for (name, seat) in fixed {
+        let Some(link) = seat.on.and_then(|on| moving[on].section.name.clone()) else {
+            continue;
+        };
+        let mut name = (*name).to_owned();
+        while !taken.insert(name.clone()) {
+            name.push_str("_frame");
+        }
+        frames.push(FrameSection {
+            name,
+            link,
+            xyz: seat.origin,
+            rpy: seat.rpy.unwrap_or_else(|| roll_pitch_yaw(&seat.rotation)),
+        });
+    }
+    frames
 }
 
 /// The error for links that hang on each other in a circle.
@@ -197,10 +233,13 @@ fn sit<'a>(
     moving: &mut Vec<Moving<'a>>,
     place: &Place,
 ) -> Result<Seat, ConfigError> {
+    // an origin that nothing was lumped into is kept to the last digit
+    let unmoved = parent.rotation == UNTURNED && parent.origin == [0.0; 3];
     let here = Seat {
         on: parent.on,
         rotation: product(&parent.rotation, &of_roll_pitch_yaw(&joint.rpy)),
         origin: add(&parent.origin, &turn(&parent.rotation, &joint.xyz)),
+        rpy: unmoved.then_some(joint.rpy),
     };
     let kind = match joint.kind {
         Kind::Fixed => return Ok(here),
@@ -232,8 +271,6 @@ fn sit<'a>(
             "name the `tip` of the chain that was measured",
         ));
     }
-    // an origin that nothing was lumped into is kept to the last digit
-    let unmoved = parent.rotation == UNTURNED && parent.origin == [0.0; 3];
     let (xyz, rpy) = match unmoved {
         true => (joint.xyz, joint.rpy),
         false => (here.origin, roll_pitch_yaw(&here.rotation)),
@@ -261,6 +298,7 @@ fn sit<'a>(
         on: Some(at),
         rotation: UNTURNED,
         origin: [0.0; 3],
+        rpy: None,
     })
 }
 
@@ -280,7 +318,11 @@ fn unused(link: &str, moving: &[Moving]) -> String {
 }
 
 /// Lumps the bodies and lets mimic joints follow.
-fn finish(mut moving: Vec<Moving>, place: &Place) -> Result<UrdfChain, ConfigError> {
+fn finish(
+    mut moving: Vec<Moving>,
+    frames: Vec<FrameSection>,
+    place: &Place,
+) -> Result<UrdfChain, ConfigError> {
     let place_of: BTreeMap<&str, usize> = moving
         .iter()
         .enumerate()
@@ -309,6 +351,7 @@ fn finish(mut moving: Vec<Moving>, place: &Place) -> Result<UrdfChain, ConfigErr
     Ok(UrdfChain {
         links: moving.into_iter().map(|m| m.section).collect(),
         limits,
+        frames,
     })
 }
 

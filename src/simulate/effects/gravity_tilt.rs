@@ -3,11 +3,18 @@
 //! Masses m_i at p_i have the potential -sum m_i (gx p_x + gy p_y), and the motors supply its gradient. Of
 //! the CFT robot's chain the kinetic energy gives the first moments: the momentum along y is
 //! (theta_1 + Mr) v1 + d/dt(O sin q2 + H cos q2), so that sum m p_y = (theta_1 + Mr) q1 + O sin q2 + H cos q2
-//! and, a quarter turn on, sum m p_x = O cos q2 - H sin q2, both up to constants.
+//! and, a quarter turn on, sum m p_x = O cos q2 - H sin q2, both up to constants. The links of a serial
+//! robot have the first moments of its base parameters, and none where those of a link are no parameter:
+//! about a vertical first axis they act on that joint alone, as a `ripple` of one wave a turn.
 
+use nalgebra::Vector3;
+
+use super::frames::{Frame, frames};
 use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
-use crate::robot::JointKind;
 use crate::robot::cft::dynamics::Coefficients;
+use crate::robot::serial::{Chain, SerialRobot};
+use crate::robot::standard::STANDARD;
+use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 
 pub const KIND: Kind = Kind {
@@ -35,10 +42,16 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
                 force: -truth.inertia * gx,
             })
         }
-        Machine::Serial { .. } => Err(site.refuse(
-            KIND.name,
-            "a serial robot has its gravity in `[robot] gravity`; simulate a model with another one",
-        )),
+        Machine::Serial {
+            robot: Robot::Serial(robot),
+            theta,
+            ..
+        } => Built::plant(Askew {
+            chain: robot.chain().clone(),
+            moments: moments(robot, theta),
+            gravity: Vector3::new(gx, gy, 0.0),
+        }),
+        Machine::Serial { .. } => Err(site.refuse(KIND.name, "it has no chain of links")),
         Machine::SingleJoint(_) => Err(site.refuse(
             KIND.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
@@ -87,5 +100,45 @@ impl Effect for Constant {
         if let Some(torque) = torque.first_mut() {
             *torque += self.force;
         }
+    }
+}
+
+/// Mass and first moments of each link in its own frame, as far as base parameters know them.
+fn moments(robot: &SerialRobot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
+    let mut moments = vec![(0.0, Vector3::zeros()); robot.chain().links().len()];
+    for (grouping, value) in robot.groupings().iter().zip(theta) {
+        let Some((mass, moment)) = moments.get_mut(grouping.kept / STANDARD) else {
+            continue; // a drive's inertia
+        };
+        match grouping.kept % STANDARD {
+            6 => moment.x = *value,
+            7 => moment.y = *value,
+            8 => moment.z = *value,
+            9 => *mass = *value,
+            _ => {}
+        }
+    }
+    moments
+}
+
+/// A serial robot in gravity that has something beside what is declared.
+#[derive(Debug)]
+struct Askew {
+    chain: Chain,
+    moments: Vec<(f64, Vector3<f64>)>,
+    /// Beside the declared one, in the base's frame \[m/s^2\].
+    gravity: Vector3<f64>,
+}
+
+impl Effect for Askew {
+    fn inertia(&self, motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+        frames(&self.chain, motion.q, motion.v, |link, frame: &Frame| {
+            let (mass, moment) = self.moments[link];
+            let arm = frame.rotation * moment;
+            for (i, torque) in torque.iter_mut().enumerate() {
+                let moved = mass * frame.slides[i] + frame.turns[i].cross(&arm);
+                *torque -= self.gravity.dot(&moved);
+            }
+        });
     }
 }

@@ -21,6 +21,7 @@ mod drive_efficiency;
 mod elasticity;
 mod fault;
 mod filter;
+mod frames;
 mod gain;
 mod gravity_tilt;
 mod kind;

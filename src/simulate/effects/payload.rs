@@ -1,13 +1,18 @@
 //! `payload`: a body on the last link, its centre at (mx, my, mz)/mass in that link's frame, with the
-//! inertia of its own about the vertical axis; a point mass without.
+//! inertia of its own about its centre; a point mass without. It is that about the vertical axis on robots
+//! whose tool stays level, and on a serial robot that of a ball, the same about every axis.
 //!
 //! On the CFT robot the last link is link 8, its frame's x outward, y up, z to the side, its origin at the
 //! wrist under the arm; the mass's path p(q) gives m J^T J, m J^T dJ/dt v and m g dp_z/dq. A single joint
 //! carries it as mass, or as (mx^2 + my^2)/mass where it turns, and its axis is taken as vertical there.
 
+use nalgebra::Vector3;
+
+use super::frames::{Frame, frames};
 use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
-use crate::robot::JointKind;
 use crate::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
+use crate::robot::serial::Chain;
+use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 
 pub const KIND: Kind = Kind {
@@ -41,10 +46,16 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
             sideways: mz / mass,
             inertia,
         }),
-        Machine::Serial { .. } => Err(site.refuse(
-            KIND.name,
-            "a serial robot carries it in the base parameters of its last link; change those in the model",
-        )),
+        Machine::Serial {
+            robot: Robot::Serial(robot),
+            ..
+        } => Built::plant(Held {
+            chain: robot.chain().clone(),
+            mass,
+            centre: Vector3::new(mx, my, mz) / mass,
+            inertia,
+        }),
+        Machine::Serial { .. } => Err(site.refuse(KIND.name, "it has no chain of links")),
         Machine::SingleJoint(truth) => Built::plant(Added {
             inertia: match truth.kind {
                 JointKind::Prismatic => mass,
@@ -116,5 +127,48 @@ impl Effect for Added {
         if let Some(mass) = mass.first_mut() {
             *mass += self.inertia;
         }
+    }
+}
+
+/// On the last link of a chain: m J'J + I J_w'J_w, and the same of what the speeds and gravity ask for. The
+/// spin of a ball has no torque of its own.
+#[derive(Debug)]
+struct Held {
+    chain: Chain,
+    mass: f64,
+    /// In the last link's frame \[m\].
+    centre: Vector3<f64>,
+    /// About any axis through the centre [kg m^2].
+    inertia: f64,
+}
+
+impl Effect for Held {
+    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+        let n = self.chain.joints();
+        let last = self.chain.links().len() - 1;
+        let gravity = Vector3::from(self.chain.gravity());
+        frames(&self.chain, motion.q, motion.v, |link, frame: &Frame| {
+            if link != last {
+                return;
+            }
+            let arm = frame.rotation * self.centre;
+            let swept = frame.spin.cross(&frame.spin.cross(&arm));
+            let pull = self.mass * (frame.bias + frame.spin_bias.cross(&arm) + swept - gravity);
+            let twist = self.inertia * frame.spin_bias;
+            for i in 0..n {
+                let (turns, slides) =
+                    (frame.turns[i], frame.slides[i] + frame.turns[i].cross(&arm));
+                torque[i] += slides.dot(&pull) + turns.dot(&twist);
+                for j in 0..=i {
+                    let other = frame.slides[j] + frame.turns[j].cross(&arm);
+                    let both =
+                        self.mass * slides.dot(&other) + self.inertia * turns.dot(&frame.turns[j]);
+                    mass[n * i + j] += both;
+                    if i != j {
+                        mass[n * j + i] += both;
+                    }
+                }
+            }
+        });
     }
 }

@@ -1,10 +1,10 @@
 //! Where effects sit: the joints of a robot, the screws of the CFT robot, the robot as a whole, with the
 //! scales that default sizes are fractions of.
 
-use crate::robot::JointKind;
 use crate::robot::cft::dynamics::{Coefficients, inertia, solve_positive};
 use crate::robot::cft::geometry::L4;
 use crate::robot::cft::{JOINTS, Limits, pantograph};
+use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 use crate::simulate::cft::CftTruth;
 use crate::simulate::single_joint::{SingleJointFriction, SingleJointTruth};
@@ -99,9 +99,10 @@ impl Site {
 pub enum Machine<'a> {
     Cft(&'a CftTruth),
     SingleJoint(&'a SingleJointTruth),
-    /// A serial robot: its joints, and which of them turn, one bit each.
+    /// A serial robot, its parameters, and which of its joints turn, one bit each.
     Serial {
-        joints: usize,
+        robot: &'a Robot,
+        theta: &'a [f64],
         turning: u8,
     },
 }
@@ -112,7 +113,7 @@ impl Machine<'_> {
         match self {
             Self::Cft(_) => 4,
             Self::SingleJoint(_) => 1,
-            Self::Serial { joints, .. } => *joints,
+            Self::Serial { robot, .. } => robot.joints(),
         }
     }
 
@@ -212,7 +213,7 @@ impl<'a> Sites<'a> {
     }
 
     /// The places of a serial robot, one a joint.
-    pub fn serial(joints: Vec<Site>) -> Self {
+    pub fn serial(robot: &'a Robot, theta: &'a [f64], joints: Vec<Site>) -> Self {
         let turning = joints.iter().enumerate();
         let turning = turning.fold(0, |bits, (j, site)| bits | (u8::from(site.turns) << j));
         let whole = joints.first().map(|first| Site {
@@ -222,7 +223,8 @@ impl<'a> Sites<'a> {
         });
         Self {
             machine: Machine::Serial {
-                joints: joints.len(),
+                robot,
+                theta,
                 turning,
             },
             joints,
