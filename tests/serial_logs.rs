@@ -197,7 +197,10 @@ fn a_payload_on_a_serial_robot_is_found_with_mass_and_centre() {
     let error = |when: &str| number(&found[when]["holdout"]["overall"], "mean_relative_error");
     let (before, after) = (error("before"), error("after"));
     eprintln!("loaded, unseen: {before:.3e} to {after:.3e}");
-    assert!(after < 0.02 * before && after < 0.003, "{before} to {after}");
+    assert!(
+        after < 0.02 * before && after < 0.003,
+        "{before} to {after}"
+    );
     // the model that is written carries it, and can be simulated again
     let again = done(
         path,
