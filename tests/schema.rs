@@ -101,11 +101,6 @@ fn documents_of_cheap_commands_have_their_schema() {
             Kind::Friction,
             "friction a.csv -r configs/cft.toml -o one.toml",
         ),
-        (
-            Kind::Friction,
-            "friction a.csv@0..80% -r configs/cft.toml -o two.toml",
-        ),
-        (Kind::Compare, "compare one.toml two.toml"),
     ] {
         let done = assert_cmd::Command::cargo_bin("cft-ident")
             .unwrap()

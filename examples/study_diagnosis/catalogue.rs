@@ -95,15 +95,8 @@ pub const KINDS: &[Kind] = &[
         "counterbalance",
         "position",
         ["q2", "q5"],
-        &[("from", -1.0), ("to", 1.0)],
-        &[
-            ("m_1", 0.0),
-            ("m_2", 1.0),
-            ("m_3", -0.5),
-            ("m_4", -1.0),
-            ("m_5", 0.5),
-            ("m_6", 1.0),
-        ],
+        &[],
+        &[("stiffness", 1e3)],
     ),
     kind(
         "backlash",

@@ -185,7 +185,11 @@ pub fn values(name: &str, truth: &SingleJointTruth, scale: f64) -> BTreeMap<Stri
             ("sigma0", level / (1e-3 * scale * travel)),
             ("sigma1", 0.0),
         ],
-        "elasticity" => &[("stiffness", truth.inertia * 4e4 / scale)],
+        "elasticity" => &[
+            ("stiffness", truth.inertia * 4e4 / scale),
+            ("inertia", 0.8 * truth.inertia),
+            ("damping", 0.025),
+        ],
         "stribeck" => &[("c", 1e-3 * scale * level), ("vs", 0.05 * travel)],
         _ => &[],
     };

@@ -6,21 +6,21 @@ use serde_json::{Value, json};
 
 use super::diagnose_fault::{self as fault, DataFault};
 use super::diagnose_prior::{information, moved_alone, open};
+use super::diagnose_text::text;
 use super::friction::new_model;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::refined::{Held, hold, in_file, refined};
-use super::{CliError, Context, Outcome, arguments, files, outputs, pages, typed};
+use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
 };
-use crate::effect::{Added, Refined, Told};
+use crate::effect::{Refined, Told};
 use crate::log::LogSpec;
 use crate::motion::Parallel;
 use crate::report::json::Document;
 use crate::report::number;
-use crate::report::table::{Align, Table, hanging};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
@@ -232,6 +232,7 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
     let mut keys = Vec::new();
     let mut places = Vec::new();
     let mut widened = Vec::new();
+    let mut undetermined = Vec::new();
     for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
         let (name, joint, value) = match *unknown {
             Unknown::Theta(k) => (
@@ -260,6 +261,14 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
             |p: &&mut crate::config::model_file::Parameter| p.name == name && p.joint == joint;
         if let Some(p) = model.parameters.iter_mut().find(there) {
             let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            if !found.is_finite() {
+                // others stand in for it in these logs
+                p.value = value;
+                p.std = None;
+                p.verdict = Some(Verdict::NotIdentifiable);
+                undetermined.push(p.key());
+                continue;
+            }
             // what smoothing and the encoders' steps did to the given model, they do to this one
             let std = found.max(p.std.unwrap_or(0.0));
             // a parameter without a torque worth mentioning is known well enough as it is
@@ -275,6 +284,7 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
             places.push(i);
         }
     }
+    model.forget_covariance(&undetermined);
     model.replace_covariance(&keys, &|a, b| {
         widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
     });
@@ -333,6 +343,7 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
                 "joint": effect.place.name(robot),
                 "parameters": parameters,
                 "alternatives": alternatives,
+                "assured": d.assured(step),
                 "separate_command": (!alternatives.is_empty())
                     .then(|| super::separate::command(effect, robot))
                     .flatten(),
@@ -403,112 +414,6 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
         "episodes": episodes,
         "processing": processing(&found.held.summary),
     })
-}
-
-/// Margin of what is said of an effect.
-const MARGIN: &str = "     ";
-
-/// The tables for a person.
-pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
-    let d = &found.diagnosis;
-    let robot = &machine.robot;
-    let mut out = match verdict(d) {
-        "effects-found" => format!("{name} lacks:\n"),
-        "nothing-missing" => {
-            format!("Nothing is missing in {name}: what is left of the torque is noise.\n")
-        }
-        _ => format!("{name} leaves a residual above the noise that no known effect explains.\n"),
-    };
-    for (i, step) in d.steps.iter().enumerate() {
-        let effect: &Added = &d.model.effects[step.effect];
-        let found = format!(
-            "{} ({}): {}",
-            effect.title(robot),
-            effect.family().name(),
-            in_words(machine, d, step.effect)
-        );
-        out += &hanging(&format!("{:>3}. ", i + 1), &found, 7);
-        if let Some(s) = &step.candidate.score {
-            let told = format!(
-                "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows",
-                number::percent(s.cv_gain),
-                s.delta_bic,
-                s.effective_rows
-            );
-            out += &hanging(MARGIN, &told, 7);
-        }
-        if let Some([before, after]) = step.holdout {
-            let worse = if after > before {
-                ": it worsens them"
-            } else {
-                ""
-            };
-            out += &format!(
-                "{MARGIN}data that decided nothing: {} before, {} after{worse}\n",
-                number::percent(before),
-                number::percent(after)
-            );
-        }
-        if !step.alternatives.is_empty() {
-            let names: Vec<String> = step
-                .alternatives
-                .iter()
-                .map(|c| c.effect.title(robot))
-                .collect();
-            let told = format!(
-                "these data do not separate it from {}; {} would",
-                names.join(", "),
-                effect.kind.separate_by
-            );
-            out += &hanging(MARGIN, &told, 7);
-            if let Some(command) = super::separate::command(effect, robot) {
-                out += &format!("{MARGIN}such a motion:\n{}", typed::folded(&command, 7));
-            }
-        }
-    }
-    for e in &d.episodes {
-        let told = format!(
-            "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
-             residual)",
-            e.from_s,
-            e.to_s,
-            found.logs[e.log],
-            robot.joint_names()[e.joint],
-            e.over
-        );
-        out += &hanging("  ", &told, 4);
-    }
-    let mut table = Table::new(&[
-        ("joint", Align::Left),
-        ("fitted", Align::Decimal),
-        ("after", Align::Decimal),
-        ("unseen", Align::Decimal),
-        ("after", Align::Decimal),
-        ("its 95 %", Align::Right),
-        ("above noise", Align::Decimal),
-    ])
-    .caption("relative torque error [%] on fitted and on unseen data, before and after");
-    let hundred = number::hundredths;
-    let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
-    for (j, joint) in robot.joint_names().iter().enumerate() {
-        let of = |errors: &Errors| errors.joints[j].relative_error;
-        let unseen = |p: &diagnose::Pair| p.holdout.as_ref().map(of);
-        let interval = d.after.holdout.as_ref().map(|e| {
-            let [low, high] = e.joints[j].interval_95;
-            format!("{}..{}", hundred(low), hundred(high))
-        });
-        table.row([
-            joint.as_str(),
-            &hundred(of(&d.before.train)),
-            &hundred(of(&d.after.train)),
-            &known(unseen(&d.before)),
-            &known(unseen(&d.after)),
-            interval.as_deref().unwrap_or(number::ABSENT),
-            &hundred(d.left[j].share),
-        ]);
-    }
-    out += &format!("{table}");
-    out
 }
 
 /// Runs the command.

@@ -10,8 +10,8 @@ use super::machine::Machine;
 use super::pages::{self, Look};
 use super::refined::{held_for_pictures, refined};
 use super::{
-    CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, friction, lsq, simulate,
-    validate,
+    CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
+    lsq, simulate, validate,
 };
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
@@ -211,7 +211,7 @@ fn execute(
         }
         Ok(diagnose::Found::Diagnosed(found)) => {
             diagnose_json = diagnose::json(&machine, &found);
-            lacking = diagnose::text(&machine, &found, "model.toml");
+            lacking = diagnose_text::text(&machine, &found, "model.toml");
             if !found.diagnosis.steps.is_empty() {
                 let refined = diagnose::into_model(&machine, &model, &found);
                 write(folder, "refined.toml", &refined.to_toml()?, &mut files)?;

@@ -10,6 +10,7 @@ pub mod convert;
 pub mod diagnose;
 mod diagnose_fault;
 mod diagnose_prior;
+mod diagnose_text;
 pub mod excite;
 pub mod export;
 pub mod friction;

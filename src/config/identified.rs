@@ -120,6 +120,21 @@ impl ModelFile {
         self.parameters.extend(parameters);
     }
 
+    /// Takes parameters out of the covariance, of which it says nothing any more.
+    pub fn forget_covariance(&mut self, keys: &[String]) {
+        let Some(old) = self.covariance.take() else {
+            return;
+        };
+        let kept: Vec<usize> = (0..old.names.len())
+            .filter(|i| !keys.contains(&old.names[*i]))
+            .collect();
+        let of = |i: &usize| kept.iter().map(|j| old.matrix[*i][*j]).collect();
+        self.covariance = Some(Covariance {
+            names: kept.iter().map(|i| old.names[*i].clone()).collect(),
+            matrix: kept.iter().map(of).collect(),
+        });
+    }
+
     /// Puts a block of covariance in place of what the file has between these keys; entries between
     /// them and other keys are dropped.
     pub fn replace_covariance(&mut self, keys: &[String], block: &dyn Fn(usize, usize) -> f64) {

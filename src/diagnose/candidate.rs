@@ -186,12 +186,11 @@ impl<'a> Judge<'a> {
         let total = self.over(&cross, k, &Role::fitted);
         let (solution, share) = partial(&total, &self.inverse, &self.at.pull, SHARE);
         let solution = solution?;
-        let (p_value, effective_rows) = self.significance(&cross, &solution, columns);
-        let (before, rows) = self.touched(columns);
+        let (p_value, effective_rows) = self.significance(&cross, &total, &solution, columns);
+        let (before, after, rows) = self.touched(columns, &solution, &total);
         let effective = effective_rows.min(rows);
-        let after = (before - solution.removed).max(1e-12 * before);
-        let delta_bic =
-            effective * (before / after).ln() - (k + shapes) as f64 * effective.max(2.0).ln();
+        let free = (solution.kept.len() + shapes) as f64;
+        let delta_bic = effective * (before / after).ln() - free * effective.max(2.0).ln();
 
         let in_folds = self.over(&cross, k, &|r| matches!(r, Role::Fold(_)));
         let mut folds = Vec::with_capacity(self.folds.len());
@@ -226,27 +225,45 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// Weighted squared residual and rows of the joints that a candidate touches.
-    fn touched(&self, columns: &Columns) -> (f64, f64) {
-        let (mut square, mut rows) = (0.0, 0.0);
+    /// Weighted squared residual of the joints that a candidate touches, without and with it, and their
+    /// rows. Other joints gain too where parameters that they share were bent by the effect's absence.
+    fn touched(&self, columns: &Columns, s: &Solution, total: &Cross) -> (f64, f64, f64) {
+        let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
+        let unknowns = &self.at.base.unknowns.columns;
         for (piece, sums) in self.ground.plan.pieces.iter().zip(&self.at.base.sums) {
             if !piece.role.fitted() {
                 continue;
             }
             for (j, own) in columns[piece.stretch].iter().enumerate() {
-                if !own.is_empty() && !self.ground.plan.holds(piece.stretch, j) {
-                    square += self.at.weights[j].powi(2) * sums[j].square;
-                    rows += piece.rows.len() as f64;
+                if own.is_empty() || self.ground.plan.holds(piece.stretch, j) {
+                    continue;
                 }
+                let w = self.at.weights[j].powi(2);
+                let index = unknowns[j].iter().map(|i| s.delta[*i]);
+                let delta = DVector::from_iterator(unknowns[j].len(), index);
+                let sum = &sums[j];
+                before += w * sum.square;
+                after += w
+                    * (sum.square - 2.0 * delta.dot(&sum.score)
+                        + delta.dot(&(&sum.normal * &delta)));
+                rows += piece.rows.len() as f64;
             }
         }
-        (square, rows)
+        after += 2.0 * s.delta.dot(&(&total.with_base * &s.beta)) - 2.0 * s.beta.dot(&total.score)
+            + s.beta.dot(&(&total.own * &s.beta));
+        (before, after.max(1e-12 * before), rows)
     }
 
     /// F test of the coefficients with a covariance that correlation from piece to piece does not
     /// break (Newey and West 1987, Bartlett's weights), and the rows that independent ones of the
     /// same certainty would number.
-    fn significance(&self, cross: &[Cross], s: &Solution, columns: &Columns) -> (f64, f64) {
+    fn significance(
+        &self,
+        cross: &[Cross],
+        total: &Cross,
+        s: &Solution,
+        columns: &Columns,
+    ) -> (f64, f64) {
         let k = s.beta.len();
         let mut scores: Vec<(usize, DVector<f64>)> = Vec::new();
         let at = self.at;
@@ -273,24 +290,23 @@ impl<'a> Judge<'a> {
         let lag = LAG.min((count / 8.0) as usize);
         let mut middle = long_run(&scores, k, lag);
         // as if rows were independent: weighted residuals have variance 1 by construction
-        let (square, rows) = self.touched(columns);
-        let variance = (square - s.removed).max(1e-12 * square) / rows.max(1.0);
+        let (_, after, rows) = self.touched(columns, s, total);
+        let variance = after / rows.max(1.0);
+        // columns at rest are not tested
+        middle = middle.select_rows(&s.kept).select_columns(&s.kept);
+        let tested = s.kept.len() as f64;
         let mut ratio = 0.0;
-        for i in 0..k {
-            ratio += middle[(i, i)] / (variance * s.own[(i, i)]).max(f64::MIN_POSITIVE) / k as f64;
+        for (a, &i) in s.kept.iter().enumerate() {
+            let least = variance * s.own[(i, i)];
+            ratio += middle[(a, a)] / least.max(f64::MIN_POSITIVE) / tested;
+            middle[(a, a)] = middle[(a, a)].max(least);
         }
         // correlation only takes certainty away
         let inflation = ratio.max(1.0);
-        for i in 0..k {
-            let least = variance * s.own[(i, i)];
-            if middle[(i, i)] < least {
-                middle[(i, i)] = least;
-            }
-        }
-        let score = &s.own * &s.beta;
-        let wald = score.dot(&Inverse::of(&middle).solve(&score)) / k as f64;
-        let freedom = (count / (lag + 1) as f64 - k as f64).max(3.0);
-        let p = match FisherSnedecor::new(k as f64, freedom) {
+        let score = (&s.own * &s.beta).select_rows(&s.kept);
+        let wald = score.dot(&Inverse::of(&middle).solve(&score)) / tested;
+        let freedom = (count / (lag + 1) as f64 - tested).max(3.0);
+        let p = match FisherSnedecor::new(tested, freedom) {
             Ok(f) if wald.is_finite() && wald > 0.0 => f.sf(wald),
             _ => 1.0,
         };
@@ -301,7 +317,7 @@ impl<'a> Judge<'a> {
 /// Pieces over which scores count as correlated; a piece is some correlation times long.
 pub(super) const LAG: usize = 2;
 /// Least share of a column that must be its own.
-const SHARE: f64 = 0.003;
+const SHARE: f64 = 0.001;
 
 /// Coefficients of a candidate and the base step that goes with them.
 struct Solution {
@@ -313,6 +329,8 @@ struct Solution {
     own: DMatrix<f64>,
     /// Weighted squares removed.
     removed: f64,
+    /// Columns with a part of their own; the others stay at rest.
+    kept: Vec<usize>,
 }
 
 /// Solves for a candidate beside the base; the second result is its share of its own. None where
@@ -333,7 +351,9 @@ fn partial(
     }
     // columns that are absorbed, or that stand for one another, stay at rest
     let right = &total.score - projection.tr_mul(score);
-    let beta = absorbed(&own, &total.own, least.max(1e-6)).solve(&right);
+    let inverse_own = absorbed(&own, &total.own, least.max(1e-6));
+    let kept = (0..k).filter(|i| !inverse_own.at_rest(*i)).collect();
+    let beta = inverse_own.solve(&right);
     let delta = inverse.solve(score) - &projection * &beta;
     let removed = beta.dot(&right);
     let whole = (beta.transpose() * &total.own * &beta)[(0, 0)];
@@ -345,6 +365,7 @@ fn partial(
         projection,
         own,
         removed,
+        kept,
     };
     (Some(solution), share)
 }

@@ -246,55 +246,58 @@ fn newton(at: &Fitted, shapes_held: bool) -> (Vec<f64>, f64) {
     (delta.iter().copied().collect(), gain)
 }
 
-/// Inverse of a positive semidefinite matrix with columns scaled to one; directions without
-/// information stay at rest by a ridge far below what the data say of any other.
+/// Inverse of a positive semidefinite matrix over the unknowns that it determines. Taken one after the other,
+/// what those before it stand in for is left at rest: its row and column are zero. What is declared comes
+/// first, so that an effect gives way, and not the declared model.
 #[derive(Debug, Clone)]
 pub struct Inverse {
     matrix: DMatrix<f64>,
+    at_rest: Vec<bool>,
 }
 
-/// Ridge on the scaled diagonal.
-const RIDGE: f64 = 1e-10;
+/// Least part of an unknown's squared column that those before it do not stand in for.
+const LEAST_OWN: f64 = 1e-9;
 
 impl Inverse {
     /// Inverts.
     pub fn of(normal: &DMatrix<f64>) -> Self {
         let u = normal.nrows();
-        let scale: Vec<f64> = (0..u)
-            .map(|i| {
-                let d = normal[(i, i)];
-                if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
-            })
-            .collect();
-        let mut ridge = RIDGE;
-        loop {
-            let scaled = DMatrix::from_fn(u, u, |a, b| {
-                let x = scale[a] * normal[(a, b)] * scale[b];
-                if a != b {
-                    x
-                } else if scale[a] > 0.0 {
-                    x + ridge
-                } else {
-                    1.0
-                }
-            });
-            if let Some(cholesky) = scaled.cholesky() {
-                let mut inverse = cholesky.inverse();
-                for a in 0..u {
-                    for b in 0..u {
-                        inverse[(a, b)] *= scale[a] * scale[b];
-                    }
-                }
-                return Inverse { matrix: inverse };
+        let scale: Vec<f64> = (0..u).map(|i| normal[(i, i)].max(0.0).sqrt()).collect();
+        // Cholesky factor of the scaled matrix, row by row, without the rows at rest
+        let mut factor: DMatrix<f64> = DMatrix::zeros(u, u);
+        let mut kept: Vec<usize> = Vec::with_capacity(u);
+        for i in (0..u).filter(|i| scale[*i] > 0.0 && scale[*i].is_finite()) {
+            let mut own = 1.0;
+            for (k, &l) in kept.iter().enumerate() {
+                let before: f64 = (0..k).map(|m| factor[(i, m)] * factor[(l, m)]).sum();
+                let x = (normal[(i, l)] / (scale[i] * scale[l]) - before) / factor[(l, k)];
+                factor[(i, k)] = x;
+                own -= x * x;
             }
-            if ridge > 1.0 {
-                // not a normal matrix at all: nothing moves
-                return Inverse {
-                    matrix: DMatrix::zeros(u, u),
-                };
+            if own > LEAST_OWN {
+                factor[(i, kept.len())] = own.sqrt();
+                kept.push(i);
             }
-            ridge *= 100.0;
         }
+        let n = kept.len();
+        let lower = DMatrix::from_fn(n, n, |a, b| if b <= a { factor[(kept[a], b)] } else { 0.0 });
+        let mut matrix = DMatrix::zeros(u, u);
+        let mut at_rest = vec![true; u];
+        if let Some(half) = lower.solve_lower_triangular(&DMatrix::identity(n, n)) {
+            let inverse = half.tr_mul(&half);
+            for (a, &i) in kept.iter().enumerate() {
+                at_rest[i] = false;
+                for (b, &l) in kept.iter().enumerate() {
+                    matrix[(i, l)] = inverse[(a, b)] / (scale[i] * scale[l]);
+                }
+            }
+        }
+        Inverse { matrix, at_rest }
+    }
+
+    /// Whether the matrix says nothing of unknown `i` that those before it do not stand in for.
+    pub fn at_rest(&self, i: usize) -> bool {
+        self.at_rest[i]
     }
 
     /// Inverse times a vector.
@@ -310,5 +313,41 @@ impl Inverse {
     /// The inverse itself.
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_that_earlier_ones_stand_in_for_rests_and_the_others_are_inverted() {
+        // the third column is the first plus twice the second, the fourth is empty
+        let x = DMatrix::from_row_slice(
+            4,
+            5,
+            &[
+                1.0, 0.2, 1.4, 0.0, 3.0, //
+                -1.0, 0.5, 0.0, 0.0, 1.0, //
+                2.0, 1.0, 4.0, 0.0, -1.0, //
+                0.3, -2.0, -3.7, 0.0, 0.5,
+            ],
+        );
+        let normal = x.tr_mul(&x);
+        let inverse = Inverse::of(&normal);
+        assert_eq!(
+            (0..5).map(|i| inverse.at_rest(i)).collect::<Vec<_>>(),
+            [false, false, true, true, false]
+        );
+        let kept = [0, 1, 4];
+        let small = DMatrix::from_fn(3, 3, |a, b| normal[(kept[a], kept[b])]);
+        let wanted = small.try_inverse().unwrap();
+        for (a, i) in kept.into_iter().enumerate() {
+            for (b, l) in kept.into_iter().enumerate() {
+                let off = (inverse.matrix()[(i, l)] - wanted[(a, b)]).abs();
+                assert!(off < 1e-12 * wanted[(a, a)].abs().max(1.0), "{i} {l}");
+            }
+        }
+        assert!(inverse.matrix().column(2).iter().all(|x| *x == 0.0));
     }
 }

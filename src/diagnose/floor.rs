@@ -1,18 +1,22 @@
 //! The noise floor: how much of a filtered residual is noise that no model could explain.
 //!
-//! Just above the band that is kept, the residual holds nothing but noise: a band from 1.5 to 3 times
-//! the cut-off is looked at, block by block, and the median of the blocks is not moved by
-//! reversals. The top of the spectrum, by fourth differences, is looked at too, and the lower of the
-//! two counts: orders of a ripple beyond the band, and torque that the position filter keeps the
-//! model from following, are no noise. Noise that falls towards high frequency is underrated, and
-//! then some of it is called structure: the safe side.
+//! Where a log repeats its motion, what the filtered residual does not repeat is noise. Otherwise, and where
+//! it says less: just above the band that is kept, the residual holds nothing but noise. Two bands from 1.5
+//! to 3 times the cut-off are looked at, block by block, and the median of the blocks is not moved by
+//! reversals. Two, for noise has two sources: of the torque, white, and of the encoder by way of the
+//! acceleration, which rises with the fourth power of the frequency; carried on into the band as if it were
+//! white, it would hide what is there. The top of the spectrum, by fourth differences, is looked at too, and
+//! the lowest counts: orders of a ripple beyond the band, and torque that the position filter keeps the model
+//! from following, are no noise. Noise that falls towards high frequency is underrated, and then some of it
+//! is called structure: the safe side.
 
+use super::period::{period, unrepeated};
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 use crate::motion::{MotionError, Parallel, Stretch};
 
-/// Borders of the band that is looked at, over the cut-off.
-const BAND: [f64; 2] = [1.5, 3.0];
+/// Borders of the bands that are looked at, over the cut-off.
+const BORDERS: [f64; 3] = [1.5, 2.1, 3.0];
 
 /// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
 /// where each torque is the mean of two rows, as of commands that are held.
@@ -29,25 +33,41 @@ pub fn floor(
 ) -> Result<Vec<f64>, MotionError> {
     let joints = stretches.first().map_or(0, Stretch::joints);
     let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
+    let top = (0.45 * rate / (BORDERS[2] * cutoff_hz)).min(1.0);
     let low_pass = |times: f64| -> Result<ZeroPhase, MotionError> {
-        let cutoff = (times * cutoff_hz).min(0.45 * rate * times / BAND[1]);
+        let cutoff = times * top * cutoff_hz;
         Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
     };
-    let (lower, upper) = (low_pass(BAND[0])?, low_pass(BAND[1])?);
-    let band = |x: &[f64]| -> Result<Vec<f64>, MotionError> {
-        let (mut below, mut all) = (x.to_vec(), x.to_vec());
-        lower.run(&mut below, 1)?;
-        upper.run(&mut all, 1)?;
-        Ok(all.iter().zip(&below).map(|(a, b)| a - b).collect())
+    let passes = [
+        low_pass(BORDERS[0])?,
+        low_pass(BORDERS[1])?,
+        low_pass(BORDERS[2])?,
+    ];
+    let bands = |x: &[f64]| -> Result<[Vec<f64>; 2], MotionError> {
+        let mut below = [x.to_vec(), x.to_vec(), x.to_vec()];
+        for (pass, x) in passes.iter().zip(&mut below) {
+            pass.run(x, 1)?;
+        }
+        let between = |k: usize| -> Vec<f64> {
+            let pairs = below[k + 1].iter().zip(&below[k]);
+            pairs.map(|(a, b)| a - b).collect()
+        };
+        Ok([between(0), between(1)])
     };
+    // what the bands, and the band that is kept, see of white noise and of white noise differentiated twice
     let length = 2 * parallel.trim.max(500) + 1;
-    let mut impulse = vec![0.0; length];
-    impulse[length / 2] = 1.0;
-    let power = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-    let seen = power(&band(&impulse)?);
-    parallel.smooth(&mut impulse)?;
-    let kept = power(&impulse);
-
+    let mut seen = [[0.0; 2]; 2];
+    let mut kept = [0.0; 2];
+    for (source, kernel) in [&[1.0][..], &[1.0, -2.0, 1.0][..]].into_iter().enumerate() {
+        let mut impulse = vec![0.0; length];
+        impulse[length / 2..length / 2 + kernel.len()].copy_from_slice(kernel);
+        for (band, x) in bands(&impulse)?.iter().enumerate() {
+            seen[band][source] = power(x);
+        }
+        parallel.smooth(&mut impulse)?;
+        kept[source] = power(&impulse);
+    }
+    let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
     // a block is some periods of the band long
     let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
     // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the mean
@@ -63,22 +83,55 @@ pub fn floor(
         let (mut sum, mut rows) = (0.0, 0.0);
         // friction at rest is no noise; a joint that never moves has nothing else
         let always = held.iter().all(|h| h[j]);
-        let moving = residuals.iter().zip(held).filter(|(_, h)| always || !h[j]);
-        for (residual, _) in moving {
-            let banded = band(&residual[j])?;
-            let edge = parallel.trim.min(banded.len() / 4);
-            let near = middle(&banded[edge..banded.len() - edge]);
+        let logs = residuals.iter().zip(held).zip(&periods);
+        for ((residual, _), period) in logs.filter(|((_, h), _)| always || !h[j]) {
+            let banded = bands(&residual[j])?;
+            let edge = parallel.trim.min(residual[j].len() / 4);
+            let near = banded.each_ref().map(|x| middle(&x[edge..x.len() - edge]));
             let differences: Vec<f64> = residual[j]
                 .windows(5)
                 .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
                 .collect();
+            let white = carried_on(near, seen, kept).min(kept[0] * middle(&differences) / gain);
+            let repeated = match period {
+                Some(period) => {
+                    let mut filtered = residual[j].clone();
+                    parallel.smooth(&mut filtered)?;
+                    unrepeated(&filtered, edge..filtered.len() - edge, *period)
+                }
+                None => None,
+            };
             let weight = residual[j].len() as f64;
-            sum += weight * (near / seen).min(middle(&differences) / gain);
+            sum += weight * repeated.map_or(white, |r| r.min(white));
             rows += weight;
         }
-        floor.push(if rows > 0.0 { kept * sum / rows } else { 0.0 });
+        floor.push(if rows > 0.0 { sum / rows } else { 0.0 });
     }
     Ok(floor)
+}
+
+/// Variance in the band that is kept, from that in two bands beyond it: what white noise and rising noise of
+/// no negative power make of both, `seen[band][source]`.
+fn carried_on(near: [f64; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
+    let [[w, r], [x, s]] = seen;
+    let determinant = w * s - r * x;
+    let white = (near[0] * s - r * near[1]) / determinant;
+    let rising = (w * near[1] - near[0] * x) / determinant;
+    let alone = |source: usize| {
+        let of_band = |band: usize| near[band] / seen[band][source];
+        kept[source] * of_band(0).min(of_band(1))
+    };
+    if rising <= 0.0 || !rising.is_finite() {
+        alone(0)
+    } else if white <= 0.0 {
+        alone(1)
+    } else {
+        kept[0] * white + kept[1] * rising
+    }
+}
+
+fn power(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum()
 }
 
 /// Middle value; 0 of nothing.
@@ -92,6 +145,21 @@ mod tests {
     use super::*;
     use crate::motion::Settings;
     use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn noise_that_rises_is_told_from_white_noise() {
+        let (seen, kept) = ([[1.0, 3.0], [2.0, 20.0]], [5.0, 0.5]);
+        let of = |white: f64, rising: f64| {
+            let near = seen.map(|[w, r]| w * white + r * rising);
+            carried_on(near, seen, kept)
+        };
+        for (white, rising) in [(1.0, 0.0), (0.3, 0.8), (0.0, 2.0)] {
+            let wanted = kept[0] * white + kept[1] * rising;
+            assert!((of(white, rising) - wanted).abs() < 1e-12);
+        }
+        // a spectrum that falls: the lower of the two bands
+        assert_eq!(carried_on([4.0, 2.0], seen, kept), 5.0);
+    }
 
     #[test]
     fn white_noise_is_its_own_floor_and_a_smooth_residual_adds_nothing() {

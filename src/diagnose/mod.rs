@@ -17,6 +17,7 @@ mod fit;
 mod floor;
 mod measure;
 mod orders;
+mod period;
 mod plan;
 mod rows;
 mod run;

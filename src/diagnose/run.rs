@@ -69,7 +69,7 @@ pub struct Step {
     pub holdout: Option<[f64; 2]>,
 }
 
-/// What is left at the end on one joint.
+/// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
 #[derive(Debug, Clone, Copy)]
 pub struct Left {
     /// Fraction of the torque's power that is residual above the noise floor.
@@ -115,7 +115,7 @@ const MOST_EPISODES: usize = 8;
 /// Residual power over the floor's from which on a residual is called structured.
 pub const STRUCTURED: f64 = 2.0;
 /// Share of the torque's power below which structure is not worth a name.
-pub const NEGLIGIBLE: f64 = 2e-5;
+pub const NEGLIGIBLE: f64 = 4e-6;
 
 /// Diagnoses. `told` hears of every step; `stop` is asked now and then.
 ///
@@ -235,6 +235,11 @@ pub fn diagnose(
         let mut alternatives: Vec<Candidate> = Vec::new();
         for i in others {
             let same = |c: &Candidate| c.effect.kind.name == found[i].effect.kind.name;
+            // what moves other joints explains another residual
+            let places = [found[i].effect.place, found[chosen].effect.place];
+            if !(0..robot.joints()).any(|j| places.iter().all(|p| p.touches(j))) {
+                continue;
+            }
             if !alternatives.iter().any(same) && !same(&found[chosen]) && alternatives.len() < 3 {
                 alternatives.push(found[i].clone());
             }
@@ -306,9 +311,31 @@ pub fn diagnose(
     let before = pair(&case.given)?;
     let refitted = pair(&models[0])?.train;
     let after = pair(&at.model)?;
+    // what fits the one and not the other is structure too: where unseen data have more left, they count
+    let held_out = |s: &&Stretch| case.roles[s.log] == LogRole::Holdout;
+    let unseen: Vec<Stretch> = case.stretches.iter().filter(held_out).cloned().collect();
     let floor = noise(&at.model, case, &fitted)?;
-    let left_before = left(&floor, &before.train);
-    let left = left(&floor, &after.train);
+    let floor_unseen = noise(&at.model, case, &unseen)?;
+    let left = |pair: &Pair| -> Vec<Left> {
+        let train = left(&floor, &pair.train);
+        match &pair.holdout {
+            Some(holdout) if !unseen.is_empty() => {
+                let unseen = left(&floor_unseen, holdout).into_iter().zip(&floor_unseen);
+                let pairs = train.into_iter().zip(unseen);
+                // a joint that rests there has no floor
+                let more = |(a, (b, floor)): (Left, (Left, &f64))| {
+                    if b.share > a.share && *floor > 0.0 {
+                        b
+                    } else {
+                        a
+                    }
+                };
+                pairs.map(more).collect()
+            }
+            _ => train,
+        }
+    };
+    let (left_before, left) = (left(&before), left(&after));
     let covariance = covariance(&at, &ground);
     Ok(Diagnosis {
         unknowns: at.base.unknowns.list.clone(),
@@ -446,7 +473,8 @@ fn left(noise: &[f64], found: &Errors) -> Vec<Left> {
 }
 
 /// Covariance of all unknowns under correlated residuals: the sandwich over pieces (Newey and West
-/// 1987), at least that of independent rows.
+/// 1987), at least that of independent rows. What these data do not determine beside the others has an
+/// infinite variance.
 fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
     let base = &at.base;
     let u = base.unknowns.len();
@@ -480,15 +508,32 @@ fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
             middle[(i, i)] = least;
         }
     }
-    inverse.times(&(middle * inverse.matrix()))
+    let mut covariance = inverse.times(&(middle * inverse.matrix()));
+    for i in (0..u).filter(|i| inverse.at_rest(*i)) {
+        covariance[(i, i)] = f64::INFINITY;
+    }
+    covariance
 }
 
 impl Diagnosis {
     /// Whether some joint's residual still holds structure.
     pub fn structured(&self) -> bool {
-        self.left
-            .iter()
-            .any(|l| l.over_floor > STRUCTURED && l.share > NEGLIGIBLE)
+        self.structured_joints().next().is_some()
+    }
+
+    /// Joints whose residual still holds structure.
+    pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
+        let joints = self.left.iter().enumerate();
+        joints
+            .filter(|(_, l)| l.over_floor > STRUCTURED && l.share > NEGLIGIBLE)
+            .map(|(j, _)| j)
+    }
+
+    /// Whether a step's effect leaves nothing on the joints that it touches. Otherwise it lowers the error
+    /// and may stand in for an effect that the catalogue does not have.
+    pub fn assured(&self, step: &Step) -> bool {
+        let place = self.model.effects[step.effect].place;
+        !self.structured_joints().any(|j| place.touches(j))
     }
 
     /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.

@@ -37,12 +37,12 @@ impl Default for Limits {
     fn default() -> Self {
         Limits {
             false_alarm: 0.005,
-            unique_share: 0.01,
+            unique_share: 0.001,
             cv_gain: 0.003,
             cv_certainty: 1.0,
             veto_ratio: 1.002,
             worth: 0.01,
-            over_noise: 0.25,
+            over_noise: 0.1,
             steps: 8,
         }
     }

@@ -109,7 +109,19 @@ impl Added {
                 }
                 (vec![sigma0 / fc], vec![fc, get("sigma1")?])
             }
-            "elasticity" => (Vec::new(), vec![1.0 / get("stiffness")?]),
+            "elasticity" => {
+                let (stiffness, inertia) = (get("stiffness")?, get("inertia")?);
+                let square = stiffness / inertia;
+                if square.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+                    return Err(EffectError::Value {
+                        name: name.to_owned(),
+                        key: "stiffness".to_owned(),
+                        value: stiffness,
+                    });
+                }
+                let frequency = square.sqrt() / std::f64::consts::TAU;
+                (vec![frequency, get("damping")?], vec![inertia])
+            }
             "payload" if !kind.shape.is_empty() => {
                 let mass = get("mass")?;
                 if mass == 0.0 {
@@ -258,12 +270,21 @@ impl Added {
                 out.push(told("fc", fc, unit_vector(1), Unit::Torque));
             }
             "elasticity" => {
-                let c = self.linear[0];
+                let (frequency, inertia) = (self.shape[0], self.linear[0]);
+                let square = (std::f64::consts::TAU * frequency).powi(2);
+                let stiffness = square * inertia;
                 out.push(told(
                     "stiffness",
-                    1.0 / c,
-                    vec![-1.0 / (c * c)],
+                    stiffness,
+                    vec![2.0 * stiffness / frequency, 0.0, square],
                     Unit::Stiffness,
+                ));
+                out.push(told("inertia", inertia, unit_vector(2), Unit::Inertia));
+                out.push(told(
+                    "damping",
+                    self.shape[1],
+                    unit_vector(1),
+                    Unit::Text(""),
                 ));
             }
             "payload" if !self.shape.is_empty() => {

@@ -1,31 +1,115 @@
-//! `elasticity`: a drive that gives way by torque / stiffness. The link lags the encoder, so that the
-//! second derivative of the transmitted torque enters with the joint's inertia:
-//! -(M_jj / stiffness) d2(tau_hat)/dt2, the first term of the flexible joint's expansion (Spong 1987).
+//! `elasticity`: a spring between motor, where the encoder sits, and link. The deflection z, motor less
+//! link, is an oscillator that the load torque drives,
+//! d2z/dt2 + 2 damping w dz/dt + w^2 z = tau_l/M_jj, w = 2 pi frequency, and the link's inertia feels that
+//! much less acceleration: -inertia d2z/dt2 is added. The stiffness is inertia w^2. Far below w this is
+//! the second derivative of the torque, -(inertia/w^2) d2(tau_l/M_jj)/dt2, the first term of the flexible
+//! joint's expansion (Spong 1987).
 
-use super::{Family, Key, Kind, Role, Scene, Unit, every_joint, no_limits, no_shape};
+use nalgebra::Matrix4;
+
+use super::{Family, Key, Kind, Role, Scene, Unit, every_joint};
 
 pub const KIND: Kind = Kind {
     name: "elasticity",
     family: Family::Timing,
     role: Role::Columns,
-    shape: &[],
-    linear: &[Key::new("compliance", Unit::Text("position per torque"))],
+    shape: &[
+        Key::new("frequency", Unit::Text("Hz")),
+        Key::new("damping", Unit::Text("")),
+    ],
+    linear: &[Key::new("inertia", Unit::Inertia)],
     places: every_joint,
-    starts: no_shape,
-    limits: no_limits,
-    columns: |scene, place, _, _, out| {
+    starts: |cover, _| {
+        let starts = [0.5, 1.0, 2.0, 4.0].map(|times| vec![times * cover.cutoff_hz, DAMPING]);
+        let seen = starts.into_iter().filter(|s| s[0] < highest(cover.dt));
+        Ok(seen.collect())
+    },
+    limits: |cover, _| vec![[0.1 * cover.cutoff_hz, highest(cover.dt)], [1e-3, 1.0]],
+    columns: |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let inertia = inertia(scene, j);
-        let load = &scene.load[j];
-        let step = scene.stretch.dt;
-        for k in 1..load.len().saturating_sub(1) {
-            let second = (load[k + 1] - 2.0 * load[k] + load[k - 1]) / (step * step);
-            out[0][k] = -inertia * second;
+        if inertia <= 0.0 {
+            return;
+        }
+        let w = std::f64::consts::TAU * shape[0];
+        let step = Oscillator::new(w, shape[1], scene.stretch.dt);
+        let pull = |k: usize| scene.load[j][k] / inertia;
+        // at rest on the spring
+        let mut z = [pull(0) / (w * w), 0.0];
+        for (k, column) in out[0].iter_mut().enumerate() {
+            if k > 0 {
+                z = step.next(z, pull(k - 1), pull(k));
+            }
+            *column = -(pull(k) - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
         }
     },
     separate_by: "reversals with high jerk at two poses of different inertia: the ringing keeps its \
                   frequency at any speed",
 };
+
+/// Damping ratio to begin with.
+const DAMPING: f64 = 0.05;
+
+/// Highest frequency that samples `dt` apart still follow \[Hz\].
+fn highest(dt: f64) -> f64 {
+    0.2 / dt
+}
+
+/// One step of z'' + 2 d w z' + w^2 z = u, exact for u that runs straight between samples.
+struct Oscillator {
+    /// Of z and z' on themselves.
+    own: [[f64; 2]; 2],
+    /// Of u before and after.
+    pull: [[f64; 2]; 2],
+}
+
+impl Oscillator {
+    /// For a step of `dt` seconds; the series of the exponential at an eighth of the step, squared thrice.
+    fn new(w: f64, damping: f64, dt: f64) -> Self {
+        // states z, z', u, and du/dt of the step
+        let rates = Matrix4::new(
+            0.0,
+            1.0,
+            0.0,
+            0.0, //
+            -w * w,
+            -2.0 * damping * w,
+            1.0,
+            0.0, //
+            0.0,
+            0.0,
+            0.0,
+            1.0, //
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        );
+        let small = rates * (dt / 8.0);
+        let (mut term, mut sum) = (Matrix4::identity(), Matrix4::identity());
+        for n in 1..=14 {
+            term = term * small / f64::from(n);
+            sum += term;
+        }
+        let mut over = sum;
+        for _ in 0..3 {
+            over = over * over;
+        }
+        let own = [[over[(0, 0)], over[(0, 1)]], [over[(1, 0)], over[(1, 1)]]];
+        let pull = [0, 1].map(|i| {
+            let slope = over[(i, 3)] / dt;
+            [over[(i, 2)] - slope, slope]
+        });
+        Oscillator { own, pull }
+    }
+
+    fn next(&self, z: [f64; 2], before: f64, after: f64) -> [f64; 2] {
+        [0, 1].map(|i| {
+            let (own, pull) = (self.own[i], self.pull[i]);
+            own[0] * z[0] + own[1] * z[1] + pull[0] * before + pull[1] * after
+        })
+    }
+}
 
 /// M_jj in the middle of the stretch: the column of a unit acceleration less that of none.
 fn inertia(scene: &Scene, j: usize) -> f64 {
@@ -45,4 +129,25 @@ fn inertia(scene: &Scene, j: usize) -> f64 {
     let rest = torque(&a);
     a[j] = 1.0;
     torque(&a) - rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Oscillator;
+
+    #[test]
+    fn a_step_of_the_oscillator_is_that_of_its_closed_solution() {
+        // pulled by a constant from rest: z = u/w^2 (1 - e^(-dwt) (cos pt + dw/p sin pt))
+        let (w, d, dt, u) = (180.0, 0.07, 1e-3, 3.0);
+        let step = Oscillator::new(w, d, dt);
+        let mut z = [0.0, 0.0];
+        for k in 1..=500 {
+            z = step.next(z, u, u);
+            let t = f64::from(k) * dt;
+            let p = w * (1.0f64 - d * d).sqrt();
+            let swing = (p * t).cos() + d * w / p * (p * t).sin();
+            let wanted = u / (w * w) * (1.0 - (-d * w * t).exp() * swing);
+            assert!((z[0] - wanted).abs() < 1e-12 * u / (w * w) * 1e3, "{k}");
+        }
+    }
 }

@@ -17,12 +17,13 @@ pub const KIND: Kind = Kind {
         }
         let [low, high] = joint.position;
         let step = 0.25 * (high - low);
-        Ok((-2..=6).map(|i| vec![low + f64::from(i) * step]).collect())
+        Ok((-1..=5).map(|i| vec![low + f64::from(i) * step]).collect())
     },
     limits: |cover, place| {
         let [low, high] = cover.at(place).position;
-        let range = high - low;
-        vec![[low - 2.0 * range, high + 2.0 * range]]
+        // a spring that is at rest far outside the travel is hardly more than an offset
+        let beyond = 0.25 * (high - low);
+        vec![[low - beyond, high + beyond]]
     },
     columns: |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };

@@ -161,7 +161,7 @@ fn elastic_joints_deflect_by_what_the_link_needs() {
     let sites = Sites::cft(&truth).expect("physical");
     let site = &sites.joints[3];
     let rotor = (0.2 * site.inertia).min(0.3 * site.least_inertia);
-    let damping = 0.1 * (stiffness * rotor).sqrt();
+    let damping = 2.0 * 0.025 * (stiffness * (site.inertia - rotor)).sqrt();
     // The encoder sits on the motor.
     let deflection: Vec<f64> = (recording.q.iter().zip(&recording.actual.q))
         .map(|(motor, link)| motor[3] - link[3])

@@ -276,8 +276,13 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             .map(|c| c.effect.title(&machine.robot))
             .collect();
         let score = step.candidate.score.as_ref();
+        let title = effect.title(&machine.robot);
         rows.push(vec![
-            effect.title(&machine.robot),
+            if d.assured(step) {
+                title
+            } else {
+                format!("{title}, or what it stands in for: structure is left there")
+            },
             in_words(machine, d, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
             unseen,

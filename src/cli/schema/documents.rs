@@ -189,6 +189,7 @@ fn diagnose() -> Vec<(&'static str, Value)> {
             "alternatives",
             json!({"type": "array", "items": text(), "maxItems": 3}),
         ),
+        ("assured", json!({"type": "boolean"})),
         ("separate_by", maybe_text()),
         ("delta_bic", number()),
         ("cv_gain", number()),

@@ -3,8 +3,9 @@
 //! A play operator of width `gap` follows the position. While the joint is inside the play the torque
 //! c sgn(v) of what lies behind is missing, so that -c sgn(v) is added. The play is memory: it moves with
 //! each accepted step ([`Effect::moved`]), and while it is pushed it adds no torque, so that a step never
-//! sees it jump. Where the gap closes the missing torque ends within the last [`CONTACT`] of it, a stiff but
-//! continuous contact that the error control steps through.
+//! sees it jump. Where the gap closes the missing torque ends within the last [`CONTACT`] of half of it, a stiff
+//! but continuous contact that the error control steps through. Where it opens, at a reversal, c sgn(v) passes
+//! through zero of itself.
 
 use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Unit, sign};
 use crate::simulate::SimulateError;
@@ -36,8 +37,8 @@ pub const KIND: Kind = Kind {
     },
 };
 
-/// Share of the gap within which contact comes about.
-const CONTACT: f64 = 0.02;
+/// Share of half the gap within which contact comes about.
+const CONTACT: f64 = 0.005;
 
 #[derive(Debug)]
 struct Backlash {
@@ -54,9 +55,15 @@ impl Effect for Backlash {
         let Some(centre) = self.centre else {
             return;
         };
-        let to_contact = self.half - (motion.q[self.joint] - centre).abs();
-        let missing = (to_contact / (2.0 * CONTACT * self.half)).clamp(0.0, 1.0);
-        torque[self.joint] -= self.c * missing * sign(self.slope, motion.v[self.joint]);
+        let (off, v) = (motion.q[self.joint] - centre, motion.v[self.joint]);
+        let to_contact = self.half - off.abs();
+        let opening = off * v < 0.0;
+        let missing = if opening {
+            1.0
+        } else {
+            (to_contact / (CONTACT * self.half)).clamp(0.0, 1.0)
+        };
+        torque[self.joint] -= self.c * missing * sign(self.slope, v);
     }
 
     fn begin(&mut self, beginning: &Beginning, _z: &mut [f64]) {

@@ -1,35 +1,54 @@
 //! `elasticity`: a spring between the motor, where the encoder sits, and the link.
 //!
-//! The motor's side has a fifth of the joint's inertia ([`ROTOR`]; less where the least inertia of any pose asks
-//! for it, so that what is left to the link stays positive), all its friction and every torque that is no load; the link's side the rest, so that a stiff spring gives the rigid joint back. With the
-//! deflection z = q_motor - q_link the spring passes on T = stiffness z + damping dz/dt, and
-//! B (a + d2z/dt2) = tau - F - E - T on the motor's side. Both sides are integrated.
+//! The link's side has `inertia`, the motor's side what is left of the joint's, all its friction and every
+//! torque that is no load, so that a stiff spring gives the rigid joint back. Unless it is told, the motor has a
+//! fifth of the joint's inertia ([`ROTOR`]; less where the least inertia of any pose asks for it, so that what is
+//! left to the link stays positive). With the deflection z = q_motor - q_link the spring passes on
+//! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
+//! motor's side. Both sides are integrated.
 
-use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Twist, Unit};
+use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Site, Twist, Unit};
 use crate::simulate::SimulateError;
 
 pub const KIND: Kind = Kind {
     name: "elasticity",
     family: "timing",
     places: Places::Joints,
-    keys: &[Key::size("stiffness", Unit::Stiffness, |site| {
-        (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia
-    })],
+    keys: &[
+        Key::size("stiffness", Unit::Stiffness, |site| {
+            (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia
+        }),
+        Key::shape("inertia", Unit::Inertia, |site| site.inertia - rotor(site)),
+        Key::shape("damping", Unit::Fixed("1"), |_| DAMPING),
+    ],
     build: |site, _, values| {
-        let stiffness = values[0];
+        let &[stiffness, inertia, damping] = values else {
+            return Err(site.refuse(KIND.name, "it takes stiffness, inertia and damping"));
+        };
+        let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
+            effect: KIND.name.to_owned(),
+            key: key.to_owned(),
+            value,
+            rule: rule.to_owned(),
+        };
         if stiffness <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "stiffness".to_owned(),
-                value: stiffness,
-                rule: "must be above 0".to_owned(),
-            });
+            return Err(refuse("stiffness", stiffness, "must be above 0"));
         }
-        let rotor = (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia);
+        if damping < 0.0 {
+            return Err(refuse("damping", damping, "must not be below 0"));
+        }
+        let rotor = site.inertia - inertia;
+        if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
+            return Err(refuse(
+                "inertia",
+                inertia,
+                "must be below the joint's, and leave the motor less than the joint's least",
+            ));
+        }
         Built::plant(Elasticity {
             joint: site.joint(),
             stiffness,
-            damping: 2.0 * DAMPING * (stiffness * rotor).sqrt(),
+            damping: 2.0 * damping * (stiffness * inertia).sqrt(),
             rotor,
         })
     },
@@ -41,8 +60,13 @@ const FREQUENCY: f64 = 20.0;
 const ROTOR: f64 = 0.2;
 /// The most that it may be of the joint's least inertia.
 const ROTOR_AT_MOST: f64 = 0.3;
-/// Damping ratio of the motor on its spring.
-const DAMPING: f64 = 0.05;
+/// Damping ratio of the link on its spring.
+const DAMPING: f64 = 0.025;
+
+/// Default inertia on the motor's side, kg or kg m^2.
+fn rotor(site: &Site) -> f64 {
+    (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia)
+}
 
 #[derive(Debug)]
 struct Elasticity {

@@ -1,0 +1,138 @@
+//! What `diagnose` tells a person: the effects, their numbers, what is left, and the errors before and after.
+
+use super::diagnose::{Diagnosed, in_words, verdict};
+use super::machine::Machine;
+use super::typed;
+use crate::diagnose::{Errors, Pair};
+use crate::effect::Added;
+use crate::report::number;
+use crate::report::table::{Align, Table, hanging};
+
+/// Margin of what is said of an effect.
+const MARGIN: &str = "     ";
+
+/// The tables for a person.
+pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    let mut out = match verdict(d) {
+        "effects-found" => format!("{name} lacks:\n"),
+        "nothing-missing" => {
+            format!("Nothing is missing in {name}: what is left of the torque is noise.\n")
+        }
+        _ => format!("{name} leaves a residual above the noise that no known effect explains.\n"),
+    };
+    for (i, step) in d.steps.iter().enumerate() {
+        let effect: &Added = &d.model.effects[step.effect];
+        let found = format!(
+            "{} ({}): {}",
+            effect.title(robot),
+            effect.family().name(),
+            in_words(machine, d, step.effect)
+        );
+        out += &hanging(&format!("{:>3}. ", i + 1), &found, 7);
+        if let Some(s) = &step.candidate.score {
+            let told = format!(
+                "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows",
+                number::percent(s.cv_gain),
+                s.delta_bic,
+                s.effective_rows
+            );
+            out += &hanging(MARGIN, &told, 7);
+        }
+        if let Some([before, after]) = step.holdout {
+            let worse = if after > before {
+                ": it worsens them"
+            } else {
+                ""
+            };
+            out += &format!(
+                "{MARGIN}data that decided nothing: {} before, {} after{worse}\n",
+                number::percent(before),
+                number::percent(after)
+            );
+        }
+        if !step.alternatives.is_empty() {
+            let names: Vec<String> = step
+                .alternatives
+                .iter()
+                .map(|c| c.effect.title(robot))
+                .collect();
+            let told = format!(
+                "these data do not separate it from {}; {} would",
+                names.join(", "),
+                effect.kind.separate_by
+            );
+            out += &hanging(MARGIN, &told, 7);
+            if let Some(command) = super::separate::command(effect, robot) {
+                out += &format!("{MARGIN}such a motion:\n{}", typed::folded(&command, 7));
+            }
+        }
+    }
+    let open: Vec<String> = d
+        .structured_joints()
+        .filter(|j| {
+            d.steps
+                .iter()
+                .any(|s| d.model.effects[s.effect].place.touches(*j))
+        })
+        .map(|j| {
+            format!(
+                "{} ({:.1} times the noise)",
+                robot.joint_names()[j],
+                d.left[j].over_floor
+            )
+        })
+        .collect();
+    if !open.is_empty() {
+        let told = format!(
+            "structure is left on {}: what was found there lowers the error, and may stand in for \
+             what no known effect explains",
+            open.join(", ")
+        );
+        out += &hanging("  ", &told, 4);
+    }
+    for e in &d.episodes {
+        let told = format!(
+            "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
+             residual)",
+            e.from_s,
+            e.to_s,
+            found.logs[e.log],
+            robot.joint_names()[e.joint],
+            e.over
+        );
+        out += &hanging("  ", &told, 4);
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("fitted", Align::Decimal),
+        ("after", Align::Decimal),
+        ("unseen", Align::Decimal),
+        ("after", Align::Decimal),
+        ("its 95 %", Align::Right),
+        ("above noise", Align::Decimal),
+    ])
+    .caption("relative torque error [%] on fitted and on unseen data, before and after");
+    let hundred = number::hundredths;
+    let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
+    for (j, joint) in robot.joint_names().iter().enumerate() {
+        let of = |errors: &Errors| errors.joints[j].relative_error;
+        let unseen = |p: &Pair| p.holdout.as_ref().map(of);
+        let interval = d.after.holdout.as_ref().map(|e| {
+            let [low, high] = e.joints[j].interval_95;
+            format!("{}..{}", hundred(low), hundred(high))
+        });
+        table.row([
+            joint.as_str(),
+            &hundred(of(&d.before.train)),
+            &hundred(of(&d.after.train)),
+            &known(unseen(&d.before)),
+            &known(unseen(&d.after)),
+            interval.as_deref().unwrap_or(number::ABSENT),
+            &hundred(d.left[j].share),
+        ]);
+    }
+    out += &format!("{table}");
+    out
+}
