@@ -1,5 +1,6 @@
 //! Over all measured logs: what `diagnose` adds does not make the torque of unseen data worse than the
-//! declared model by more than its interval. A further set is one line in [`SETS`].
+//! declared model by more than its interval, and its covariance is one. A further set is one line in
+//! [`SETS`].
 
 mod measured_support;
 
@@ -41,6 +42,21 @@ const SETS: &[Set] = &[
         &["bldc-cogging/speed_test1.txt@0.5..10s"],
         &["bldc-cogging/speed_test1.txt@10..14.5s"],
     ),
+    set(
+        "configs/panda.toml",
+        &["panda/panda_exciting.csv@0..70%"],
+        &["panda/panda_exciting.csv@70..100%"],
+    ),
+    set(
+        "configs/ur10.toml",
+        &["ur10/ur10_exciting_trajectory.mcap@0..70%"],
+        &["ur10/ur10_exciting_trajectory.mcap@70..100%"],
+    ),
+    set(
+        "configs/tx40.toml",
+        &["tx40/tx40_joint.csv@0..70%"],
+        &["tx40/tx40_joint.csv@70..100%"],
+    ),
 ];
 
 const fn set(
@@ -59,6 +75,31 @@ const fn set(
 fn logs(names: &[&str]) -> Option<Vec<String>> {
     let path = |name: &&str| Some(shared(name)?.to_string_lossy().into_owned());
     names.iter().map(path).collect()
+}
+
+/// The covariance of a model is one: no variance below zero, no correlation above one, and what has a
+/// standard deviation stands in it.
+#[track_caller]
+fn assert_covariance(model: &toml::Value) {
+    let matrix = model["covariance"]["matrix"].as_array().unwrap();
+    let at = |i: usize, j: usize| matrix[i].as_array().unwrap()[j].as_float().unwrap();
+    for i in 0..matrix.len() {
+        assert!(at(i, i) > 0.0, "variance {i} is {}", at(i, i));
+        for j in 0..i {
+            let correlation = at(i, j) / (at(i, i) * at(j, j)).sqrt();
+            assert!(correlation.abs() <= 1.0 + 1e-9, "{i} {j}: {correlation}");
+        }
+    }
+    let names = model["covariance"]["names"].as_array().unwrap();
+    for p in model["parameter"].as_array().unwrap() {
+        let name = p["name"].as_str().unwrap();
+        let key = match p.get("joint").and_then(toml::Value::as_str) {
+            Some(joint) => format!("{name}:{joint}"),
+            None => name.to_owned(),
+        };
+        let there = names.iter().any(|n| n.as_str() == Some(&key));
+        assert!(there || p.get("std").is_none(), "{key}");
+    }
 }
 
 #[test]
@@ -80,7 +121,10 @@ fn the_final_model_is_no_worse_on_unseen_data_than_the_declared_one() {
         for log in unseen {
             diagnose.extend(["--holdout".to_owned(), log]);
         }
+        diagnose.extend(words("-o refined.toml"));
         let found = run(folder.path(), &diagnose);
+        let text = std::fs::read_to_string(folder.path().join("refined.toml")).unwrap();
+        assert_covariance(&toml::from_str(&text).unwrap());
         let joints = |when: &str| found[when]["holdout"]["joints"].as_array().unwrap().clone();
         for (before, after) in joints("before").iter().zip(&joints("after")) {
             let error = |j: &Value| j["relative_error"].as_f64().unwrap();
