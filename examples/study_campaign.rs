@@ -80,7 +80,7 @@ fn campaign(seed: u64) -> Value {
         let recording =
             follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");
         let log = block(&recording);
-        let (prepared, e) = estimated(&robot, j, &names, &log);
+        let (prepared, e) = estimated(&robot, j, &names, &log, true);
         let law = truth.friction[j];
         let (error, covered, total) = curve(&e, &law);
         // a start that is wrong by up to a factor of three in everything, alone
@@ -260,6 +260,8 @@ fn summarise(rows: &[Value], folder: &Path) {
                 "median error": percent(quantile(over(&relative), 0.5)),
                 "within 3 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 3.0)),
                 "within 1.96 std": format!("{:.1} %", 100.0 * share(&|r| z(r).abs() <= 1.96)),
+                "mean error in std": format!("{:.2}", over(&z).iter().sum::<f64>() / n as f64),
+                "largest in std": format!("{:.1}", quantile(over(&|r| z(r).abs()), 1.0)),
             }));
         }
         let at = |key: &'static str| over(&|r| number(&r[key][j]));
@@ -269,7 +271,8 @@ fn summarise(rows: &[Value], folder: &Path) {
             "unseen, median": percent(quantile(at("unseen"), 0.5)),
             "largest": percent(quantile(at("unseen"), 1.0)),
             "true parameters, median": percent(quantile(at("unseen_truth"), 0.5)),
-            "largest ratio to them": format!("{:.3}", quantile(ratio, 1.0)),
+            "ratio to them above 1.1": ratio.iter().filter(|r| **r > 1.1).count(),
+            "largest ratio": format!("{:.3}", quantile(ratio, 1.0)),
             "noise-free sensors, median": percent(quantile(at("clean"), 0.5)),
             "noise-free, true parameters": percent(quantile(at("clean_truth"), 0.5)),
         }));

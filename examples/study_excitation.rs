@@ -45,7 +45,7 @@ fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFrict
             .expect("a ladder");
         let settings = noisy(20.0, 10 * seed + j as u64);
         let log = block(&follow(truth, &[], motion, &settings).expect("a run"));
-        let (_, e) = estimated(robot, j, &names, &log);
+        let (_, e) = estimated(robot, j, &names, &log, true);
         Some(KnownFriction {
             law: e.law,
             covariance: e.covariance,

@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use rand::SeedableRng;
+use rand_distr::Distribution;
 use serde_json::Value;
 
 /// Runs the tool in a folder and returns its JSON document.
@@ -221,6 +223,66 @@ fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads()
     );
     assert!(after < 0.9 * before, "{before} {after}");
     assert_eq!(found, diagnose("1"));
+}
+
+/// Writes a log anew with a torque of position and speed added, and noise of 0.5 N.
+fn add_torque(from: &Path, to: &Path, torque: impl Fn(f64, f64) -> f64) {
+    let mut log = csv::Reader::from_path(from).unwrap();
+    let header = log.headers().unwrap().clone();
+    assert_eq!(header.iter().collect::<Vec<_>>(), ["t", "q1", "tau1"]);
+    let rows: Vec<[f64; 3]> = log.deserialize().map(|row| row.unwrap()).collect();
+    let noise = rand_distr::Normal::new(0.0, 0.5).unwrap();
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut out = csv::Writer::from_path(to).unwrap();
+    out.write_record(&header).unwrap();
+    for (i, [t, q, tau]) in rows.iter().enumerate() {
+        let (a, b) = (rows[i.saturating_sub(5)], rows[(i + 5).min(rows.len() - 1)]);
+        let speed = (b[1] - a[1]) / (b[0] - a[0]);
+        let tau = tau + torque(*q, speed) + noise.sample(&mut chance);
+        out.serialize([*t, *q, tau]).unwrap();
+    }
+    out.flush().unwrap();
+}
+
+#[test]
+fn what_the_catalogue_does_not_have_is_unexplained_and_not_its_nearest_neighbour() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "log.csv", "25", "2", &[]);
+    simulate(at, "unseen.csv", "25", "3", &[]);
+    // waves whose order goes with the speed
+    let wave =
+        |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 20.0 * q * (1.0 + 4.0 * v.abs())).sin();
+    let travelling = |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 30.0 * q + 40.0 * v).sin();
+    let torques: [(&str, &dyn Fn(f64, f64) -> f64); 2] =
+        [("wave", &wave), ("travelling", &travelling)];
+    for (name, torque) in torques {
+        let (log, unseen) = (format!("{name}.csv"), format!("{name}-unseen.csv"));
+        add_torque(&at.join("log.csv"), &at.join(&log), torque);
+        add_torque(&at.join("unseen.csv"), &at.join(&unseen), torque);
+        run(at, &["lsq", &log, "-r", ROBOT, "-o", "declared.toml"]);
+        let found = run(
+            at,
+            &[
+                "diagnose",
+                &log,
+                "-m",
+                "declared.toml",
+                "--holdout",
+                &unseen,
+            ],
+        );
+        assert_eq!(found["verdict"], "unexplained-residual", "{name}");
+        for step in found["steps"].as_array().unwrap() {
+            assert_eq!(step["assured"], false, "{name}: {}", step["effect"]);
+        }
+        let left = &found["unexplained"][0];
+        assert_eq!(left["joint"], "q1");
+        // 3 N of some 50 N in amplitude, squared and halved
+        let share = left["share"].as_f64().unwrap();
+        assert!((0.0005..0.003).contains(&share), "{name}: {share}");
+        assert!(left["over_floor"].as_f64().unwrap() > 50.0, "{name}");
+    }
 }
 
 #[test]

@@ -157,12 +157,14 @@ pub fn along(series: Fourier<4>) -> Reference<4> {
     }
 }
 
-/// The one-joint problem of a log and its estimate, as the tool makes it.
+/// The one-joint problem of a log and its estimate, as the tool makes it; with `smoothing` the other
+/// joints' motion is smoothed as narrowly as the innovations want, which takes most of the time.
 pub fn estimated(
     robot: &Robot,
     joint: usize,
     names: &[String],
     log: &Block,
+    smoothing: bool,
 ) -> (Prepared, JointEstimate) {
     let found = |settings: &Processing| {
         motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
@@ -183,8 +185,8 @@ pub fn estimated(
         sensors: &sensors,
     };
     let options = Options::default();
-    let e =
-        estimate(JOINTS[joint], names, &prepared, Some(&inputs), &options).expect("an estimate");
+    let inputs = smoothing.then_some(&inputs);
+    let e = estimate(JOINTS[joint], names, &prepared, inputs, &options).expect("an estimate");
     (prepared, e)
 }
 

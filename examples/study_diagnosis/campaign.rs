@@ -79,14 +79,18 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
     let oracle = known.filter(|k| !k.is_empty()).map(|known| {
         let mut given = campaign.declared.clone();
         given.effects.extend(known);
-        run(given, nothing, Vec::new())
+        let fitted = run(given, nothing, Vec::new());
+        if aloud {
+            numbers(&lab.robot, "effect known", &fitted);
+        }
+        fitted
     });
     let shown = oracle.as_ref().map(|oracle| {
         (0..lab.robot.joints())
             .map(|j| {
                 let plain = result.refitted.joints[j].rmse.powi(2);
                 let known = oracle.after.train.joints[j].rmse.powi(2);
-                (plain - known) * oracle.left[j].over_floor / known
+                (plain - known) * oracle.left[j].over_floor.unwrap_or(0.0) / known
             })
             .fold(0.0, f64::max)
     });
@@ -119,6 +123,10 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
             "place": robot.joint_names()[e.joint], "from_s": e.from_s, "to_s": e.to_s,
         })).collect::<Vec<_>>(),
         "structured": result.structured(),
+        // structure left per joint over what was there before, and over the noise
+        "left": result.left.iter().zip(&result.part_left).map(|(left, part)| {
+            [Some(*part), left.over_floor]
+        }).collect::<Vec<_>>(),
         "shown": shown,
         "before": unseen(&result, false),
         "after": unseen(&result, true),
@@ -227,11 +235,29 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
         "family": effect.family().name(),
         "place": place,
         "alternatives": alike,
+        "assured": result.assured(step),
+        "explained": result.explained(step),
         "off": off,
     })
 }
 
+/// The effects of a model with their standard deviations, and the error that it was fitted to.
+fn numbers(robot: &Robot, what: &str, result: &Diagnosis) {
+    for (i, effect) in result.model.effects.iter().enumerate() {
+        let told = effect.told(robot, "", Some(&result.covariance_of(i)));
+        let told = told.iter().map(|t| match t.std {
+            Some(std) => format!("{} {:.6} +- {:.6}", t.key, t.value, std),
+            None => format!("{} {:.6}", t.key, t.value),
+        });
+        let told: Vec<String> = told.collect();
+        eprintln!("  {what}: {} {}", effect.title(robot), told.join(", "));
+    }
+    let rms: Vec<f64> = result.after.train.joints.iter().map(|e| e.rmse).collect();
+    eprintln!("  {what}: fitted to {rms:?}");
+}
+
 fn show(robot: &Robot, result: &Diagnosis) {
+    numbers(robot, "found", result);
     for s in &result.steps {
         let e = &result.model.effects[s.effect];
         let score = |c: &Candidate| match &c.score {
@@ -283,7 +309,7 @@ fn show(robot: &Robot, result: &Diagnosis) {
     let over: Vec<String> = result
         .left
         .iter()
-        .map(|l| format!("{:.2}", l.over_floor))
+        .map(|l| format!("{:.2}", l.over_floor.unwrap_or(f64::NAN)))
         .collect();
     eprintln!("  over floor {over:?}");
 }
@@ -446,7 +472,8 @@ impl Campaign {
         let mut known = Vec::new();
         for j in 0..JOINTS.len() {
             let recording = ladder(j, before);
-            let (_, e) = estimated(robot, j, &names, &block(&recording));
+            // where all is refitted with the effects, the filter's law is a start and no more
+            let (_, e) = estimated(robot, j, &names, &block(&recording), keep);
             known.push(Some(KnownFriction {
                 law: e.law,
                 covariance: e.covariance,

@@ -269,7 +269,13 @@ fn rates(rows: &[Value]) -> Vec<Value> {
             out.len(),
         ),
         rate(
-            "withheld, and no name of another family",
+            "withheld: verdict of unexplained, or of its family alone",
+            "-",
+            out.iter().filter(|r| unclaimed(r)).count(),
+            out.len(),
+        ),
+        rate(
+            "withheld, and nothing of another family added",
             "-",
             out.iter().filter(|r| unnamed(r)).count(),
             out.len(),
@@ -333,9 +339,24 @@ fn only_family(row: &Value) -> bool {
     }
 }
 
-/// Whether a withheld effect ends as an unexplained residual, or as its own family.
+/// Whether a step of another family than the withheld effect's is marked so.
+fn stranger(row: &Value, mark: &str) -> bool {
+    let own = families(text(&row["put"][0]["effect"]));
+    list(&row["steps"]).iter().any(|s| {
+        let found = families(text(&s["effect"]));
+        s[mark] == true && !own.iter().any(|f| found.contains(f))
+    })
+}
+
+/// Whether a withheld effect ends as an unexplained residual, nothing of another family being assured, or
+/// as its own family.
 fn honest(row: &Value) -> bool {
-    row["structured"] == true || only_family(row)
+    only_family(row) || row["structured"] == true && !stranger(row, "assured")
+}
+
+/// Whether nothing of another family is behind a verdict of effects found.
+fn unclaimed(row: &Value) -> bool {
+    only_family(row) || row["structured"] == true && !stranger(row, "explained")
 }
 
 /// Whether a withheld effect has no name but its family's: a residual without a name, or that.
@@ -384,7 +405,7 @@ fn withheld(rows: &[Value]) -> Vec<Value> {
                 "withheld": kind.name,
                 "campaigns": own.len(),
                 "unexplained, absorbed or its family": own.iter().filter(|r| honest(r)).count(),
-                "unexplained residual": own.iter().filter(|r| r["structured"] == true).count(),
+                "verdict of unexplained, or of its family": own.iter().filter(|r| unclaimed(r)).count(),
                 "said": tally(&own),
             })
         })

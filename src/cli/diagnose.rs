@@ -213,7 +213,8 @@ pub fn in_words(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Stri
 
 /// Whether there is a verdict of effects, of nothing, or of structure without a name.
 pub fn verdict(diagnosis: &Diagnosis) -> &'static str {
-    if !diagnosis.steps.is_empty() {
+    let named = |step| diagnosis.explained(step);
+    if diagnosis.steps.iter().any(named) {
         "effects-found"
     } else if diagnosis.structured() {
         "unexplained-residual"

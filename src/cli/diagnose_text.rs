@@ -20,7 +20,17 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
         "nothing-missing" => {
             format!("Nothing is missing in {name}: what is left of the torque is noise.\n")
         }
-        _ => format!("{name} leaves a residual above the noise that no known effect explains.\n"),
+        _ if d.steps.is_empty() => {
+            format!("{name} leaves a residual above the noise that no known effect explains.\n")
+        }
+        _ => hanging(
+            "",
+            &format!(
+                "{name} leaves a residual above the noise that no known effect explains. Nearest to it, \
+                 and added, for they lower the error:"
+            ),
+            0,
+        ),
     };
     for (i, step) in d.steps.iter().enumerate() {
         let effect: &Added = &d.model.effects[step.effect];
@@ -76,12 +86,9 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
                 .iter()
                 .any(|s| d.model.effects[s.effect].place.touches(*j))
         })
-        .map(|j| {
-            format!(
-                "{} ({:.1} times the noise)",
-                robot.joint_names()[j],
-                d.left[j].over_floor
-            )
+        .map(|j| match d.left[j].over_floor {
+            Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
+            None => robot.joint_names()[j].clone(),
         })
         .collect();
     if !open.is_empty() {

@@ -49,12 +49,11 @@ impl RobotFile {
 
     /// Unit of a joint's torque channel: "N", "Nm", or "A" where currents are not scaled to torques.
     pub fn torque_unit(&self, joint: usize) -> &'static str {
-        let robot = self.robot();
-        let name = robot.joint_names().get(joint);
-        let channels = name.and_then(|name| self.log.joint.get(name));
+        let names = self.joint_names();
+        let channels = names.get(joint).and_then(|name| self.log.joint.get(name));
         match channels {
             Some(c) if c.torque_unit == Some(TorqueUnit::Ampere) && c.torque_scale.is_none() => "A",
-            _ => robot.joint_unit(joint),
+            _ => self.joint_kind(joint).torque_unit(),
         }
     }
 

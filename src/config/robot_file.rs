@@ -324,6 +324,15 @@ impl RobotFile {
         }
     }
 
+    /// Whether an independent joint turns or slides. The chain of a serial robot is not built for it, and its
+    /// base parameters are not looked for.
+    pub fn joint_kind(&self, joint: usize) -> JointKind {
+        match self.robot.model {
+            ModelKind::Serial => self.robot.chain_kind(joint),
+            _ => self.robot().joint_kind(joint),
+        }
+    }
+
     /// Joint names, and the actuator coordinates of the CFT robot.
     pub fn coordinate_names(&self) -> Vec<String> {
         let mut names = self.joint_names();

@@ -157,6 +157,15 @@ impl RobotSection {
         names
     }
 
+    /// Whether an independent joint turns or slides, by the first link that it moves.
+    pub(super) fn chain_kind(&self, joint: usize) -> JointKind {
+        let names = self.chain_joints();
+        let moved =
+            |link: &&LinkSection| link.joint.is_some() && link.joint.as_ref() == names.get(joint);
+        let kind = self.link.iter().find(moved).and_then(|link| link.kind);
+        kind.unwrap_or(JointKind::Revolute)
+    }
+
     /// Names of the links.
     fn link_names(&self) -> Vec<String> {
         let name = |(i, l): (usize, &LinkSection)| {

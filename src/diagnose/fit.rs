@@ -168,6 +168,35 @@ pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
     Ok(at)
 }
 
+/// How far the unknowns move where the motion goes through the position filter once more: to leading order
+/// what the filter's own distortion, at reversals above all, has made of them. Zero without such a filter.
+///
+/// # Errors
+/// [`MotionError`] of the filters.
+pub fn moved_by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionError> {
+    let none = DVector::zeros(at.base.unknowns.len());
+    let mut again = Vec::with_capacity(ground.stretches.len());
+    for (i, stretch) in ground.stretches.iter().enumerate() {
+        if ground.plan.idle(i) {
+            again.push(stretch.clone());
+            continue;
+        }
+        match ground.parallel.twice(stretch)? {
+            Some(stretch) => again.push(stretch),
+            None => return Ok(none),
+        }
+    }
+    let ground = Ground {
+        stretches: &again,
+        plan: ground.plan.clone(),
+        cover: ground.cover.clone(),
+        ..*ground
+    };
+    let smoothed = evaluate(at.model.clone(), &ground, Some(&at.weights))?;
+    let moved = DVector::from_vec(newton(&smoothed, false).0);
+    Ok(moved - DVector::from_vec(newton(at, false).0))
+}
+
 /// Weighted squares and the prior's share.
 fn objective(at: &Fitted, ground: &Ground) -> f64 {
     let off = ground.prior.off(&at.base.unknowns, &at.model);
@@ -222,7 +251,26 @@ fn summed(model: Refined, base: Base, weights: Vec<f64>, ground: &Ground) -> Fit
     .with_score(total.score)
 }
 
+/// The least that the objective comes to from here by a linear step, with one unknown held.
+pub fn least_with_held(at: &Fitted, ground: &Ground, held: Option<usize>) -> f64 {
+    let (mut normal, mut pull) = (at.normal.clone(), at.pull.clone());
+    if let Some(i) = held {
+        normal.row_mut(i).fill(0.0);
+        normal.column_mut(i).fill(0.0);
+        pull[i] = 0.0;
+    }
+    objective(at, ground) - Inverse::of(&normal).solve(&pull).dot(&pull)
+}
+
 impl Fitted {
+    /// Another model in the weights of this one.
+    ///
+    /// # Errors
+    /// [`MotionError`] of the filter.
+    pub fn with(&self, model: Refined, ground: &Ground) -> Result<Fitted, MotionError> {
+        evaluate(model, ground, Some(&self.weights))
+    }
+
     /// The pull of prior and data together.
     fn with_score(mut self, score: DVector<f64>) -> Self {
         self.pull += score;

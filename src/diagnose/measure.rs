@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::plan::{Plan, Role};
+use super::rows::standing;
 use crate::effect::Refined;
 use crate::motion::{MotionError, Parallel, Stretch};
 
@@ -57,6 +58,15 @@ struct Sums {
 /// Resamplings of the bootstrap.
 const DRAWS: usize = 1000;
 
+/// Which rows of the pieces count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counted {
+    /// All of them, as `validate` counts.
+    All,
+    /// Without those in which friction at rest takes whatever the torque is.
+    Moving,
+}
+
 /// Errors of a model over the pieces whose role is wanted; none where there is no such piece.
 ///
 /// # Errors
@@ -67,7 +77,7 @@ pub fn errors(
     stretches: &[Stretch],
     parallel: &Parallel,
     plan: &Plan,
-    wanted: &dyn Fn(Role) -> bool,
+    (wanted, counted): (&dyn Fn(Role) -> bool, Counted),
 ) -> Result<Option<Errors>, MotionError> {
     let n = model.model.robot.joints();
     let mut pieces: Vec<Vec<Sums>> = Vec::new();
@@ -83,13 +93,21 @@ pub fn errors(
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
+        let mut still = vec![vec![false; parallel.rows(stretch.len())]; n];
+        if counted == Counted::Moving {
+            for (j, still) in still.iter_mut().enumerate() {
+                for i in standing(model, stretch, parallel, j) {
+                    still[i] = true;
+                }
+            }
+        }
         for piece in own {
             let joint = |j: usize| {
                 let mut s = Sums::default();
                 if plan.rests(index, j) {
                     return s;
                 }
-                for i in piece.rows.clone() {
+                for i in piece.rows.clone().filter(|i| !still[j][*i]) {
                     let (measured, e) = (rows[j][i], rows[j][i] - rows[n + j][i]);
                     s.error += e * e;
                     s.torque += measured * measured;

@@ -93,6 +93,29 @@ impl Binned {
     }
 }
 
+/// Orders that are summed side by side.
+const LANES: usize = 8;
+
+/// Power of a binned signal at `LANES` orders from the given one on.
+fn powers(free: &[f64], first: usize) -> [f64; LANES] {
+    let step = std::array::from_fn::<_, LANES, _>(|l| {
+        let waves = (first + l) as f64 * SPACING;
+        (std::f64::consts::TAU * waves / free.len() as f64).sin_cos()
+    });
+    // rotation from bin to bin instead of a sine each
+    let (mut c, mut s) = ([1.0; LANES], [0.0; LANES]);
+    let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+    for x in free {
+        for l in 0..LANES {
+            re[l] += c[l] * x;
+            im[l] += s[l] * x;
+            let (sin, cos) = step[l];
+            (c[l], s[l]) = (c[l] * cos - s[l] * sin, s[l] * cos + c[l] * sin);
+        }
+    }
+    std::array::from_fn(|l| re[l] * re[l] + im[l] * im[l])
+}
+
 /// Waves over the travel at the highest peaks of a binned signal's spectrum.
 fn peaks(sums: &[f64], count: &[f64]) -> Vec<f64> {
     let bins = sums.len();
@@ -104,20 +127,9 @@ fn peaks(sums: &[f64], count: &[f64]) -> Vec<f64> {
     let free: Vec<f64> = sums.iter().zip(count).map(|(s, c)| s - mean * c).collect();
     let last = (bins as f64 / 8.0 / SPACING) as usize;
     let power: Vec<f64> = (0..last)
-        .map(|i| {
-            let waves = i as f64 * SPACING;
-            let step = std::f64::consts::TAU * waves / bins as f64;
-            let (sin, cos) = step.sin_cos();
-            // rotation from bin to bin instead of a sine each
-            let (mut c, mut s) = (1.0, 0.0);
-            let (mut re, mut im) = (0.0, 0.0);
-            for x in &free {
-                re += c * x;
-                im += s * x;
-                (c, s) = (c * cos - s * sin, s * cos + c * sin);
-            }
-            re * re + im * im
-        })
+        .step_by(LANES)
+        .flat_map(|first| powers(&free, first))
+        .take(last)
         .collect();
     let first = (LEAST / SPACING) as usize;
     let mut found: Vec<(f64, f64)> = (first.max(1)..last.saturating_sub(1))

@@ -5,17 +5,19 @@ use nalgebra::{DMatrix, DVector};
 
 use super::candidate::{Judge, LAG};
 use super::episode::{self, Episode};
-use super::fit::{Fitted, Ground, Inverse, Prior, fit};
-use super::floor::floor;
-use super::measure::{Errors, errors};
+use super::fit::{Fitted, Ground, Inverse, Prior, fit, moved_by_smoothing};
+use super::left::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
+use super::measure::{Counted, Errors, errors};
 use super::orders;
 use super::plan::{LogRole, Plan, Role, SetAside};
+use super::profile;
 use super::search::{Bar, Candidate, Limits, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
 use crate::effect::{Added, Cover, Refined, held_joints};
 use crate::math::long_run::long_run;
 use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::model::JointFriction;
 
 /// What a diagnosis works on.
 pub struct Case {
@@ -69,15 +71,6 @@ pub struct Step {
     pub holdout: Option<[f64; 2]>,
 }
 
-/// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
-#[derive(Debug, Clone, Copy)]
-pub struct Left {
-    /// Fraction of the torque's power that is residual above the noise floor.
-    pub share: f64,
-    /// Power of the residual over that of the floor.
-    pub over_floor: f64,
-}
-
 /// Errors before or after.
 #[derive(Debug, Clone)]
 pub struct Pair {
@@ -99,8 +92,9 @@ pub struct Diagnosis {
     /// The declared model refitted to these logs, with nothing added.
     pub refitted: Errors,
     pub after: Pair,
-    pub left_before: Vec<Left>,
     pub left: Vec<Left>,
+    /// Part of the structure of each joint's residual that is left on the fitted logs.
+    pub part_left: Vec<f64>,
     pub set_aside: Vec<SetAside>,
     /// Disturbances that were cut out of the logs.
     pub episodes: Vec<Episode>,
@@ -112,10 +106,8 @@ pub struct Diagnosis {
 
 /// Most episodes that are cut out.
 const MOST_EPISODES: usize = 8;
-/// Residual power over the floor's from which on a residual is called structured.
-pub const STRUCTURED: f64 = 2.0;
-/// Share of the torque's power below which structure is not worth a name.
-pub const NEGLIGIBLE: f64 = 4e-6;
+/// Part of a joint's structure that may be left where effects are named for the rest of it.
+const NAMED: f64 = 0.1;
 
 /// Diagnoses. `told` hears of every step; `stop` is asked now and then.
 ///
@@ -281,16 +273,18 @@ pub fn diagnose(
     // everything is decided: the holdout may be looked at
     let plan = &ground.plan;
     let wanted = |role: Role| role == Role::Holdout;
-    let measure = |model: &Refined, wanted: &dyn Fn(Role) -> bool| {
+    let measured = |model: &Refined, wanted: &dyn Fn(Role) -> bool, counted: Counted| {
         errors(
             model,
             &case.units,
             &case.stretches,
             &case.parallel,
             plan,
-            wanted,
+            (wanted, counted),
         )
     };
+    let measure =
+        |model: &Refined, wanted: &dyn Fn(Role) -> bool| measured(model, wanted, Counted::All);
     let mut means = Vec::with_capacity(models.len());
     for model in &models {
         means.push(measure(model, &wanted)?.map(|e| e.overall.mean_relative_error));
@@ -300,43 +294,39 @@ pub fn diagnose(
             step.holdout = Some([*before, *after]);
         }
     }
-    let pair = |model: &Refined| -> Result<Pair, DiagnoseError> {
-        let train = measure(model, &Role::fitted)?
+    let pair_of = |model: &Refined, counted: Counted| -> Result<Pair, DiagnoseError> {
+        let train = measured(model, &Role::fitted, counted)?
             .ok_or(DiagnoseError::TooFewRows { rows: 0, unknowns })?;
         Ok(Pair {
             train,
-            holdout: measure(model, &wanted)?,
+            holdout: measured(model, &wanted, counted)?,
         })
     };
+    let pair = |model: &Refined| pair_of(model, Counted::All);
     let before = pair(&case.given)?;
     let refitted = pair(&models[0])?.train;
     let after = pair(&at.model)?;
-    // what fits the one and not the other is structure too: where unseen data have more left, they count
     let held_out = |s: &&Stretch| case.roles[s.log] == LogRole::Holdout;
     let unseen: Vec<Stretch> = case.stretches.iter().filter(held_out).cloned().collect();
     let floor = noise(&at.model, case, &fitted)?;
-    let floor_unseen = noise(&at.model, case, &unseen)?;
-    let left = |pair: &Pair| -> Vec<Left> {
-        let train = left(&floor, &pair.train);
-        match &pair.holdout {
-            Some(holdout) if !unseen.is_empty() => {
-                let unseen = left(&floor_unseen, holdout).into_iter().zip(&floor_unseen);
-                let pairs = train.into_iter().zip(unseen);
-                // a joint that rests there has no floor
-                let more = |(a, (b, floor)): (Left, (Left, &f64))| {
-                    if b.share > a.share && *floor > 0.0 {
-                        b
-                    } else {
-                        a
-                    }
-                };
-                pairs.map(more).collect()
-            }
-            _ => train,
-        }
+    let floor_unseen = match unseen.is_empty() {
+        true => None,
+        false => Some(noise(&at.model, case, &unseen)?),
     };
-    let (left_before, left) = (left(&before), left(&after));
-    let covariance = covariance(&at, &ground);
+    // friction at rest is no structure either, where the law jumps
+    let jumps = |law: &JointFriction| matches!(law, JointFriction::ViscousCoulomb(_));
+    let (given, last) = match case.given.model.friction.iter().any(jumps) {
+        true => (
+            pair_of(&case.given, Counted::Moving)?,
+            pair_of(&at.model, Counted::Moving)?,
+        ),
+        false => (before.clone(), after.clone()),
+    };
+    let part_left = part_left(&floor, &given.train, &last.train);
+    let left = left(&last.train, &floor, last.holdout.as_ref().zip(floor_unseen));
+    let moved = moved_by_smoothing(&at, &ground)?;
+    let mut covariance = covariance(&at, &ground) + &moved * moved.transpose();
+    profile::widen(&at, &ground, &mut covariance)?;
     Ok(Diagnosis {
         unknowns: at.base.unknowns.list.clone(),
         covariance,
@@ -347,8 +337,8 @@ pub fn diagnose(
         before,
         refitted,
         after,
-        left_before,
         left,
+        part_left,
         set_aside: plan.set_aside.clone(),
         episodes,
         fitted_logs: case.roles.iter().filter(|r| **r == LogRole::Train).count(),
@@ -433,45 +423,6 @@ fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize
     Ok(worst.map(|(i, _)| i))
 }
 
-/// Variance of the noise in each joint's filtered residual.
-fn noise(model: &Refined, case: &Case, stretches: &[Stretch]) -> Result<Vec<f64>, MotionError> {
-    let residual = |s: &Stretch| {
-        let mut hat = model.reconstruct(s);
-        for (hat, tau) in hat.iter_mut().zip(&s.tau) {
-            for (h, t) in hat.iter_mut().zip(tau) {
-                *h = t - *h;
-            }
-        }
-        hat
-    };
-    let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
-    floor(
-        &residuals,
-        stretches,
-        &case.parallel,
-        case.cutoff_hz,
-        case.averaged,
-        &held_joints(&model.model.robot, stretches),
-    )
-}
-
-/// How much of each joint's residual is above the noise floor.
-fn left(noise: &[f64], found: &Errors) -> Vec<Left> {
-    found
-        .joints
-        .iter()
-        .zip(noise)
-        .map(|(e, noise)| {
-            let residual = e.rmse * e.rmse;
-            let torque = residual / (e.relative_error * e.relative_error);
-            Left {
-                share: ((residual - noise) / torque).max(0.0),
-                over_floor: residual / noise.max(f64::MIN_POSITIVE),
-            }
-        })
-        .collect()
-}
-
 /// Covariance of all unknowns under correlated residuals: the sandwich over pieces (Newey and West
 /// 1987), at least that of independent rows. What these data do not determine beside the others has an
 /// infinite variance.
@@ -525,15 +476,25 @@ impl Diagnosis {
     pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
         let joints = self.left.iter().enumerate();
         joints
-            .filter(|(_, l)| l.over_floor > STRUCTURED && l.share > NEGLIGIBLE)
+            .filter(|(_, l)| {
+                l.over_floor.is_none_or(|over| over > STRUCTURED) && l.share > NEGLIGIBLE
+            })
             .map(|(j, _)| j)
     }
 
-    /// Whether a step's effect leaves nothing on the joints that it touches. Otherwise it lowers the error
-    /// and may stand in for an effect that the catalogue does not have.
+    /// Whether what was added leaves nothing on the joints that a step's effect touches. Otherwise it lowers
+    /// the error and may stand in for an effect that the catalogue does not have.
     pub fn assured(&self, step: &Step) -> bool {
         let place = self.model.effects[step.effect].place;
         !self.structured_joints().any(|j| place.touches(j))
+    }
+
+    /// Whether what was added leaves at most a small part of the structure on the joints that a step's effect
+    /// touches, so that there is something to its name.
+    pub fn explained(&self, step: &Step) -> bool {
+        let place = self.model.effects[step.effect].place;
+        let mut open = self.structured_joints().filter(|j| place.touches(*j));
+        open.all(|j| self.part_left[j] <= NAMED)
     }
 
     /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.

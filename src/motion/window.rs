@@ -26,6 +26,9 @@ pub(super) struct Window {
     a: Vec<f64>,
     /// Computed channels, [group][sample][lane].
     channels: Vec<f64>,
+    /// Whether a group holds zeros only, as the columns of links do that a joint does not carry: it is neither
+    /// written nor filtered, for the filter of zeros is zeros.
+    empty: Vec<bool>,
     /// Samples of the rows, as indices within the window.
     kept: Vec<usize>,
     /// Channels of the rows before and after the filter, row-major.
@@ -67,7 +70,8 @@ impl Window {
         self.choose_rows(chain, samples);
         self.compute(from..to, joints, channels, fill);
         let span = to - from;
-        for group in self.channels.chunks_exact_mut(span * GROUP) {
+        let groups = self.channels.chunks_exact_mut(span * GROUP);
+        for (group, _) in groups.zip(&self.empty).filter(|(_, empty)| !**empty) {
             chain.parallel.run(group, GROUP)?;
         }
         self.filtered.resize(self.kept.len() * channels, 0.0);
@@ -134,9 +138,9 @@ impl Window {
         let size = span.len() * GROUP;
         let needed = channels.div_ceil(GROUP) * size;
         if self.channels.len() != needed {
-            // Lanes without a channel stay zero: the filter of zeros is zeros.
-            self.channels.clear();
-            self.channels.resize(needed, 0.0);
+            // Lanes without a channel stay zero.
+            self.channels = vec![0.0; needed];
+            self.empty = vec![true; channels.div_ceil(GROUP)];
         }
         self.raw.clear();
         let mut values = vec![0.0; channels];
@@ -144,11 +148,12 @@ impl Window {
         for k in span.clone() {
             fill(&self.sample(k, joints), &mut values);
             let at = (k - span.start) * GROUP;
-            for (lanes, group) in values
-                .chunks(GROUP)
-                .zip(self.channels.chunks_exact_mut(size))
-            {
-                group[at..at + lanes.len()].copy_from_slice(lanes);
+            let groups = self.channels.chunks_exact_mut(size).zip(&mut self.empty);
+            for (lanes, (group, empty)) in values.chunks(GROUP).zip(groups) {
+                *empty = *empty && lanes.iter().all(|x| *x == 0.0);
+                if !*empty {
+                    group[at..at + lanes.len()].copy_from_slice(lanes);
+                }
             }
             if rows.next_if_eq(&&k).is_some() {
                 self.raw.extend_from_slice(&values);

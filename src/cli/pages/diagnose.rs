@@ -64,10 +64,17 @@ pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
             "Nothing is missing: what is left of the torque is noise.".to_owned(),
             true,
         ),
-        _ => (
-            "A residual above the noise is left that no known effect explains.".to_owned(),
-            false,
-        ),
+        _ => {
+            let mut text =
+                "A residual above the noise is left that no known effect explains.".to_owned();
+            if !titles.is_empty() {
+                text += &format!(
+                    " Nearest to it, and added, for they lower the error: {}.",
+                    titles.join("; ")
+                );
+            }
+            (text, false)
+        }
     }
 }
 

@@ -49,20 +49,41 @@ pub fn walk(
     q: &[f64],
     v: &[f64],
     a: &[f64],
-    mut visit: impl FnMut(usize, usize, &[f64; STANDARD]),
+    visit: impl FnMut(usize, usize, &[f64; STANDARD]),
 ) {
     let n = chain.joints();
     assert!(
         q.len() >= n && v.len() >= n && a.len() >= n,
         "{n} joints each"
     );
-    let mut states = [AT_REST; MOST_LINKS];
+    // most arms have few links, and clearing the states of many takes a tenth of the time
+    match chain.links().len() {
+        ..=FEW_LINKS => walk_within::<FEW_LINKS>(chain, q, v, a, visit),
+        _ => walk_within::<MOST_LINKS>(chain, q, v, a, visit),
+    }
+}
+
+/// Links up to which a smaller set of states serves.
+const FEW_LINKS: usize = 8;
+
+#[inline(always)]
+fn walk_within<const LINKS: usize>(
+    chain: &Chain,
+    q: &[f64],
+    v: &[f64],
+    a: &[f64],
+    mut visit: impl FnMut(usize, usize, &[f64; STANDARD]),
+) {
+    let n = chain.joints();
+    let mut states = [AT_REST; LINKS];
     let base = State {
         a: times(-1.0, &chain.gravity()),
         ..AT_REST
     };
     for (i, link) in chain.links().iter().enumerate() {
-        let before = link.parent.map_or(&base, |parent| &states[parent]);
+        let (done, rest) = states.split_at_mut(i);
+        let state = &mut rest[0];
+        let before = link.parent.map_or(&base, |parent| &done[parent]);
         let mut slope = [0.0; MOST_JOINTS];
         let [u, du, ddu] = link.coordinate.motion(q, v, a, &mut slope);
         let (rotation, origin) = match link.kind {
@@ -77,12 +98,9 @@ pub fn walk(
             &before.a,
             &add(&cross(&before.dw, &origin), &cross(&before.w, &swept)),
         );
-        let mut state = State {
-            w: turn_back(&rotation, &before.w),
-            dw: turn_back(&rotation, &before.dw),
-            a: turn_back(&rotation, &carried),
-            jacobian: [[[0.0; 3]; 2]; MOST_JOINTS],
-        };
+        state.w = turn_back(&rotation, &before.w);
+        state.dw = turn_back(&rotation, &before.dw);
+        state.a = turn_back(&rotation, &carried);
         let along = times(du, &link.axis);
         let pushed = times(ddu, &link.axis);
         match link.kind {
@@ -96,9 +114,13 @@ pub fn walk(
             }
         }
         for k in (0..n).filter(|k| chain.moves(*k, i)) {
-            let [wk, lk] = &before.jacobian[k];
-            let mut wk_here = turn_back(&rotation, wk);
-            let mut lk_here = turn_back(&rotation, &add(lk, &cross(wk, &origin)));
+            // a joint's first link has nothing of it from the link before
+            let (mut wk_here, mut lk_here) = ([0.0; 3], [0.0; 3]);
+            if link.parent.is_some_and(|parent| chain.moves(k, parent)) {
+                let [wk, lk] = &before.jacobian[k];
+                wk_here = turn_back(&rotation, wk);
+                lk_here = turn_back(&rotation, &add(lk, &cross(wk, &origin)));
+            }
             if slope[k] != 0.0 {
                 let own = times(slope[k], &link.axis);
                 match link.kind {
@@ -107,9 +129,8 @@ pub fn walk(
                 }
             }
             state.jacobian[k] = [wk_here, lk_here];
-            visit(i, k, &row(&state, &wk_here, &lk_here));
+            visit(i, k, &row(state, &wk_here, &lk_here));
         }
-        states[i] = state;
     }
 }
 

@@ -1,0 +1,97 @@
+//! What is left of the torque's residual above its noise, before and after.
+
+use super::floor::floor;
+use super::measure::Errors;
+use super::run::Case;
+use crate::effect::{Refined, held_joints};
+use crate::motion::{MotionError, Stretch};
+
+/// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
+#[derive(Debug, Clone, Copy)]
+pub struct Left {
+    /// Fraction of the torque's power that is residual above the noise floor.
+    pub share: f64,
+    /// Power of the residual over that of the floor; none where the torque was filtered before it was logged,
+    /// so that nothing beyond the band tells of its noise.
+    pub over_floor: Option<f64>,
+}
+
+/// Residual power over the floor's from which on a residual is called structured.
+pub const STRUCTURED: f64 = 2.0;
+/// Share of the torque's power below which structure is not worth a name.
+pub const NEGLIGIBLE: f64 = 4e-6;
+
+/// Power of a torque's noise over its own below which it is that of rounding, and no noise.
+const NO_NOISE: f64 = 1e-10;
+/// Variance of the noise in each joint's filtered residual.
+pub(super) fn noise(
+    model: &Refined,
+    case: &Case,
+    stretches: &[Stretch],
+) -> Result<Vec<f64>, MotionError> {
+    let residual = |s: &Stretch| {
+        let mut hat = model.reconstruct(s);
+        for (hat, tau) in hat.iter_mut().zip(&s.tau) {
+            for (h, t) in hat.iter_mut().zip(tau) {
+                *h = t - *h;
+            }
+        }
+        hat
+    };
+    let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
+    floor(
+        &residuals,
+        stretches,
+        &case.parallel,
+        case.cutoff_hz,
+        case.averaged,
+        &held_joints(&model.model.robot, stretches),
+    )
+}
+
+/// How much of each joint's residual is above the noise floor.
+fn above(noise: &[f64], found: &Errors) -> Vec<Left> {
+    found
+        .joints
+        .iter()
+        .zip(noise)
+        .map(|(e, noise)| {
+            let residual = e.rmse * e.rmse;
+            let torque = residual / (e.relative_error * e.relative_error);
+            Left {
+                share: ((residual - noise) / torque).max(0.0),
+                over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),
+            }
+        })
+        .collect()
+}
+
+/// What is left on fitted logs, or on unseen ones with their own noise where that is more: what fits the one and
+/// not the other is structure too.
+pub(super) fn left(
+    train: &Errors,
+    noise: &[f64],
+    unseen: Option<(&Errors, Vec<f64>)>,
+) -> Vec<Left> {
+    let train = above(noise, train);
+    let Some((holdout, noise)) = unseen else {
+        return train;
+    };
+    let pairs = train.into_iter().zip(above(&noise, holdout)).zip(&noise);
+    // a joint that rests there has no floor
+    let more = |((train, unseen), noise): ((Left, Left), &f64)| {
+        if unseen.share > train.share && *noise > 0.0 {
+            unseen
+        } else {
+            train
+        }
+    };
+    pairs.map(more).collect()
+}
+
+/// Structure after over structure before, per joint.
+pub(super) fn part_left(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
+    let shares = above(noise, before).into_iter().zip(above(noise, after));
+    let part = |(before, after): (Left, Left)| after.share / before.share.max(f64::MIN_POSITIVE);
+    shares.map(part).collect()
+}
