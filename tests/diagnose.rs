@@ -225,8 +225,11 @@ fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads()
     assert_eq!(found, diagnose("1"));
 }
 
+/// A torque of position and speed.
+type Torque<'a> = &'a dyn Fn(f64, f64) -> f64;
+
 /// Writes a log anew with a torque of position and speed added, and noise of 0.5 N.
-fn add_torque(from: &Path, to: &Path, torque: impl Fn(f64, f64) -> f64) {
+fn add_torque(from: &Path, to: &Path, torque: Torque) {
     let mut log = csv::Reader::from_path(from).unwrap();
     let header = log.headers().unwrap().clone();
     assert_eq!(header.iter().collect::<Vec<_>>(), ["t", "q1", "tau1"]);
@@ -254,8 +257,7 @@ fn what_the_catalogue_does_not_have_is_unexplained_and_not_its_nearest_neighbour
     let wave =
         |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 20.0 * q * (1.0 + 4.0 * v.abs())).sin();
     let travelling = |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 30.0 * q + 40.0 * v).sin();
-    let torques: [(&str, &dyn Fn(f64, f64) -> f64); 2] =
-        [("wave", &wave), ("travelling", &travelling)];
+    let torques: [(&str, Torque); 2] = [("wave", &wave), ("travelling", &travelling)];
     for (name, torque) in torques {
         let (log, unseen) = (format!("{name}.csv"), format!("{name}-unseen.csv"));
         add_torque(&at.join("log.csv"), &at.join(&log), torque);
