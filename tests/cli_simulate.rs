@@ -84,6 +84,45 @@ fn the_log_and_the_truth_are_read_back_by_the_tool() {
     assert_eq!(theta_1["value"].as_float(), Some(121.3049));
 }
 
+/// Range of a joint over a log.
+fn travel(log: &Path, robot: &str, joint: usize) -> f64 {
+    let robot = RobotFile::load(Path::new(robot)).unwrap();
+    let joints = robot.joint_names().len();
+    let mut reader = Reader::open(&LogSpec::whole(log.to_owned()), &robot.layout()).unwrap();
+    let mut block = Block::default();
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    while reader.read(&mut block).unwrap() {
+        for q in block.q.chunks_exact(joints) {
+            low = low.min(q[joint]);
+            high = high.max(q[joint]);
+        }
+        block.clear();
+    }
+    high - low
+}
+
+#[test]
+fn a_joint_moves_over_the_part_of_its_range_that_is_asked_for_about_the_middle() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |part: &str, log: &str| {
+        let words = format!("--move q4 --travel {part} --seconds 15 -o {log}");
+        simulate(folder.path(), &words).assert().code(0);
+        travel(&folder.path().join(log), "configs/cft.toml", 2)
+    };
+    let (whole, tenth) = (of("1", "whole.csv"), of("0.1", "tenth.csv"));
+    assert!(whole > 1.5, "{whole}");
+    assert!((tenth / whole - 0.1).abs() < 0.01, "{tenth} of {whole}");
+    for words in [
+        "--move q4 --travel 0 -o a.csv",
+        "--move q4 --travel 1.5 -o a.csv",
+        "--move q4 --travel half -o a.csv",
+        "--travel 0.5 -o a.csv",
+    ] {
+        simulate(folder.path(), words).assert().code(2);
+        assert!(!folder.path().join("a.csv").exists(), "{words}");
+    }
+}
+
 #[test]
 fn the_same_seed_gives_the_same_bytes_at_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();

@@ -52,6 +52,15 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A part of a whole: above 0, at most 1.
+pub(super) fn part(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
+        Ok(_) => Err("must be above 0 and at most 1, the whole".into()),
+        Err(_) => Err("is not a number".into()),
+    }
+}
+
 /// A finite number (a position, a speed).
 pub(super) fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {

@@ -9,6 +9,9 @@ const LADDER_S: u32 = 60;
 /// Long enough for friction to warm up \[s\].
 const WARM_S: u32 = 600;
 
+/// A tenth of the range.
+const NARROW: &str = " --travel 0.1";
+
 /// A motion of one joint or motor alone, both ways at ten speeds over its range, where such a motion
 /// separates the effect; none where it takes a payload, a standstill or other sensors.
 pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
@@ -25,9 +28,11 @@ pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
         "rotor-inertia",
         "coupling",
     ];
-    let seconds = match effect.kind.name {
-        "warm-up" => WARM_S,
-        name if ladder.contains(&name) => LADDER_S,
+    let (seconds, travel) = match effect.kind.name {
+        "warm-up" => (WARM_S, ""),
+        // beside logs over the whole range: a gap keeps its width, a loop shrinks with the amplitude
+        "backlash" | "presliding" => (LADDER_S, NARROW),
+        name if ladder.contains(&name) => (LADDER_S, ""),
         _ => return None,
     };
     let moves = match effect.place {
@@ -42,7 +47,7 @@ pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
         Place::All => return None,
     };
     Some(format!(
-        "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move {moves} --seconds {seconds} \
+        "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move {moves}{travel} --seconds {seconds} \
          -o separate.csv"
     ))
 }
@@ -70,6 +75,8 @@ mod tests {
         assert!(friction.contains("--move x_c2 "), "{friction}");
         let coupling = told("coupling", Place::Pair { on: 1, of: 3 }).unwrap();
         assert!(coupling.contains("--move q5 "), "{coupling}");
+        let play = told("backlash", Place::Joint(0)).unwrap();
+        assert!(play.contains("--move q1 --travel 0.1 "), "{play}");
         assert_eq!(told("delay", Place::All), None);
     }
 }

@@ -42,6 +42,9 @@ pub struct Args {
     /// One-joint experiment: JOINT moves over its range at several speeds, the others are held
     #[arg(long = "move", value_name = "JOINT", group = "motion")]
     pub move_joint: Option<String>,
+    /// Part of its range that JOINT moves over, about the middle [default: 1]
+    #[arg(long, value_name = "PART", value_parser = arguments::part, requires = "move_joint")]
+    pub travel: Option<f64>,
     /// Log whose volts u_1..u_4 drive the motors, without a controller
     #[arg(long, value_name = "LOG", group = "motion")]
     pub volts: Option<LogSpec>,
@@ -112,7 +115,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
     let motion = match (&reference, &args.move_joint, &volts) {
         (Some(reference), ..) => Motion::Trajectory(&reference.value),
-        (_, Some(joint), _) => Motion::Move(joint),
+        (_, Some(joint), _) => Motion::MoveWithin {
+            joint,
+            part: args.travel.unwrap_or(1.0),
+        },
         (_, _, Some(volts)) => Motion::Volts {
             times: &volts.times,
             volts: &volts.rows,

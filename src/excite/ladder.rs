@@ -16,7 +16,8 @@ use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::simulate::cft_experiment::OneJointMove;
 use crate::simulate::from_files::{
-    cft_limits, cft_reference, single_joint_ladder, single_joint_reference, single_joint_truth,
+    LadderOf, cft_limits, cft_reference, single_joint_ladder, single_joint_reference,
+    single_joint_truth,
 };
 use crate::simulate::reference::TURN;
 use crate::simulate::{Frame, Path, Reference};
@@ -225,7 +226,13 @@ fn usual_speeds(
         Motors::Joints => {
             let truth = single_joint_truth(task.robot, task.model)?;
             let (seconds, seed) = (task.seconds, task.seed);
-            let reference = single_joint_ladder(task.robot, &truth, None, seconds, seed)?;
+            let reference = single_joint_ladder(
+                task.robot,
+                &truth,
+                LadderOf::Usual { part: 1.0 },
+                seconds,
+                seed,
+            )?;
             Ok(speeds(&reference))
         }
     }

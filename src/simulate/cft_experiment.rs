@@ -10,7 +10,9 @@ use super::controller::Control;
 use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::plant::Plant;
 use super::recording::Recording;
-use super::reference::{Fourier, Frame, LadderPlan, Path, Reference, TURN, Travel, travel};
+use super::reference::{
+    Fourier, Frame, LadderPlan, Path, Reference, TURN, Travel, middle_part, travel,
+};
 use super::run::{Drive, Start, run};
 use super::settings::Settings;
 use crate::robot::cft::actuation::{Limits, Setup};
@@ -106,6 +108,8 @@ pub struct OneJointMove {
     pub pose: Option<[f64; 4]>,
     /// Range of the mover, m or rad; what the limits leave, with a margin, where absent.
     pub range: Option<(f64, f64)>,
+    /// Middle part of the range that the limits leave; all of it, 1, unless asked for.
+    pub part: f64,
     /// Plateau speeds, m/s or rad/s; ten in equal ratios up to the motors' limit where absent.
     pub speeds: Option<Vec<f64>>,
     /// Largest acceleration, m/s^2 or rad/s^2; by mover and set-up where absent.
@@ -126,6 +130,7 @@ impl OneJointMove {
             limits: None,
             pose: None,
             range: None,
+            part: 1.0,
             speeds: None,
             acceleration: None,
             turn: None,
@@ -164,7 +169,7 @@ impl OneJointMove {
                 (Frame::Motors, middle, room)
             }
         };
-        let range = self.range.unwrap_or(room.range);
+        let range = self.range.unwrap_or(middle_part(room.range, self.part));
         if range.0 < room.range.0 - 1e-9 || range.1 > room.range.1 + 1e-9 {
             return Err(SimulateError::Reference {
                 what: format!(
@@ -186,7 +191,8 @@ impl OneJointMove {
                 (of(LOWEST)[place], of(acceleration(setup))[place])
             }
         };
-        let acceleration = self.acceleration.unwrap_or(acceleration);
+        // strokes last as long as those of the whole range, so that the controller follows them as well
+        let acceleration = self.acceleration.unwrap_or(self.part * acceleration);
         let top = SPEED_SHARE * room.top_speed;
         let ladder = match &self.speeds {
             None => LadderPlan::usual(range, (lowest, top), acceleration, self.seconds, self.seed)?,

@@ -5,7 +5,7 @@ use super::cft::CftTruth;
 use super::cft_experiment::{Mover, OneJointMove};
 use super::controller::Control;
 use super::plant::Plant;
-use super::reference::{Fourier, Frame, LadderPlan, Path, Points, Reference, TURN};
+use super::reference::{Fourier, Frame, LadderPlan, Path, Points, Reference, TURN, middle_part};
 use super::sensors::{Noise, Sensors};
 use super::settings::Settings;
 use super::single_joint::{SingleJointFriction, SingleJointTruth};
@@ -241,9 +241,19 @@ pub fn single_joint_reference(
             })
         }
         Trajectory::SingleJoint(file) => {
-            single_joint_ladder(robot, truth, Some(file), seconds.unwrap_or(SECONDS), seed)
+            let seconds = seconds.unwrap_or(SECONDS);
+            single_joint_ladder(robot, truth, LadderOf::File(file), seconds, seed)
         }
     }
+}
+
+/// Which ladder a single joint runs.
+#[derive(Debug, Clone, Copy)]
+pub enum LadderOf<'a> {
+    /// That of a file.
+    File(&'a SingleJointMove),
+    /// Ten speeds over the middle part of the range, 1 for all of it.
+    Usual { part: f64 },
 }
 
 /// Ladder of a single joint over the range of its limits (or of the file), at the file's speeds or at ten up
@@ -254,10 +264,14 @@ pub fn single_joint_reference(
 pub fn single_joint_ladder(
     robot: &RobotFile,
     truth: &SingleJointTruth,
-    file: Option<&SingleJointMove>,
+    ladder: LadderOf,
     seconds: f64,
     seed: u64,
 ) -> Outcome<1> {
+    let (file, part) = match ladder {
+        LadderOf::File(file) => (Some(file), 1.0),
+        LadderOf::Usual { part } => (None, part),
+    };
     let limits = robot.limits.get(&truth.name).cloned().unwrap_or_default();
     let (lower, upper) = truth.limits();
     let margin = 0.05 * (upper[0] - lower[0]);
@@ -279,6 +293,8 @@ pub fn single_joint_ladder(
         .and_then(|file| file.acceleration)
         .or(limits.acceleration);
     let acceleration = acceleration.unwrap_or(8.0 * (range.1 - range.0));
+    // strokes last as long as those of the whole range, so that the controller follows them as well
+    let (range, acceleration) = (middle_part(range, part), part * acceleration);
     let ladder = match file {
         Some(file) => LadderPlan {
             range,

@@ -31,8 +31,21 @@ pub enum Motion<'a> {
     Trajectory(&'a Trajectory),
     /// One joint (or motor coordinate) runs a ladder of speeds.
     Move(&'a str),
+    /// The same within a part of its range, about the middle.
+    MoveWithin { joint: &'a str, part: f64 },
     /// Volts of a log: times \[s\], and volts row by row.
     Volts { times: &'a [f64], volts: &'a [f64] },
+}
+
+impl<'a> Motion<'a> {
+    /// The joint that moves alone, and the part of its range that it moves over.
+    pub(super) fn alone(&self) -> Option<(&'a str, f64)> {
+        match *self {
+            Motion::Move(joint) => Some((joint, 1.0)),
+            Motion::MoveWithin { joint, part } => Some((joint, part)),
+            _ => None,
+        }
+    }
 }
 
 /// What is asked of the simulator.
@@ -144,12 +157,13 @@ fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLo
             order.seconds,
             order.seed,
         )?),
-        Motion::Move(name) => {
-            let mover = cft_experiment::Mover::named(name)?;
+        Motion::Move(joint) | Motion::MoveWithin { joint, .. } => {
+            let mover = cft_experiment::Mover::named(joint)?;
             let seconds = order.seconds.unwrap_or(SECONDS);
             let ladder = cft_experiment::OneJointMove {
                 mover,
                 limits: Some(limits),
+                part: order.motion.alone().map_or(1.0, |(_, part)| part),
                 ..cft_experiment::OneJointMove::new(0, seconds, Some(order.seed))
             };
             Some(ladder.reference(setup)?)
@@ -181,26 +195,23 @@ fn single(
     let (effects, values) = built_effects(order, &Sites::single_joint(&truth))?;
     let seconds = order.seconds.unwrap_or(SECONDS);
     let reference = match order.motion {
-        Motion::Usual => Some(from_files::single_joint_ladder(
-            order.robot,
-            &truth,
-            None,
-            seconds,
-            order.seed,
-        )?),
-        Motion::Move(name) if name != truth.name => {
+        Motion::Move(joint) | Motion::MoveWithin { joint, .. } if joint != truth.name => {
             return Err(SimulateError::UnknownJoint {
-                name: name.to_owned(),
+                name: joint.to_owned(),
                 known: truth.name,
             });
         }
-        Motion::Move(_) => Some(from_files::single_joint_ladder(
-            order.robot,
-            &truth,
-            None,
-            seconds,
-            order.seed,
-        )?),
+        Motion::Usual | Motion::Move(_) | Motion::MoveWithin { .. } => {
+            let part = order.motion.alone().map_or(1.0, |(_, part)| part);
+            let ladder = from_files::LadderOf::Usual { part };
+            Some(from_files::single_joint_ladder(
+                order.robot,
+                &truth,
+                ladder,
+                seconds,
+                order.seed,
+            )?)
+        }
         Motion::Trajectory(trajectory) => Some(from_files::single_joint_reference(
             order.robot,
             &truth,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::SimulateError;
-use super::from_files::{SECONDS, fourier, points, single_joint_ladder};
+use super::from_files::{LadderOf, SECONDS, fourier, points, single_joint_ladder};
 use super::order::{Motion, Order};
 use super::plant::Plant;
 use super::reference::{Fourier, Frame, Path, Reference};
@@ -85,7 +85,7 @@ pub(super) fn reference<const J: usize>(
 ) -> Result<Option<Reference<J>>, SimulateError> {
     let names = truth.joint_names();
     let seconds = order.seconds.unwrap_or(SECONDS);
-    let ladder = |name: &str, file| -> Result<Reference<J>, SimulateError> {
+    let along = |name: &str, ladder: LadderOf| -> Result<Reference<J>, SimulateError> {
         let Some(moving) = names.iter().position(|n| n == name) else {
             return Err(SimulateError::UnknownJoint {
                 name: name.to_owned(),
@@ -93,7 +93,7 @@ pub(super) fn reference<const J: usize>(
             });
         };
         let joint = &truth.joints[moving];
-        let one = single_joint_ladder(order.robot, joint, file, seconds, order.seed)?;
+        let one = single_joint_ladder(order.robot, joint, ladder, seconds, order.seed)?;
         let Path::Ladder { ladder, .. } = one.path else {
             return Err(SimulateError::Reference {
                 what: "a ladder was asked for".to_owned(),
@@ -112,8 +112,11 @@ pub(super) fn reference<const J: usize>(
     };
     Ok(match order.motion {
         Motion::Usual => Some(usual(truth)),
-        Motion::Move(name) => Some(ladder(name, None)?),
-        Motion::Trajectory(Trajectory::SingleJoint(file)) => Some(ladder(&file.joint, Some(file))?),
+        Motion::Move(joint) => Some(along(joint, LadderOf::Usual { part: 1.0 })?),
+        Motion::MoveWithin { joint, part } => Some(along(joint, LadderOf::Usual { part })?),
+        Motion::Trajectory(Trajectory::SingleJoint(file)) => {
+            Some(along(&file.joint, LadderOf::File(file))?)
+        }
         Motion::Trajectory(Trajectory::Fourier(file)) => {
             let names = std::array::from_fn(|j| names[j].as_str());
             Some(fourier(file, Frame::Joints, names, truth.middle())?)

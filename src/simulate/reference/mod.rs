@@ -11,7 +11,7 @@ pub use clock::Clock;
 pub use fourier::Fourier;
 pub use ladder::{Ladder, LadderPlan, TURN};
 pub use points::Points;
-pub use travel::{Travel, travel};
+pub use travel::{Travel, middle_part, travel};
 
 use super::SimulateError;
 

@@ -91,3 +91,12 @@ pub fn travel<P: Plant<J>, const J: usize>(
         top_speed,
     })
 }
+
+/// The middle part of a range.
+pub fn middle_part((low, high): (f64, f64), part: f64) -> (f64, f64) {
+    let (middle, half) = (0.5 * (low + high), 0.5 * part * (high - low));
+    if part == 1.0 {
+        return (low, high);
+    }
+    (middle - half, middle + half)
+}
