@@ -26,8 +26,8 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
         _ => hanging(
             "",
             &format!(
-                "{name} leaves a residual above the noise that no known effect explains. Nearest to it, \
-                 and added, for they lower the error:"
+                "{name} leaves a residual above the noise that no known effect explains. What \
+                 comes near to it was added, and lowers the error:"
             ),
             0,
         ),

@@ -2,7 +2,7 @@
 //! where it is least; a slope that saturates, or a gap whose reversals come one by one, has a floor that is
 //! flat or ragged there, and the linear promise is kept further out only.
 //!
-//! Where the profile (the least weighted square over all other unknowns, Bates and Watts 1988, section 6.1)
+//! Where the profile (the least weighted square over all other unknowns, Bates and Watts 1988)
 //! rises by less than the linearisation says it does at two standard deviations, the shape's standard
 //! deviation becomes half of the distance at which it rises by as much, on the side where that is farther.
 

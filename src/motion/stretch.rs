@@ -155,7 +155,7 @@ impl Parallel {
     }
 
     /// The stretch with its motion through the position filter once more; none where there is no such
-    /// filter. To leading order this doubles what the filter took (Tukey's twicing, 1977, section 16).
+    /// filter. To leading order this doubles what the filter took (Tukey's twicing, Exploratory Data Analysis, 1977).
     ///
     /// # Errors
     /// [`MotionError`] where the stretch is too short for the filter.

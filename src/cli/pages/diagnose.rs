@@ -69,7 +69,7 @@ pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
                 "A residual above the noise is left that no known effect explains.".to_owned();
             if !titles.is_empty() {
                 text += &format!(
-                    " Nearest to it, and added, for they lower the error: {}.",
+                    " What comes near to it was added, and lowers the error: {}.",
                     titles.join("; ")
                 );
             }
