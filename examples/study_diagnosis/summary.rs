@@ -324,28 +324,26 @@ fn families(effect: &str) -> &'static [&'static str] {
     }
 }
 
+/// Whether a step is of the family of what was put in.
+fn related(row: &Value, step: &Value) -> bool {
+    let own = families(text(&row["put"][0]["effect"]));
+    let found = families(text(&step["effect"]));
+    own.iter().any(|f| found.contains(f))
+}
+
 /// Whether all that was named is of a withheld effect's family; where nothing was, whether nothing of it
 /// shows.
 fn only_family(row: &Value) -> bool {
-    let steps = list(&row["steps"]);
-    let own = families(text(&row["put"][0]["effect"]));
-    let alike = |s: &Value| {
-        let found = families(text(&s["effect"]));
-        own.iter().any(|f| found.contains(f))
-    };
-    match steps {
+    match list(&row["steps"]) {
         [] => !shows(row),
-        some => some.iter().all(alike),
+        some => some.iter().all(|step| related(row, step)),
     }
 }
 
 /// Whether a step of another family than the withheld effect's is marked so.
 fn stranger(row: &Value, mark: &str) -> bool {
-    let own = families(text(&row["put"][0]["effect"]));
-    list(&row["steps"]).iter().any(|s| {
-        let found = families(text(&s["effect"]));
-        s[mark] == true && !own.iter().any(|f| found.contains(f))
-    })
+    let mut steps = list(&row["steps"]).iter();
+    steps.any(|s| s[mark] == true && !related(row, s))
 }
 
 /// Whether a withheld effect ends as an unexplained residual, nothing of another family being assured, or

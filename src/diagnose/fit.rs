@@ -255,9 +255,7 @@ fn summed(model: Refined, base: Base, weights: Vec<f64>, ground: &Ground) -> Fit
 pub fn least_with_held(at: &Fitted, ground: &Ground, held: Option<usize>) -> f64 {
     let (mut normal, mut pull) = (at.normal.clone(), at.pull.clone());
     if let Some(i) = held {
-        normal.row_mut(i).fill(0.0);
-        normal.column_mut(i).fill(0.0);
-        pull[i] = 0.0;
+        hold(&mut normal, &mut pull, i);
     }
     objective(at, ground) - Inverse::of(&normal).solve(&pull).dot(&pull)
 }
@@ -278,15 +276,20 @@ impl Fitted {
     }
 }
 
+/// Takes an unknown out of a linear step: it stays where it is.
+fn hold(normal: &mut DMatrix<f64>, pull: &mut DVector<f64>, i: usize) {
+    normal.row_mut(i).fill(0.0);
+    normal.column_mut(i).fill(0.0);
+    pull[i] = 0.0;
+}
+
 /// The step to the minimum of the linearised problem, and the squares that it promises to remove.
 fn newton(at: &Fitted, shapes_held: bool) -> (Vec<f64>, f64) {
     let (mut normal, mut pull) = (at.normal.clone(), at.pull.clone());
     let list = at.base.unknowns.list.iter().enumerate();
     for (i, unknown) in list.filter(|_| shapes_held) {
         if matches!(unknown, Unknown::Shape { .. }) {
-            normal.row_mut(i).fill(0.0);
-            normal.column_mut(i).fill(0.0);
-            pull[i] = 0.0;
+            hold(&mut normal, &mut pull, i);
         }
     }
     let delta = Inverse::of(&normal).solve(&pull);
