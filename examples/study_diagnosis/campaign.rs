@@ -123,9 +123,10 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
             "place": robot.joint_names()[e.joint], "from_s": e.from_s, "to_s": e.to_s,
         })).collect::<Vec<_>>(),
         "structured": result.structured(),
-        // structure left per joint over what was there before, and over the noise
+        "remainder": result.remainder().map(|c| c.effect.title(robot)).collect::<Vec<_>>(),
+        // structure left per joint: over what was there before, power over the noise's, share of the torque's
         "left": result.left.iter().zip(&result.part_left).map(|(left, part)| {
-            [Some(*part), left.over_floor]
+            [Some(*part), left.over_floor, Some(left.share)]
         }).collect::<Vec<_>>(),
         "shown": shown,
         "before": unseen(&result, false),
@@ -235,7 +236,7 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
         "family": effect.family().name(),
         "place": place,
         "alternatives": alike,
-        "assured": result.assured(step),
+        "assured": result.assured(),
         "explained": result.explained(step),
         "off": off,
     })

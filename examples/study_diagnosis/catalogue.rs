@@ -217,7 +217,7 @@ impl Setting {
 }
 
 /// All cases of one seed: the largest single effects, two at once, withheld ones, then the smaller
-/// single effects; a clean campaign before every sixth.
+/// single effects; a clean campaign before every eighth.
 pub fn settings() -> Vec<Setting> {
     let setting = |study, put, withheld| Setting {
         study,
@@ -252,9 +252,9 @@ pub fn settings() -> Vec<Setting> {
         setting("withheld", vec![put], true)
     }));
     out.extend(SIZES[1..].iter().flat_map(|size| single(*size)));
-    let mut all = Vec::with_capacity(out.len() * 6 / 5 + 1);
+    let mut all = Vec::with_capacity(out.len() * 9 / 8 + 1);
     for (i, one) in out.into_iter().enumerate() {
-        if i % 5 == 0 {
+        if i % 8 == 0 {
             all.push(setting("clean", Vec::new(), false));
         }
         all.push(one);

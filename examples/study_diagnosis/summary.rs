@@ -196,6 +196,8 @@ fn rates(rows: &[Value]) -> Vec<Value> {
         .collect();
     let shown: Vec<&Value> = large.iter().copied().filter(|r| shows(r)).collect();
     let count = |rows: &[&Value], which: usize| rows.iter().filter(|r| right(r)[which]).count();
+    let certain: Vec<&Value> = shown.iter().copied().filter(|r| right(r)[1]).collect();
+    let certainly = |r: &Value| list(&r["steps"]).iter().all(|s| s["assured"] == true);
     let two = of(rows, "two");
     let out = of(rows, "withheld");
     let alternatives: Vec<f64> = shown
@@ -255,6 +257,12 @@ fn rates(rows: &[Value]) -> Vec<Value> {
             "-",
             count(&shown, 1),
             shown.len(),
+        ),
+        rate(
+            "of these, assured",
+            "-",
+            certain.iter().filter(|r| certainly(r)).count(),
+            certain.len(),
         ),
         rate(
             "both of two at once",
@@ -346,10 +354,11 @@ fn stranger(row: &Value, mark: &str) -> bool {
     steps.any(|s| s[mark] == true && !related(row, s))
 }
 
-/// Whether a withheld effect ends as an unexplained residual, nothing of another family being assured, or
-/// as its own family.
+/// Whether a withheld effect ends as an unexplained residual, told from noise by its size or by a test, with
+/// nothing of another family assured, or as its own family.
 fn honest(row: &Value) -> bool {
-    only_family(row) || row["structured"] == true && !stranger(row, "assured")
+    let told = row["structured"] == true || !list(&row["remainder"]).is_empty();
+    only_family(row) || told && !stranger(row, "assured")
 }
 
 /// Whether nothing of another family is behind a verdict of effects found.

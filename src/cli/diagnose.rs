@@ -318,6 +318,7 @@ fn candidate_json(machine: &Machine, c: &Candidate) -> Value {
         "delta_bic": c.score.as_ref().map(|s| s.delta_bic),
         "p_value": c.score.as_ref().map(|s| s.p_value),
         "accepted": c.accepted,
+        "significant": c.significant,
         "reason": c.reason,
     })
 }
@@ -344,7 +345,7 @@ pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
                 "joint": effect.place.name(robot),
                 "parameters": parameters,
                 "alternatives": alternatives,
-                "assured": d.assured(step),
+                "assured": d.assured(),
                 "separate_command": (!alternatives.is_empty())
                     .then(|| super::separate::command(effect, robot))
                     .flatten(),

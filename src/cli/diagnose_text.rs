@@ -79,25 +79,8 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
             }
         }
     }
-    let open: Vec<String> = d
-        .structured_joints()
-        .filter(|j| {
-            d.steps
-                .iter()
-                .any(|s| d.model.effects[s.effect].place.touches(*j))
-        })
-        .map(|j| match d.left[j].over_floor {
-            Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
-            None => robot.joint_names()[j].clone(),
-        })
-        .collect();
-    if !open.is_empty() {
-        let told = format!(
-            "structure is left on {}: what was found there lowers the error, and may stand in for \
-             what no known effect explains",
-            open.join(", ")
-        );
-        out += &hanging("  ", &told, 4);
+    if !d.steps.is_empty() {
+        out += &doubt(machine, found);
     }
     for e in &d.episodes {
         let told = format!(
@@ -141,5 +124,36 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
         ]);
     }
     out += &format!("{table}");
+    out
+}
+
+/// Why what was found may stand in for something else; nothing where it leaves only noise.
+fn doubt(machine: &Machine, found: &Diagnosed) -> String {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    let open: Vec<String> = d
+        .structured_joints()
+        .map(|j| match d.left[j].over_floor {
+            Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
+            None => robot.joint_names()[j].clone(),
+        })
+        .collect();
+    let remainder: Vec<String> = d.remainder().map(|c| c.effect.title(robot)).collect();
+    let mut out = String::new();
+    if !open.is_empty() {
+        let told = format!(
+            "structure is left on {}: what was found lowers the error, and may stand in for what no \
+             known effect explains",
+            open.join(", ")
+        );
+        out += &hanging("  ", &told, 4);
+    }
+    if !remainder.is_empty() {
+        let told = format!(
+            "too small to matter, and still no chance: {}; what was found is not quite what is there",
+            remainder.join(", ")
+        );
+        out += &hanging("  ", &told, 4);
+    }
     out
 }

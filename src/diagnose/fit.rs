@@ -5,19 +5,37 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::plan::{Plan, Role};
-use super::rows::Base;
+use super::rows::{Base, Inertial, inertial};
 use super::unknowns::{Open, Unknown, Unknowns, step};
 use crate::effect::{Cover, Refined, Torques};
 use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::Robot;
 
 /// Everything that a fit works on.
 pub struct Ground<'a> {
     pub stretches: &'a [Stretch],
+    /// What the inertial parameters do along each of them.
+    pub inertial: Vec<Inertial>,
     pub parallel: &'a Parallel,
     pub plan: Plan,
     pub open: &'a Open,
     pub prior: &'a Prior,
     pub cover: Cover,
+}
+
+/// The filtered regressors of all stretches.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn inertial_of(
+    robot: &Robot,
+    stretches: &[Stretch],
+    parallel: &Parallel,
+    plan: &Plan,
+) -> Result<Vec<Inertial>, MotionError> {
+    let all = stretches.par_iter().enumerate();
+    all.map(|(i, stretch)| inertial(robot, stretch, parallel, &|j| plan.holds(i, j)))
+        .collect()
 }
 
 impl Ground<'_> {
@@ -187,6 +205,7 @@ pub fn moved_by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, 
         }
     }
     let ground = Ground {
+        inertial: inertial_of(&at.model.model.robot, &again, ground.parallel, &ground.plan)?,
         stretches: &again,
         plan: ground.plan.clone(),
         cover: ground.cover.clone(),
@@ -213,7 +232,7 @@ fn evaluate(
     let base = Base::of(
         &model,
         unknowns,
-        ground.stretches,
+        (ground.stretches, &ground.inertial),
         ground.parallel,
         &ground.plan,
     )?;

@@ -1,14 +1,14 @@
 //! The noise floor: how much of a filtered residual is noise that no model could explain.
 //!
-//! Where a log repeats its motion, what the filtered residual does not repeat is noise. Otherwise, and where
-//! it says less: just above the band that is kept, the residual holds nothing but noise. Two bands from 1.5
-//! to 3 times the cut-off are looked at, block by block, and the median of the blocks is not moved by
-//! reversals. Two, for noise has two sources: of the torque, white, and of the encoder by way of the
-//! acceleration, which rises with the fourth power of the frequency; carried on into the band as if it were
-//! white, it would hide what is there. The top of the spectrum, by fourth differences, is looked at too, and
-//! the lowest counts: orders of a ripple beyond the band, and torque that the position filter keeps the model
-//! from following, are no noise. Noise that falls towards high frequency is underrated, and then some of it
-//! is called structure: the safe side.
+//! Where a log repeats its motion, what the filtered residual does not repeat is noise; so is the rounding of
+//! the encoders, which it may repeat. Otherwise, and where it says less: just above the band that is kept, the
+//! residual holds nothing but noise. Two bands from 1.5 to 3 times the cut-off are looked at, block by block,
+//! and the median of the blocks is not moved by reversals. Two, for noise has two sources: of the torque,
+//! white, and of the encoder by way of the acceleration, which rises with the fourth power of the frequency;
+//! carried on into the band as if it were white, it would hide what is there. The top of the spectrum, by
+//! fourth differences, is looked at too, and the lowest counts: orders of a ripple beyond the band, and torque
+//! that the position filter keeps the model from following, are no noise. Noise that falls towards high
+//! frequency is underrated, and then some of it is called structure: the safe side.
 
 use super::period::{period, unrepeated};
 use crate::math::sos::Sos;
@@ -77,7 +77,7 @@ pub fn floor(
     for j in 0..joints {
         let middle = |x: &[f64]| {
             let blocks = x.chunks_exact(block).map(|b| power(b) / block as f64);
-            median(&mut blocks.collect::<Vec<f64>>())
+            Middle::of(&mut blocks.collect::<Vec<f64>>())
         };
         // logs differ in their noise: each has its own, and they count by their rows
         let (mut sum, mut rows) = (0.0, 0.0);
@@ -92,7 +92,8 @@ pub fn floor(
                 .windows(5)
                 .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
                 .collect();
-            let white = carried_on(near, seen, kept).min(kept[0] * middle(&differences) / gain);
+            let [white, rising] = carried_on(near, seen, kept);
+            let beyond = (white + rising).min(kept[0] * middle(&differences).value / gain);
             let repeated = match period {
                 Some(period) => {
                     let mut filtered = residual[j].clone();
@@ -102,7 +103,8 @@ pub fn floor(
                 None => None,
             };
             let weight = residual[j].len() as f64;
-            sum += weight * repeated.map_or(white, |r| r.min(white));
+            // the encoders' rounding comes again with the motion, and is noise all the same
+            sum += weight * repeated.map_or(beyond, |r| (r + rising).min(beyond));
             rows += weight;
         }
         floor.push(if rows > 0.0 { sum / rows } else { 0.0 });
@@ -110,23 +112,25 @@ pub fn floor(
     Ok(floor)
 }
 
-/// Variance in the band that is kept, from that in two bands beyond it: what white noise and rising noise of
-/// no negative power make of both, `seen[band][source]`.
-fn carried_on(near: [f64; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
+/// Variances of white noise and of rising noise in the band that is kept, from that in two bands beyond it:
+/// what the two, with no negative power, make of both, `seen[band][source]`. White noise that the rising noise
+/// hides there is anything up to its standard error, and is taken to be that: what is no more is no structure.
+fn carried_on(near: [Middle; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
     let [[w, r], [x, s]] = seen;
     let determinant = w * s - r * x;
-    let white = (near[0] * s - r * near[1]) / determinant;
-    let rising = (w * near[1] - near[0] * x) / determinant;
+    let [first, second] = near.map(|n| n.value);
+    let white = (first * s - r * second) / determinant;
+    let rising = (w * second - first * x) / determinant;
+    let error = (near[0].error * s).hypot(near[1].error * r) / determinant.abs();
     let alone = |source: usize| {
-        let of_band = |band: usize| near[band] / seen[band][source];
+        let of_band = |band: usize| near[band].value / seen[band][source];
         kept[source] * of_band(0).min(of_band(1))
     };
+    let white = (kept[0] * white.max(error)).min(alone(0));
     if rising <= 0.0 || !rising.is_finite() {
-        alone(0)
-    } else if white <= 0.0 {
-        alone(1)
+        [alone(0), 0.0]
     } else {
-        kept[0] * white + kept[1] * rising
+        [white, (kept[1] * rising).min(alone(1))]
     }
 }
 
@@ -134,10 +138,29 @@ fn power(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// Middle value; 0 of nothing.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+/// Median of blocks with its standard error, as if they were normal between their quartiles.
+#[derive(Debug, Clone, Copy, Default)]
+struct Middle {
+    value: f64,
+    error: f64,
+}
+
+impl Middle {
+    /// Sorts the values; 0 of none.
+    fn of(values: &mut [f64]) -> Self {
+        values.sort_by(f64::total_cmp);
+        let n = values.len();
+        let at = |part: f64| {
+            let index = (part * n as f64) as usize;
+            values.get(index).copied().unwrap_or(0.0)
+        };
+        // quartiles of a normal distribution are 1.349 apart, and its median has 1.2533 times the mean's error
+        let spread = (at(0.75) - at(0.25)) / 1.349;
+        Middle {
+            value: at(0.5),
+            error: 1.2533 * spread / (n.max(1) as f64).sqrt(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -147,18 +170,43 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     #[test]
-    fn noise_that_rises_is_told_from_white_noise() {
+    fn noise_that_rises_is_told_from_white_noise_and_what_it_hides_is_its_standard_error() {
         let (seen, kept) = ([[1.0, 3.0], [2.0, 20.0]], [5.0, 0.5]);
+        let known = |value: f64| Middle { value, error: 0.0 };
         let of = |white: f64, rising: f64| {
-            let near = seen.map(|[w, r]| w * white + r * rising);
+            let near = seen.map(|[w, r]| known(w * white + r * rising));
             carried_on(near, seen, kept)
         };
         for (white, rising) in [(1.0, 0.0), (0.3, 0.8), (0.0, 2.0)] {
-            let wanted = kept[0] * white + kept[1] * rising;
-            assert!((of(white, rising) - wanted).abs() < 1e-12);
+            let [a, b] = of(white, rising);
+            assert!((a - kept[0] * white).abs() < 1e-12, "{a} {b}");
+            assert!((b - kept[1] * rising).abs() < 1e-12, "{a} {b}");
         }
         // a spectrum that falls: the lower of the two bands
-        assert_eq!(carried_on([4.0, 2.0], seen, kept), 5.0);
+        assert_eq!(carried_on([4.0, 2.0].map(known), seen, kept), [5.0, 0.0]);
+        // rising noise alone, known to a tenth: (20 * 0.3 hypot 3 * 2) / 14 of white noise may be there
+        let near = [3.0, 20.0].map(|value| Middle {
+            value,
+            error: 0.1 * value,
+        });
+        let [white, rising] = carried_on(near, seen, kept);
+        assert!((white - 5.0 * 72f64.sqrt() / 14.0).abs() < 1e-12, "{white}");
+        assert!((rising - 0.5).abs() < 1e-12, "{rising}");
+    }
+
+    #[test]
+    fn a_middle_has_the_standard_error_of_a_median() {
+        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let mut draw = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let found: Vec<Middle> = (0..2000)
+            .map(|_| Middle::of(&mut (0..49).map(|_| 3.0 + draw()).collect::<Vec<f64>>()))
+            .collect();
+        let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
+        let told = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
+        assert!(
+            (told / scatter.sqrt() - 1.0).abs() < 0.1,
+            "{told} {scatter}"
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::floor::floor;
 use super::measure::Errors;
 use super::run::Case;
-use crate::effect::{Refined, held_joints};
+use crate::effect::held_joints;
 use crate::motion::{MotionError, Stretch};
 
 /// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
@@ -19,33 +19,24 @@ pub struct Left {
 /// Residual power over the floor's from which on a residual is called structured.
 pub const STRUCTURED: f64 = 2.0;
 /// Share of the torque's power below which structure is not worth a name.
-pub const NEGLIGIBLE: f64 = 4e-6;
+pub const NEGLIGIBLE: f64 = 1e-6;
 
 /// Power of a torque's noise over its own below which it is that of rounding, and no noise.
 const NO_NOISE: f64 = 1e-10;
-/// Variance of the noise in each joint's filtered residual.
+
+/// Variance of the noise in each joint's filtered residual, from raw residuals `[stretch][joint][sample]`.
 pub(super) fn noise(
-    model: &Refined,
+    residuals: &[Vec<Vec<f64>>],
     case: &Case,
     stretches: &[Stretch],
 ) -> Result<Vec<f64>, MotionError> {
-    let residual = |s: &Stretch| {
-        let mut hat = model.reconstruct(s);
-        for (hat, tau) in hat.iter_mut().zip(&s.tau) {
-            for (h, t) in hat.iter_mut().zip(tau) {
-                *h = t - *h;
-            }
-        }
-        hat
-    };
-    let residuals: Vec<Vec<Vec<f64>>> = stretches.iter().map(residual).collect();
     floor(
-        &residuals,
+        residuals,
         stretches,
         &case.parallel,
         case.cutoff_hz,
         case.averaged,
-        &held_joints(&model.model.robot, stretches),
+        &held_joints(&case.given.model.robot, stretches),
     )
 }
 

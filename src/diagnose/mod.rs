@@ -10,6 +10,7 @@
 //! effective number of rows, cross-validation over blocks with gaps, and data set aside that may
 //! veto. All must agree. The holdout decides nothing.
 
+mod accept;
 mod candidate;
 mod episode;
 mod evidence;
@@ -27,6 +28,7 @@ mod search;
 mod suspect;
 mod unknowns;
 
+pub use accept::{Candidate, Limits};
 pub use candidate::Score;
 pub use episode::Episode;
 pub use evidence::{JointEvidence, evidence};
@@ -35,6 +37,5 @@ pub use left::{Left, STRUCTURED};
 pub use measure::{Errors, JointErrors, OverallErrors};
 pub use plan::{LogRole, SetAside};
 pub use run::{Case, DiagnoseError, Diagnosis, Pair, Step, diagnose};
-pub use search::{Candidate, Limits};
 pub use suspect::Suspicion;
 pub use unknowns::{Open, Unknown};

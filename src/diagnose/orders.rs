@@ -2,7 +2,7 @@
 //! friction start: of the raw residual, for a ripple dies in a decimating filter, and of the
 //! filtered one at full rate, where a strong order beyond the band does not hide a weaker one in it.
 
-use crate::effect::{Cover, JointCover, Refined};
+use crate::effect::{Cover, JointCover};
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::JointKind;
 
@@ -17,26 +17,22 @@ const PEAKS: usize = 6;
 /// Least waves over the travel.
 const LEAST: f64 = 1.5;
 
-/// Fills the orders of a cover from the residual of a model.
+/// Fills the orders of a cover from the raw residuals of a model, `[stretch][joint][sample]`.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn find(
     cover: &mut Cover,
-    model: &Refined,
+    residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
     parallel: &Parallel,
 ) -> Result<(), MotionError> {
-    let hats: Vec<Vec<Vec<f64>>> = stretches.iter().map(|s| model.reconstruct(s)).collect();
     for j in 0..cover.joints.len() {
         let range = cover.joints[j].range();
         if range <= 0.0 {
             continue;
         }
-        let mut raw: Vec<Vec<f64>> = Vec::with_capacity(stretches.len());
-        for (s, hat) in stretches.iter().zip(&hats) {
-            raw.push(s.tau[j].iter().zip(&hat[j]).map(|(t, h)| t - h).collect());
-        }
+        let raw: Vec<Vec<f64>> = residuals.iter().map(|r| r[j].clone()).collect();
         let mut filtered = raw.clone();
         for channel in &mut filtered {
             parallel.smooth(channel)?;

@@ -7,12 +7,60 @@ use super::plan::{Plan, Role};
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{Refined, Scene, Torques, shifted};
 use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// Derivative columns and residual of one stretch, `[joint][column][row]`.
 pub struct Filtered {
     pub columns: Vec<Vec<Vec<f64>>>,
     pub residual: Vec<Vec<f64>>,
+}
+
+/// Filtered regressor of the inertial parameters along one stretch, `[joint][parameter][row]`; nothing of
+/// joints that are held. It is the same for every model that is tried on the motion, but for one that is
+/// late.
+pub type Inertial = Vec<Vec<Vec<f64>>>;
+
+/// The filtered regressor of a robot along one stretch.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn inertial(
+    robot: &Robot,
+    stretch: &Stretch,
+    parallel: &Parallel,
+    held: &dyn Fn(usize) -> bool,
+) -> Result<Inertial, MotionError> {
+    let n = robot.joints();
+    let mut out = vec![Vec::new(); n];
+    if (0..n).all(held) {
+        return Ok(out);
+    }
+    let raw = regressor(robot, stretch);
+    for (j, out) in out.iter_mut().enumerate().filter(|(j, _)| !held(*j)) {
+        let channels: Vec<&[f64]> = raw[j].iter().map(Vec::as_slice).collect();
+        *out = parallel.run(&channels)?;
+    }
+    Ok(out)
+}
+
+/// Regressor of the inertial parameters along a stretch, `[joint][parameter][sample]`.
+fn regressor(robot: &Robot, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let samples = stretch.len();
+    let mut out = vec![vec![vec![0.0; samples]; p]; n];
+    let mut y = vec![0.0; n * p];
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for k in 0..samples {
+        stretch.at(k, &mut q, &mut v, &mut a);
+        robot.regressor(&q, &v, &a, &mut y);
+        for (j, columns) in out.iter_mut().enumerate() {
+            for (c, column) in columns.iter_mut().enumerate() {
+                column[k] = y[j * p + c];
+            }
+        }
+    }
+    out
 }
 
 /// Columns of all unknowns and the residual along one stretch; zeros for joints that are held.
@@ -22,13 +70,12 @@ pub struct Filtered {
 pub fn filtered(
     model: &Refined,
     unknowns: &Unknowns,
-    stretch: &Stretch,
+    (stretch, inertial): (&Stretch, &Inertial),
     parallel: &Parallel,
     held: &dyn Fn(usize) -> bool,
 ) -> Result<Filtered, MotionError> {
     let plain = &model.model;
     let n = plain.robot.joints();
-    let p = plain.theta.len();
     let samples = stretch.len();
     if (0..n).all(held) {
         let rows = parallel.rows(samples);
@@ -43,24 +90,16 @@ pub fn filtered(
     }
     let torques = model.torques(stretch);
     let scene = scene(model, stretch, &torques);
-    // regressor rows of all joints, once
-    let mut regressor = vec![vec![vec![0.0; samples]; p]; n];
-    let mut y = vec![0.0; n * p];
-    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    for k in 0..samples {
-        stretch.at(k, &mut q, &mut v, &mut a);
-        plain.robot.regressor(&q, &v, &a, &mut y);
-        for (j, columns) in regressor.iter_mut().enumerate() {
-            for (c, column) in columns.iter_mut().enumerate() {
-                column[k] = y[j * p + c];
-            }
-        }
-    }
+    let late = |j: usize| model.shift(j) / stretch.dt;
+    let mut of_late = match (0..n).any(|j| !held(j) && late(j) != 0.0) {
+        true => regressor(&plain.robot, stretch),
+        false => Vec::new(),
+    };
     let mut out = Filtered {
         columns: Vec::with_capacity(n),
         residual: Vec::with_capacity(n),
     };
-    for (j, regressor) in regressor.iter_mut().enumerate() {
+    for j in 0..n {
         if held(j) {
             let rows = parallel.rows(samples);
             out.columns
@@ -68,13 +107,14 @@ pub fn filtered(
             out.residual.push(vec![0.0; rows]);
             continue;
         }
-        let late = model.shift(j) / stretch.dt;
+        let late = late(j);
         let mut raw: Vec<Vec<f64>> = Vec::with_capacity(unknowns.columns[j].len() + 1);
         let mut effect_columns: Vec<Option<Vec<Vec<f64>>>> = vec![None; model.effects.len()];
         let mut friction = friction_columns(&plain.friction[j], &stretch.v[j]);
         for &i in &unknowns.columns[j] {
             let mut column = match unknowns.list[i] {
-                Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
+                Unknown::Theta(_) if late == 0.0 => continue,
+                Unknown::Theta(c) => std::mem::take(&mut of_late[j][c]),
                 Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
                 Unknown::Offset(_) => vec![1.0; samples],
                 Unknown::Linear { effect, k } => {
@@ -95,10 +135,18 @@ pub fn filtered(
         raw.push(hat);
         let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
         let mut rows = parallel.run(&channels)?;
+        let mut columns = match late == 0.0 {
+            // the inertial parameters come first in the list
+            true => inertial[j].clone(),
+            false => Vec::with_capacity(rows.len()),
+        };
+        let residual = rows.pop().unwrap_or_default();
+        columns.extend(rows);
+        columns.push(residual);
         let still = standing(model, stretch, parallel, j);
-        rows.iter_mut().for_each(|column| clear(column, &still));
-        out.residual.push(rows.pop().unwrap_or_default());
-        out.columns.push(rows);
+        columns.iter_mut().for_each(|column| clear(column, &still));
+        out.residual.push(columns.pop().unwrap_or_default());
+        out.columns.push(columns);
     }
     Ok(out)
 }
@@ -209,14 +257,15 @@ impl Base {
     pub fn of(
         model: &Refined,
         unknowns: Unknowns,
-        stretches: &[Stretch],
+        (stretches, inertial): (&[Stretch], &[Inertial]),
         parallel: &Parallel,
         plan: &Plan,
     ) -> Result<Self, MotionError> {
         let filtered = stretches
             .par_iter()
+            .zip(inertial)
             .enumerate()
-            .map(|(i, s)| filtered(model, &unknowns, s, parallel, &|j| plan.holds(i, j)))
+            .map(|(i, motion)| filtered(model, &unknowns, motion, parallel, &|j| plan.holds(i, j)))
             .collect::<Result<Vec<_>, _>>()?;
         let sums = plan
             .pieces
@@ -319,7 +368,16 @@ pub struct Total {
     pub square: f64,
 }
 
-/// Inner product, in a fixed order.
+/// Inner product, in a fixed order: eight sums side by side, for one would wait for itself.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let (blocks_a, rest_a) = a.as_chunks::<8>();
+    let (blocks_b, rest_b) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (a, b) in blocks_a.iter().zip(blocks_b) {
+        for l in 0..8 {
+            sums[l] += a[l] * b[l];
+        }
+    }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + rest
 }

@@ -3,18 +3,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::accept::{Candidate, Limits};
 use super::candidate::{Judge, LAG};
 use super::episode::{self, Episode};
-use super::fit::{Fitted, Ground, Inverse, Prior, fit, moved_by_smoothing};
+use super::fit::{Fitted, Ground, Inverse, Prior, fit, inertial_of, moved_by_smoothing};
 use super::left::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
 use super::measure::{Counted, Errors, errors};
 use super::orders;
 use super::plan::{LogRole, Plan, Role, SetAside};
 use super::profile;
-use super::search::{Bar, Candidate, Limits, choose, search};
+use super::search::{Bar, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
-use crate::effect::{Added, Cover, Refined, held_joints};
+use crate::effect::{Added, Cover, Refined, Torques, held_joints};
 use crate::math::long_run::long_run;
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::model::JointFriction;
@@ -125,6 +126,7 @@ pub fn diagnose(
     plan.rest = held_joints(robot, &case.stretches);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
     let mut ground = Ground {
+        inertial: inertial_of(robot, &case.stretches, &case.parallel, &plan)?,
         stretches: &case.stretches,
         parallel: &case.parallel,
         plan,
@@ -181,8 +183,10 @@ pub fn diagnose(
         }
         let plan = &ground.plan;
         let declared = declared.get_or_insert_with(|| at.base.residual_squares(plan));
-        orders::find(&mut ground.cover, &at.model, &fitted, &case.parallel)?;
-        let noise = noise(&at.model, case, &fitted)?;
+        let torques = ground.torques(&at.model);
+        let residuals = residuals(&at.model, &fitted, fitted_torques(case, &torques));
+        orders::find(&mut ground.cover, &residuals, &fitted, &case.parallel)?;
+        let noise = noise(&residuals, case, &fitted)?;
         let bar = Bar {
             declared,
             noise: &noise,
@@ -190,7 +194,7 @@ pub fn diagnose(
         let mut found = if case.limits.steps == 0 {
             Vec::new()
         } else {
-            search(&at, &ground, case, &bar, stop)?
+            search(&at, &ground, case, &bar, &torques, stop)?
         };
         if stop() {
             return Err(DiagnoseError::Interrupted);
@@ -210,6 +214,7 @@ pub fn diagnose(
                     break;
                 }
                 found[chosen].accepted = false;
+                found[chosen].significant = false;
                 found[chosen].reason =
                     "vetoed: the joint refit makes the error on data set aside larger".into();
                 skip.push(chosen);
@@ -259,6 +264,7 @@ pub fn diagnose(
             let mut gone = steps.remove(k).candidate;
             models.remove(k + 1);
             gone.accepted = false;
+            gone.significant = false;
             gone.reason = "a later effect made it superfluous".into();
             dropped.push(gone);
         }
@@ -308,10 +314,18 @@ pub fn diagnose(
     let after = pair(&at.model)?;
     let held_out = |s: &&Stretch| case.roles[s.log] == LogRole::Holdout;
     let unseen: Vec<Stretch> = case.stretches.iter().filter(held_out).cloned().collect();
-    let floor = noise(&at.model, case, &fitted)?;
+    let noise_along = |stretches: &[Stretch]| {
+        let torques: Vec<Torques> = stretches.iter().map(|s| at.model.torques(s)).collect();
+        noise(
+            &residuals(&at.model, stretches, torques.iter()),
+            case,
+            stretches,
+        )
+    };
+    let floor = noise_along(&fitted)?;
     let floor_unseen = match unseen.is_empty() {
         true => None,
-        false => Some(noise(&at.model, case, &unseen)?),
+        false => Some(noise_along(&unseen)?),
     };
     // friction at rest is no structure either, where the law jumps
     let jumps = |law: &JointFriction| matches!(law, JointFriction::ViscousCoulomb(_));
@@ -366,6 +380,27 @@ fn held(case: &Case, fitted: &[Stretch]) -> Vec<Vec<bool>> {
 fn fitted_stretches(case: &Case) -> Vec<Stretch> {
     let fitted = |s: &&Stretch| case.roles[s.log] == LogRole::Train;
     case.stretches.iter().filter(fitted).cloned().collect()
+}
+
+/// Those of the stretches' torques that belong to logs that are fitted.
+fn fitted_torques<'a>(case: &Case, all: &'a [Torques]) -> impl Iterator<Item = &'a Torques> {
+    let pairs = case.stretches.iter().zip(all);
+    let fitted = pairs.filter(|(s, _)| case.roles[s.log] == LogRole::Train);
+    fitted.map(|(_, torques)| torques)
+}
+
+/// Raw residuals along stretches, `[stretch][joint][sample]`.
+fn residuals<'a>(
+    model: &Refined,
+    stretches: &[Stretch],
+    torques: impl Iterator<Item = &'a Torques>,
+) -> Vec<Vec<Vec<f64>>> {
+    let of = |(stretch, torques): (&Stretch, &Torques)| match torques.hat.is_empty() {
+        // along a log in which nothing moves
+        true => model.residual(stretch, &model.torques(stretch)),
+        false => model.residual(stretch, torques),
+    };
+    stretches.iter().zip(torques).map(of).collect()
 }
 
 /// Squared residual of the veto pieces in a fit's own weights.
@@ -482,11 +517,17 @@ impl Diagnosis {
             .map(|(j, _)| j)
     }
 
-    /// Whether what was added leaves nothing on the joints that a step's effect touches. Otherwise it lowers
-    /// the error and may stand in for an effect that the catalogue does not have.
-    pub fn assured(&self, step: &Step) -> bool {
-        let place = self.model.effects[step.effect].place;
-        !self.structured_joints().any(|j| place.touches(j))
+    /// Candidates of the last round that the data tell from chance, and that were not added, for they are too
+    /// small to matter: what was added is then not all that is there, or not quite what is there.
+    pub fn remainder(&self) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter().filter(|c| c.significant)
+    }
+
+    /// Whether what was added leaves nothing that is told from noise on any joint. Otherwise it lowers the
+    /// error and may stand in for an effect that the catalogue does not have: joints share inertial
+    /// parameters, and what is missing on one forges effects on the others.
+    pub fn assured(&self) -> bool {
+        !self.structured() && self.remainder().next().is_none()
     }
 
     /// Whether what was added leaves at most a small part of the structure on the joints that a step's effect

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::candidate::{Columns, Judge, Score, spread};
+use super::accept::{Candidate, Worth, decide};
+use super::candidate::{Columns, Judge, spread};
 use super::fit::{Fitted, Ground};
 use super::orders::SCANNED;
 use super::rows::{clear, scene, standing};
@@ -10,54 +11,6 @@ use super::run::Case;
 use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, order_is_whole, shifted};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
-
-/// Limits that a candidate must keep. All tests must agree.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// Chance of one false effect or more among all candidates of a round.
-    pub false_alarm: f64,
-    /// Least share of the effect's torque that nothing declared can stand in for.
-    pub unique_share: f64,
-    /// Least fraction of cross-validated squared error removed.
-    pub cv_gain: f64,
-    /// Least cross-validated gain in its own standard errors.
-    pub cv_certainty: f64,
-    /// Largest squared error on the veto pieces, over that without the effect.
-    pub veto_ratio: f64,
-    /// Least part of the declared model's squared residual, on the joints concerned, that it
-    /// removes: below it an effect may be there and does not matter.
-    pub worth: f64,
-    /// Least power that it removes, over that of the noise.
-    pub over_noise: f64,
-    /// Most effects that are added; with none the given model is fitted and nothing is looked for.
-    pub steps: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits {
-            false_alarm: 0.005,
-            unique_share: 0.001,
-            cv_gain: 0.003,
-            cv_certainty: 1.0,
-            veto_ratio: 1.002,
-            worth: 0.01,
-            over_noise: 0.1,
-            steps: 8,
-        }
-    }
-}
-
-/// One candidate with what became of it.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    pub effect: Added,
-    /// None where the data lack what it needs, or where nothing of it is its own.
-    pub score: Option<Score>,
-    pub accepted: bool,
-    /// Why not; empty where accepted.
-    pub reason: String,
-}
 
 /// What an effect's size is measured by, per joint.
 #[derive(Debug, Clone, Copy)]
@@ -80,9 +33,9 @@ pub fn search(
     ground: &Ground,
     case: &Case,
     bar: &Bar,
+    torques: &[Torques],
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Candidate>, MotionError> {
-    let torques = ground.torques(&at.model);
     let judge = Judge::new(at, ground);
     let robot = &at.model.model.robot;
     let laws = &at.model.model.friction;
@@ -102,7 +55,7 @@ pub fn search(
                 at,
                 ground,
                 &judge,
-                &torques,
+                torques,
                 (kind, place),
                 case.keep,
                 HOPELESS * least,
@@ -154,6 +107,7 @@ fn refused(kind: &'static Kind, place: Place, reason: String) -> Candidate {
         },
         score: None,
         accepted: false,
+        significant: false,
         reason,
     }
 }
@@ -291,6 +245,7 @@ fn one(
         effect,
         score,
         accepted: false,
+        significant: false,
         reason,
     };
     Ok((candidate, count))
@@ -361,77 +316,6 @@ pub fn columns(
         out.push(of_stretch);
     }
     Ok(out)
-}
-
-/// How much a candidate removes, over what there is.
-#[derive(Debug, Clone, Copy)]
-struct Worth {
-    of_declared: f64,
-    of_noise: f64,
-}
-
-/// Puts a candidate to every test.
-fn decide(candidate: &mut Candidate, tried: usize, limits: &Limits, worth: &dyn Fn(f64) -> Worth) {
-    let Some(s) = &candidate.score else { return };
-    let corrected = s.p_value * tried as f64;
-    let physical = match candidate.effect.kind.name {
-        // a drive cannot be stiffer than stiff
-        "elasticity" => candidate.effect.linear[0] > 0.0,
-        "presliding" => candidate.effect.linear[0] > 0.0,
-        _ => true,
-    };
-    let reason = if !s.beta.iter().all(|b| b.is_finite()) {
-        "its coefficients are not finite".to_owned()
-    } else if s.unique_share < limits.unique_share {
-        format!(
-            "only {:.2} % of it is its own: what is declared stands in for the rest",
-            100.0 * s.unique_share
-        )
-    } else if !physical {
-        "its coefficient has a sign that the effect cannot have".to_owned()
-    } else if corrected > limits.false_alarm {
-        format!(
-            "chance gives as much: p = {} among all candidates",
-            match corrected {
-                // by Bonferroni's bound, which may pass 1
-                p if p >= 1.0 => "1".to_owned(),
-                p => format!("{p:.2e}"),
-            }
-        )
-    } else if worth(s.gain).of_declared < limits.worth || worth(s.gain).of_noise < limits.over_noise
-    {
-        format!(
-            "too small to matter: {:.2} % of the declared model's squared residual, {:.2} of the \
-             noise's power",
-            100.0 * worth(s.gain).of_declared,
-            worth(s.gain).of_noise
-        )
-    } else if s.delta_bic <= 0.0 {
-        format!(
-            "not worth its parameters: BIC changes by {:.1} with {:.0} effective rows",
-            s.delta_bic, s.effective_rows
-        )
-    } else if s.cv_gain < limits.cv_gain {
-        format!(
-            "cross-validation: {:+.2} % of the squared error",
-            100.0 * s.cv_gain
-        )
-    } else if s.cv_gain < limits.cv_certainty * s.cv_std {
-        format!(
-            "cross-validation is not of one mind: {:+.2} +- {:.2} %",
-            100.0 * s.cv_gain,
-            100.0 * s.cv_std
-        )
-    } else if s.veto_ratio > limits.veto_ratio {
-        format!(
-            "vetoed: it makes the squared error on data set aside {:.3} times as large",
-            s.veto_ratio
-        )
-    } else {
-        candidate.accepted = true;
-        String::new()
-    };
-    candidate.reason = reason;
 }
 
 /// Of accepted candidates the one to add, and those that the data do not separate from it: within

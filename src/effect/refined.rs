@@ -79,9 +79,24 @@ impl Refined {
 
     /// Reconstructed torque, `[joint][sample]`, shifts included.
     pub fn reconstruct(&self, stretch: &Stretch) -> Vec<Vec<f64>> {
-        let mut hat = self.torques(stretch).hat;
+        self.late(self.torques(stretch).hat, stretch.dt)
+    }
+
+    /// Measured less reconstructed torque, `[joint][sample]`, where the latter is known before shifts.
+    pub fn residual(&self, stretch: &Stretch, torques: &Torques) -> Vec<Vec<f64>> {
+        let mut residual = self.late(torques.hat.clone(), stretch.dt);
+        for (e, tau) in residual.iter_mut().zip(&stretch.tau) {
+            for (e, tau) in e.iter_mut().zip(tau) {
+                *e = tau - *e;
+            }
+        }
+        residual
+    }
+
+    /// Torques of all joints, shifted.
+    fn late(&self, mut hat: Vec<Vec<f64>>, dt: f64) -> Vec<Vec<f64>> {
         for (j, channel) in hat.iter_mut().enumerate() {
-            shifted(channel, self.shift(j) / stretch.dt);
+            shifted(channel, self.shift(j) / dt);
         }
         hat
     }

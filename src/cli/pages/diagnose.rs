@@ -285,10 +285,10 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
         let score = step.candidate.score.as_ref();
         let title = effect.title(&machine.robot);
         rows.push(vec![
-            if d.assured(step) {
+            if d.assured() {
                 title
             } else {
-                format!("{title}, or what it stands in for: structure is left there")
+                format!("{title}, or what it stands in for: structure is left")
             },
             in_words(machine, d, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),

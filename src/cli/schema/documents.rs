@@ -209,6 +209,7 @@ fn diagnose() -> Vec<(&'static str, Value)> {
         ("score", number()),
         ("unique_share", number()),
         ("accepted", truth()),
+        ("significant", truth()),
         ("reason", text()),
     ]);
     vec![
