@@ -102,6 +102,39 @@ fn one_position_column_is_a_single_joint() {
 }
 
 #[test]
+fn a_time_column_says_its_unit_in_brackets_or_behind_its_name() {
+    for (time, per_second, unit) in [
+        ("time_ms", 1e3, "ms"),
+        ("time [ms]", 1e3, "ms"),
+        ("stamp_ns", 1e9, "ns"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut log = format!("{time},q1,tau1\n");
+        for k in 0..4000 {
+            let t = f64::from(k) * 1e-3;
+            let (q, tau) = ((3.0 * t).sin(), -9.0 * (3.0 * t).sin() + (3.0 * t).cos());
+            log += &format!("{},{q},{tau}\n", (per_second * t).round());
+        }
+        std::fs::write(folder.path().join("log.csv"), log).unwrap();
+        command(folder.path())
+            .args(["new", "mine", "--log", "log.csv"])
+            .assert()
+            .success();
+        let text = std::fs::read_to_string(folder.path().join("mine.toml")).unwrap();
+        let told = format!("time_unit = \"{unit}\"");
+        assert!(text.contains(&told), "{time}: {text}");
+        command(folder.path())
+            .args(["inspect", "log.csv", "--json", "found.json", "-q"])
+            .assert()
+            .success();
+        let found = std::fs::read_to_string(folder.path().join("found.json")).unwrap();
+        let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+        let rate = found["logs"][0]["rate_hz"].as_f64().unwrap();
+        assert!((rate - 1000.0).abs() < 1.0, "{time}: {rate}");
+    }
+}
+
+#[test]
 fn a_file_that_is_there_stays() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("mine.toml"), "mine").unwrap();

@@ -12,6 +12,8 @@ use crate::study::{percent, quantile};
 
 /// Power over the noise's below which nothing is looked for: the declared parameters stand in for it.
 const SHOWS: f64 = 0.25;
+/// Most findings that a line of a table tells apart.
+const TOLD: usize = 4;
 /// Most alternatives among which the truth counts as named.
 const ALTERNATIVES: usize = 3;
 
@@ -128,7 +130,13 @@ fn tally(rows: &[&Value]) -> String {
     }
     let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
-    let told: Vec<String> = counts.iter().map(|(s, n)| format!("{s} ({n})")).collect();
+    let shown = if counts.len() > TOLD { TOLD - 1 } else { TOLD };
+    let rest: usize = counts.iter().skip(shown).map(|(_, n)| n).sum();
+    let first = counts.iter().take(shown);
+    let mut told: Vec<String> = first.map(|(s, n)| format!("{s} ({n})")).collect();
+    if rest > 0 {
+        told.push(format!("others ({rest})"));
+    }
     told.join(", ")
 }
 

@@ -39,7 +39,9 @@ pub(super) fn time_column(table: &Table) -> Result<(usize, f64), CliError> {
         ))
         .hint("name the time column in the [log] section of a robot file and give it with -r")
     })?;
-    Ok((time, seconds(table.unit(time))))
+    // `time [ms]`, or `time_ms`
+    let suffix = || names[time].rsplit_once('_').map(|(_, unit)| unit);
+    Ok((time, seconds(table.unit(time).or_else(suffix))))
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
