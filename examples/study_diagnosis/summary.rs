@@ -204,7 +204,8 @@ fn rates(rows: &[Value]) -> Vec<Value> {
         .collect();
     let shown: Vec<&Value> = large.iter().copied().filter(|r| shows(r)).collect();
     let count = |rows: &[&Value], which: usize| rows.iter().filter(|r| right(r)[which]).count();
-    let certain: Vec<&Value> = shown.iter().copied().filter(|r| right(r)[1]).collect();
+    let named = |r: &&Value| right(r)[1] && !list(&r["steps"]).is_empty();
+    let certain: Vec<&Value> = shown.iter().copied().filter(named).collect();
     let certainly = |r: &Value| list(&r["steps"]).iter().all(|s| s["assured"] == true);
     let two = of(rows, "two");
     let out = of(rows, "withheld");
@@ -267,7 +268,7 @@ fn rates(rows: &[Value]) -> Vec<Value> {
             shown.len(),
         ),
         rate(
-            "of these, assured",
+            "of these with an effect added, assured",
             "-",
             certain.iter().filter(|r| certainly(r)).count(),
             certain.len(),

@@ -3,7 +3,7 @@
 use super::diagnose::{Diagnosed, in_words, verdict};
 use super::machine::Machine;
 use super::typed;
-use crate::diagnose::{Errors, Pair};
+use crate::diagnose::{Candidate, Diagnosis, Errors, Pair};
 use crate::effect::Added;
 use crate::report::number;
 use crate::report::table::{Align, Table, hanging};
@@ -17,9 +17,7 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
     let robot = &machine.robot;
     let mut out = match verdict(d) {
         "effects-found" => format!("{name} lacks:\n"),
-        "nothing-missing" => {
-            format!("Nothing is missing in {name}: what is left of the torque is noise.\n")
-        }
+        "nothing-missing" => format!("{}\n", nothing_missing(d, &format!(" in {name}"))),
         _ if d.steps.is_empty() => {
             format!("{name} leaves a residual above the noise that no known effect explains.\n")
         }
@@ -79,8 +77,8 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
             }
         }
     }
-    if !d.steps.is_empty() {
-        out += &doubt(machine, found);
+    for told in doubts(machine, found) {
+        out += &hanging("  ", &told, 4);
     }
     for e in &d.episodes {
         let told = format!(
@@ -127,8 +125,20 @@ pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
     out
 }
 
-/// Why what was found may stand in for something else; nothing where it leaves only noise.
-fn doubt(machine: &Machine, found: &Diagnosed) -> String {
+/// Nothing is missing, or nothing that matters: in the model called so.
+pub fn nothing_missing(d: &Diagnosis, model: &str) -> String {
+    match d.remainder().next() {
+        None => format!("Nothing is missing{model}: what is left of the torque is noise."),
+        Some(_) => format!("Nothing that matters is missing{model}."),
+    }
+}
+
+/// Most candidates of a remainder that are named.
+const NAMED: usize = 3;
+
+/// Why what was found may stand in for something else, and what else is no chance; nothing where only noise
+/// is left.
+pub fn doubts(machine: &Machine, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let robot = &machine.robot;
     let open: Vec<String> = d
@@ -138,22 +148,34 @@ fn doubt(machine: &Machine, found: &Diagnosed) -> String {
             None => robot.joint_names()[j].clone(),
         })
         .collect();
-    let remainder: Vec<String> = d.remainder().map(|c| c.effect.title(robot)).collect();
-    let mut out = String::new();
-    if !open.is_empty() {
-        let told = format!(
+    let mut out = Vec::new();
+    if !open.is_empty() && !d.steps.is_empty() {
+        out.push(format!(
             "structure is left on {}: what was found lowers the error, and may stand in for what no \
              known effect explains",
             open.join(", ")
-        );
-        out += &hanging("  ", &told, 4);
+        ));
     }
-    if !remainder.is_empty() {
-        let told = format!(
-            "too small to matter, and still no chance: {}; what was found is not quite what is there",
-            remainder.join(", ")
-        );
-        out += &hanging("  ", &told, 4);
+    let mut remainder: Vec<&Candidate> = d.remainder().collect();
+    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
+    remainder.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let mut names: Vec<String> = remainder
+        .iter()
+        .take(NAMED)
+        .map(|c| c.effect.title(robot))
+        .collect();
+    if remainder.len() > NAMED {
+        names.push(format!("and {} more", remainder.len() - NAMED));
+    }
+    if !names.is_empty() {
+        let doubt = match d.steps.is_empty() {
+            true => "",
+            false => "; what was found may not be quite what is there",
+        };
+        out.push(format!(
+            "not added, and still no chance: {}{doubt}",
+            names.join(", ")
+        ));
     }
     out
 }

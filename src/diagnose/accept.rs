@@ -1,7 +1,10 @@
 //! What a candidate must pass to be added: all tests must agree.
 
-use super::candidate::Score;
+use super::candidate::{Score, spread};
 use crate::effect::Added;
+
+/// Standard errors by which the error on the veto pieces may grow by chance.
+const VETO_CHANCE: f64 = 1.0;
 
 /// Limits that a candidate must keep. All tests must agree.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +17,8 @@ pub struct Limits {
     pub cv_gain: f64,
     /// Least cross-validated gain in its own standard errors.
     pub cv_certainty: f64,
-    /// Largest squared error on the veto pieces, over that without the effect.
+    /// Largest squared error on the veto pieces, over that without the effect; a standard error of their
+    /// difference comes on top.
     pub veto_ratio: f64,
     /// Least part of the declared model's squared residual, on the joints concerned, that it
     /// removes: below it an effect may be there and does not matter.
@@ -37,6 +41,19 @@ impl Default for Limits {
             over_noise: 0.1,
             steps: 8,
         }
+    }
+}
+
+impl Limits {
+    /// Whether the squared errors on the pieces that may veto grow by more than the limit, and by more than
+    /// chance makes of them.
+    pub(super) fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
+        let sum = |x: &[f64]| x.iter().sum::<f64>();
+        let chance = match before.len() {
+            0 | 1 => 0.0,
+            _ => VETO_CHANCE * spread(before, after),
+        };
+        sum(after) > self.veto_ratio * sum(before) + chance
     }
 }
 
@@ -122,10 +139,10 @@ pub(super) fn decide(
             100.0 * s.cv_gain,
             100.0 * s.cv_std
         ))
-    } else if s.veto_ratio > limits.veto_ratio {
+    } else if limits.vetoes(&s.vetoes[0], &s.vetoes[1]) {
         Some(format!(
             "vetoed: it makes the squared error on data set aside {:.3} times as large",
-            s.veto_ratio
+            s.vetoes[1].iter().sum::<f64>() / s.vetoes[0].iter().sum::<f64>()
         ))
     } else {
         None
@@ -151,7 +168,7 @@ mod tests {
             cv_gain: 0.2,
             cv_std: 0.05,
             folds: vec![1.0; 10],
-            veto_ratio: 0.9,
+            vetoes: [vec![1.0; 10], vec![0.9; 10]],
         };
         change(&mut score);
         let kind = crate::effect::kind("torque-offset").unwrap();
@@ -194,7 +211,7 @@ mod tests {
             (|s| s.delta_bic = -1.0, "not worth"),
             (|s| s.cv_gain = 0.001, "cross-validation:"),
             (|s| s.cv_std = 0.3, "cross-validation is not"),
-            (|s| s.veto_ratio = 1.1, "vetoed"),
+            (|s| s.vetoes[1] = vec![1.1; 10], "vetoed"),
         ];
         for (change, says) in failures {
             let found = decided(change, large);

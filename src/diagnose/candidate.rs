@@ -69,8 +69,8 @@ pub struct Score {
     pub cv_std: f64,
     /// Squared error of each fold left out, with the candidate.
     pub folds: Vec<f64>,
-    /// Squared error on the pieces that may veto, with the candidate over without.
-    pub veto_ratio: f64,
+    /// Squared error on each piece that may veto, without and with the candidate.
+    pub vetoes: [Vec<f64>; 2],
 }
 
 /// The fitted model, prepared for many candidates.
@@ -79,10 +79,12 @@ pub struct Judge<'a> {
     ground: &'a Ground<'a>,
     inverse: Inverse,
     folds: Vec<Fold>,
-    veto: Total,
+    /// Sums of each piece that may veto.
+    of_vetoes: Vec<Total>,
     /// Squared error of each fold left out, without a candidate.
     pub base_folds: Vec<f64>,
-    base_veto: f64,
+    /// Squared error of each piece that may veto.
+    base_vetoes: Vec<f64>,
 }
 
 /// One fold left out.
@@ -112,20 +114,22 @@ impl<'a> Judge<'a> {
             .collect();
         let inverse = Inverse::of(&at.normal);
         let rest = inverse.solve(&at.pull);
-        let veto = sum(&|r| r == Role::Veto);
+        let of_vetoes = at
+            .base
+            .each(&ground.plan, &at.weights, &|r| r == Role::Veto);
         let base_folds = folds
             .iter()
             .map(|f| square_after(&f.held_out, &f.inverse.solve(&f.score)))
             .collect();
-        let base_veto = square_after(&veto, &rest);
+        let base_vetoes = of_vetoes.iter().map(|v| square_after(v, &rest)).collect();
         Judge {
             at,
             ground,
             inverse,
             folds,
-            veto,
+            of_vetoes,
             base_folds,
-            base_veto,
+            base_vetoes,
         }
     }
 
@@ -205,12 +209,7 @@ impl<'a> Judge<'a> {
         }
         let base: f64 = self.base_folds.iter().sum();
         let with: f64 = folds.iter().sum();
-        let veto = self.over(&cross, k, &|r| r == Role::Veto);
-        let veto_ratio = if self.base_veto > 0.0 {
-            square_with(&self.veto, &veto, &solution) / self.base_veto
-        } else {
-            1.0
-        };
+        let vetoes = [self.base_vetoes.clone(), self.vetoes(&cross, &solution)];
         Some(Score {
             beta: solution.beta.iter().copied().collect(),
             gain: solution.removed / self.at.square.max(f64::MIN_POSITIVE),
@@ -221,8 +220,18 @@ impl<'a> Judge<'a> {
             cv_gain: (base - with) / base.max(f64::MIN_POSITIVE),
             cv_std: spread(&self.base_folds, &folds) / base.max(f64::MIN_POSITIVE),
             folds,
-            veto_ratio,
+            vetoes,
         })
+    }
+
+    /// Squared error on each piece that may veto, with a candidate.
+    fn vetoes(&self, cross: &[Cross], solution: &Solution) -> Vec<f64> {
+        let pieces = self.ground.plan.pieces.iter().zip(cross);
+        let vetoing = pieces.filter(|(p, _)| p.role == Role::Veto);
+        vetoing
+            .zip(&self.of_vetoes)
+            .map(|((_, cross), total)| square_with(total, cross, solution))
+            .collect()
     }
 
     /// Weighted squared residual of the joints that a candidate touches, without and with it, and their

@@ -16,7 +16,7 @@ use crate::math::zero_phase::ZeroPhase;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Borders of the bands that are looked at, over the cut-off.
-const BORDERS: [f64; 3] = [1.5, 2.1, 3.0];
+const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 
 /// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
 /// where each torque is the mean of two rows, as of commands that are held.
@@ -73,48 +73,87 @@ pub fn floor(
     // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the mean
     // of two neighbours, (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7 times.
     let gain = if averaged { 7.0 } else { 70.0 };
+    // independent numbers of a band in a block
+    let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
+    let freedom = 2.0 * width * block as f64 / rate;
     let mut floor = Vec::with_capacity(joints);
     for j in 0..joints {
-        let middle = |x: &[f64]| {
-            let blocks = x.chunks_exact(block).map(|b| power(b) / block as f64);
-            Middle::of(&mut blocks.collect::<Vec<f64>>())
-        };
-        // logs differ in their noise: each has its own, and they count by their rows
-        let (mut sum, mut rows) = (0.0, 0.0);
         // friction at rest is no noise; a joint that never moves has nothing else
         let always = held.iter().all(|h| h[j]);
         let logs = residuals.iter().zip(held).zip(&periods);
+        let mut seen_of = Vec::with_capacity(stretches.len());
         for ((residual, _), period) in logs.filter(|((_, h), _)| always || !h[j]) {
-            let banded = bands(&residual[j])?;
             let edge = parallel.trim.min(residual[j].len() / 4);
-            let near = banded.each_ref().map(|x| middle(&x[edge..x.len() - edge]));
+            if residual[j].len() < 2 * edge + block {
+                continue;
+            }
+            let banded = bands(&residual[j])?;
+            let inner = edge..residual[j].len() - edge;
+            let powers = |x: &[f64]| -> Vec<f64> {
+                let blocks = x.chunks_exact(block);
+                blocks.map(|b| power(b) / block as f64).collect()
+            };
             let differences: Vec<f64> = residual[j]
                 .windows(5)
                 .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
                 .collect();
-            let [white, rising] = carried_on(near, seen, kept);
-            let beyond = (white + rising).min(kept[0] * middle(&differences).value / gain);
             let repeated = match period {
                 Some(period) => {
                     let mut filtered = residual[j].clone();
                     parallel.smooth(&mut filtered)?;
-                    unrepeated(&filtered, edge..filtered.len() - edge, *period)
+                    unrepeated(&filtered, inner.clone(), *period)
                 }
                 None => None,
             };
-            let weight = residual[j].len() as f64;
-            // the encoders' rounding comes again with the motion, and is noise all the same
-            sum += weight * repeated.map_or(beyond, |r| (r + rising).min(beyond));
-            rows += weight;
+            seen_of.push(Seen {
+                weight: residual[j].len() as f64,
+                near: banded
+                    .each_ref()
+                    .map(|x| Middle::of(powers(&x[inner.clone()]), freedom)),
+                top: Middle::of(powers(&differences), f64::INFINITY).value / gain,
+                repeated,
+            });
         }
-        floor.push(if rows > 0.0 { sum / rows } else { 0.0 });
+        floor.push(together(&seen_of, seen, kept));
     }
     Ok(floor)
 }
 
-/// Variances of white noise and of rising noise in the band that is kept, from that in two bands beyond it:
-/// what the two, with no negative power, make of both, `seen[band][source]`. White noise that the rising noise
-/// hides there is anything up to its standard error, and is taken to be that: what is no more is no structure.
+/// What one stretch shows of a joint's noise.
+struct Seen {
+    /// Its rows.
+    weight: f64,
+    /// Power in the two bands.
+    near: [Middle; 2],
+    /// Variance of white noise by the top of the spectrum.
+    top: f64,
+    /// Variance in the band that is kept of what does not repeat.
+    repeated: Option<f64>,
+}
+
+/// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none. Bands are taken
+/// together before anything is solved for, so that their errors average out.
+fn together(stretches: &[Seen], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
+    let rows: f64 = stretches.iter().map(|s| s.weight).sum();
+    if rows <= 0.0 {
+        return 0.0;
+    }
+    let mean =
+        |of: &dyn Fn(&Seen) -> f64| stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows;
+    let near = [0, 1].map(|band: usize| Middle {
+        value: mean(&|s| s.near[band].value),
+        error: (mean(&|s| s.weight * s.near[band].error.powi(2)) / rows).sqrt(),
+    });
+    let [white, rising] = carried_on(near, seen, kept);
+    let beyond = (white + rising).min(kept[0] * mean(&|s| s.top));
+    // the encoders' rounding comes again with the motion, and is noise all the same
+    mean(&|s| s.repeated.map_or(beyond, |r| (r + rising).min(beyond)))
+}
+
+/// Variances of white noise and of rising noise in the band that is kept, from that in two bands beyond it, of
+/// which `seen[band][source]` is what each band sees of each. White noise that the rising noise hides there is
+/// anything up to its standard error, and is taken to be that, for what is no more is no structure; but it is
+/// no more than all that a band has.
 fn carried_on(near: [Middle; 2], seen: [[f64; 2]; 2], kept: [f64; 2]) -> [f64; 2] {
     let [[w, r], [x, s]] = seen;
     let determinant = w * s - r * x;
@@ -138,7 +177,11 @@ fn power(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// Median of blocks with its standard error, as if they were normal between their quartiles.
+/// Blocks below which their spread says nothing of the median's error.
+const FEW: usize = 8;
+
+/// Median of blocks with its standard error, as if they were normal between their quartiles; of few blocks it
+/// is no more than an order of magnitude.
 #[derive(Debug, Clone, Copy, Default)]
 struct Middle {
     value: f64,
@@ -146,8 +189,9 @@ struct Middle {
 }
 
 impl Middle {
-    /// Sorts the values; 0 of none.
-    fn of(values: &mut [f64]) -> Self {
+    /// Of powers with so many independent numbers in each: their median lies below their mean (Wilson and Hilferty
+    /// 1931), which is what is told. 0 of none.
+    fn of(mut values: Vec<f64>, freedom: f64) -> Self {
         values.sort_by(f64::total_cmp);
         let n = values.len();
         let at = |part: f64| {
@@ -156,10 +200,13 @@ impl Middle {
         };
         // quartiles of a normal distribution are 1.349 apart, and its median has 1.2533 times the mean's error
         let spread = (at(0.75) - at(0.25)) / 1.349;
-        Middle {
-            value: at(0.5),
-            error: 1.2533 * spread / (n.max(1) as f64).sqrt(),
-        }
+        let below = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+        let value = at(0.5) / below;
+        let error = match n < FEW {
+            true => value,
+            false => 1.2533 * spread / (n as f64).sqrt() / below,
+        };
+        Middle { value, error }
     }
 }
 
@@ -199,7 +246,7 @@ mod tests {
         let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(9);
         let mut draw = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
         let found: Vec<Middle> = (0..2000)
-            .map(|_| Middle::of(&mut (0..49).map(|_| 3.0 + draw()).collect::<Vec<f64>>()))
+            .map(|_| Middle::of((0..49).map(|_| 3.0 + draw()).collect(), f64::INFINITY))
             .collect();
         let scatter = found.iter().map(|m| (m.value - 3.0).powi(2)).sum::<f64>() / 2000.0;
         let told = found.iter().map(|m| m.error).sum::<f64>() / 2000.0;
@@ -207,6 +254,45 @@ mod tests {
             (told / scatter.sqrt() - 1.0).abs() < 0.1,
             "{told} {scatter}"
         );
+    }
+
+    /// White noise beside noise that rises much higher beyond the band: the floor is that of both, in one log
+    /// or cut in four.
+    #[test]
+    fn white_noise_beside_an_encoders_has_its_floor_in_one_log_and_in_four() {
+        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(12);
+        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let n = 80_000;
+        let rounding: Vec<f64> = (0..n + 2).map(|_| normal()).collect();
+        let noise: Vec<f64> = (0..n)
+            .map(|k| {
+                let twice = rounding[k] - 2.0 * rounding[k + 1] + rounding[k + 2];
+                normal() + 60.0 * twice
+            })
+            .collect();
+        let mut filtered = noise.clone();
+        parallel.smooth(&mut filtered).unwrap();
+        let inner = &filtered[500..n - 500];
+        let wanted = inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64;
+        let of = |parts: usize| {
+            let pieces: Vec<Vec<Vec<f64>>> = noise
+                .chunks_exact(n / parts)
+                .map(|part| vec![part.to_vec()])
+                .collect();
+            let stretch = Stretch {
+                dt: 1e-3,
+                q: vec![vec![0.0; n / parts]],
+                t: vec![0.0; n / parts],
+                ..Stretch::default()
+            };
+            let stretches = vec![stretch; parts];
+            let held = vec![vec![false]; parts];
+            floor(&pieces, &stretches, &parallel, 10.0, false, &held).unwrap()[0]
+        };
+        let (whole, four) = (of(1), of(4));
+        assert!((whole / wanted - 1.0).abs() < 0.3, "{whole} {wanted}");
+        assert!((four / whole - 1.0).abs() < 0.15, "{four} {whole}");
     }
 
     #[test]
@@ -240,7 +326,7 @@ mod tests {
                 &[vec![false]],
             )
             .unwrap()[0];
-            assert!((found / seen - 1.0).abs() < 0.15, "{found} {seen}");
+            assert!((found / seen - 1.0).abs() < 0.1, "{found} {seen}");
         }
     }
 }

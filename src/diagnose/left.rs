@@ -19,7 +19,7 @@ pub struct Left {
 /// Residual power over the floor's from which on a residual is called structured.
 pub const STRUCTURED: f64 = 2.0;
 /// Share of the torque's power below which structure is not worth a name.
-pub const NEGLIGIBLE: f64 = 1e-6;
+pub const NEGLIGIBLE: f64 = 2e-6;
 
 /// Power of a torque's noise over its own below which it is that of rounding, and no noise.
 const NO_NOISE: f64 = 1e-10;

@@ -134,15 +134,16 @@ pub fn filtered(
         }
         raw.push(hat);
         let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
-        let mut rows = parallel.run(&channels)?;
-        let mut columns = match late == 0.0 {
-            // the inertial parameters come first in the list
-            true => inertial[j].clone(),
-            false => Vec::with_capacity(rows.len()),
+        let mut rows = parallel.run(&channels)?.into_iter();
+        let known = |i: usize| match unknowns.list[i] {
+            Unknown::Theta(c) if late == 0.0 => Some(inertial[j][c].clone()),
+            _ => None,
         };
-        let residual = rows.pop().unwrap_or_default();
+        let of = unknowns.columns[j].iter();
+        let mut columns: Vec<Vec<f64>> = of
+            .filter_map(|&i| known(i).or_else(|| rows.next()))
+            .collect();
         columns.extend(rows);
-        columns.push(residual);
         let still = standing(model, stretch, parallel, j);
         columns.iter_mut().for_each(|column| clear(column, &still));
         out.residual.push(columns.pop().unwrap_or_default());
@@ -331,17 +332,26 @@ impl Base {
     /// Weighted normal matrix, score and squared residual over the pieces whose role is wanted.
     pub fn total(&self, plan: &Plan, weights: &[f64], wanted: &dyn Fn(Role) -> bool) -> Total {
         let u = self.unknowns.len();
-        let mut total = Total {
-            normal: DMatrix::zeros(u, u),
-            score: DVector::zeros(u),
-            square: 0.0,
-        };
+        let mut total = Total::none(u);
         for (piece, sums) in plan.pieces.iter().zip(&self.sums) {
             if wanted(piece.role) {
                 self.add(sums, weights, &mut total);
             }
         }
         total
+    }
+
+    /// The same of every such piece by itself.
+    pub fn each(&self, plan: &Plan, weights: &[f64], wanted: &dyn Fn(Role) -> bool) -> Vec<Total> {
+        let pieces = plan.pieces.iter().zip(&self.sums);
+        let u = self.unknowns.len();
+        let of = |sums: &Vec<PieceSums>| {
+            let mut total = Total::none(u);
+            self.add(sums, weights, &mut total);
+            total
+        };
+        let wanted = pieces.filter(|(p, _)| wanted(p.role));
+        wanted.map(|(_, sums)| of(sums)).collect()
     }
 
     /// Adds one piece.
@@ -368,8 +378,19 @@ pub struct Total {
     pub square: f64,
 }
 
+impl Total {
+    fn none(u: usize) -> Self {
+        Total {
+            normal: DMatrix::zeros(u, u),
+            score: DVector::zeros(u),
+            square: 0.0,
+        }
+    }
+}
+
 /// Inner product, in a fixed order: eight sums side by side, for one would wait for itself.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    debug_assert_eq!(a.len(), b.len());
     let (blocks_a, rest_a) = a.as_chunks::<8>();
     let (blocks_b, rest_b) = b.as_chunks::<8>();
     let mut sums = [0.0; 8];
@@ -380,4 +401,89 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
     sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Cover;
+    use crate::motion::Settings;
+    use crate::robot::cft::{Setup, Structure};
+    use crate::robot::model::Model;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn an_inner_product_counts_every_pair_whatever_their_number() {
+        for n in [0, 1, 7, 8, 9, 16, 29] {
+            let a: Vec<f64> = (0..n).map(|k| f64::from(k) - 3.0).collect();
+            let b: Vec<f64> = (0..n).map(|k| 2.0 * f64::from(k) + 1.0).collect();
+            let wanted: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
+            assert_eq!(dot(&a, &b), wanted, "{n}");
+        }
+    }
+
+    /// What is kept from fit to fit is what a fit of a model that is late by nothing to speak of finds anew.
+    #[test]
+    fn kept_regressors_are_those_of_the_model_itself() {
+        let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
+        let samples = 3000;
+        let wave = |j: usize, order: i32| -> Vec<f64> {
+            let w = 2.0 + 0.7 * j as f64;
+            let at = |k: usize| {
+                let phase = w * k as f64 * 1e-3 + 0.3 * j as f64;
+                w.powi(order) * (phase + f64::from(order) * std::f64::consts::FRAC_PI_2).sin()
+            };
+            (0..samples).map(at).collect()
+        };
+        let stretch = Stretch {
+            dt: 1e-3,
+            t: (0..samples).map(|k| k as f64 * 1e-3).collect(),
+            q: (0..4).map(|j| wave(j, 0)).collect(),
+            v: (0..4).map(|j| wave(j, 1)).collect(),
+            a: (0..4).map(|j| wave(j, 2)).collect(),
+            tau: (0..4).map(|j| wave(3 - j, 0)).collect(),
+            ..Stretch::default()
+        };
+        let parallel = Parallel::design(&Settings::default(), stretch.dt).unwrap();
+        let held = |j: usize| j == 1;
+        let kept = inertial(&robot, &stretch, &parallel, &held).unwrap();
+        let plain = Refined::plain(Model {
+            theta: (0..12).map(|i| 1.0 + f64::from(i)).collect(),
+            friction: vec![JointFriction::None; 4],
+            offset: vec![0.0; 4],
+            robot,
+        });
+        let late_by = |d: f64| {
+            let values = BTreeMap::from([("d".to_owned(), d)]);
+            let delay =
+                crate::effect::Added::of_keys(&plain.model.robot, "delay", Some("q4"), &values);
+            Refined {
+                effects: vec![delay.unwrap()],
+                ..plain.clone()
+            }
+        };
+        let cover = Cover::of(&plain.model.robot, std::slice::from_ref(&stretch), 10.0);
+        let open = super::super::unknowns::Open {
+            offset: vec![true; 4],
+            friction: vec![Vec::new(); 4],
+        };
+        let rows = |model: &Refined| {
+            let unknowns = Unknowns::of(model, &open, &cover);
+            filtered(model, &unknowns, (&stretch, &kept), &parallel, &held).unwrap()
+        };
+        // q4 is reckoned anew where it is late; q1 and q5 are kept in both, q2 is held
+        let (now, late) = (rows(&late_by(0.0)), rows(&late_by(1e-15)));
+        for j in 0..4 {
+            assert_eq!(now.columns[j].len(), late.columns[j].len());
+            let largest = |x: &[f64]| x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let all = late.columns[j].iter().chain([&late.residual[j]]);
+            let own = now.columns[j].iter().chain([&now.residual[j]]);
+            for (c, (a, b)) in own.zip(all).enumerate() {
+                let off: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+                assert!(largest(&off) <= 1e-9 * (1.0 + largest(b)), "{j} {c}");
+            }
+        }
+        assert!(now.columns[1].iter().flatten().all(|x| *x == 0.0));
+        assert!(now.columns[2][..12].iter().flatten().any(|x| *x != 0.0));
+    }
 }

@@ -2,6 +2,7 @@
 //! is tested for removal, and only then is the holdout looked at.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::accept::{Candidate, Limits};
 use super::candidate::{Judge, LAG};
@@ -12,6 +13,7 @@ use super::measure::{Counted, Errors, errors};
 use super::orders;
 use super::plan::{LogRole, Plan, Role, SetAside};
 use super::profile;
+use super::rows::PieceSums;
 use super::search::{Bar, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
@@ -125,17 +127,7 @@ pub fn diagnose(
     plan.held = held(case, &fitted);
     plan.rest = held_joints(robot, &case.stretches);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
-    let mut ground = Ground {
-        inertial: inertial_of(robot, &case.stretches, &case.parallel, &plan)?,
-        stretches: &case.stretches,
-        parallel: &case.parallel,
-        plan,
-        open: &case.open,
-        prior: &case.prior,
-        cover,
-    };
-    let unknowns = super::unknowns::Unknowns::of(&case.given, &case.open, &ground.cover).len();
-    let plan = &ground.plan;
+    let unknowns = super::unknowns::Unknowns::of(&case.given, &case.open, &cover).len();
     if plan.fitted_rows() < 10 * unknowns || plan.folds < 3 {
         return Err(DiagnoseError::TooFewRows {
             rows: plan.fitted_rows(),
@@ -154,9 +146,18 @@ pub fn diagnose(
         }
     }
     // faults of the data come before any physics
-    if let Some(found) = suspicion(&case.given, &case.stretches, &case.parallel, &ground.plan)? {
+    if let Some(found) = suspicion(&case.given, &case.stretches, &case.parallel, &plan)? {
         return Err(DiagnoseError::Channels(found));
     }
+    let mut ground = Ground {
+        inertial: inertial_of(robot, &case.stretches, &case.parallel, &plan)?,
+        stretches: &case.stretches,
+        parallel: &case.parallel,
+        plan,
+        open: &case.open,
+        prior: &case.prior,
+        cover,
+    };
     let mut at = fit(&case.given, &ground)?;
     let mut episodes: Vec<Episode> = Vec::new();
     let mut models = vec![at.model.clone()];
@@ -207,8 +208,8 @@ pub fn diagnose(
                 model.effects.push(found[chosen].effect.clone());
                 let fitted = fit(&model, &ground)?;
                 // the joint fit must keep what the linear tests promised
-                let kept = veto_square(&fitted, &ground.plan)
-                    <= case.limits.veto_ratio * veto_square_with(&at, &fitted, &ground.plan);
+                let vetoing = |of: &Fitted| veto_squares(of, &fitted.weights, &ground.plan);
+                let kept = !case.limits.vetoes(&vetoing(&at), &vetoing(&fitted));
                 if kept && fitted.square_with(&at.weights, &ground.plan) < at.square {
                     next = Some((chosen, others, fitted));
                     break;
@@ -222,6 +223,11 @@ pub fn diagnose(
         }
         let Some((chosen, others, fitted)) = next else {
             candidates = found;
+            for candidate in candidates.iter_mut().filter(|c| c.accepted) {
+                candidate.accepted = false;
+                candidate.reason =
+                    "as many effects as are looked for were found before it".to_owned();
+            }
             break;
         };
         told(&format!(
@@ -315,7 +321,7 @@ pub fn diagnose(
     let held_out = |s: &&Stretch| case.roles[s.log] == LogRole::Holdout;
     let unseen: Vec<Stretch> = case.stretches.iter().filter(held_out).cloned().collect();
     let noise_along = |stretches: &[Stretch]| {
-        let torques: Vec<Torques> = stretches.iter().map(|s| at.model.torques(s)).collect();
+        let torques: Vec<Torques> = stretches.par_iter().map(|s| at.model.torques(s)).collect();
         noise(
             &residuals(&at.model, stretches, torques.iter()),
             case,
@@ -403,14 +409,17 @@ fn residuals<'a>(
     stretches.iter().zip(torques).map(of).collect()
 }
 
-/// Squared residual of the veto pieces in a fit's own weights.
-fn veto_square(at: &Fitted, plan: &Plan) -> f64 {
-    squares(at, &at.weights, plan, &|r| r == Role::Veto)
-}
-
-/// Squared residual of the veto pieces of one fit in the weights of another.
-fn veto_square_with(at: &Fitted, other: &Fitted, plan: &Plan) -> f64 {
-    squares(at, &other.weights, plan, &|r| r == Role::Veto)
+/// Squared residual of each veto piece in given weights.
+fn veto_squares(at: &Fitted, weights: &[f64], plan: &Plan) -> Vec<f64> {
+    let pieces = plan.pieces.iter().zip(&at.base.sums);
+    let vetoing = pieces.filter(|(p, _)| p.role == Role::Veto);
+    let square = |sums: &Vec<PieceSums>| {
+        sums.iter()
+            .zip(weights)
+            .map(|(s, w)| w * w * s.square)
+            .sum()
+    };
+    vetoing.map(|(_, sums)| square(sums)).collect()
 }
 
 fn squares(at: &Fitted, weights: &[f64], plan: &Plan, wanted: &dyn Fn(Role) -> bool) -> f64 {
@@ -518,7 +527,8 @@ impl Diagnosis {
     }
 
     /// Candidates of the last round that the data tell from chance, and that were not added, for they are too
-    /// small to matter: what was added is then not all that is there, or not quite what is there.
+    /// small to matter or came after the last that is looked for: what was added is then not all that is there,
+    /// or not quite what is there.
     pub fn remainder(&self) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().filter(|c| c.significant)
     }

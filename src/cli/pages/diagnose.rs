@@ -2,6 +2,7 @@
 
 use super::super::diagnose::{Diagnosed, in_words, into_model, verdict};
 use super::super::diagnose_fault::DataFault;
+use super::super::diagnose_text::{doubts, nothing_missing};
 use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
@@ -60,10 +61,7 @@ pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
             }
             (text, true)
         }
-        "nothing-missing" => (
-            "Nothing is missing: what is left of the torque is noise.".to_owned(),
-            true,
-        ),
+        "nothing-missing" => (nothing_missing(d, ""), true),
         _ => {
             let mut text =
                 "A residual above the noise is left that no known effect explains.".to_owned();
@@ -135,6 +133,7 @@ pub fn sections(
         page.heading("What was added");
         steps(page, machine, found);
     }
+    page.list(doubts(machine, found));
     // logs that decided nothing, where there are any
     let all: Vec<usize> = (0..look.names.len()).collect();
     let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
@@ -288,7 +287,7 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             if d.assured() {
                 title
             } else {
-                format!("{title}, or what it stands in for: structure is left")
+                format!("{title}, or what it stands in for")
             },
             in_words(machine, d, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
