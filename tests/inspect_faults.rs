@@ -19,7 +19,7 @@ fn all_move() -> Log {
 /// q4 moves at several speeds, with rests; the others are held.
 fn one_moves() -> Log {
     static LOG: OnceLock<Log> = OnceLock::new();
-    LOG.get_or_init(|| Log::simulated(Motion::Move("q4"), 20.0))
+    LOG.get_or_init(|| Log::simulated(Motion::of_joint("q4"), 20.0))
         .clone()
 }
 

@@ -86,7 +86,7 @@ fn every_embedded_cft_robot_simulates_its_moves_without_reaching_a_limit() {
     for name in ["configs/cft.toml", "configs/cft-dspace.toml"] {
         let robot = robot(name);
         for mover in ["q1", "q2", "q4", "q5", "x_c1", "x_c2", "x_c3", "x_c4"] {
-            let log = simulate(&order(&robot, Motion::Move(mover))).expect(mover);
+            let log = simulate(&order(&robot, Motion::of_joint(mover))).expect(mover);
             assert_eq!(
                 log.ending,
                 Ending::Completed,
@@ -106,7 +106,7 @@ fn every_embedded_cft_robot_simulates_its_moves_without_reaching_a_limit() {
 #[test]
 fn motor_moves_move_one_coordinate_and_hold_the_others() {
     let robot = robot("configs/cft.toml");
-    let log = simulate(&order(&robot, Motion::Move("x_c2"))).expect("runs");
+    let log = simulate(&order(&robot, Motion::of_joint("x_c2"))).expect("runs");
     assert!(span(&column(&log, "x_c2")) > 0.5);
     for (name, most) in [("x_c1", 0.006), ("x_c3", 0.005), ("x_c4", 0.002)] {
         let moved = span(&column(&log, name));
@@ -331,7 +331,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     };
     let ordered = Order {
         model: Some(("emps-model.toml", &model)),
-        ..order(&robot, Motion::Move("q1"))
+        ..order(&robot, Motion::of_joint("q1"))
     };
     let log = simulate(&ordered).expect("runs");
     assert_eq!(log.header, ["t", "q1", "tau1"], "named as [log] reads them");
@@ -350,7 +350,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         .collect();
     assert_eq!(values, expected);
     let other = simulate(&Order {
-        motion: Motion::Move("q9"),
+        motion: Motion::of_joint("q9"),
         ..ordered
     });
     assert!(matches!(other, Err(SimulateError::UnknownJoint { .. })));
@@ -364,7 +364,7 @@ fn orders_that_name_what_is_not_there_are_refused() {
             .expect_err("refused")
             .to_string()
     };
-    assert!(text(Motion::Move("q3")).contains("q1, q2, q4, q5, x_c1"));
+    assert!(text(Motion::of_joint("q3")).contains("q1, q2, q4, q5, x_c1"));
     let other = trajectory(
         "kind = \"points\"\ncoordinates = \"joint\"\n[[point]]\nt = 0.0\nposition = [0.1]\n[[point]]\nt = 1.0\nposition = [0.2]\n",
     );

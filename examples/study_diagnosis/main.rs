@@ -10,8 +10,9 @@
 //! target/study_diagnosis.jsonl as it goes, and goes on from there when it is begun again. All
 //! effects, places and sizes, clean campaigns, pairs and withheld effects of one seed are done before
 //! the next seed begins. At the end, or with SEEDS = 0 of what is there, it writes into FOLDER the
-//! summaries that docs/closing-the-loop.md is generated from. `-- try TEXT [SEED]` runs the cases
-//! whose name holds TEXT, and tells everything of them.
+//! summaries that docs/closing-the-loop.md is generated from, and the lines themselves, from which it
+//! begins where there is no file in target. Lines made before the diagnosis was changed are to be deleted.
+//! `-- try TEXT [SEED]` runs the cases whose name holds TEXT, and tells everything of them.
 
 mod campaign;
 mod catalogue;
@@ -30,6 +31,8 @@ use catalogue::{Setting, settings};
 use serde_json::Value;
 
 const LOG: &str = "target/study_diagnosis.jsonl";
+const KEPT: &str = "study_diagnosis_rows.jsonl";
+const RESULTS: &str = "docs/results";
 const USUAL: u64 = 10;
 
 fn main() {
@@ -49,10 +52,21 @@ fn main() {
         return;
     }
     let seeds: u64 = argument(0).and_then(|s| s.parse().ok()).unwrap_or(USUAL);
-    let folder = PathBuf::from(argument(1).unwrap_or("docs/results"));
+    let folder = PathBuf::from(argument(1).unwrap_or(RESULTS));
+    if !Path::new(LOG).exists() {
+        let kept = Path::new(RESULTS).join(KEPT);
+        if kept.exists() {
+            std::fs::copy(kept, LOG).expect("the log is written");
+        }
+    }
     let mut rows = study::finished(Path::new(LOG));
     run(seeds, &mut rows);
+    // whole seeds, where so many were asked for
+    rows.retain(|r| seeds == 0 || r["seed"].as_u64().is_some_and(|s| s < plant(seeds + 1, 0)));
+    rows.sort_by_key(|r| r["seed"].as_u64());
     summary::write(&rows, &folder);
+    let lines: String = rows.iter().map(|row| format!("{row}\n")).collect();
+    std::fs::write(folder.join(KEPT), lines).expect("the lines are written");
 }
 
 /// A plant of its own for every case.

@@ -42,7 +42,7 @@ pub(super) fn simulate(
     let mut orders: Vec<(String, Motion, Option<f64>)> = joints
         .iter()
         .zip(&moves)
-        .map(|(joint, log)| (log.clone(), Motion::Move(joint), Some(ONE_JOINT_S)))
+        .map(|(joint, log)| (log.clone(), Motion::of_joint(joint), Some(ONE_JOINT_S)))
         .collect();
     orders.push((
         "identification.csv".into(),

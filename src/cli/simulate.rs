@@ -115,7 +115,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
     let motion = match (&reference, &args.move_joint, &volts) {
         (Some(reference), ..) => Motion::Trajectory(&reference.value),
-        (_, Some(joint), _) => Motion::MoveWithin {
+        (_, Some(joint), _) => Motion::Move {
             joint,
             part: args.travel.unwrap_or(1.0),
         },

@@ -29,22 +29,16 @@ pub enum Motion<'a> {
     Usual,
     /// A trajectory file.
     Trajectory(&'a Trajectory),
-    /// One joint (or motor coordinate) runs a ladder of speeds.
-    Move(&'a str),
-    /// The same within a part of its range, about the middle.
-    MoveWithin { joint: &'a str, part: f64 },
+    /// One joint (or motor coordinate) runs a ladder of speeds, within a part of its range about the middle.
+    Move { joint: &'a str, part: f64 },
     /// Volts of a log: times \[s\], and volts row by row.
     Volts { times: &'a [f64], volts: &'a [f64] },
 }
 
 impl<'a> Motion<'a> {
-    /// The joint that moves alone, and the part of its range that it moves over.
-    pub(super) fn alone(&self) -> Option<(&'a str, f64)> {
-        match *self {
-            Motion::Move(joint) => Some((joint, 1.0)),
-            Motion::MoveWithin { joint, part } => Some((joint, part)),
-            _ => None,
-        }
+    /// One joint over all of its range.
+    pub fn of_joint(joint: &'a str) -> Self {
+        Motion::Move { joint, part: 1.0 }
     }
 }
 
@@ -157,13 +151,13 @@ fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLo
             order.seconds,
             order.seed,
         )?),
-        Motion::Move(joint) | Motion::MoveWithin { joint, .. } => {
+        Motion::Move { joint, part } => {
             let mover = cft_experiment::Mover::named(joint)?;
             let seconds = order.seconds.unwrap_or(SECONDS);
             let ladder = cft_experiment::OneJointMove {
                 mover,
                 limits: Some(limits),
-                part: order.motion.alone().map_or(1.0, |(_, part)| part),
+                part,
                 ..cft_experiment::OneJointMove::new(0, seconds, Some(order.seed))
             };
             Some(ladder.reference(setup)?)
@@ -195,14 +189,17 @@ fn single(
     let (effects, values) = built_effects(order, &Sites::single_joint(&truth))?;
     let seconds = order.seconds.unwrap_or(SECONDS);
     let reference = match order.motion {
-        Motion::Move(joint) | Motion::MoveWithin { joint, .. } if joint != truth.name => {
+        Motion::Move { joint, .. } if joint != truth.name => {
             return Err(SimulateError::UnknownJoint {
                 name: joint.to_owned(),
                 known: truth.name,
             });
         }
-        Motion::Usual | Motion::Move(_) | Motion::MoveWithin { .. } => {
-            let part = order.motion.alone().map_or(1.0, |(_, part)| part);
+        Motion::Usual | Motion::Move { .. } => {
+            let part = match order.motion {
+                Motion::Move { part, .. } => part,
+                _ => 1.0,
+            };
             let ladder = from_files::LadderOf::Usual { part };
             Some(from_files::single_joint_ladder(
                 order.robot,

@@ -112,8 +112,7 @@ pub(super) fn reference<const J: usize>(
     };
     Ok(match order.motion {
         Motion::Usual => Some(usual(truth)),
-        Motion::Move(joint) => Some(along(joint, LadderOf::Usual { part: 1.0 })?),
-        Motion::MoveWithin { joint, part } => Some(along(joint, LadderOf::Usual { part })?),
+        Motion::Move { joint, part } => Some(along(joint, LadderOf::Usual { part })?),
         Motion::Trajectory(Trajectory::SingleJoint(file)) => {
             Some(along(&file.joint, LadderOf::File(file))?)
         }
