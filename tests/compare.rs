@@ -290,3 +290,26 @@ fn models_of_the_same_log_are_told_to_be_not_independent() {
         .code(0)
         .stderr(contains("warning: both models are made from id.csv"));
 }
+
+#[test]
+fn files_of_friction_alone_are_compared_without_logs_and_named_with_them() {
+    let folder = bench();
+    let friction = |viscous: f64| {
+        let parameters = [
+            ("viscous", true, viscous, Some(0.3), "N s/m"),
+            ("coulomb", true, 5.0, Some(0.1), "N"),
+        ];
+        model("q1", "viscous-coulomb", &parameters)
+    };
+    fs::write(folder.path().join("cold.toml"), friction(24.0)).unwrap();
+    fs::write(folder.path().join("warm.toml"), friction(20.0)).unwrap();
+    let found = json(folder.path(), "compare cold.toml warm.toml");
+    let parameters = found["parameters"].as_array().unwrap();
+    assert_eq!(parameters.len(), 2, "{parameters:?}");
+    assert_eq!(parameters[0]["name"], "viscous");
+    assert_eq!(parameters[0]["difference"], -4.0);
+    tool(folder.path(), "compare cold.toml warm.toml log.csv")
+        .assert()
+        .failure()
+        .stderr(contains("cold.toml: parameter `inertia` is missing"));
+}

@@ -7,10 +7,19 @@ use crate::config::model_file::{Effect, EffectParameter};
 use crate::effect::{Added, EffectError, Refined, Told};
 use crate::log::{Instant, LogSpec, Provenance, did_you_mean};
 use crate::motion::{Stretch, Summary, stretches};
+use crate::robot::model::Model;
 
 /// The model of a file with its effects; `name` names the file in errors.
 pub fn refined(file: &ModelFile, name: &str) -> Result<Refined, CliError> {
-    let model = file.model(name)?;
+    with_effects(file, name, file.model(name)?)
+}
+
+/// The same of a file that may hold friction alone, with inertias of 0 then: for what asks for no torque.
+pub fn refined_or_friction(file: &ModelFile, name: &str) -> Result<Refined, CliError> {
+    with_effects(file, name, file.model_or_friction(name)?)
+}
+
+fn with_effects(file: &ModelFile, name: &str, model: Model) -> Result<Refined, CliError> {
     let effects = file
         .effects
         .iter()

@@ -57,8 +57,26 @@ impl ModelFile {
     /// # Errors
     /// [`ConfigError::MissingParameter`] for the first inertial or friction parameter it lacks.
     pub fn model(&self, file: &str) -> Result<Model, ConfigError> {
+        self.model_with(file, self.inertial(file)?)
+    }
+
+    /// The model of a file that may hold friction alone, as `friction` writes it: with inertias of 0 then, for
+    /// what asks for no torque.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] for the first friction parameter that it lacks, or the first inertial
+    /// one where it has some.
+    pub fn model_or_friction(&self, file: &str) -> Result<Model, ConfigError> {
         let robot = self.robot.robot();
-        let theta = self.inertial(file)?;
+        let mut inertial = robot.parameters().iter();
+        if inertial.any(|p| self.find(&p.name, None).is_some()) {
+            return self.model(file);
+        }
+        self.model_with(file, vec![0.0; robot.parameters().len()])
+    }
+
+    fn model_with(&self, file: &str, theta: Vec<f64>) -> Result<Model, ConfigError> {
+        let robot = self.robot.robot();
         let mut friction = Vec::with_capacity(robot.joints());
         let mut offset = Vec::with_capacity(robot.joints());
         for joint in robot.joint_names() {

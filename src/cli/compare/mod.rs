@@ -12,7 +12,7 @@ use super::files::Given;
 use super::lsq::processing;
 use super::machine::Machine;
 use super::pages::{self, Look, curve, speeds};
-use super::refined::{Held, hold, refined};
+use super::refined::{Held, hold, refined, refined_or_friction};
 use super::{CliError, Context, Outcome, arguments, files, outputs};
 use crate::compare::{self, Differences, Pair, SideBySide};
 use crate::config::ModelFile;
@@ -92,9 +92,13 @@ pub struct Curves {
     laws: [Option<JointFriction>; 2],
 }
 
-fn side(path: &Path) -> Result<Side, CliError> {
+/// A model file; without logs one of friction alone will do.
+fn side(path: &Path, logs: bool) -> Result<Side, CliError> {
     let given = files::model(path)?;
-    let model = refined(&given.value, &given.name)?;
+    let model = match logs {
+        true => refined(&given.value, &given.name)?,
+        false => refined_or_friction(&given.value, &given.name)?,
+    };
     Ok(Side { given, model })
 }
 
@@ -163,7 +167,7 @@ pub fn compare(
     logs: &[LogSpec],
     context: &Context,
 ) -> Result<Compared, CliError> {
-    let sides = [side(a)?, side(b)?];
+    let sides = [side(a, !logs.is_empty())?, side(b, !logs.is_empty())?];
     one_robot(sides.each_ref())?;
     let first = &sides[0].given;
     let machine = Machine::new(&first.name, first.value.robot.clone());
