@@ -47,7 +47,6 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
         Some(name) => on_drive(setting, name, seed),
         None => on_arm(setting, seed),
     };
-    let specs: Vec<EffectSpec> = put.iter().map(|t| t.spec.clone()).collect();
 
     let without = match setting.withheld {
         true => setting.put.iter().map(|p| p.kind.name.to_owned()).collect(),
@@ -68,22 +67,25 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
             },
             &|| false,
         )
-        .expect("a diagnosis")
     };
-    let result = run(campaign.declared.clone(), Limits::default(), without);
+    let result = match run(campaign.declared.clone(), Limits::default(), without) {
+        Ok(result) => result,
+        Err(error) => return refused(setting, seed, &put, &error.to_string()),
+    };
     if aloud {
         show(&lab.robot, &result);
     }
     // the oracle knows the effects and fits their numbers; the plain fit knows of none
     let known: Option<Vec<Added>> = put.iter().map(|t| t.added.clone()).collect();
-    let oracle = known.filter(|k| !k.is_empty()).map(|known| {
+    let oracle = known.filter(|k| !k.is_empty()).and_then(|known| {
         let mut given = campaign.declared.clone();
         given.effects.extend(known);
-        let fitted = run(given, nothing, Vec::new());
+        // a log may hold rows enough for the declared model and not for the effects beside it
+        let fitted = run(given, nothing, Vec::new()).ok()?;
         if aloud {
             numbers(&lab.robot, "effect known", &fitted);
         }
-        fitted
+        Some(fitted)
     });
     let shown = oracle.as_ref().map(|oracle| {
         (0..lab.robot.joints())
@@ -102,17 +104,7 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
     let steps: Vec<Value> = (0..result.steps.len())
         .map(|s| step(robot, &result, s, &put))
         .collect();
-    let put: Vec<Value> = setting
-        .put
-        .iter()
-        .zip(&specs)
-        .map(|(p, spec)| {
-            json!({
-                "effect": p.kind.name, "family": p.kind.family, "place": p.place, "size": p.size,
-                "values": spec.values,
-            })
-        })
-        .collect();
+    let put = put_in(setting, &put);
     json!({
         "case": setting.name(),
         "study": setting.study,
@@ -132,6 +124,32 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
         "before": unseen(&result, false),
         "after": unseen(&result, true),
         "oracle": oracle.as_ref().map(|d| unseen(d, true)),
+    })
+}
+
+/// The effects that were put in.
+fn put_in(setting: &Setting, put: &[Truth]) -> Vec<Value> {
+    let pairs = setting.put.iter().zip(put);
+    pairs
+        .map(|(p, truth)| {
+            json!({
+                "effect": p.kind.name, "family": p.kind.family, "place": p.place, "size": p.size,
+                "values": truth.spec.values,
+            })
+        })
+        .collect()
+}
+
+/// A campaign that is no basis for a diagnosis: nothing was said of it.
+fn refused(setting: &Setting, seed: u64, put: &[Truth], why: &str) -> Value {
+    json!({
+        "case": setting.name(),
+        "study": setting.study,
+        "seed": seed,
+        "put": put_in(setting, put),
+        "refused": why,
+        "steps": [], "cut": [], "structured": false, "remainder": [], "left": [],
+        "shown": null, "before": null, "after": null, "oracle": null,
     })
 }
 
