@@ -111,7 +111,7 @@ impl Prior {
 }
 
 /// Value of an unknown in a model; 0 for an effect that it does not have.
-fn value(model: &Refined, unknown: Unknown) -> f64 {
+pub fn value(model: &Refined, unknown: Unknown) -> f64 {
     match unknown {
         Unknown::Theta(i) => model.model.theta[i],
         Unknown::Offset(j) => model.model.offset[j],
@@ -184,36 +184,6 @@ pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
         }
     }
     Ok(at)
-}
-
-/// How far the unknowns move where the motion goes through the position filter once more: to leading order
-/// what the filter's own distortion, at reversals above all, has made of them. Zero without such a filter.
-///
-/// # Errors
-/// [`MotionError`] of the filters.
-pub fn moved_by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionError> {
-    let none = DVector::zeros(at.base.unknowns.len());
-    let mut again = Vec::with_capacity(ground.stretches.len());
-    for (i, stretch) in ground.stretches.iter().enumerate() {
-        if ground.plan.idle(i) {
-            again.push(stretch.clone());
-            continue;
-        }
-        match ground.parallel.twice(stretch)? {
-            Some(stretch) => again.push(stretch),
-            None => return Ok(none),
-        }
-    }
-    let ground = Ground {
-        inertial: inertial_of(&at.model.model.robot, &again, ground.parallel, &ground.plan)?,
-        stretches: &again,
-        plan: ground.plan.clone(),
-        cover: ground.cover.clone(),
-        ..*ground
-    };
-    let smoothed = evaluate(at.model.clone(), &ground, Some(&at.weights))?;
-    let moved = DVector::from_vec(newton(&smoothed, false).0);
-    Ok(moved - DVector::from_vec(newton(at, false).0))
 }
 
 /// Weighted squares and the prior's share.

@@ -12,12 +12,14 @@
 
 mod accept;
 mod candidate;
+mod covariance;
 mod episode;
 mod evidence;
 mod fit;
 mod floor;
 mod left;
 mod measure;
+mod moved;
 mod orders;
 mod period;
 mod plan;

@@ -4,7 +4,8 @@
 //!
 //! Where the profile (the least weighted square over all other unknowns, Bates and Watts 1988)
 //! rises by less than the linearisation says it does at two standard deviations, the shape's standard
-//! deviation becomes half of the distance at which it rises by as much, on the side where that is farther.
+//! deviation becomes half of the distance at which it rises by as much, on the side where that is farther. What
+//! goes along with the shape, as the inertia of an elastic drive with its frequency, is then known less well too.
 
 use nalgebra::DMatrix;
 
@@ -70,9 +71,7 @@ pub fn widen(
             farthest = farthest.max(distance(first, end, promised, |d| risen(value + side * d))?);
         }
         if linear {
-            let factor = farthest / first;
-            covariance.row_mut(i).scale_mut(factor);
-            covariance.column_mut(i).scale_mut(factor);
+            stretch(covariance, i, farthest / first);
         } else if farthest < high - low {
             covariance.row_mut(i).fill(0.0);
             covariance.column_mut(i).fill(0.0);
@@ -80,6 +79,13 @@ pub fn widen(
         }
     }
     Ok(())
+}
+
+/// Makes one standard deviation larger by a factor; what is known of the others with this one given stays as it is.
+fn stretch(covariance: &mut DMatrix<f64>, i: usize, factor: f64) {
+    let column = covariance.column(i).clone_owned();
+    let more = (factor.powi(2) - 1.0) / column[i];
+    covariance.ger(more, &column, &column, 1.0);
 }
 
 /// Distance at which a function that is 0 at 0 has risen by what was promised at `first`, or the end of the way.
@@ -111,7 +117,9 @@ fn distance<E>(
 mod tests {
     use std::convert::Infallible;
 
-    use super::distance;
+    use nalgebra::DMatrix;
+
+    use super::{distance, stretch};
 
     fn of(first: f64, end: f64, promised: f64, rise: fn(f64) -> f64) -> f64 {
         let Ok(found) = distance(first, end, promised, |d| Ok::<_, Infallible>(rise(d)));
@@ -127,6 +135,28 @@ mod tests {
         // steps of 3 each, 5 apart: the second is passed at 10
         let ragged = of(0.01, 100.0, 4.0, |d| 3.0 * (d / 5.0).floor());
         assert!((5.0..20.0).contains(&ragged), "{ragged}");
+    }
+
+    #[test]
+    fn a_wider_shape_takes_its_companions_along_and_leaves_what_is_known_beside_it() {
+        #[rustfmt::skip]
+        let before = DMatrix::from_row_slice(3, 3, &[
+            4.0, 1.0, -0.5,
+            1.0, 2.0, 0.3,
+            -0.5, 0.3, 1.0,
+        ]);
+        let mut after = before.clone();
+        stretch(&mut after, 1, 3.0);
+        assert!((after[(1, 1)] - 18.0).abs() < 1e-12);
+        // of the others with this one given: the Schur complement, and the regression on it
+        for a in [0, 2] {
+            assert!((after[(a, 1)] / after[(1, 1)] - before[(a, 1)] / 2.0).abs() < 1e-12);
+            for b in [0, 2] {
+                let given = |c: &DMatrix<f64>| c[(a, b)] - c[(a, 1)] * c[(1, b)] / c[(1, 1)];
+                assert!((given(&after) - given(&before)).abs() < 1e-12);
+            }
+        }
+        assert!(after[(0, 0)] > before[(0, 0)]);
     }
 
     #[test]

@@ -1,24 +1,23 @@
 //! The loop: fit, search, add the best, refit, until nothing is accepted; then every accepted effect
 //! is tested for removal, and only then is the holdout looked at.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::accept::{Candidate, Limits};
-use super::candidate::{Judge, LAG};
+use super::candidate::Judge;
+use super::covariance::covariance;
 use super::episode::{self, Episode};
-use super::fit::{Fitted, Ground, Inverse, Prior, fit, inertial_of, moved_by_smoothing};
+use super::fit::{Fitted, Ground, Prior, fit, inertial_of};
 use super::left::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
 use super::measure::{Counted, Errors, errors};
 use super::orders;
 use super::plan::{LogRole, Plan, Role, SetAside};
-use super::profile;
 use super::rows::PieceSums;
 use super::search::{Bar, choose, search};
 use super::suspect::{Suspicion, suspicion};
 use super::unknowns::{Open, Unknown};
 use crate::effect::{Added, Cover, Refined, Torques, held_joints};
-use crate::math::long_run::long_run;
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -168,7 +167,7 @@ pub fn diagnose(
         if stop() {
             return Err(DiagnoseError::Interrupted);
         }
-        let found = episode::find(&at.base, &ground.plan);
+        let found = episode::find(&at, &ground, case.cutoff_hz);
         if !found.is_empty() && episodes.len() < MOST_EPISODES && case.limits.steps > 0 {
             let cut = episode::cut(&found, &mut ground.plan, &case.stretches, &case.parallel);
             for e in &cut {
@@ -344,9 +343,7 @@ pub fn diagnose(
     };
     let part_left = part_left(&floor, &given.train, &last.train);
     let left = left(&last.train, &floor, last.holdout.as_ref().zip(floor_unseen));
-    let moved = moved_by_smoothing(&at, &ground)?;
-    let mut covariance = covariance(&at, &ground) + &moved * moved.transpose();
-    profile::widen(&at, &ground, &mut covariance)?;
+    let covariance = covariance(&at, &ground, case.cutoff_hz)?;
     Ok(Diagnosis {
         unknowns: at.base.unknowns.list.clone(),
         covariance,
@@ -465,49 +462,6 @@ fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize
         }
     }
     Ok(worst.map(|(i, _)| i))
-}
-
-/// Covariance of all unknowns under correlated residuals: the sandwich over pieces (Newey and West
-/// 1987), at least that of independent rows. What these data do not determine beside the others has an
-/// infinite variance.
-fn covariance(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
-    let base = &at.base;
-    let u = base.unknowns.len();
-    let inverse = Inverse::of(&at.normal);
-    let mut scores: Vec<(usize, DVector<f64>)> = Vec::new();
-    let mut rows = 0.0;
-    for (piece, sums) in ground.plan.pieces.iter().zip(&base.sums) {
-        if !piece.role.fitted() {
-            continue;
-        }
-        let mut g = DVector::zeros(u);
-        for (j, s) in sums.iter().enumerate() {
-            if !ground.plan.holds(piece.stretch, j) {
-                rows += piece.rows.len() as f64;
-            }
-            let w = at.weights[j] * at.weights[j];
-            for (x, &i) in s.score.iter().zip(&base.unknowns.columns[j]) {
-                g[i] += w * x;
-            }
-        }
-        scores.push((piece.stretch, g));
-    }
-    let mut middle = long_run(&scores, u, LAG);
-    // the prior is data too
-    middle += &at.information * ground.prior.rows_per_independent.max(1.0);
-    let total = base.total(&ground.plan, &at.weights, &Role::fitted);
-    let variance = total.square / rows.max(1.0);
-    for i in 0..u {
-        let least = variance * total.normal[(i, i)];
-        if middle[(i, i)] < least {
-            middle[(i, i)] = least;
-        }
-    }
-    let mut covariance = inverse.times(&(middle * inverse.matrix()));
-    for i in (0..u).filter(|i| inverse.at_rest(*i)) {
-        covariance[(i, i)] = f64::INFINITY;
-    }
-    covariance
 }
 
 impl Diagnosis {

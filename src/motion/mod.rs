@@ -25,11 +25,13 @@
 //! | [`held_force`] | motor forces held over a sample, where a linkage turns them |
 //! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
 //! | [`stretch`] | whole stretches in memory, for searches |
+//! | `once_more` | a stretch smoothed once more, or with its noise once more |
 
 mod cutter;
 pub mod differences;
 pub mod full_rate;
 pub mod held_force;
+mod once_more;
 pub mod run;
 pub mod settings;
 pub mod stretch;

@@ -3,7 +3,7 @@
 
 use super::MotionError;
 use super::run::{RunError, Summary, run};
-use super::settings::{Chain, Settings};
+use super::settings::{Chain, Differences, Settings};
 use crate::log::Block;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -132,7 +132,9 @@ pub fn stretches<E>(
 pub struct Parallel {
     filter: ZeroPhase,
     /// The filter that the positions of its stretches came through.
-    position: Option<ZeroPhase>,
+    pub(super) position: Option<ZeroPhase>,
+    /// How they were differentiated.
+    pub(super) differences: Differences,
     /// Every how many samples a row is kept.
     pub decimation: usize,
     /// Samples left off at each end of a stretch.
@@ -149,26 +151,10 @@ impl Parallel {
         Ok(Parallel {
             filter: chain.parallel,
             position: chain.position,
+            differences: chain.differences,
             decimation: chain.decimation,
             trim: chain.trim,
         })
-    }
-
-    /// The stretch with its motion through the position filter once more; none where there is no such
-    /// filter. To leading order this doubles what the filter took (Tukey's twicing, Exploratory Data Analysis, 1977).
-    ///
-    /// # Errors
-    /// [`MotionError`] where the stretch is too short for the filter.
-    pub fn twice(&self, stretch: &Stretch) -> Result<Option<Stretch>, MotionError> {
-        let Some(filter) = &self.position else {
-            return Ok(None);
-        };
-        let mut again = stretch.clone();
-        let motion = [&mut again.q, &mut again.v, &mut again.a];
-        for channel in motion.into_iter().flatten() {
-            filter.run(channel, 1)?;
-        }
-        Ok(Some(again))
     }
 
     /// Rows that a stretch of `samples` gives.
@@ -218,52 +204,5 @@ impl Parallel {
             }
         }
         Ok(out)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn smoothing_once_more_doubles_what_the_filter_takes_of_a_slow_wave() {
-        let settings = Settings {
-            q_cutoff_hz: Some(60.0),
-            ..Settings::default()
-        };
-        let parallel = Parallel::design(&settings, 1e-3).unwrap();
-        let filter = parallel.position.clone().unwrap();
-        let wave = |k: usize| (std::f64::consts::TAU * 30.0 * k as f64 * 1e-3).sin();
-        let raw: Vec<f64> = (0..3000).map(wave).collect();
-        let mut once = raw.clone();
-        filter.run(&mut once, 1).unwrap();
-        let stretch = Stretch {
-            dt: 1e-3,
-            t: (0..3000).map(|k| k as f64 * 1e-3).collect(),
-            q: vec![once.clone()],
-            v: vec![vec![0.0; 3000]],
-            a: vec![vec![0.0; 3000]],
-            tau: vec![vec![0.0; 3000]],
-            ..Stretch::default()
-        };
-        let twice = parallel.twice(&stretch).unwrap().unwrap();
-        let off = |x: &[f64]| -> f64 {
-            let inner = 500..2500;
-            let pairs = x[inner.clone()].iter().zip(&raw[inner]);
-            pairs.map(|(x, r)| (x - r).powi(2)).sum::<f64>().sqrt()
-        };
-        let ratio = off(&twice.q[0]) / off(&once);
-        assert!((1.95..2.05).contains(&ratio), "{ratio}");
-        assert_eq!(twice.tau, stretch.tau);
-    }
-
-    #[test]
-    fn without_a_position_filter_there_is_nothing_to_double() {
-        let settings = Settings {
-            q_order: 0,
-            ..Settings::default()
-        };
-        let parallel = Parallel::design(&settings, 1e-3).unwrap();
-        assert!(parallel.twice(&Stretch::default()).unwrap().is_none());
     }
 }

@@ -1,0 +1,200 @@
+//! What was done to positions once, done once more: through the filter that smoothed them, or with noise like
+//! theirs beside it. What estimates make of it tells how far the first time has moved them.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::MotionError;
+use super::stretch::{Parallel, Stretch};
+
+impl Parallel {
+    /// The stretch with its motion through the position filter once more; none where there is no such
+    /// filter. To leading order this doubles what the filter took (Tukey's twicing, Exploratory Data Analysis, 1977).
+    ///
+    /// # Errors
+    /// [`MotionError`] where the stretch is too short for the filter.
+    pub fn twice(&self, stretch: &Stretch) -> Result<Option<Stretch>, MotionError> {
+        let Some(filter) = &self.position else {
+            return Ok(None);
+        };
+        let mut again = stretch.clone();
+        let motion = [&mut again.q, &mut again.v, &mut again.a];
+        for channel in motion.into_iter().flatten() {
+            filter.run(channel, 1)?;
+        }
+        Ok(Some(again))
+    }
+
+    /// The stretch with white noise of its own positions' level added to them, and the same with the noise taken
+    /// off: what is of first order in it is gone from the mean of the two, what is of second is doubled
+    /// (Cook and Stefanski, J. Am. Stat. Assoc. 89, 1994). Velocity and acceleration get the noise as
+    /// they got that of the log, filtered and differentiated. `seed` chooses it.
+    ///
+    /// # Errors
+    /// [`MotionError`] where the stretch is too short for the filter.
+    pub fn noisier(&self, stretch: &Stretch, seed: u64) -> Result<[Stretch; 2], MotionError> {
+        let mut chance = ChaCha8Rng::seed_from_u64(seed);
+        let mut pair = [stretch.clone(), stretch.clone()];
+        for j in 0..stretch.joints() {
+            let [q, v, a] = self.motion_of_noise(stretch, &mut chance)?;
+            let level = middle_roughness(&stretch.a[j]) / middle_roughness(&a);
+            if !level.is_finite() {
+                continue;
+            }
+            for (noisier, sign) in pair.iter_mut().zip([level, -level]) {
+                let channels = [&mut noisier.q[j], &mut noisier.v[j], &mut noisier.a[j]];
+                for (channel, noise) in channels.into_iter().zip([&q, &v, &a]) {
+                    for (x, n) in channel.iter_mut().zip(noise) {
+                        *x += sign * n;
+                    }
+                }
+            }
+        }
+        Ok(pair)
+    }
+
+    /// What white noise of positions, even over an interval of 1, becomes: position, velocity, acceleration.
+    fn motion_of_noise(
+        &self,
+        stretch: &Stretch,
+        chance: &mut ChaCha8Rng,
+    ) -> Result<[Vec<f64>; 3], MotionError> {
+        let mut q: Vec<f64> = stretch
+            .t
+            .iter()
+            .map(|_| chance.random::<f64>() - 0.5)
+            .collect();
+        if let Some(filter) = &self.position {
+            filter.run(&mut q, 1)?;
+        }
+        let (mut v, mut a) = (vec![0.0; q.len()], vec![0.0; q.len()]);
+        self.differences.apply(&q, 1, stretch.dt, &mut v, &mut a);
+        Ok([q, v, a])
+    }
+}
+
+/// Samples of a block whose roughness is taken together.
+const BLOCK: usize = 64;
+/// Samples that a fourth difference spans.
+const SPAN: usize = 5;
+
+/// Median over blocks of the rms of the fourth difference, to which motion gives next to nothing, and a jerk
+/// at a reversal only a few of the blocks. 0 for less than a block.
+fn middle_roughness(x: &[f64]) -> f64 {
+    let rough = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
+    let mut of_blocks: Vec<f64> = x
+        .chunks_exact(BLOCK)
+        .map(|block| block.windows(SPAN).map(|w| rough(w).powi(2)).sum())
+        .collect();
+    let middle = of_blocks.len() / 2;
+    if of_blocks.is_empty() {
+        return 0.0;
+    }
+    let (_, square, _) = of_blocks.select_nth_unstable_by(middle, f64::total_cmp);
+    (*square / (BLOCK - SPAN + 1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::Settings;
+
+    #[test]
+    fn smoothing_once_more_doubles_what_the_filter_takes_of_a_slow_wave() {
+        let settings = Settings {
+            q_cutoff_hz: Some(60.0),
+            ..Settings::default()
+        };
+        let parallel = Parallel::design(&settings, 1e-3).unwrap();
+        let filter = parallel.position.clone().unwrap();
+        let wave = |k: usize| (std::f64::consts::TAU * 30.0 * k as f64 * 1e-3).sin();
+        let raw: Vec<f64> = (0..3000).map(wave).collect();
+        let mut once = raw.clone();
+        filter.run(&mut once, 1).unwrap();
+        let stretch = Stretch {
+            dt: 1e-3,
+            t: (0..3000).map(|k| k as f64 * 1e-3).collect(),
+            q: vec![once.clone()],
+            v: vec![vec![0.0; 3000]],
+            a: vec![vec![0.0; 3000]],
+            tau: vec![vec![0.0; 3000]],
+            ..Stretch::default()
+        };
+        let twice = parallel.twice(&stretch).unwrap().unwrap();
+        let off = |x: &[f64]| -> f64 {
+            let inner = 500..2500;
+            let pairs = x[inner.clone()].iter().zip(&raw[inner]);
+            pairs.map(|(x, r)| (x - r).powi(2)).sum::<f64>().sqrt()
+        };
+        let ratio = off(&twice.q[0]) / off(&once);
+        assert!((1.95..2.05).contains(&ratio), "{ratio}");
+        assert_eq!(twice.tau, stretch.tau);
+    }
+
+    #[test]
+    fn without_a_position_filter_there_is_nothing_to_double() {
+        let settings = Settings {
+            q_order: 0,
+            ..Settings::default()
+        };
+        let parallel = Parallel::design(&settings, 1e-3).unwrap();
+        assert!(parallel.twice(&Stretch::default()).unwrap().is_none());
+    }
+
+    /// A slow motion read by an encoder of a known count: the noise that comes to it has the variance of the
+    /// rounding, in position and acceleration, and the two of the pair are opposite.
+    #[test]
+    fn the_noise_that_comes_to_a_stretch_is_that_of_its_encoder() {
+        let (dt, count, n) = (1e-3, 1e-4, 20_000);
+        let parallel = Parallel::design(&Settings::default(), dt).unwrap();
+        let motion =
+            |k: usize| 0.4 * (1.7 * k as f64 * dt).sin() + 0.05 * (9.1 * k as f64 * dt).sin();
+        let smooth = |mut q: Vec<f64>| {
+            parallel.position.clone().unwrap().run(&mut q, 1).unwrap();
+            let (mut v, mut a) = (vec![0.0; n], vec![0.0; n]);
+            parallel.differences.apply(&q, 1, dt, &mut v, &mut a);
+            Stretch {
+                dt,
+                t: (0..n).map(|k| k as f64 * dt).collect(),
+                q: vec![q],
+                v: vec![v],
+                a: vec![a],
+                ..Stretch::default()
+            }
+        };
+        let true_motion = smooth((0..n).map(motion).collect());
+        let read = smooth(
+            (0..n)
+                .map(|k| (motion(k) / count).round() * count)
+                .collect(),
+        );
+        let [more, less] = parallel.noisier(&read, 1).unwrap();
+        let rms_off = |x: &[f64], y: &[f64]| {
+            let inner = 1000..n - 1000;
+            let pairs = x[inner.clone()].iter().zip(&y[inner]);
+            pairs.map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt()
+        };
+        for of in [|s: &Stretch| s.q[0].clone(), |s: &Stretch| s.a[0].clone()] {
+            let added = rms_off(&of(&more), &of(&read));
+            let had = rms_off(&of(&read), &of(&true_motion));
+            assert!((added / had - 1.0).abs() < 0.1, "{added} {had}");
+            assert!((rms_off(&of(&more), &of(&less)) / added - 2.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_holds_no_noise_gets_none() {
+        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let still = Stretch {
+            dt: 1e-3,
+            t: vec![0.0; 3000],
+            q: vec![vec![0.3; 3000]],
+            v: vec![vec![0.0; 3000]],
+            a: vec![vec![0.0; 3000]],
+            ..Stretch::default()
+        };
+        let [more, less] = parallel.noisier(&still, 1).unwrap();
+        assert_eq!(more, still);
+        assert_eq!(less, still);
+    }
+}
