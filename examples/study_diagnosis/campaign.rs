@@ -54,6 +54,7 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
     };
     let nothing = Limits {
         steps: 0,
+        deviations: aloud,
         ..Limits::default()
     };
     let run = |given: Refined, limits: Limits, without: Vec<String>| {

@@ -27,6 +27,8 @@ pub struct Limits {
     pub over_noise: f64,
     /// Most effects that are added; with none the given model is fitted and nothing is looked for.
     pub steps: usize,
+    /// Whether standard deviations are worked out, which takes several fits; without them they are not a number.
+    pub deviations: bool,
 }
 
 impl Default for Limits {
@@ -40,6 +42,7 @@ impl Default for Limits {
             worth: 0.01,
             over_noise: 0.1,
             steps: 8,
+            deviations: true,
         }
     }
 }

@@ -84,7 +84,7 @@ pub struct Pair {
 pub struct Diagnosis {
     /// The refined model.
     pub model: Refined,
-    /// Unknowns of the final fit and their covariance under correlated residuals.
+    /// Unknowns of the final fit and their covariance.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
     pub steps: Vec<Step>,
@@ -343,7 +343,11 @@ pub fn diagnose(
     };
     let part_left = part_left(&floor, &given.train, &last.train);
     let left = left(&last.train, &floor, last.holdout.as_ref().zip(floor_unseen));
-    let covariance = covariance(&at, &ground, case.cutoff_hz)?;
+    let size = at.base.unknowns.len();
+    let covariance = match case.limits.deviations {
+        true => covariance(&at, &ground, case.cutoff_hz)?,
+        false => DMatrix::from_element(size, size, f64::NAN),
+    };
     Ok(Diagnosis {
         unknowns: at.base.unknowns.list.clone(),
         covariance,
