@@ -238,18 +238,16 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
     let of = |t: &&Truth| {
         t.spec.name == effect.kind.name && t.spec.joint.clone().unwrap_or_default() == place
     };
-    let off: BTreeMap<String, f64> = put
-        .iter()
-        .find(of)
-        .into_iter()
-        .flat_map(|t| {
-            told.iter().filter_map(|told| {
-                let truth = t.spec.values.iter().find(|(k, _)| *k == told.key)?.1;
-                let std = told.std.filter(|s| *s > 0.0)?;
-                Some((told.key.clone(), (told.value - truth) / std))
-            })
-        })
-        .collect();
+    let truth = put.iter().find(of);
+    let known = told.iter().filter_map(|told| {
+        let truth = truth?.spec.values.iter().find(|(k, _)| *k == told.key)?.1;
+        let std = told.std.filter(|s| *s > 0.0)?;
+        Some((told.key.clone(), [(told.value - truth) / std, std]))
+    });
+    let known: BTreeMap<String, [f64; 2]> = known.collect();
+    let each = |which: usize| -> BTreeMap<&String, f64> {
+        known.iter().map(|(key, of)| (key, of[which])).collect()
+    };
     json!({
         "effect": effect.kind.name,
         "family": effect.family().name(),
@@ -257,7 +255,8 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
         "alternatives": alike,
         "assured": result.assured(),
         "explained": result.explained(step),
-        "off": off,
+        "off": each(0),
+        "std": each(1),
     })
 }
 

@@ -32,6 +32,11 @@ pub fn write(rows: &[Value], folder: &Path) {
             rates(rows),
         ),
         (
+            "study_diagnosis_numbers",
+            "numbers found against the truth, in their standard deviations",
+            numbers(rows),
+        ),
+        (
             "study_diagnosis_pairs",
             "two effects at once, each of size 4",
             pairs(rows),
@@ -317,6 +322,57 @@ fn rates(rows: &[Value]) -> Vec<Value> {
             ratios.len(),
         ),
     ]
+}
+
+/// How far each number of each effect is from the truth, and how well it is known.
+fn numbers(rows: &[Value]) -> Vec<Value> {
+    let single = of(rows, "one");
+    let mut lines = Vec::new();
+    for kind in KINDS {
+        let mut by_key: BTreeMap<&str, (Vec<f64>, Vec<f64>)> = BTreeMap::new();
+        let own = single.iter().filter(|r| r["put"][0]["effect"] == kind.name);
+        let steps = own.flat_map(|r| {
+            list(&r["steps"])
+                .iter()
+                .map(|s| (&r["put"][0]["values"], s))
+        });
+        for (truth, step) in steps.filter(|(_, s)| s["effect"] == kind.name) {
+            let truth = |key: &str| {
+                let mut pairs = list(truth).iter();
+                pairs.find(|p| p[0] == key).and_then(|p| p[1].as_f64())
+            };
+            for (key, off) in step["off"].as_object().into_iter().flatten() {
+                let (all, parts) = by_key.entry(key).or_default();
+                all.extend(off.as_f64());
+                let std = step["std"][key].as_f64();
+                let truth = truth(key).filter(|x| *x != 0.0);
+                parts.extend(std.zip(truth).map(|(std, truth)| (std / truth).abs()));
+            }
+        }
+        for (key, (off, parts)) in by_key.into_iter().filter(|(_, (off, _))| !off.is_empty()) {
+            let within = |stds: f64| off.iter().filter(|z| z.abs() <= stds).count();
+            let n = off.len() as f64;
+            let largest = off
+                .iter()
+                .copied()
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            lines.push(json!({
+                "effect": kind.name,
+                "number": key,
+                "campaigns": off.len(),
+                "within 2": within(2.0),
+                "within 3": within(3.0),
+                "mean": format!("{:+.2}", off.iter().sum::<f64>() / n),
+                "rms": format!("{:.2}", (off.iter().map(|z| z * z).sum::<f64>() / n).sqrt()),
+                "farthest": largest.map(|z| format!("{z:+.1}")),
+                "median deviation over the truth": match parts.is_empty() {
+                    true => "-".to_owned(),
+                    false => percent(quantile(parts, 0.5)),
+                },
+            }));
+        }
+    }
+    lines
 }
 
 /// Whether both effects that were put in are among what was found.

@@ -261,7 +261,8 @@ pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> Mod
         let there =
             |p: &&mut crate::config::model_file::Parameter| p.name == name && p.joint == joint;
         if let Some(p) = model.parameters.iter_mut().find(there) {
-            let found = diagnosis.covariance[(i, i)].max(0.0).sqrt();
+            let variance = diagnosis.covariance[(i, i)];
+            let found = if variance < 0.0 { 0.0 } else { variance.sqrt() };
             if !found.is_finite() {
                 // others stand in for it in these logs
                 p.value = value;

@@ -52,7 +52,9 @@ pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, 
             let moving = piece.rows.clone().filter(|row| !near[*row]);
             let squares = moving.map(|row| residual[row].powi(2));
             let (rows, sum) = squares.fold((0, 0.0), |(n, sum), x| (n + 1, sum + x));
-            (rows > 0).then(|| (i, sum / rows as f64, rows))
+            // of few rows that are left one that rings would stand for all
+            let most = 2 * rows >= piece.rows.len();
+            (rows > 0 && most).then(|| (i, sum / rows as f64, rows))
         };
         let pieces: Vec<_> = plan.pieces.iter().enumerate().filter_map(counted).collect();
         let mut all: Vec<f64> = pieces.iter().map(|(_, mean, _)| *mean).collect();

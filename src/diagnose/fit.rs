@@ -156,10 +156,30 @@ const HALVINGS: usize = 6;
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
-    let mut at = evaluate(start.clone(), ground, None)?;
+    descend(evaluate(start.clone(), ground, None)?, ground, None)
+}
+
+/// Fits a fitted model on other ground in the weights that it has; what these data did not determine stays.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn refit(at: &Fitted, ground: &Ground) -> Result<Fitted, MotionError> {
+    let begun = at.with(at.model.clone(), ground)?;
+    descend(begun, ground, Some(&Inverse::of(&at.normal)))
+}
+
+/// Gauss-Newton steps to the least square; `known` says what stays where it is, and that the weights do.
+fn descend(
+    mut at: Fitted,
+    ground: &Ground,
+    known: Option<&Inverse>,
+) -> Result<Fitted, MotionError> {
     for k in 0..STEPS {
         // an effect that has just come meets parameters fitted without it: its coefficients first
-        let (delta, gain) = newton(&at, k < SHAPES_HELD);
+        let early = |u: Unknown| k < SHAPES_HELD && matches!(u, Unknown::Shape { .. });
+        let list = &at.base.unknowns.list;
+        let rests = |i: usize| known.is_some_and(|inverse| inverse.at_rest(i));
+        let (delta, gain) = newton(&at, &|i| early(list[i]) || rests(i));
         let mut factor = 1.0;
         let mut next = None;
         for _ in 0..HALVINGS {
@@ -178,7 +198,9 @@ pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
         at = next;
         // weights follow the residual in the first steps, then stay so that the steps converge
         if k < 2 {
-            at = reweighted(at, ground);
+            if known.is_none() {
+                at = reweighted(at, ground);
+            }
         } else if done {
             break;
         }
@@ -273,13 +295,10 @@ fn hold(normal: &mut DMatrix<f64>, pull: &mut DVector<f64>, i: usize) {
 }
 
 /// The step to the minimum of the linearised problem, and the squares that it promises to remove.
-fn newton(at: &Fitted, shapes_held: bool) -> (Vec<f64>, f64) {
+fn newton(at: &Fitted, held: &dyn Fn(usize) -> bool) -> (Vec<f64>, f64) {
     let (mut normal, mut pull) = (at.normal.clone(), at.pull.clone());
-    let list = at.base.unknowns.list.iter().enumerate();
-    for (i, unknown) in list.filter(|_| shapes_held) {
-        if matches!(unknown, Unknown::Shape { .. }) {
-            hold(&mut normal, &mut pull, i);
-        }
+    for i in (0..pull.len()).filter(|i| held(*i)) {
+        hold(&mut normal, &mut pull, i);
     }
     let delta = Inverse::of(&normal).solve(&pull);
     let gain = delta.dot(&pull);

@@ -39,6 +39,9 @@ pub fn widen(
     let mut known: Vec<f64> = known.filter(|r| r.is_finite()).collect();
     known.sort_by(f64::total_cmp);
     let usual = known.get(known.len() / 2).copied().unwrap_or(1.0);
+    // all by the covariance as it came, or two shapes that trade with each other would widen each other
+    let before = covariance.clone();
+    let mut alone: Vec<(usize, f64)> = Vec::new();
     for (i, unknown) in at.base.unknowns.list.iter().enumerate() {
         let Unknown::Shape { effect, k } = *unknown else {
             continue;
@@ -46,10 +49,10 @@ pub fn widen(
         let added = &at.model.effects[effect];
         let value = added.shape[k];
         let [low, high] = (added.kind.limits)(&ground.cover, added.place)[k];
-        let std = covariance[(i, i)].sqrt();
+        let std = before[(i, i)].sqrt();
         let linear = std.is_finite() && std > 0.0 && !least.at_rest(i);
         let (first, inflation) = match linear {
-            true => (REACH * std, covariance[(i, i)] / least.matrix()[(i, i)]),
+            true => (REACH * std, before[(i, i)] / least.matrix()[(i, i)]),
             false => (FIRST * value.abs(), usual),
         };
         if !(first > 0.0 && first.is_finite()) {
@@ -71,19 +74,23 @@ pub fn widen(
             farthest = farthest.max(distance(first, end, promised, |d| risen(value + side * d))?);
         }
         if linear {
-            stretch(covariance, i, farthest / first);
+            widen_one(covariance, &before, i, farthest / first);
         } else if farthest < high - low {
-            covariance.row_mut(i).fill(0.0);
-            covariance.column_mut(i).fill(0.0);
-            covariance[(i, i)] = (farthest / REACH).powi(2);
+            alone.push((i, (farthest / REACH).powi(2)));
         }
+    }
+    for (i, variance) in alone {
+        covariance.row_mut(i).fill(0.0);
+        covariance.column_mut(i).fill(0.0);
+        covariance[(i, i)] = variance;
     }
     Ok(())
 }
 
-/// Makes one standard deviation larger by a factor; what is known of the others with this one given stays as it is.
-fn stretch(covariance: &mut DMatrix<f64>, i: usize, factor: f64) {
-    let column = covariance.column(i).clone_owned();
+/// Makes one standard deviation larger by a factor of what it was before; what is known of the others with this one
+/// given stays as it is.
+fn widen_one(covariance: &mut DMatrix<f64>, before: &DMatrix<f64>, i: usize, factor: f64) {
+    let column = before.column(i);
     let more = (factor.powi(2) - 1.0) / column[i];
     covariance.ger(more, &column, &column, 1.0);
 }
@@ -119,7 +126,7 @@ mod tests {
 
     use nalgebra::DMatrix;
 
-    use super::{distance, stretch};
+    use super::{distance, widen_one};
 
     fn of(first: f64, end: f64, promised: f64, rise: fn(f64) -> f64) -> f64 {
         let Ok(found) = distance(first, end, promised, |d| Ok::<_, Infallible>(rise(d)));
@@ -146,7 +153,7 @@ mod tests {
             -0.5, 0.3, 1.0,
         ]);
         let mut after = before.clone();
-        stretch(&mut after, 1, 3.0);
+        widen_one(&mut after, &before, 1, 3.0);
         assert!((after[(1, 1)] - 18.0).abs() < 1e-12);
         // of the others with this one given: the Schur complement, and the regression on it
         for a in [0, 2] {

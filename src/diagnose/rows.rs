@@ -171,7 +171,7 @@ const STANDING: f64 = 0.01;
 /// Rows in which a joint with a jump in its friction law stands still for as long as the filter
 /// remembers: static friction takes any torque up to its limit there, and no law of v says which.
 pub fn standing(model: &Refined, stretch: &Stretch, parallel: &Parallel, j: usize) -> Vec<usize> {
-    if !matches!(model.model.friction[j], JointFriction::ViscousCoulomb(_)) {
+    if !model.model.friction[j].jumps() {
         return Vec::new();
     }
     let v = &stretch.v[j];
@@ -212,7 +212,7 @@ pub fn near_rests(
     j: usize,
 ) -> Vec<bool> {
     let mut near = vec![false; parallel.rows(stretch.len())];
-    if !matches!(model.model.friction[j], JointFriction::ViscousCoulomb(_)) {
+    if !model.model.friction[j].jumps() {
         return near;
     }
     let v = &stretch.v[j];
@@ -224,7 +224,7 @@ pub fn near_rests(
     for (i, near) in near.iter_mut().enumerate() {
         let centre = parallel.sample_of(i);
         while k < v.len() && k <= centre + reach {
-            if v[k].abs() < slow || (k > 0 && v[k] * v[k - 1] < 0.0) {
+            if v[k].abs() <= slow || (k > 0 && v[k] * v[k - 1] < 0.0) {
                 last = Some(k);
             }
             k += 1;

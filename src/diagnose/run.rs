@@ -333,8 +333,7 @@ pub fn diagnose(
         false => Some(noise_along(&unseen)?),
     };
     // friction at rest is no structure either, where the law jumps
-    let jumps = |law: &JointFriction| matches!(law, JointFriction::ViscousCoulomb(_));
-    let (given, last) = match case.given.model.friction.iter().any(jumps) {
+    let (given, last) = match case.given.model.friction.iter().any(JointFriction::jumps) {
         true => (
             pair_of(&case.given, Counted::Moving)?,
             pair_of(&at.model, Counted::Moving)?,
@@ -343,6 +342,9 @@ pub fn diagnose(
     };
     let part_left = part_left(&floor, &given.train, &last.train);
     let left = left(&last.train, &floor, last.holdout.as_ref().zip(floor_unseen));
+    if stop() {
+        return Err(DiagnoseError::Interrupted);
+    }
     let size = at.base.unknowns.len();
     let covariance = match case.limits.deviations {
         true => covariance(&at, &ground, case.cutoff_hz)?,

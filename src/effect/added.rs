@@ -237,7 +237,8 @@ impl Added {
                     }
                 }
             }
-            let std = variance.max(0.0).sqrt();
+            // rounding may leave nothing below nothing; what is not a number is no deviation
+            let std = if variance < 0.0 { 0.0 } else { variance.sqrt() };
             std.is_finite().then_some(std)
         };
         let unit_vector = |i: usize| {

@@ -133,6 +133,8 @@ pub struct Parallel {
     filter: ZeroPhase,
     /// The filter that the positions of its stretches came through.
     pub(super) position: Option<ZeroPhase>,
+    /// Its cut-off \[Hz\].
+    pub(super) position_cutoff_hz: Option<f64>,
     /// How they were differentiated.
     pub(super) differences: Differences,
     /// Every how many samples a row is kept.
@@ -151,6 +153,7 @@ impl Parallel {
         Ok(Parallel {
             filter: chain.parallel,
             position: chain.position,
+            position_cutoff_hz: chain.q_cutoff_hz,
             differences: chain.differences,
             decimation: chain.decimation,
             trim: chain.trim,

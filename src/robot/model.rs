@@ -25,6 +25,11 @@ impl JointFriction {
         }
     }
 
+    /// Whether it jumps at rest, where friction is any torque up to its limit.
+    pub fn jumps(&self) -> bool {
+        matches!(self, Self::ViscousCoulomb(_))
+    }
+
     /// Number of its parameters.
     pub fn parameters(&self) -> usize {
         match self {
