@@ -341,3 +341,29 @@ fn a_turned_torque_and_a_dead_one_are_faults_of_the_data_and_no_physics() {
     assert_eq!(found["verdict"], "data-fault");
     assert_eq!(found["faults"][0]["kind"], "stuck-channel");
 }
+
+/// Friction at rest makes pieces that stand out on a drive whose law jumps, and they are no push; a push is.
+#[test]
+fn a_push_on_a_drive_is_cut_out_and_its_reversals_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, effects, wanted) in [
+        ("free.csv", &[][..], 0),
+        (
+            "pushed.csv",
+            &["disturbance:q1:at=14.2,seconds=0.3,c=40"],
+            1,
+        ),
+    ] {
+        simulate(at, name, "25", "4", effects);
+        run(at, &["lsq", name, "-r", ROBOT, "-o", "declared.toml"]);
+        let found = run(at, &["diagnose", name, "-m", "declared.toml"]);
+        let episodes = found["episodes"].as_array().unwrap();
+        assert_eq!(episodes.len(), wanted, "{name}: {episodes:?}");
+        for episode in episodes {
+            let (from, to) = (&episode["from_s"], &episode["to_s"]);
+            let (from, to) = (from.as_f64().unwrap(), to.as_f64().unwrap());
+            assert!(from < 14.3 && to > 14.4 && to - from < 1.5, "{episode}");
+        }
+    }
+}

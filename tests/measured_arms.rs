@@ -113,3 +113,22 @@ fn what_the_diagnosis_adds_to_panda_and_ur10_does_not_worsen_what_it_never_saw()
     let overall = &committed("panda_closed_all")["overall"]["relative_error"];
     assert!(overall.as_f64().unwrap() < 0.014, "{overall}");
 }
+
+/// A deviation that ran away would be true, and of no use.
+#[test]
+fn what_the_diagnosis_adds_to_the_ur10_is_known_as_well_as_58_parameters_let_it() {
+    let found = committed("ur10_diagnosis");
+    let steps = found["steps"].as_array().unwrap();
+    assert!(steps.len() > 4);
+    for step in steps {
+        for (key, number) in step["parameters"].as_object().unwrap() {
+            let (value, std) = (&number["value"], &number["std"]);
+            let over = std.as_f64().unwrap() / value.as_f64().unwrap().abs();
+            assert!(over < 20.0, "{} {key} {number}", step["effect"]);
+        }
+    }
+    let first = &steps[0]["parameters"]["c"];
+    let over = first["std"].as_f64().unwrap() / first["value"].as_f64().unwrap().abs();
+    assert_eq!(steps[0]["effect"], "stribeck");
+    assert!(over < 0.1, "{first}");
+}
