@@ -2,6 +2,8 @@
 //! who pushes. What depends on the motion comes again with the motion; an episode does not. It is cut
 //! out, and said so: no law is fitted to it.
 
+use std::collections::BTreeMap;
+
 use super::fit::{Fitted, Ground};
 use super::plan::{Piece, Plan, Role};
 use super::rows::near_rests;
@@ -70,7 +72,23 @@ pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, 
         let highest = out.iter().map(|(_, mean, _)| *mean).fold(0.0, f64::max);
         let few = rows(&out) as f64 <= MOST * rows(&pieces) as f64 && runs <= RUNS;
         if highest > STANDS_OUT * middle && few {
-            found.extend(out.into_iter().map(|(i, mean, _)| (i, j, mean / middle)));
+            let mean = |i: usize| base.sums[i][j].square / plan.pieces[i].rows.len().max(1) as f64;
+            let mut all: BTreeMap<usize, f64> =
+                out.iter().map(|(i, mean, _)| (*i, *mean)).collect();
+            // what it does beside a rest is its own too
+            for (i, _, _) in out {
+                let beside = |k: &usize| {
+                    let (piece, own) = (&plan.pieces[*k], &plan.pieces[i]);
+                    let used = piece.role.fitted() || piece.role == Role::Veto;
+                    used && piece.stretch == own.stretch && mean(*k) > REST * middle
+                };
+                let before = (0..i).rev().take_while(beside);
+                let after = (i + 1..plan.pieces.len()).take_while(beside);
+                for k in before.chain(after) {
+                    all.entry(k).or_insert_with(|| mean(k));
+                }
+            }
+            found.extend(all.into_iter().map(|(i, mean)| (i, j, mean / middle)));
         }
     }
     found
