@@ -1,7 +1,7 @@
 //! Standard deviations of a fit: what correlated residuals leave open, what was done to the positions, and how far
 //! shapes may go before the data say no.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::candidate::LAG;
@@ -86,6 +86,8 @@ struct Jackknife {
 /// Least part of what is known of a direction that must be the other pieces': with less, a linear step says nothing
 /// of how far it goes without this one.
 const LEAST_OTHERS: f64 = 0.1;
+/// Most turns of the eigenvalues' search; it takes some tens.
+const TURNS: usize = 10_000;
 
 impl Jackknife {
     /// None where the normal matrix has no Cholesky factor.
@@ -116,7 +118,7 @@ impl Jackknife {
             .map(|(i, s)| own.score[*i] / s);
         let right = DVector::from_iterator(self.kept.len(), right);
         let right = self.factor.solve_lower_triangular(&right)?;
-        let eigen = part.symmetric_eigen();
+        let eigen = SymmetricEigen::try_new(part, f64::EPSILON, TURNS)?;
         let mut along = eigen.eigenvectors.tr_mul(&right);
         for (x, share) in along.iter_mut().zip(&eigen.eigenvalues) {
             *x /= (1.0 - share).clamp(LEAST_OTHERS, 1.0);
