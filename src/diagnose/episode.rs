@@ -2,10 +2,8 @@
 //! who pushes. What depends on the motion comes again with the motion; an episode does not. It is cut
 //! out, and said so: no law is fitted to it.
 
-use std::collections::BTreeMap;
-
 use super::fit::{Fitted, Ground};
-use super::plan::{Piece, Plan, Role};
+use super::plan::{Plan, Role};
 use super::rows::near_rests;
 use crate::motion::{Parallel, Stretch};
 
@@ -33,8 +31,8 @@ const LEAST: usize = 20;
 /// Most runs of neighbouring pieces.
 const RUNS: usize = 3;
 
-/// Pieces that stand out, with joint and by how much: index in the plan. What friction at rest does, of which a
-/// law that jumps says too much, is no episode.
+/// Pieces that stand out, with joint and by how much: index in the plan. What friction at rest does alone, of
+/// which a law that jumps says too much, is no episode.
 pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, f64)> {
     let (base, plan) = (&at.base, &ground.plan);
     let joints = base.unknowns.columns.len();
@@ -42,53 +40,45 @@ pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, 
     for j in 0..joints {
         let near = |stretch| near_rests(&at.model, stretch, ground.parallel, cutoff_hz, j);
         let near: Vec<Vec<bool>> = ground.stretches.iter().map(near).collect();
-        // index, mean squared residual and number of the rows of a piece that count
-        let counted = |(i, piece): (usize, &Piece)| -> Option<(usize, f64, usize)> {
-            // an episode among the rows that may veto would veto what is right
+        // an episode among the rows that may veto would veto what is right
+        let looked_at = |i: &usize| {
+            let piece = &plan.pieces[*i];
             let used = piece.role.fitted() || piece.role == Role::Veto;
-            if !used || plan.holds(piece.stretch, j) {
-                return None;
-            }
-            let near = &near[piece.stretch];
-            let residual = &base.stretches[piece.stretch].residual[j];
-            let moving = piece.rows.clone().filter(|row| !near[*row]);
-            let squares = moving.map(|row| residual[row].powi(2));
-            let (rows, sum) = squares.fold((0, 0.0), |(n, sum), x| (n + 1, sum + x));
-            // of few rows that are left one that rings would stand for all
-            let most = 2 * rows >= piece.rows.len();
-            (rows > 0 && most).then(|| (i, sum / rows as f64, rows))
+            used && !plan.holds(piece.stretch, j)
         };
-        let pieces: Vec<_> = plan.pieces.iter().enumerate().filter_map(counted).collect();
-        let mut all: Vec<f64> = pieces.iter().map(|(_, mean, _)| *mean).collect();
+        let pieces: Vec<usize> = (0..plan.pieces.len()).filter(looked_at).collect();
+        let mean = |i: usize| base.sums[i][j].square / plan.pieces[i].rows.len().max(1) as f64;
+        let mut all: Vec<f64> = pieces.iter().map(|i| mean(*i)).collect();
         all.sort_by(f64::total_cmp);
         let middle = all.get(all.len() / 2).copied().unwrap_or(0.0);
         if middle <= 0.0 || pieces.len() < LEAST {
             continue;
         }
-        let stands = |(_, mean, _): &(usize, f64, usize)| *mean > REST * middle;
-        let out: Vec<_> = pieces.iter().copied().filter(stands).collect();
-        let rows = |of: &[(usize, f64, usize)]| of.iter().map(|(_, _, n)| n).sum::<usize>();
-        let runs = 1 + out.windows(2).filter(|w| w[1].0 > w[0].0 + 1).count();
-        let highest = out.iter().map(|(_, mean, _)| *mean).fold(0.0, f64::max);
+        let out: Vec<usize> = pieces
+            .iter()
+            .copied()
+            .filter(|i| mean(*i) > REST * middle)
+            .collect();
+        let rows = |of: &[usize]| of.iter().map(|i| plan.pieces[*i].rows.len()).sum::<usize>();
+        let runs = 1 + out.windows(2).filter(|w| w[1] > w[0] + 1).count();
         let few = rows(&out) as f64 <= MOST * rows(&pieces) as f64 && runs <= RUNS;
-        if highest > STANDS_OUT * middle && few {
-            let mean = |i: usize| base.sums[i][j].square / plan.pieces[i].rows.len().max(1) as f64;
-            let mut all: BTreeMap<usize, f64> =
-                out.iter().map(|(i, mean, _)| (*i, *mean)).collect();
-            // what it does beside a rest is its own too
-            for (i, _, _) in out {
-                let beside = |k: &usize| {
-                    let (piece, own) = (&plan.pieces[*k], &plan.pieces[i]);
-                    let used = piece.role.fitted() || piece.role == Role::Veto;
-                    used && piece.stretch == own.stretch && mean(*k) > REST * middle
-                };
-                let before = (0..i).rev().take_while(beside);
-                let after = (i + 1..plan.pieces.len()).take_while(beside);
-                for k in before.chain(after) {
-                    all.entry(k).or_insert_with(|| mean(k));
-                }
+        // one piece at least must stand out by rows of its own that are near no rest
+        let moving = |i: usize| {
+            let piece = &plan.pieces[i];
+            let near = &near[piece.stretch];
+            let residual = &base.stretches[piece.stretch].residual[j];
+            let rows = piece.rows.clone().filter(|row| !near[*row]);
+            let squares = rows.map(|row| residual[row].powi(2));
+            let (rows, sum) = squares.fold((0, 0.0), |(n, sum), x| (n + 1, sum + x));
+            // of few rows that are left one that rings would stand for all
+            match 2 * rows >= piece.rows.len().max(1) {
+                true => sum / rows as f64,
+                false => 0.0,
             }
-            found.extend(all.into_iter().map(|(i, mean)| (i, j, mean / middle)));
+        };
+        let highest = out.iter().map(|i| moving(*i)).fold(0.0, f64::max);
+        if highest > STANDS_OUT * middle && few {
+            found.extend(out.into_iter().map(|i| (i, j, mean(i) / middle)));
         }
     }
     found
