@@ -10,34 +10,22 @@
 //! effective number of rows, cross-validation over blocks with gaps, and data set aside that may
 //! veto. All must agree. The holdout decides nothing.
 
-mod accept;
-mod candidate;
-mod covariance;
-mod episode;
-mod evidence;
-mod fit;
-mod floor;
-mod left;
-mod measure;
-mod moved;
-mod orders;
-mod period;
-mod plan;
-mod profile;
-mod rows;
+mod candidates;
+mod faults;
+mod problem;
 mod run;
-mod search;
-mod suspect;
-mod unknowns;
+mod selection;
+mod uncertainty;
+mod unexplained;
 
-pub use accept::{Candidate, Limits};
-pub use candidate::Score;
-pub use episode::Episode;
-pub use evidence::{JointEvidence, evidence};
-pub use fit::Prior;
-pub use left::{Left, STRUCTURED};
-pub use measure::{Errors, JointErrors, OverallErrors};
-pub use plan::{LogRole, SetAside};
+pub use candidates::score::Score;
+pub use faults::channels::Suspicion;
+pub use faults::episode::Episode;
+pub use problem::fit::Prior;
+pub use problem::plan::{LogRole, SetAside};
+pub use problem::unknowns::{Open, Unknown};
 pub use run::{Case, DiagnoseError, Diagnosis, Pair, Step, diagnose};
-pub use suspect::Suspicion;
-pub use unknowns::{Open, Unknown};
+pub use selection::accept::{Candidate, Limits};
+pub use unexplained::errors::{Errors, JointErrors, OverallErrors};
+pub use unexplained::evidence::{JointEvidence, evidence};
+pub use unexplained::{Left, STRUCTURED};

@@ -4,19 +4,19 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::accept::{Candidate, Limits};
-use super::candidate::Judge;
-use super::covariance::covariance;
-use super::episode::{self, Episode};
-use super::fit::{Fitted, Ground, Prior, fit, inertial_of};
-use super::left::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
-use super::measure::{Counted, Errors, errors};
-use super::orders;
-use super::plan::{LogRole, Plan, Role, SetAside};
-use super::rows::PieceSums;
-use super::search::{Bar, choose, search};
-use super::suspect::{Suspicion, suspicion};
-use super::unknowns::{Open, Unknown};
+use super::candidates::orders;
+use super::candidates::score::Judge;
+use super::candidates::search::{Bar, choose, search};
+use super::faults::channels::{Suspicion, suspicion};
+use super::faults::episode::{self, Episode};
+use super::problem::fit::{Fitted, Ground, Prior, fit, inertial_of};
+use super::problem::plan::{LogRole, Plan, Role, SetAside};
+use super::problem::rows::PieceSums;
+use super::problem::unknowns::{Open, Unknown};
+use super::selection::accept::{Candidate, Limits};
+use super::uncertainty::covariance::covariance;
+use super::unexplained::errors::{Counted, Errors, errors};
+use super::unexplained::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
 use crate::effect::{Added, Cover, Refined, Torques, held_joints};
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::model::JointFriction;
@@ -126,7 +126,7 @@ pub fn diagnose(
     plan.held = held(case, &fitted);
     plan.rest = held_joints(robot, &case.stretches);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
-    let unknowns = super::unknowns::Unknowns::of(&case.given, &case.open, &cover).len();
+    let unknowns = super::problem::unknowns::Unknowns::of(&case.given, &case.open, &cover).len();
     if plan.fitted_rows() < 10 * unknowns || plan.folds < 3 {
         return Err(DiagnoseError::TooFewRows {
             rows: plan.fitted_rows(),
@@ -452,7 +452,7 @@ fn superfluous(at: &Fitted, ground: &Ground, case: &Case) -> Result<Option<usize
         let without = fit(&model, ground)?;
         let judge = Judge::new(&without, ground);
         let torques = ground.torques(&without.model);
-        let columns = super::search::columns(&without.model, ground, &torques, effect)?;
+        let columns = super::candidates::search::columns(&without.model, ground, &torques, effect)?;
         let score = judge.score(&columns, effect.linear.len(), effect.shape.len());
         let (gain, needed) = match score {
             None => (0.0, false),

@@ -3,8 +3,8 @@
 
 use nalgebra::DVector;
 
-use super::fit::{Fitted, Ground, Inverse, inertial_of, refit, value};
-use super::rows::near_rests;
+use crate::diagnose::problem::fit::{Fitted, Ground, Inverse, inertial_of, refit, value};
+use crate::diagnose::problem::rows::near_rests;
 use crate::motion::{MotionError, Stretch};
 
 /// How far the unknowns move where the motion goes through the position filter once more: to leading order
@@ -107,9 +107,9 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::diagnose::fit::{Prior, fit};
-    use crate::diagnose::plan::{LogRole, Plan};
-    use crate::diagnose::unknowns::Open;
+    use crate::diagnose::problem::fit::{Prior, fit};
+    use crate::diagnose::problem::plan::{LogRole, Plan};
+    use crate::diagnose::problem::unknowns::Open;
     use crate::effect::{Cover, Refined};
     use crate::motion::{Parallel, Settings};
     use crate::robot::friction::ViscousCoulomb;

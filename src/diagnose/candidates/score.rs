@@ -7,9 +7,9 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::fit::{Fitted, Ground, Inverse};
-use super::plan::Role;
-use super::rows::{Total, dot};
+use crate::diagnose::problem::fit::{Fitted, Ground, Inverse};
+use crate::diagnose::problem::plan::Role;
+use crate::diagnose::problem::rows::{Total, dot};
 use crate::math::long_run::long_run;
 
 /// A candidate's filtered columns: `[stretch][joint][column][row]`; no columns where the joint is
@@ -137,7 +137,7 @@ impl<'a> Judge<'a> {
     fn cross(&self, columns: &Columns, k: usize) -> Vec<Cross> {
         let base = &self.at.base;
         let u = base.unknowns.len();
-        let piece = |piece: &super::plan::Piece| {
+        let piece = |piece: &crate::diagnose::problem::plan::Piece| {
             let mut cross = Cross::none(u, k);
             let rows = &base.stretches[piece.stretch];
             for (j, own) in columns[piece.stretch].iter().enumerate() {
@@ -324,7 +324,7 @@ impl<'a> Judge<'a> {
 }
 
 /// Pieces over which scores count as correlated; a piece is some correlation times long.
-pub(super) const LAG: usize = 2;
+pub const LAG: usize = 2;
 /// Least share of a column that must be its own.
 const SHARE: f64 = 0.001;
 

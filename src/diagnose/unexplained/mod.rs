@@ -1,8 +1,13 @@
 //! What is left of the torque's residual above its noise, before and after.
 
-use super::floor::floor;
-use super::measure::Errors;
-use super::run::Case;
+pub mod errors;
+pub mod evidence;
+mod noise_floor;
+mod period;
+
+use self::errors::Errors;
+use self::noise_floor::floor;
+use crate::diagnose::run::Case;
 use crate::effect::held_joints;
 use crate::motion::{MotionError, Stretch};
 
@@ -25,7 +30,7 @@ pub const NEGLIGIBLE: f64 = 2e-6;
 const NO_NOISE: f64 = 1e-10;
 
 /// Variance of the noise in each joint's filtered residual, from raw residuals `[stretch][joint][sample]`.
-pub(super) fn noise(
+pub fn noise(
     residuals: &[Vec<Vec<f64>>],
     case: &Case,
     stretches: &[Stretch],
@@ -59,11 +64,7 @@ fn above(noise: &[f64], found: &Errors) -> Vec<Left> {
 
 /// What is left on fitted logs, or on unseen ones with their own noise where that is more: what fits the one and
 /// not the other is structure too.
-pub(super) fn left(
-    train: &Errors,
-    noise: &[f64],
-    unseen: Option<(&Errors, Vec<f64>)>,
-) -> Vec<Left> {
+pub fn left(train: &Errors, noise: &[f64], unseen: Option<(&Errors, Vec<f64>)>) -> Vec<Left> {
     let train = above(noise, train);
     let Some((holdout, noise)) = unseen else {
         return train;
@@ -81,7 +82,7 @@ pub(super) fn left(
 }
 
 /// Structure after over structure before, per joint.
-pub(super) fn part_left(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
+pub fn part_left(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
     let shares = above(noise, before).into_iter().zip(above(noise, after));
     let part = |(before, after): (Left, Left)| after.share / before.share.max(f64::MIN_POSITIVE);
     shares.map(part).collect()

@@ -9,8 +9,8 @@
 
 use nalgebra::DMatrix;
 
-use super::fit::{Fitted, Ground, Inverse, least_with_held};
-use super::unknowns::Unknown;
+use crate::diagnose::problem::fit::{Fitted, Ground, Inverse, least_with_held};
+use crate::diagnose::problem::unknowns::Unknown;
 use crate::motion::MotionError;
 
 /// Standard deviations at which the promise is looked at.

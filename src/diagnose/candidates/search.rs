@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::accept::{Candidate, Worth, decide};
-use super::candidate::{Columns, Judge, spread};
-use super::fit::{Fitted, Ground};
 use super::orders::SCANNED;
-use super::rows::{clear, scene, standing};
-use super::run::Case;
+use super::score::{Columns, Judge, spread};
+use crate::diagnose::problem::fit::{Fitted, Ground};
+use crate::diagnose::problem::rows::{clear, scene, standing};
+use crate::diagnose::run::Case;
+use crate::diagnose::selection::accept::{Candidate, Worth, decide};
 use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, order_is_whole, shifted};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;

@@ -2,9 +2,9 @@
 //! who pushes. What depends on the motion comes again with the motion; an episode does not. It is cut
 //! out, and said so: no law is fitted to it.
 
-use super::fit::{Fitted, Ground};
-use super::plan::{Plan, Role};
-use super::rows::near_rests;
+use crate::diagnose::problem::fit::{Fitted, Ground};
+use crate::diagnose::problem::plan::{Plan, Role};
+use crate::diagnose::problem::rows::near_rests;
 use crate::motion::{Parallel, Stretch};
 
 /// An episode that was cut out.

@@ -1,6 +1,6 @@
 //! What a candidate must pass to be added: all tests must agree.
 
-use super::candidate::{Score, spread};
+use crate::diagnose::candidates::score::{Score, spread};
 use crate::effect::Added;
 
 /// Standard errors by which the error on the veto pieces may grow by chance.
@@ -50,7 +50,7 @@ impl Default for Limits {
 impl Limits {
     /// Whether the squared errors on the pieces that may veto grow by more than the limit, and by more than
     /// chance makes of them.
-    pub(super) fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
+    pub fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
         let sum = |x: &[f64]| x.iter().sum::<f64>();
         let chance = match before.len() {
             0 | 1 => 0.0,
@@ -75,13 +75,13 @@ pub struct Candidate {
 
 /// How much a candidate removes, over what there is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Worth {
+pub struct Worth {
     pub of_declared: f64,
     pub of_noise: f64,
 }
 
 /// Puts a candidate to every test.
-pub(super) fn decide(
+pub fn decide(
     candidate: &mut Candidate,
     tried: usize,
     limits: &Limits,

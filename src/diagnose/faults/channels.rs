@@ -1,7 +1,7 @@
 //! Torque channels that are another's, or have the other sign: told before any physics is tried,
 //! by the model that is given.
 
-use super::plan::{Plan, Role};
+use crate::diagnose::problem::plan::{Plan, Role};
 use crate::effect::Refined;
 use crate::motion::{MotionError, Parallel, Stretch};
 
@@ -40,7 +40,8 @@ pub fn suspicion(
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
-        let own = |p: &&super::plan::Piece| p.stretch == index && Role::fitted(p.role);
+        let own =
+            |p: &&crate::diagnose::problem::plan::Piece| p.stretch == index && Role::fitted(p.role);
         for piece in plan.pieces.iter().filter(own) {
             for (a, products) in products.iter_mut().enumerate() {
                 for (b, sum) in products.iter_mut().enumerate() {
@@ -48,7 +49,10 @@ pub fn suspicion(
                         continue;
                     }
                     let range = piece.rows.clone();
-                    *sum += super::rows::dot(&rows[a][range.clone()], &rows[b][range]);
+                    *sum += crate::diagnose::problem::rows::dot(
+                        &rows[a][range.clone()],
+                        &rows[b][range],
+                    );
                 }
             }
         }

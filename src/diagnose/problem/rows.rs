@@ -547,7 +547,7 @@ mod tests {
             }
         };
         let cover = Cover::of(&plain.model.robot, std::slice::from_ref(&stretch), 10.0);
-        let open = super::super::unknowns::Open {
+        let open = crate::diagnose::problem::unknowns::Open {
             offset: vec![true; 4],
             friction: vec![Vec::new(); 4],
         };

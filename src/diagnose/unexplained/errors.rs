@@ -5,8 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use super::plan::{Plan, Role};
-use super::rows::standing;
+use crate::diagnose::problem::plan::{Plan, Role};
+use crate::diagnose::problem::rows::standing;
 use crate::effect::Refined;
 use crate::motion::{MotionError, Parallel, Stretch};
 

@@ -4,11 +4,11 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::candidate::LAG;
-use super::fit::{Fitted, Ground, Inverse};
-use super::plan::{Piece, Role};
-use super::rows::{PieceSums, Total};
-use super::{moved, profile};
+use super::{bias, profile};
+use crate::diagnose::candidates::score::LAG;
+use crate::diagnose::problem::fit::{Fitted, Ground, Inverse};
+use crate::diagnose::problem::plan::{Piece, Role};
+use crate::diagnose::problem::rows::{PieceSums, Total};
 use crate::math::long_run::long_run;
 use crate::motion::MotionError;
 
@@ -23,9 +23,9 @@ pub fn covariance(
 ) -> Result<DMatrix<f64>, MotionError> {
     let mut covariance = of_residual(at, ground);
     for moved in [
-        moved::by_smoothing(at, ground)?,
-        moved::by_noise(at, ground)?,
-        moved::by_rests(at, ground, cutoff_hz),
+        bias::by_smoothing(at, ground)?,
+        bias::by_noise(at, ground)?,
+        bias::by_rests(at, ground, cutoff_hz),
     ] {
         covariance += &moved * moved.transpose();
     }

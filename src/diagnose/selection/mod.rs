@@ -1,0 +1,3 @@
+//! Which candidate is added: all tests must agree.
+
+pub mod accept;
