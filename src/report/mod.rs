@@ -1,11 +1,19 @@
-//! What a person or a script sees of a result: plain-text tables, SVG figures, JSON documents.
+//! What a person or a script sees of a result: one [`Report`] as terminal text and as a page, SVG
+//! figures, JSON documents and their schemas.
 //!
 //! Everything here is a function of plain data and writes nowhere by itself; the same data give the
 //! same bytes.
 
+mod encode;
 pub mod figure;
 pub mod json;
 pub mod number;
-pub mod page;
+mod page;
 pub mod summary;
 pub mod table;
+mod text;
+mod traces;
+mod value;
+
+pub use traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
+pub use value::{Part, Report, Shown, Writer};

@@ -44,6 +44,14 @@ impl Table {
         }
     }
 
+    /// A table for a page, which tells numbers from words by itself.
+    pub fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
+        let columns: Vec<(&str, Align)> = head.iter().map(|name| (*name, Align::Left)).collect();
+        let mut table = Table::new(&columns).caption(caption);
+        rows.into_iter().for_each(|row| table.row(row));
+        table
+    }
+
     /// A line above the headers.
     pub fn caption(mut self, text: &str) -> Self {
         self.caption = Some(printable(text));

@@ -7,22 +7,23 @@ use crate::excite::Motion;
 use crate::log::escape;
 use crate::report::figure::MotionFigure;
 use crate::report::number;
-use crate::report::page::{Page, Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::{Report, Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 
 /// The page as a file; `name` is the trajectory's, without folders.
 pub(super) fn page(bench: &Bench, motion: &Motion, judged: &Judged, name: &str) -> String {
     let name = escape(name);
-    let mut page = Page::new(&format!("Motion {name}"));
+    let mut report = Report::new(&format!("Motion {name}"));
+    let mut page = report.page();
     let (text, good) = words(judged);
     page.verdict(&text, good);
-    page.table_of(&judged.limits_table(bench, &name));
+    page.table(judged.limits_table(bench, &name));
     page.list(judged.broken());
     page.heading("Expected parameters");
     match &judged.friction {
-        Some(friction) => page.table_of(&friction.table(judged.foresight.rows)),
+        Some(friction) => page.table(friction.table(judged.foresight.rows)),
         None => {
             page.paragraph("Friction is taken as known; the noise is that of the robot file.");
-            page.table_of(&judged.parameters_table());
+            page.table(judged.parameters_table());
             directions(&mut page, judged);
         }
     }
@@ -42,7 +43,7 @@ pub(super) fn page(bench: &Bench, motion: &Motion, judged: &Judged, name: &str) 
         None,
         bench.context,
     );
-    page.html()
+    report.html()
 }
 
 fn words(judged: &Judged) -> (String, bool) {
@@ -76,7 +77,7 @@ fn words(judged: &Judged) -> (String, bool) {
     (text, broken == 0)
 }
 
-fn directions(page: &mut Page, judged: &Judged) {
+fn directions(page: &mut Writer, judged: &Judged) {
     let f = &judged.foresight;
     let rows: Vec<Vec<String>> = f
         .weakest_direction
@@ -84,10 +85,10 @@ fn directions(page: &mut Page, judged: &Judged) {
         .take_while(|part| part.weight.abs() > 0.1)
         .map(|part| vec![part.parameter.clone(), format!("{:+.2}", part.weight)])
         .collect();
-    page.table(
+    page.rows(
         "weakest direction, of columns scaled to norm 1",
         &["parameter", "part"],
-        &rows,
+        rows,
     );
     if let Some(pair) = &f.confounded {
         page.paragraph(&format!(
@@ -124,7 +125,7 @@ fn traces(figure: &MotionFigure) -> Traces {
 }
 
 /// Speed amplitudes by harmonic, and the band of the torque.
-fn spectrum(page: &mut Page, bench: &Bench, judged: &Judged) {
+fn spectrum(page: &mut Writer, bench: &Bench, judged: &Judged) {
     let Some(spectrum) = &judged.spectrum else {
         return;
     };
@@ -146,7 +147,7 @@ fn spectrum(page: &mut Page, bench: &Bench, judged: &Judged) {
             [name, unit].into_iter().chain(values).collect()
         })
         .collect();
-    page.table("amplitude of the speed by harmonic", &head, &rows);
+    page.rows("amplitude of the speed by harmonic", &head, rows);
     if let Some(band) = &judged.band {
         let joints = bench.machine.model.robot.joint_names().iter().zip(band);
         let bands: Vec<String> = joints

@@ -6,7 +6,7 @@ use super::look::Look;
 use super::torque::Drawn;
 use super::{provenance, quality, torque};
 use crate::log::{LogSpec, Provenance, escape};
-use crate::report::page::{Page, TraceStyle};
+use crate::report::{Report, TraceStyle, Writer};
 
 /// What the page is made from.
 pub struct Compare<'a> {
@@ -28,19 +28,20 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
     let Compare { of, logs, .. } = *page;
     let read = page.read;
     let title = format!("{} and {}", of.name(0), of.name(1));
-    let mut out = Page::new(&format!("Comparison of {title}"));
+    let mut report = Report::new(&format!("Comparison of {title}"));
+    let mut out = report.page();
     out.verdict(&of.words(), of.warnings.is_empty());
     out.list(&of.warnings);
     if let Some(tried) = &of.tried {
-        out.table_of(&error_table(tried, &of.machine, page.title));
+        out.table(error_table(tried, &of.machine, page.title));
         used_before(&mut out, of, &tried.held.inputs);
     }
     out.heading("Parameters");
     if !of.table.parameters.is_empty() {
-        out.table_of(&parameter_table(of));
+        out.table(parameter_table(of));
     }
     for table in [0, 1].into_iter().filter_map(|side| apart_table(of, side)) {
-        out.table_of(&table);
+        out.table(table);
     }
     if !of.curves.is_empty() {
         out.heading("Friction");
@@ -71,11 +72,11 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
     made_from.dedup();
     let file = &of.machine.file;
     provenance::section(&mut out, file, read, &made_from, summary, context);
-    Ok(out.html())
+    Ok(report.html())
 }
 
 /// A log that one of the models was made from favours that model.
-fn used_before(page: &mut Page, of: &Compared, inputs: &[Provenance]) {
+fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
     for (letter, side) in ["A", "B"].iter().zip(&of.sides) {
         let made_from = &side.given.value.provenance.inputs;
         let known = |i: &&Provenance| {

@@ -13,7 +13,7 @@ use crate::diagnose::{Candidate, Errors, Pair};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::figure::ResidualFigure;
 use crate::report::number;
-use crate::report::page::{Page, TraceStyle};
+use crate::report::{Report, TraceStyle, Writer};
 
 /// Candidates that are told.
 const MOST: usize = 20;
@@ -87,7 +87,8 @@ pub fn diagnose(
     context: &Context,
 ) -> Result<String, CliError> {
     let machine = of.machine;
-    let mut page = Page::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    let mut page = report.page();
     let (text, good) = words(machine, found);
     page.verdict(&text, good);
     errors(&mut page, machine, found);
@@ -114,7 +115,7 @@ pub fn diagnose(
         summary,
         context,
     );
-    Ok(page.html())
+    Ok(report.html())
 }
 
 /// What was added, the torque and the residual before and after, and what was not added.
@@ -122,7 +123,7 @@ pub fn diagnose(
 /// # Errors
 /// Stretches that are too short for the filter.
 pub fn sections(
-    page: &mut Page,
+    page: &mut Writer,
     machine: &Machine,
     found: &Diagnosed,
     figure: &str,
@@ -159,7 +160,7 @@ pub fn sections(
     Ok(())
 }
 
-fn candidates(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+fn candidates(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
     let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
     let all = found.diagnosis.candidates.iter();
     let mut rest: Vec<_> = all.filter(|c| c.score.is_some()).collect();
@@ -181,7 +182,7 @@ fn candidates(page: &mut Page, machine: &Machine, found: &Diagnosed) {
         return;
     }
     page.heading("Candidates that were not added");
-    page.table(
+    page.rows(
         "the best of them, of the last round",
         &[
             "effect",
@@ -190,7 +191,7 @@ fn candidates(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             "own share",
             "why not",
         ],
-        &rows,
+        rows,
     );
 }
 
@@ -199,7 +200,8 @@ fn candidates(page: &mut Page, machine: &Machine, found: &Diagnosed) {
 /// # Errors
 /// Interruption.
 pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result<String, CliError> {
-    let mut page = Page::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    let mut page = report.page();
     page.verdict(
         &format!("The data are at fault ({}): {}.", fault.kind, fault.effect),
         false,
@@ -216,11 +218,11 @@ pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result
         None,
         context,
     );
-    Ok(page.html())
+    Ok(report.html())
 }
 
 /// Errors of every joint before and after, on the logs that were fitted and on those that were not.
-pub fn errors(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+pub fn errors(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
     let d = &found.diagnosis;
     let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
     let rows: Vec<Vec<String>> = machine
@@ -252,7 +254,7 @@ pub fn errors(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             ]
         })
         .collect();
-    page.table(
+    page.rows(
         "relative torque error",
         &[
             "joint",
@@ -264,11 +266,11 @@ pub fn errors(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             "rms after",
             "torque power left above noise",
         ],
-        &rows,
+        rows,
     );
 }
 
-fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
+fn steps(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
     let d = &found.diagnosis;
     let mut rows = Vec::new();
     for step in &d.steps {
@@ -299,7 +301,7 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             },
         ]);
     }
-    page.table(
+    page.rows(
         "in the order in which they were added; numbers of the last fit",
         &[
             "effect",
@@ -308,6 +310,6 @@ fn steps(page: &mut Page, machine: &Machine, found: &Diagnosed) {
             "unseen",
             "not separated from; what would",
         ],
-        &rows,
+        rows,
     );
 }

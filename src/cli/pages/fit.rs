@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::super::lsq;
 use crate::config::ModelFile;
+use crate::report::Writer;
 use crate::report::number;
-use crate::report::page::Page;
 
 /// Correlation of two errors from which on a pair is told.
 const ALIKE: f64 = 0.9;
@@ -13,14 +13,14 @@ const ALIKE: f64 = 0.9;
 const MOST: usize = 8;
 
 /// The section of a fit.
-pub fn section(page: &mut Page, found: &lsq::Identified, model: &ModelFile) {
+pub fn section(page: &mut Writer, found: &lsq::Identified, model: &ModelFile) {
     page.heading("Condition and weakest directions");
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
-    page.table(
+    page.rows(
         "the stacked regressor of the fit",
         &["what", "value"],
-        &[
+        vec![
             vec![
                 "condition as it stands".into(),
                 condition(fit.condition.raw),
@@ -45,7 +45,7 @@ pub fn section(page: &mut Page, found: &lsq::Identified, model: &ModelFile) {
 }
 
 /// The combination of scaled columns with the largest variance.
-fn weakest(page: &mut Page, found: &lsq::Identified) {
+fn weakest(page: &mut Writer, found: &lsq::Identified) {
     let fit = &found.fit;
     let n = found.unknowns.len();
     let norm = |i: usize| fit.column_rms.column(i).norm();
@@ -76,15 +76,15 @@ fn weakest(page: &mut Page, found: &lsq::Identified) {
             ]
         })
         .collect();
-    page.table(
+    page.rows(
         "weakest direction: the combination of the columns, scaled to norm 1, that is least certain",
         &["parameter", "joint", "part"],
-        &rows,
+        rows,
     );
 }
 
 /// Parameters of a model whose errors are alike.
-pub fn pairs(page: &mut Page, model: &ModelFile) {
+pub fn pairs(page: &mut Writer, model: &ModelFile) {
     let Some(covariance) = &model.covariance else {
         return;
     };
@@ -124,12 +124,12 @@ pub fn pairs(page: &mut Page, model: &ModelFile) {
         ));
         return;
     }
-    page.table(
+    page.rows(
         &format!(
             "errors most alike, {} of {count} pairs beyond {ALIKE}",
             rows.len()
         ),
         &["parameter", "and", "correlation"],
-        &rows,
+        rows,
     );
 }

@@ -3,8 +3,8 @@
 use super::look::Look;
 use crate::config::ModelFile;
 use crate::effect::Refined;
+use crate::report::Writer;
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
-use crate::report::page::Page;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 
@@ -102,7 +102,7 @@ fn deviation(law: &JointFriction, covariance: &[f64], v: f64) -> f64 {
 }
 
 /// The section; none for a model without friction.
-pub fn section(page: &mut Page, figure: &FrictionFigure) {
+pub fn section(page: &mut Writer, figure: &FrictionFigure) {
     if figure.panels.is_empty() {
         return;
     }

@@ -8,7 +8,7 @@ use crate::config::ModelFile;
 use crate::friction::passes::Ending;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::number;
-use crate::report::page::Page;
+use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct FrictionFit<'a> {
@@ -46,7 +46,8 @@ fn words(of: &FrictionFit) -> (String, bool) {
 pub fn friction_fit(of: &FrictionFit, context: &Context) -> Result<String, CliError> {
     let machine = of.machine;
     let names: Vec<String> = of.logs.iter().map(|l| escape(&l.name())).collect();
-    let mut page = Page::new(&format!("Friction from {}", names.join(", ")));
+    let mut report = Report::new(&format!("Friction from {}", names.join(", ")));
+    let mut page = report.page();
     let (text, good) = words(of);
     page.verdict(&text, good);
     let rows: Vec<Vec<String>> = of
@@ -76,7 +77,7 @@ pub fn friction_fit(of: &FrictionFit, context: &Context) -> Result<String, CliEr
             ]
         })
         .collect();
-    page.table(
+    page.rows(
         "the filter, joint by joint (NIS: normalised innovations squared, 1 where all is modelled)",
         &[
             "joint",
@@ -87,7 +88,7 @@ pub fn friction_fit(of: &FrictionFit, context: &Context) -> Result<String, CliEr
             "its 95 % bounds",
             "samples",
         ],
-        &rows,
+        rows,
     );
     page.heading("Friction");
     page.figure(&figure(machine, of.found).svg());
@@ -100,11 +101,11 @@ pub fn friction_fit(of: &FrictionFit, context: &Context) -> Result<String, CliEr
     let mut inputs = of.given.clone();
     inputs.extend(of.found.inputs.iter().cloned());
     provenance::section(&mut page, &machine.file, &inputs, &[], None, context);
-    Ok(page.html())
+    Ok(report.html())
 }
 
 /// What was estimated along, and is no friction.
-fn nuisance(page: &mut Page, of: &FrictionFit) {
+fn nuisance(page: &mut Writer, of: &FrictionFit) {
     let rows: Vec<Vec<String>> = of
         .found
         .joints
@@ -123,6 +124,6 @@ fn nuisance(page: &mut Page, of: &FrictionFit) {
             "Inertia, gravity and what the other joints' motion adds; not part of the model.",
         );
         let head = ["quantity", "joint", "value", "std", "unit"];
-        page.table("nuisance quantities", &head, &rows);
+        page.rows("nuisance quantities", &head, rows);
     }
 }

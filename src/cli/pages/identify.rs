@@ -13,7 +13,7 @@ use crate::config::model_file::Parameter;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::number;
-use crate::report::page::Page;
+use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct Identify<'a> {
@@ -49,7 +49,7 @@ impl Identify<'_> {
         names.join(", ")
     }
 
-    fn verdicts(&self, page: &mut Page) {
+    fn verdicts(&self, page: &mut Writer) {
         if let Some(fault) = self.fault {
             let text = format!("The data are at fault ({}): {}.", fault.kind, fault.effect);
             page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
@@ -86,7 +86,8 @@ impl Identify<'_> {
 /// Interruption, and stretches that are too short for the filter.
 pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<String, CliError> {
     let machine = of.machine;
-    let mut page = Page::new(&format!("Identification: {}", escape(of.campaign.0)));
+    let mut report = Report::new(&format!("Identification: {}", escape(of.campaign.0)));
+    let mut page = report.page();
     of.verdicts(&mut page);
     match (of.diagnosed, of.validated) {
         (Some(found), _) => diagnose::errors(&mut page, machine, found),
@@ -143,5 +144,5 @@ pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<Str
             .collect::<Vec<_>>()
             .join(", ")
     ));
-    Ok(page.html())
+    Ok(report.html())
 }

@@ -10,7 +10,7 @@ use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::number;
-use crate::report::page::Page;
+use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct Lsq<'a> {
@@ -27,7 +27,7 @@ pub struct Lsq<'a> {
 }
 
 /// The residual of the fit, joint by joint.
-pub fn residuals(page: &mut Page, machine: &Machine, found: &Identified) {
+pub fn residuals(page: &mut Writer, machine: &Machine, found: &Identified) {
     let joints = machine.robot.joint_names().iter().enumerate();
     let rows: Vec<Vec<String>> = joints
         .map(|(j, joint)| {
@@ -46,10 +46,10 @@ pub fn residuals(page: &mut Page, machine: &Machine, found: &Identified) {
             ]
         })
         .collect();
-    page.table(
+    page.rows(
         "residual of the fit, on the logs that were fitted",
         &["joint", "relative error", "residual rms", "torque rms"],
-        &rows,
+        rows,
     );
 }
 
@@ -60,7 +60,8 @@ pub fn residuals(page: &mut Page, machine: &Machine, found: &Identified) {
 pub fn lsq(of: &Lsq, context: &Context) -> Result<String, CliError> {
     let names: Vec<String> = of.logs.iter().map(|l| escape(&l.name())).collect();
     let title = names.join(", ");
-    let mut page = Page::new(&format!("Least squares fit to {title}"));
+    let mut report = Report::new(&format!("Least squares fit to {title}"));
+    let mut page = report.page();
     let (text, good) = parameters::tally(of.file);
     page.verdict(&format!("{text}."), good);
     residuals(&mut page, of.machine, of.found);
@@ -82,5 +83,5 @@ pub fn lsq(of: &Lsq, context: &Context) -> Result<String, CliError> {
     inputs.extend(of.found.inputs.iter().cloned());
     let summary = Some(&of.found.summary);
     provenance::section(&mut page, &of.machine.file, &inputs, &[], summary, context);
-    Ok(page.html())
+    Ok(report.html())
 }

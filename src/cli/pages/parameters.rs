@@ -2,8 +2,8 @@
 
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
+use crate::report::Writer;
 use crate::report::number;
-use crate::report::page::Page;
 use crate::verdict::{IDENTIFIED, Verdict};
 
 /// How many parameters have which verdict, in words, and whether all are identified.
@@ -30,7 +30,7 @@ pub fn tally(model: &ModelFile) -> (String, bool) {
 }
 
 /// The section; `truth` gives the true value of a parameter where it is known.
-pub fn section(page: &mut Page, model: &ModelFile, truth: &dyn Fn(&Parameter) -> Option<f64>) {
+pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) -> Option<f64>) {
     page.heading("Parameters");
     let truths = model.parameters.iter().any(|p| truth(p).is_some());
     // theta_1 needs no column that says 1
@@ -86,16 +86,16 @@ pub fn section(page: &mut Page, model: &ModelFile, truth: &dyn Fn(&Parameter) ->
             row
         })
         .collect();
-    page.table(
+    page.rows(
         "value and standard deviation (std) in the unit named",
         &head,
-        &rows,
+        rows,
     );
     effects(page, model);
 }
 
 /// Effects that the model has beyond the declared structure.
-fn effects(page: &mut Page, model: &ModelFile) {
+fn effects(page: &mut Writer, model: &ModelFile) {
     let rows: Vec<Vec<String>> = model
         .effects
         .iter()
@@ -122,10 +122,6 @@ fn effects(page: &mut Page, model: &ModelFile) {
             "standard deviation",
             "unit",
         ];
-        page.table(
-            "effects that were added to the declared model",
-            &head,
-            &rows,
-        );
+        page.rows("effects that were added to the declared model", &head, rows);
     }
 }

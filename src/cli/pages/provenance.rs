@@ -4,11 +4,11 @@ use super::super::Context;
 use crate::config::RobotFile;
 use crate::log::{Provenance, escape};
 use crate::motion::Summary;
+use crate::report::Writer;
 use crate::report::number;
-use crate::report::page::Page;
 
 /// Files by name, span and checksum.
-fn files(page: &mut Page, caption: &str, inputs: &[Provenance]) {
+fn files(page: &mut Writer, caption: &str, inputs: &[Provenance]) {
     let rows: Vec<Vec<String>> = inputs
         .iter()
         .map(|i| {
@@ -25,13 +25,13 @@ fn files(page: &mut Page, caption: &str, inputs: &[Provenance]) {
         .collect();
     if !rows.is_empty() {
         let head = ["file", "span", "samples", "duration [s]", "SHA-256"];
-        page.table(caption, &head, &rows);
+        page.rows(caption, &head, rows);
     }
 }
 
 /// The section: inputs, what the model was made from, processing, command and configuration.
 pub fn section(
-    page: &mut Page,
+    page: &mut Writer,
     robot: &RobotFile,
     inputs: &[Provenance],
     model_inputs: &[Provenance],

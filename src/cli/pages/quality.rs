@@ -4,8 +4,8 @@ use super::super::machine::Machine;
 use super::super::{CliError, Context, Exit, inspect};
 use crate::inspect::Severity;
 use crate::log::{LogSpec, escape};
+use crate::report::Writer;
 use crate::report::number;
-use crate::report::page::Page;
 
 /// Faults that are told; a log with more of them has one cause.
 const MOST: usize = 30;
@@ -15,7 +15,7 @@ const MOST: usize = 30;
 /// # Errors
 /// Interruption.
 pub fn section(
-    page: &mut Page,
+    page: &mut Writer,
     machine: &Machine,
     logs: &[&LogSpec],
     warnings: &[String],
@@ -63,7 +63,7 @@ pub fn section(
             ]);
         }
     }
-    page.table(
+    page.rows(
         "logs",
         &[
             "log",
@@ -76,11 +76,11 @@ pub fn section(
             "warnings",
             "notes",
         ],
-        &rows,
+        rows,
     );
     match faults.is_empty() {
         true => page.paragraph("No fault was found in the logs."),
-        false => page.table(
+        false => page.rows(
             "faults, the worst of each log first",
             &[
                 "log",
@@ -91,7 +91,7 @@ pub fn section(
                 "what it is",
                 "remedy",
             ],
-            &faults,
+            faults,
         ),
     }
     if hidden > 0 {

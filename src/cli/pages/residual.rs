@@ -5,8 +5,8 @@ use super::super::machine::Machine;
 use super::look::Look;
 use crate::diagnose::JointEvidence;
 use crate::effect::Refined;
+use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
-use crate::report::page::Page;
 
 /// The residual of the first model, and of the second where there is one, over the logs of `wanted`.
 ///
@@ -87,7 +87,7 @@ fn panels(
 }
 
 /// The section.
-pub fn section(page: &mut Page, figure: &str) {
+pub fn section(page: &mut Writer, figure: &str) {
     page.heading("The residual and its spectra");
     page.paragraph(
         "Means over bins of the filtered residual, forward and backward apart; amplitudes of its \

@@ -7,7 +7,7 @@ use crate::effect::Refined;
 use crate::motion::Stretch;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::number;
-use crate::report::page::{Page, Trace, TraceLine, TracePanel, TraceStyle, Traces};
+use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 
 /// A model whose torque is drawn.
 pub struct Drawn<'a> {
@@ -197,7 +197,7 @@ pub fn still(machine: &Machine, trace: &Trace, title: &str) -> TorqueFigure {
 /// # Errors
 /// Stretches that are too short for the filter.
 pub fn section(
-    page: &mut Page,
+    page: &mut Writer,
     look: &Look,
     logs: &[usize],
     models: &[Drawn],

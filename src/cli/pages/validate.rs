@@ -10,7 +10,7 @@ use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::number;
-use crate::report::page::Page;
+use crate::report::{Report, Writer};
 use crate::validate::Validation;
 
 /// What the page is made from.
@@ -72,7 +72,7 @@ pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (Strin
 }
 
 /// The errors of every joint.
-pub fn errors(page: &mut Page, machine: &Machine, validation: &Validation, caption: &str) {
+pub fn errors(page: &mut Writer, machine: &Machine, validation: &Validation, caption: &str) {
     let rows: Vec<Vec<String>> = validation
         .joints
         .iter()
@@ -99,7 +99,7 @@ pub fn errors(page: &mut Page, machine: &Machine, validation: &Validation, capti
             ]
         })
         .collect();
-    page.table(
+    page.rows(
         caption,
         &[
             "joint",
@@ -110,12 +110,12 @@ pub fn errors(page: &mut Page, machine: &Machine, validation: &Validation, capti
             "relative error before the filter",
             "rows",
         ],
-        &rows,
+        rows,
     );
 }
 
 /// Logs that the model was made from are no test of it.
-fn used_before(page: &mut Page, file: &ModelFile, inputs: &[Provenance]) {
+fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
     let made_from = &file.provenance.inputs;
     let known = |i: &&Provenance| {
         made_from
@@ -147,10 +147,11 @@ pub fn validate(of: &Validate, context: &Context) -> Result<String, CliError> {
     let (machine, validation) = (of.machine, &of.found.validation);
     let names: Vec<String> = of.logs.iter().map(|l| escape(&l.name())).collect();
     let title = names.join(", ");
-    let mut page = Page::new(&format!(
+    let mut report = Report::new(&format!(
         "Validation of {} on {title}",
         escape(&of.given.name)
     ));
+    let mut page = report.page();
     let (text, good) = words(validation, of.limit, &title);
     page.verdict(&text, good);
     used_before(&mut page, of.file, &of.found.inputs);
@@ -195,5 +196,5 @@ pub fn validate(of: &Validate, context: &Context) -> Result<String, CliError> {
         summary,
         context,
     );
-    Ok(page.html())
+    Ok(report.html())
 }

@@ -1,189 +1,127 @@
 //! One self-contained page: headings, paragraphs, tables and figures in one HTML file that opens
 //! from disk, on paper and on a phone, in light and in dark, without a network.
 //!
-//! Pictures are SVG and are seen without a script. Where a script runs, [`Traces`] take the place of
-//! their still picture and can be zoomed. The page's policy allows that one script, by its checksum,
+//! Pictures are SVG and are seen without a script. Where a script runs, [`Part::Traces`] take the place
+//! of their still picture and can be zoomed. The page's policy allows that one script, by its checksum,
 //! and nothing from anywhere else.
-
-mod encode;
-mod traces;
 
 use std::fmt::Write;
 
-pub use traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
-
+use super::encode;
 use super::table::Table;
+use super::value::{Part, Report, Shown};
 use crate::log::Provenance;
-
-/// A page under construction. Every text that is given is escaped.
-#[derive(Debug, Clone)]
-pub struct Page {
-    title: String,
-    /// What stands before the first section.
-    opening: String,
-    sections: Vec<Section>,
-    scripted: bool,
-}
-
-#[derive(Debug, Clone)]
-struct Section {
-    heading: String,
-    body: String,
-}
 
 const STYLE: &str = include_str!("style.css");
 const VIEWER: &str = include_str!("viewer.js");
 
-impl Page {
-    /// An empty page.
-    pub fn new(title: &str) -> Self {
-        Page {
-            title: escaped(title),
-            opening: String::new(),
-            sections: Vec::new(),
-            scripted: false,
-        }
-    }
-
-    fn body(&mut self) -> &mut String {
-        match self.sections.last_mut() {
-            Some(section) => &mut section.body,
-            None => &mut self.opening,
-        }
-    }
-
-    /// The verdict in words; `good` where nothing calls for attention.
-    pub fn verdict(&mut self, text: &str, good: bool) {
-        let class = if good { "verdict" } else { "verdict bad" };
-        let _ = writeln!(self.body(), "<p class=\"{class}\">{}</p>", escaped(text));
-    }
-
-    /// Begins a section.
-    pub fn heading(&mut self, text: &str) {
-        self.sections.push(Section {
-            heading: escaped(text),
-            body: String::new(),
-        });
-    }
-
-    /// A paragraph.
-    pub fn paragraph(&mut self, text: &str) {
-        let _ = writeln!(self.body(), "<p>{}</p>", escaped(text));
-    }
-
-    /// A list of sentences; nothing where there are none.
-    pub fn list<S: AsRef<str>>(&mut self, items: impl IntoIterator<Item = S>) {
-        let items: String = items
-            .into_iter()
-            .map(|item| format!("<li>{}</li>\n", escaped(item.as_ref())))
-            .collect();
-        if !items.is_empty() {
-            let _ = writeln!(self.body(), "<ul>\n{items}</ul>");
-        }
-    }
-
-    /// A table; the first column holds names. A column of words is set to the left.
-    pub fn table(&mut self, caption: &str, head: &[&str], rows: &[Vec<String>]) {
-        let columns: Vec<Column> = (0..head.len())
-            .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
-            .collect();
-        let class = |c: usize| columns.get(c).map_or("", |column| column.class());
-        let mut out = String::from("<div class=\"wide\" tabindex=\"0\" role=\"region\"");
-        let _ = write!(
-            out,
-            " aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
-            escaped(caption)
-        );
-        for (c, name) in head.iter().enumerate() {
-            let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escaped(name));
-        }
-        out.push_str("</tr></thead><tbody>\n");
-        for row in rows {
-            out.push_str("<tr>");
-            for (c, cell) in row.iter().enumerate() {
-                let _ = write!(out, "<td{}>{}</td>", class(c), escaped(cell));
-            }
-            out.push_str("</tr>\n");
-        }
-        out.push_str("</tbody></table></div>\n");
-        self.body().push_str(&out);
-    }
-
-    /// A table that a terminal shows too.
-    pub fn table_of(&mut self, table: &Table) {
-        let (caption, head, rows) = table.parts();
-        self.table(caption, &head, rows);
-    }
-
-    /// A figure: an SVG document of this crate, its words escaped where it was drawn.
-    pub fn figure(&mut self, svg: &str) {
-        let svg = inline(svg);
-        let _ = writeln!(
-            self.body(),
-            "<figure><div class=\"still\">{svg}</div></figure>"
-        );
-    }
-
-    /// Series over time that can be zoomed, and the still picture that stands in for them.
-    pub fn traces(&mut self, traces: &Traces, still: &str) {
-        let (svg, data) = (inline(still), traces.data());
-        let _ = writeln!(
-            self.body(),
-            "<figure><div class=\"still\">{svg}</div>\
-             <script type=\"application/json\" class=\"traces\">{data}</script></figure>"
-        );
-        self.scripted = true;
-    }
-
-    /// A line of code.
-    pub fn code(&mut self, text: &str) {
-        let _ = writeln!(self.body(), "<pre>{}</pre>", escaped(text));
-    }
-
-    /// Text that is folded away, as it stands.
-    pub fn details(&mut self, summary: &str, text: &str) {
-        let _ = writeln!(
-            self.body(),
-            "<details><summary>{}</summary><pre>{}</pre></details>",
-            escaped(summary),
-            escaped(text)
-        );
-    }
-
-    /// The page as a file.
+impl Report {
+    /// The report as a file. Every text in it is escaped.
     pub fn html(&self) -> String {
+        let (mut opening, mut sections) = (String::new(), Vec::<(String, String)>::new());
+        let mut scripted = false;
+        for part in self.parts(Shown::Page) {
+            if let Part::Heading(text) = part {
+                sections.push((escaped(text), String::new()));
+                continue;
+            }
+            scripted |= matches!(part, Part::Traces { .. });
+            let body = sections.last_mut().map_or(&mut opening, |(_, body)| body);
+            body.push_str(&shown(part));
+        }
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
              style-src 'unsafe-inline'; script-src '{}'\">\n\
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
-             <title>{title}</title><style>\n{STYLE}</style></head><body>\n<h1>{title}</h1>\n{}",
+             <title>{title}</title><style>\n{STYLE}</style></head><body>\n<h1>{title}</h1>\n{opening}",
             fingerprint(),
-            self.opening,
-            title = self.title,
+            title = escaped(self.title()),
         );
-        if self.sections.len() > 2 {
+        if sections.len() > 2 {
             out.push_str("<nav aria-label=\"sections\">");
-            for (k, section) in self.sections.iter().enumerate() {
-                let _ = write!(out, "<a href=\"#s{}\">{}</a> ", k + 1, section.heading);
+            for (k, (heading, _)) in sections.iter().enumerate() {
+                let _ = write!(out, "<a href=\"#s{}\">{heading}</a> ", k + 1);
             }
             out.push_str("</nav>\n");
         }
-        for (k, section) in self.sections.iter().enumerate() {
+        for (k, (heading, body)) in sections.iter().enumerate() {
             let _ = write!(
                 out,
-                "<section><h2 id=\"s{}\">{}</h2>\n{}</section>\n",
-                k + 1,
-                section.heading,
-                section.body
+                "<section><h2 id=\"s{}\">{heading}</h2>\n{body}</section>\n",
+                k + 1
             );
         }
-        if self.scripted {
+        if scripted {
             let _ = writeln!(out, "<script>{VIEWER}</script>");
         }
         out.push_str("</body></html>\n");
         out
     }
+}
+
+/// A part as markup, with a line end.
+fn shown(part: &Part) -> String {
+    match part {
+        Part::Verdict { text, good } => {
+            let class = if *good { "verdict" } else { "verdict bad" };
+            format!("<p class=\"{class}\">{}</p>\n", escaped(text))
+        }
+        Part::Heading(_) => String::new(),
+        Part::Paragraph(text) | Part::Line(text) => format!("<p>{}</p>\n", escaped(text)),
+        Part::Note { head, text, .. } => {
+            format!("<p>{}{}</p>\n", escaped(head.trim_start()), escaped(text))
+        }
+        Part::List(items) => {
+            let item = |item: &String| format!("<li>{}</li>\n", escaped(item));
+            let items: String = items.iter().map(item).collect();
+            format!("<ul>\n{items}</ul>\n")
+        }
+        Part::Table(table) => table_of(table),
+        Part::Figure(svg) => {
+            let svg = inline(svg);
+            format!("<figure><div class=\"still\">{svg}</div></figure>\n")
+        }
+        Part::Traces { data, still } => format!(
+            "<figure><div class=\"still\">{}</div>\
+             <script type=\"application/json\" class=\"traces\">{data}</script></figure>\n",
+            inline(still)
+        ),
+        Part::Code(text) => format!("<pre>{}</pre>\n", escaped(text)),
+        Part::Details { summary, text } => format!(
+            "<details><summary>{}</summary><pre>{}</pre></details>\n",
+            escaped(summary),
+            escaped(text)
+        ),
+    }
+}
+
+/// A table; the first column holds names. A column of words is set to the left.
+fn table_of(table: &Table) -> String {
+    let (caption, head, rows) = table.parts();
+    let columns: Vec<Column> = (0..head.len())
+        .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
+        .collect();
+    let class = |c: usize| columns.get(c).map_or("", |column| column.class());
+    let mut out = String::from("<div class=\"wide\" tabindex=\"0\" role=\"region\"");
+    let _ = write!(
+        out,
+        " aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
+        escaped(caption)
+    );
+    for (c, name) in head.iter().enumerate() {
+        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escaped(name));
+    }
+    out.push_str("</tr></thead><tbody>\n");
+    for row in rows {
+        out.push_str("<tr>");
+        for (c, cell) in row.iter().enumerate() {
+            let _ = write!(out, "<td{}>{}</td>", class(c), escaped(cell));
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</tbody></table></div>\n");
+    out
 }
 
 /// What a column of a table holds.
@@ -266,11 +204,13 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::Traces;
 
     #[test]
     fn nothing_that_is_given_becomes_markup() {
         let evil = "</script><script>alert('x')</script>&\"";
-        let mut page = Page::new(evil);
+        let mut report = Report::new(evil);
+        let mut page = report.page();
         page.verdict(evil, true);
         for _ in 0..3 {
             page.heading(evil);
@@ -278,9 +218,9 @@ mod tests {
         page.paragraph(evil);
         page.list([evil]);
         page.details(evil, evil);
-        page.table(evil, &[evil], &[vec![evil.to_owned()]]);
+        page.table(Table::of_words(evil, &[evil], vec![vec![evil.to_owned()]]));
         page.traces(&Traces::sample(evil), "<svg></svg>");
-        let html = page.html();
+        let html = report.html();
         // the data of the traces and the viewer
         assert_eq!(html.matches("<script").count(), 2);
         assert_eq!(html.matches("</script>").count(), 2);
@@ -289,9 +229,10 @@ mod tests {
 
     #[test]
     fn the_page_asks_for_nothing_from_anywhere() {
-        let mut page = Page::new("t");
+        let mut report = Report::new("t");
+        let mut page = report.page();
         page.traces(&Traces::sample("q1"), "<svg></svg>");
-        let html = page.html();
+        let html = report.html();
         for word in [
             "http:", "https:", "src=", "@import", "url(", "fetch(", "import(",
         ] {
@@ -307,7 +248,7 @@ mod tests {
         assert_eq!(encode::base64(&[0xe3, 0xb0, 0xc4, 0x42]), "47DEQg==");
         let fingerprint = fingerprint();
         assert_eq!(fingerprint.len(), "sha256-".len() + 44);
-        assert!(Page::new("t").html().contains(&fingerprint));
+        assert!(Report::new("t").html().contains(&fingerprint));
     }
 
     #[test]

@@ -1,0 +1,94 @@
+//! A report as a terminal shows it: tables and paragraphs of 80 columns, without colour.
+
+use super::table::{WIDTH, hanging};
+use super::value::{Part, Report, Shown};
+
+impl Report {
+    /// The report for a terminal, ending in a line end.
+    pub fn text(&self) -> String {
+        self.parts(Shown::Terminal).map(shown).collect()
+    }
+}
+
+fn shown(part: &Part) -> String {
+    match part {
+        Part::Verdict { text, .. } => hanging("", text, 0),
+        Part::Heading(text) | Part::Line(text) => format!("{text}\n"),
+        Part::Paragraph(text) => hanging("", text, 2),
+        Part::Note { head, text, margin } => hanging(head, text, *margin),
+        Part::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
+        Part::Table(table) => table.to_string(),
+        Part::Code(command) => command_lines(command, CODE),
+        Part::Figure(_) | Part::Traces { .. } | Part::Details { .. } => String::new(),
+    }
+}
+
+/// Columns before a command.
+const CODE: usize = 7;
+
+/// A command in lines that fit a terminal and that a shell takes as one: none begins with the value
+/// of an option. Its words hold no spaces.
+fn command_lines(command: &str, indent: usize) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    for word in command.split(' ') {
+        match parts.last_mut() {
+            Some(part)
+                if part.starts_with('-') && !part.contains(' ') && !word.starts_with('-') =>
+            {
+                part.push(' ');
+                part.push_str(word);
+            }
+            _ => parts.push(word.to_owned()),
+        }
+    }
+    // room for the mark that the command goes on
+    let room = WIDTH - 2;
+    let mut out = String::new();
+    let mut line = " ".repeat(indent);
+    let mut begun = false;
+    for part in parts {
+        if begun && line.chars().count() + 1 + part.chars().count() > room {
+            out += &format!("{line} \\\n");
+            line = " ".repeat(indent + 2);
+        } else if begun {
+            line.push(' ');
+        }
+        line += &part;
+        begun = true;
+    }
+    out + &line + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_command_is_folded_between_its_options() {
+        let told = command_lines(
+            "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 -o separate.csv",
+            7,
+        );
+        assert_eq!(
+            told,
+            "       cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 \\\n         \
+             -o separate.csv\n"
+        );
+        assert!(told.lines().all(|line| line.len() <= WIDTH));
+        assert_eq!(command_lines("cft-ident new", 2), "  cft-ident new\n");
+    }
+
+    #[test]
+    fn a_terminal_shows_what_is_for_it_in_the_order_in_which_it_was_told() {
+        let mut report = Report::new("title of the page");
+        report.everywhere().verdict("all is well", true);
+        report.page().paragraph("not here");
+        report.terminal().line("written: a.toml");
+        report.everywhere().list(["one", "two"]);
+        report.everywhere().figure("<svg></svg>");
+        assert_eq!(
+            report.text(),
+            "all is well\nwritten: a.toml\n  one\n  two\n"
+        );
+    }
+}
