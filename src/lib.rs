@@ -19,6 +19,7 @@
 //! [`simulate`] a plant to test against.
 
 pub mod math;
+pub mod number;
 pub mod robot;
 pub mod verdict;
 

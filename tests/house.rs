@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 const ROOMS: &[(&str, &[&str])] = &[
     ("math", &[]),
     ("verdict", &[]),
+    ("number", &[]),
     ("robot", &["math"]),
     ("log", &["math", "robot"]),
     ("config", &["robot", "log", "verdict"]),
@@ -24,7 +25,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("simulate", &["math", "robot", "log", "config"]),
     (
         "excite",
-        &["math", "robot", "config", "inertia", "simulate"],
+        &["math", "number", "robot", "config", "inertia", "simulate"],
     ),
     (
         "compare",
@@ -32,14 +33,16 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "report",
-        &["log", "verdict", "friction", "inertia", "validate"],
+        &[
+            "log", "verdict", "number", "friction", "inertia", "validate",
+        ],
     ),
     (
         "cli",
         &[
-            "math", "verdict", "robot", "log", "config", "output", "motion", "effect", "friction",
-            "inertia", "diagnose", "validate", "inspect", "simulate", "excite", "compare",
-            "report", "export",
+            "math", "verdict", "number", "robot", "log", "config", "output", "motion", "effect",
+            "friction", "inertia", "diagnose", "validate", "inspect", "simulate", "excite",
+            "compare", "report", "export",
         ],
     ),
 ];

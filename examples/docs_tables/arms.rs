@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::tables::{Rendered, json, number, rows, table, text};
-use cft_ident::report::number::{percent, value_and_std};
+use cft_ident::number::{percent, value_and_std};
 
 /// Errors of validations, a column per joint; `NAME:WORDS_WITH_UNDERSCORES` gives a line its name,
 /// and a name that is no validation's holds published errors in per cent.

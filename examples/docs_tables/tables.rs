@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::arms;
-use cft_ident::report::number::{percent, significant, value_and_std};
+use cft_ident::number::{percent, significant, value_and_std};
 use serde_json::Value;
 
 pub type Rendered = Result<String, String>;

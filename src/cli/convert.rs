@@ -7,9 +7,9 @@ use serde_json::json;
 use super::machine::Machine;
 use super::{CliError, Context, Outcome, arguments, columns};
 use crate::log::{Block, Instant, LogSpec, Provenance, Reader, Table, TableBlock, escape};
+use crate::number;
 use crate::output::{LogForm, LogWriter};
 use crate::report::json::Document;
-use crate::report::number;
 
 const EXAMPLE: &str = "\
 Example:

@@ -19,8 +19,8 @@ use crate::diagnose::{
 use crate::effect::{Refined, Told};
 use crate::log::LogSpec;
 use crate::motion::Parallel;
+use crate::number;
 use crate::report::json::Document;
-use crate::report::number;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::verdict::{IDENTIFIED, Verdict, verdict_of};

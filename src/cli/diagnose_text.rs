@@ -5,7 +5,7 @@ use super::machine::Machine;
 use super::typed;
 use crate::diagnose::{Candidate, Diagnosis, Errors, Pair};
 use crate::effect::Added;
-use crate::report::number;
+use crate::number;
 use crate::report::table::{Align, Table, hanging};
 
 /// Margin of what is said of an effect.

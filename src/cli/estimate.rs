@@ -18,7 +18,7 @@ use crate::inertia::solve::{self, Fit, FitError, fit};
 use crate::inertia::{accumulate_weighted, add_processing};
 use crate::log::{Block, LogSpec, Provenance};
 use crate::motion::{Settings, Summary};
-use crate::report::number;
+use crate::number;
 
 /// How parameters are estimated from the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

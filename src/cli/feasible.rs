@@ -12,7 +12,7 @@ use crate::config::model_file::LinkBody;
 use crate::inertia::feasible::{Feasible, PRIOR_WEIGHT, Task, feasible};
 use crate::inertia::robust::Status;
 use crate::inertia::solve::{factor, residual_of, weights_of};
-use crate::report::number;
+use crate::number;
 use crate::report::table::{Align, Table, hanging, unbroken};
 use crate::robot::standard::{Body, StandardMap, pseudo_inertia};
 

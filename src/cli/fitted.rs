@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 use super::lsq::{Identified, Unknown};
 use super::machine::Machine;
 use crate::motion::Summary;
+use crate::number;
+use crate::report::summary;
 use crate::report::table::{hanging, unbroken};
-use crate::report::{number, summary};
 use crate::verdict::{IDENTIFIED, Verdict, WEAK};
 
 /// The JSON fields of the command.

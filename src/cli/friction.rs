@@ -17,9 +17,10 @@ use crate::friction::inputs::Inputs;
 use crate::friction::passes::{Ending, Given};
 use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
 use crate::log::{LogSpec, Provenance, did_you_mean};
+use crate::number;
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::report::json::Document;
-use crate::report::{number, summary};
+use crate::report::summary;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::Verdict;
 

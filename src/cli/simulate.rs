@@ -10,9 +10,9 @@ use super::outcome::Outcome;
 use super::{arguments, files};
 use crate::config::RobotFile;
 use crate::log::{Block, LogSpec, Provenance, Reader};
+use crate::number;
 use crate::output::{LogWriter, write_whole};
 use crate::report::json::Document;
-use crate::report::number;
 use crate::report::table::{Align, Table};
 use crate::simulate::{
     self, EffectSpec, Ending, InitialConditions, Motion, Order, SimulatedLog, TruthFile,

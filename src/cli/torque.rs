@@ -11,9 +11,9 @@ use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::log::LogSpec;
 use crate::motion::{self, Settings};
+use crate::number;
 use crate::output::LogWriter;
 use crate::report::json::Document;
-use crate::report::number;
 use crate::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\

@@ -11,11 +11,12 @@ use super::refined::{held_for_pictures, hold, refined};
 use super::{CliError, Context, Outcome, arguments, files, outputs};
 use crate::effect::Refined;
 use crate::log::{Instant, LogSpec, Provenance};
+use crate::number;
 use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
+use crate::report::summary;
 use crate::report::table::{hanging, unbroken};
-use crate::report::{number, summary};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
 
 const EXAMPLE: &str = "\

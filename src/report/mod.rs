@@ -7,7 +7,6 @@
 mod encode;
 pub mod figure;
 pub mod json;
-pub mod number;
 mod page;
 pub mod summary;
 pub mod table;

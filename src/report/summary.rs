@@ -1,7 +1,7 @@
 //! The two tables that most commands end with: parameters, and torque errors per joint.
 
-use super::number::{self, ABSENT};
 use super::table::{Align, Table};
+use crate::number::{self, ABSENT};
 
 /// One estimated parameter, as a table shows it.
 #[derive(Debug, Clone, PartialEq)]

@@ -19,9 +19,9 @@ use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, escape};
 use crate::motion::Parallel;
+use crate::number;
 use crate::report::figure::{CurvePoint, OverlayFigure, OverlayPanel};
 use crate::report::json::Document;
-use crate::report::number;
 use crate::robot::model::JointFriction;
 use crate::validate::{Reconstruction, Validation};
 

@@ -3,7 +3,7 @@
 use super::{Compared, LETTERS, Tried};
 use crate::cli::machine::Machine;
 use crate::compare::{Apart, Difference, Estimate, Reason};
-use crate::report::number;
+use crate::number;
 use crate::report::table::{Align, Table, paragraph};
 
 /// Parameters that both have.

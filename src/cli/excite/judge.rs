@@ -9,8 +9,8 @@ use crate::excite::limits::{Channel, Quantity};
 use crate::excite::motion::{spectrum, torque_band};
 use crate::excite::usage::Use;
 use crate::excite::{Given, Motion};
+use crate::number;
 use crate::report::figure::{MotionFigure, MotionPanel};
-use crate::report::number;
 use crate::report::table::{Align, Table, hanging, unbroken};
 
 /// Share of the torque's power that its band holds.

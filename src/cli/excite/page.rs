@@ -5,8 +5,8 @@ use super::judge::{self, Judged};
 use crate::cli::pages::provenance;
 use crate::excite::Motion;
 use crate::log::escape;
+use crate::number;
 use crate::report::figure::MotionFigure;
-use crate::report::number;
 use crate::report::{Report, Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 
 /// The page as a file; `name` is the trajectory's, without folders.

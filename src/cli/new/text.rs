@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Shape;
 use super::columns::{Joint, Mapping, Seen};
-use crate::report::number;
+use crate::number;
 use crate::robot::JointKind;
 
 /// What the text is made from.

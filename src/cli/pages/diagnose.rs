@@ -11,8 +11,8 @@ use super::{fit, friction, parameters, provenance, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::diagnose::{Candidate, Errors, Pair};
 use crate::log::{LogSpec, Provenance, escape};
+use crate::number;
 use crate::report::figure::ResidualFigure;
-use crate::report::number;
 use crate::report::{Report, TraceStyle, Writer};
 
 /// Candidates that are told.

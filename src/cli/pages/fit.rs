@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::super::lsq;
 use crate::config::ModelFile;
+use crate::number;
 use crate::report::Writer;
-use crate::report::number;
 
 /// Correlation of two errors from which on a pair is told.
 const ALIKE: f64 = 0.9;

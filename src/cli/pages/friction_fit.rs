@@ -7,7 +7,7 @@ use super::{fit, parameters, provenance, quality};
 use crate::config::ModelFile;
 use crate::friction::passes::Ending;
 use crate::log::{LogSpec, Provenance, escape};
-use crate::report::number;
+use crate::number;
 use crate::report::{Report, Writer};
 
 /// What the page is made from.

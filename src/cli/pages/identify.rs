@@ -12,7 +12,7 @@ use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
-use crate::report::number;
+use crate::number;
 use crate::report::{Report, Writer};
 
 /// What the page is made from.

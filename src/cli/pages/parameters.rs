@@ -2,8 +2,8 @@
 
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
+use crate::number;
 use crate::report::Writer;
-use crate::report::number;
 use crate::verdict::{IDENTIFIED, Verdict};
 
 /// How many parameters have which verdict, in words, and whether all are identified.

@@ -4,8 +4,8 @@ use super::super::Context;
 use crate::config::RobotFile;
 use crate::log::{Provenance, escape};
 use crate::motion::Summary;
+use crate::number;
 use crate::report::Writer;
-use crate::report::number;
 
 /// Files by name, span and checksum.
 fn files(page: &mut Writer, caption: &str, inputs: &[Provenance]) {

@@ -4,8 +4,8 @@ use super::super::machine::Machine;
 use super::super::{CliError, Context, Exit, inspect};
 use crate::inspect::Severity;
 use crate::log::{LogSpec, escape};
+use crate::number;
 use crate::report::Writer;
-use crate::report::number;
 
 /// Faults that are told; a log with more of them has one cause.
 const MOST: usize = 30;

@@ -5,8 +5,8 @@ use super::super::machine::Machine;
 use super::look::Look;
 use crate::effect::Refined;
 use crate::motion::Stretch;
+use crate::number;
 use crate::report::figure::{JointTorque, TorqueFigure};
-use crate::report::number;
 use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 
 /// A model whose torque is drawn.

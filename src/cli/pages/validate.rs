@@ -9,7 +9,7 @@ use super::{fit, friction, parameters, provenance, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
-use crate::report::number;
+use crate::number;
 use crate::report::{Report, Writer};
 use crate::validate::Validation;
 

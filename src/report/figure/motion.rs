@@ -6,7 +6,7 @@ use super::decimate::decimated;
 use super::legend::{self, Key};
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
-use crate::report::number;
+use crate::number;
 
 /// One quantity over time.
 #[derive(Debug, Clone, PartialEq)]

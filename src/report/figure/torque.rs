@@ -7,7 +7,7 @@ use super::decimate::{POINTS, decimated};
 use super::legend::{self, Key};
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted};
-use crate::report::number;
+use crate::number;
 
 /// The torque of one joint over time. A row that is not finite splits the lines: put one between
 /// logs and across gaps.
