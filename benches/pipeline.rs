@@ -6,9 +6,9 @@ use std::hint::black_box;
 use std::path::Path;
 
 use cft_ident::config::RobotFile;
-use cft_ident::friction::filter::Filter;
+use cft_ident::friction::filter::ExtendedKalmanFilter;
 use cft_ident::friction::passes::spread;
-use cft_ident::friction::problem::{FRICTION, Noise, Problem, Record};
+use cft_ident::friction::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
 use cft_ident::friction::score::score;
 use cft_ident::math::rfactor::RFactor;
 use cft_ident::robot::Robot;
@@ -20,13 +20,13 @@ const SAMPLES: usize = 20_000;
 const NUISANCE: usize = 5;
 
 /// A one-joint record of 20 s with a nuisance of five, as q1 of the CFT robot has.
-fn problem() -> Problem {
+fn problem() -> FrictionProblem {
     let t: Vec<f64> = (0..SAMPLES).map(|k| k as f64 * 1e-3).collect();
     let y: Vec<f64> = t.iter().map(|t| 0.2 * (1.3 * t).sin()).collect();
     let tau = t[1..]
         .iter()
         .map(|t| 60.0 * (1.3 * t).cos().signum() - 40.0 * (1.3 * t).sin());
-    Problem {
+    FrictionProblem {
         records: vec![Record {
             r: vec![2e-12; SAMPLES],
             tau: tau.collect(),
@@ -49,7 +49,7 @@ fn problem() -> Problem {
     }
 }
 
-fn start(problem: &Problem) -> Vec<f64> {
+fn start(problem: &FrictionProblem) -> Vec<f64> {
     let mut p = vec![0.5, 0.8, -0.3, 3.0, 1.0];
     p.resize(problem.parameters(), 0.1);
     p[FRICTION] = 1.2;
@@ -58,7 +58,7 @@ fn start(problem: &Problem) -> Vec<f64> {
 
 /// The same filter with dense matrices, written as the equations stand: P' = Phi P Phi' + Q and
 /// P = (I - K H) P, new matrices at every sample.
-fn dense(problem: &Problem, start: &[f64]) -> DVector<f64> {
+fn dense(problem: &FrictionProblem, start: &[f64]) -> DVector<f64> {
     let n = 2 + problem.parameters();
     let record = &problem.records[0];
     let mut x = DVector::zeros(n);
@@ -123,7 +123,7 @@ fn dense(problem: &Problem, start: &[f64]) -> DVector<f64> {
 fn filter(c: &mut Criterion) {
     let problem = problem();
     let p = start(&problem);
-    let noise = Noise {
+    let noise = NoiseLevels {
         torque: 0.5,
         position_factor: 1.0,
     };
@@ -132,7 +132,7 @@ fn filter(c: &mut Criterion) {
         .throughput(Throughput::Elements(SAMPLES as u64))
         .sample_size(10);
     group.bench_function("filter pass", |b| {
-        let mut filter = Filter::new(&problem);
+        let mut filter = ExtendedKalmanFilter::new(&problem);
         let spread = spread(&problem);
         b.iter(|| black_box(filter.pass(&problem, &p, &spread, noise)));
     });

@@ -12,12 +12,12 @@ use std::path::Path;
 use cft_ident::cli::machine::narrowed;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
 use cft_ident::friction::passes::Ending;
-use cft_ident::inertia::columns::{Columns, KnownFriction};
+use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
-use cft_ident::inertia::solve::{Estimator, fit};
+use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::inertia::verdict::verdict;
 use cft_ident::inertia::{accumulate, add_processing};
-use cft_ident::motion::{HeldForces, Settings as Processing};
+use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::dynamics::{Coefficients, inertia};
 use cft_ident::robot::cft::{Setup, Structure};
@@ -122,7 +122,7 @@ fn campaign(seed: u64) -> Value {
         }));
     }
 
-    let columns = Columns {
+    let columns = RegressorColumns {
         joints: 4,
         shared: 12,
         own: vec![Vec::new(); 4],
@@ -131,10 +131,10 @@ fn campaign(seed: u64) -> Value {
     let motion = excitation_at_random_phase(Setup::Tuedacs, seed);
     let recording = follow(&truth, &[], motion, &noisy(40.0, 10 * seed + 5)).expect("a run");
     let mut log = block(&recording);
-    HeldForces::new(4).centre(&robot, &mut log);
+    ZeroOrderHold::new(4).centre(&robot, &mut log);
     let solved = |settings: &Processing| {
         let found = accumulate(&robot, &columns, settings, &mut source(&log)).expect("a log");
-        fit(&found.0, Estimator::Wls).expect("a fit")
+        fit(&found.0, Weighting::Wls).expect("a fit")
     };
     let mut fit = solved(&processing());
     add_processing(&mut fit, &solved(&narrowed(&processing(), 1000.0)));
@@ -143,7 +143,7 @@ fn campaign(seed: u64) -> Value {
             let mut read = source(&log);
             let found = accumulate_shifted(&robot, &columns, None, &processing(), grid, &mut read);
             let sums = found.expect("a log").expect("its encoders are known");
-            cft_ident::inertia::solve::fit(&sums, Estimator::Wls).expect("a fit")
+            cft_ident::inertia::solve::fit(&sums, Weighting::Wls).expect("a fit")
         })
         .collect();
     add_scatter(&mut fit, &shifted);
@@ -202,7 +202,7 @@ fn errors(
     )
     .expect("a run");
     let mut log = block(&recording);
-    HeldForces::new(4).centre(robot, &mut log);
+    ZeroOrderHold::new(4).centre(robot, &mut log);
     models
         .iter()
         .map(|model| {

@@ -14,9 +14,9 @@ mod study;
 use std::path::Path;
 
 use cft_ident::inertia::accumulate;
-use cft_ident::inertia::columns::{Columns, KnownFriction};
-use cft_ident::inertia::solve::{Estimator, fit};
-use cft_ident::motion::HeldForces;
+use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
+use cft_ident::inertia::solve::{Weighting, fit};
+use cft_ident::motion::ZeroOrderHold;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_phase, follow};
@@ -59,7 +59,7 @@ fn campaigns(seed: u64) -> Value {
     let truth = CftTruth::synthetic(Setup::Tuedacs)
         .varied(0.15, seed)
         .expect("a plant");
-    let columns = Columns {
+    let columns = RegressorColumns {
         joints: 4,
         shared: 12,
         own: vec![Vec::new(); 4],
@@ -67,9 +67,9 @@ fn campaigns(seed: u64) -> Value {
     };
     let theta = |recording: &Recording<4>| -> Vec<f64> {
         let mut log = block(recording);
-        HeldForces::new(4).centre(&robot, &mut log);
+        ZeroOrderHold::new(4).centre(&robot, &mut log);
         let found = accumulate(&robot, &columns, &processing(), &mut source(&log)).expect("a log");
-        let fit = fit(&found.0, Estimator::Wls).expect("a fit");
+        let fit = fit(&found.0, Weighting::Wls).expect("a fit");
         fit.theta.as_slice().to_vec()
     };
     let run = |designed: bool, settings: &Settings<4>| {

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use crate::log::Block;
-use crate::motion::{self, Parallel, Settings, Stretch, Summary};
+use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary};
 use crate::robot::model::Model;
 
 /// Errors of one joint.
@@ -44,13 +44,13 @@ pub struct Validation {
     pub joints: Vec<JointError>,
     pub overall: Overall,
     pub summary: Summary,
-    pub traces: Traces,
+    pub traces: TorqueTraces,
 }
 
 /// Filtered torques over time for the figure, thinned to a bounded number of points so that every
 /// extreme survives.
 #[derive(Debug, Clone, Default)]
-pub struct Traces {
+pub struct TorqueTraces {
     /// Time of each point [s].
     pub t: Vec<f64>,
     /// First point of each uninterrupted stretch.
@@ -60,9 +60,9 @@ pub struct Traces {
     pub reconstructed: Vec<f64>,
 }
 
-/// Sums of one joint.
+/// ErrorSums of one joint.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct ErrorSums {
     error: f64,
     torque: f64,
     mean: f64,
@@ -73,7 +73,7 @@ struct Sums {
     raw_torque: f64,
 }
 
-impl Sums {
+impl ErrorSums {
     fn add(&mut self, measured: f64, reconstructed: f64) {
         let e = measured - reconstructed;
         self.error += e * e;
@@ -104,7 +104,7 @@ pub struct Reconstructed<'a> {
 
 /// Where the thinning of a log's rows stands.
 struct Taken<'a> {
-    settings: &'a Settings,
+    settings: &'a FilterSettings,
     stretch: Option<usize>,
     count: usize,
     began: f64,
@@ -112,7 +112,7 @@ struct Taken<'a> {
 }
 
 impl<'a> Taken<'a> {
-    fn new(settings: &'a Settings) -> Self {
+    fn new(settings: &'a FilterSettings) -> Self {
         Taken {
             settings,
             stretch: None,
@@ -140,8 +140,8 @@ impl<'a> Taken<'a> {
 /// Errors of several logs and joints, summed log after log.
 pub struct Reconstruction<'a> {
     model: &'a Model,
-    sums: Vec<Sums>,
-    traces: Traces,
+    sums: Vec<ErrorSums>,
+    traces: TorqueTraces,
 }
 
 impl<'a> Reconstruction<'a> {
@@ -149,8 +149,8 @@ impl<'a> Reconstruction<'a> {
     pub fn new(model: &'a Model) -> Self {
         Reconstruction {
             model,
-            sums: vec![Sums::default(); model.robot.joints()],
-            traces: Traces::default(),
+            sums: vec![ErrorSums::default(); model.robot.joints()],
+            traces: TorqueTraces::default(),
         }
     }
 
@@ -161,7 +161,7 @@ impl<'a> Reconstruction<'a> {
     /// Those of the source and of [`motion::run`].
     pub fn add<E>(
         &mut self,
-        settings: &Settings,
+        settings: &FilterSettings,
         source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
         row: &mut dyn FnMut(&Reconstructed),
     ) -> Result<Summary, motion::RunError<E>> {
@@ -196,7 +196,7 @@ impl<'a> Reconstruction<'a> {
     /// [`MotionError`](motion::MotionError) of the filter.
     pub fn add_stretch(
         &mut self,
-        settings: &Settings,
+        settings: &FilterSettings,
         segment: usize,
         stretch: &Stretch,
         reconstructed: &[Vec<f64>],
@@ -306,7 +306,7 @@ impl<'a> Reconstruction<'a> {
 const MOST_POINTS: usize = 16_384;
 
 /// Appends a row to the traces; thins them by two where they are too many.
-fn append(traces: &mut Traces, t: f64, filtered: &[f64], n: usize) {
+fn append(traces: &mut TorqueTraces, t: f64, filtered: &[f64], n: usize) {
     traces.t.push(t);
     traces.measured.extend_from_slice(&filtered[..n]);
     traces.reconstructed.extend_from_slice(&filtered[n..]);
@@ -317,8 +317,8 @@ fn append(traces: &mut Traces, t: f64, filtered: &[f64], n: usize) {
 
 /// Of every four points keeps the two whose first-joint error is smallest and largest, in order
 /// of time; stretches keep their borders.
-fn halve(traces: &mut Traces, n: usize) {
-    let mut out = Traces::default();
+fn halve(traces: &mut TorqueTraces, n: usize) {
+    let mut out = TorqueTraces::default();
     let mut bounds = traces.breaks.clone();
     bounds.push(traces.t.len());
     for pair in bounds.windows(2) {

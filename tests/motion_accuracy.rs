@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use cft_ident::log::Block;
 use cft_ident::math::rfactor::RFactor;
-use cft_ident::motion::{self, Row, Sample, Settings, TorqueTiming};
+use cft_ident::motion::{self, FilterSettings, FilteredRow, MotionSample, TorqueTiming};
 
 const INERTIA: f64 = 0.35;
 const VISCOUS: f64 = 1.7;
@@ -63,7 +63,7 @@ fn simulate(seconds: f64, dt: f64, held: bool) -> Joint {
     Joint { t, q, tau }
 }
 
-fn estimate(joint: &Joint, settings: &Settings) -> [f64; 3] {
+fn estimate(joint: &Joint, settings: &FilterSettings) -> [f64; 3] {
     let mut factor = RFactor::new(4);
     let mut read = false;
     motion::run::<Infallible>(
@@ -79,8 +79,10 @@ fn estimate(joint: &Joint, settings: &Settings) -> [f64; 3] {
         settings,
         None,
         4,
-        &|s: &Sample<'_>, y: &mut [f64]| y.copy_from_slice(&[s.a[0], s.v[0], s.q[0], s.tau[0]]),
-        &mut |row: &Row<'_>| factor.fold(row.filtered),
+        &|s: &MotionSample<'_>, y: &mut [f64]| {
+            y.copy_from_slice(&[s.a[0], s.v[0], s.q[0], s.tau[0]])
+        },
+        &mut |row: &FilteredRow<'_>| factor.fold(row.filtered),
     )
     .expect("a log that can be filtered");
     let r = factor.r();
@@ -102,20 +104,20 @@ fn worst(errors: [f64; 3]) -> f64 {
 #[test]
 fn torque_sampled_with_the_position_biases_nothing() {
     let joint = simulate(20.0, 1e-3, false);
-    let errors = estimate(&joint, &Settings::default());
+    let errors = estimate(&joint, &FilterSettings::default());
     assert!(worst(errors) < 1e-6, "{errors:?}");
 }
 
 #[test]
 fn torque_held_over_the_sample_biases_nothing() {
     let joint = simulate(20.0, 1e-3, true);
-    let settings = Settings {
-        torque: TorqueTiming::HeldOverSample,
-        ..Settings::default()
+    let settings = FilterSettings {
+        torque: TorqueTiming::ZeroOrderHold,
+        ..FilterSettings::default()
     };
     let errors = estimate(&joint, &settings);
     assert!(worst(errors) < 1e-6, "{errors:?}");
     // Half a sample of delay is what the setting takes away.
-    let errors = estimate(&joint, &Settings::default());
+    let errors = estimate(&joint, &FilterSettings::default());
     assert!(worst(errors) > 1e-3, "{errors:?}");
 }

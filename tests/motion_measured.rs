@@ -6,7 +6,9 @@ use std::path::Path;
 use cft_ident::log::Block;
 use cft_ident::math::rank;
 use cft_ident::math::rfactor::RFactor;
-use cft_ident::motion::{self, Differences, ParallelFilter, Row, Sample, Settings, Summary};
+use cft_ident::motion::{
+    self, Differences, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
+};
 
 /// The named columns of a file, row by row; none where the data folder is absent.
 fn read<const N: usize>(name: &str, columns: [&str; N]) -> Option<Vec<[f64; N]>> {
@@ -50,8 +52,8 @@ fn blocks<const N: usize>(
 }
 
 /// The processing published with the EMPS benchmark (Janot, Gautier and Brunot 2019).
-fn settings(trim_s: f64) -> Settings {
-    Settings {
+fn settings(trim_s: f64) -> FilterSettings {
+    FilterSettings {
         cutoff_hz: 40.0,
         filter: ParallelFilter::Chebyshev {
             order: 8,
@@ -63,12 +65,12 @@ fn settings(trim_s: f64) -> Settings {
         differences: Differences::Central,
         q_trim_s: Some(0.0),
         trim_s: Some(trim_s),
-        ..Settings::default()
+        ..FilterSettings::default()
     }
 }
 
 /// R factor of [a, v, sign v, 1 | tau].
-fn factor(log: &[[f64; 3]], settings: &Settings) -> RFactor {
+fn factor(log: &[[f64; 3]], settings: &FilterSettings) -> RFactor {
     let mut factor = RFactor::new(5);
     let summary = motion::run(
         &mut blocks(log),
@@ -76,12 +78,12 @@ fn factor(log: &[[f64; 3]], settings: &Settings) -> RFactor {
         settings,
         None,
         5,
-        &|s: &Sample<'_>, y: &mut [f64]| {
+        &|s: &MotionSample<'_>, y: &mut [f64]| {
             let v = s.v[0];
             let sign = if v == 0.0 { 0.0 } else { v.signum() };
             y.copy_from_slice(&[s.a[0], v, sign, 1.0, s.tau[0]]);
         },
-        &mut |row: &Row<'_>| factor.fold(row.filtered),
+        &mut |row: &FilteredRow<'_>| factor.fold(row.filtered),
     )
     .expect("a log that can be filtered");
     assert_eq!(
@@ -149,7 +151,10 @@ fn published_processing_on_the_measured_log_gives_the_figures_of_numpy() {
 
 /// Relative difference, per joint, between velocities differentiated here and velocities that the
 /// robot logged, both through the parallel filter.
-fn velocity_errors<const N: usize>(log: &[[f64; N]], settings: &Settings) -> (Vec<f64>, Summary) {
+fn velocity_errors<const N: usize>(
+    log: &[[f64; N]],
+    settings: &FilterSettings,
+) -> (Vec<f64>, Summary) {
     let joints = (N - 1) / 2;
     let mut sums = vec![[0.0; 2]; joints];
     let summary = motion::run(
@@ -158,11 +163,11 @@ fn velocity_errors<const N: usize>(log: &[[f64; N]], settings: &Settings) -> (Ve
         settings,
         None,
         2 * joints,
-        &|s: &Sample<'_>, y: &mut [f64]| {
+        &|s: &MotionSample<'_>, y: &mut [f64]| {
             y[..joints].copy_from_slice(s.v);
             y[joints..].copy_from_slice(s.tau);
         },
-        &mut |row: &Row<'_>| {
+        &mut |row: &FilteredRow<'_>| {
             for (j, sum) in sums.iter_mut().enumerate() {
                 let (found, logged) = (row.filtered[j], row.filtered[joints + j]);
                 sum[0] += (found - logged).powi(2);
@@ -186,7 +191,7 @@ fn velocities_of_a_log_with_an_uneven_clock_are_those_that_the_robot_logged() {
     ) else {
         return;
     };
-    let (errors, summary) = velocity_errors(&log, &Settings::default());
+    let (errors, summary) = velocity_errors(&log, &FilterSettings::default());
     assert_eq!((summary.samples, summary.segments), (20544, 5));
     assert_eq!(summary.skipped.segments, 0);
     assert!(errors.iter().all(|e| *e < 0.02), "{errors:?}");
@@ -202,7 +207,7 @@ fn velocities_of_a_slow_log_are_those_that_the_robot_logged() {
     ) else {
         return;
     };
-    let (errors, summary) = velocity_errors(&log, &Settings::default());
+    let (errors, summary) = velocity_errors(&log, &FilterSettings::default());
     assert_eq!((summary.samples, summary.segments), (3441, 1));
     assert!(errors.iter().all(|e| *e < 0.006), "{errors:?}");
 }

@@ -4,7 +4,9 @@ use std::convert::Infallible;
 
 use cft_ident::log::Block;
 use cft_ident::math::MathError;
-use cft_ident::motion::{self, MotionError, Row, RunError, Sample, Settings, Summary};
+use cft_ident::motion::{
+    self, FilterSettings, FilteredRow, MotionError, MotionSample, RunError, Summary,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -27,7 +29,7 @@ fn torque(t: f64) -> f64 {
 /// One kept row: t, segment, position, velocity, acceleration, filtered acceleration and torque.
 type Kept = (f64, usize, [f64; 3], [f64; 2]);
 
-fn run_block(block: Block, settings: &Settings) -> Result<(Vec<Kept>, Summary), MotionError> {
+fn run_block(block: Block, settings: &FilterSettings) -> Result<(Vec<Kept>, Summary), MotionError> {
     let mut source = Some(block);
     let mut rows = Vec::new();
     let outcome = motion::run::<Infallible>(
@@ -42,8 +44,8 @@ fn run_block(block: Block, settings: &Settings) -> Result<(Vec<Kept>, Summary), 
         settings,
         None,
         2,
-        &|s: &Sample<'_>, y: &mut [f64]| y.copy_from_slice(&[s.a[0], s.tau[0]]),
-        &mut |row: &Row<'_>| {
+        &|s: &MotionSample<'_>, y: &mut [f64]| y.copy_from_slice(&[s.a[0], s.tau[0]]),
+        &mut |row: &FilteredRow<'_>| {
             rows.push((
                 row.t,
                 row.segment,
@@ -59,7 +61,7 @@ fn run_block(block: Block, settings: &Settings) -> Result<(Vec<Kept>, Summary), 
     }
 }
 
-fn run(t: &[f64], settings: &Settings) -> Result<(Vec<Kept>, Summary), MotionError> {
+fn run(t: &[f64], settings: &FilterSettings) -> Result<(Vec<Kept>, Summary), MotionError> {
     run_block(
         Block {
             t: t.to_vec(),
@@ -88,7 +90,7 @@ fn errors(rows: &[Kept]) -> [f64; 3] {
 
 #[test]
 fn even_rows_are_differentiated_without_error() {
-    let (rows, summary) = run(&even(20_000, 1e-3), &Settings::default()).expect("usable");
+    let (rows, summary) = run(&even(20_000, 1e-3), &FilterSettings::default()).expect("usable");
     assert_eq!((summary.segments, summary.interpolated), (1, 0));
     assert_eq!((summary.decimation, summary.q_cutoff_hz), (10, Some(60.0)));
     assert!((summary.dt - 1e-3).abs() < 1e-15);
@@ -103,7 +105,7 @@ fn rows_that_are_missing_one_by_one_are_interpolated() {
         .filter(|k| k % 97 != 50)
         .map(|k| k as f64 * 1e-3)
         .collect();
-    let (rows, summary) = run(&t, &Settings::default()).expect("usable");
+    let (rows, summary) = run(&t, &FilterSettings::default()).expect("usable");
     assert_eq!(summary.segments, 1);
     assert_eq!(summary.interpolated, 206);
     let [v, a, tau] = errors(&rows);
@@ -116,7 +118,7 @@ fn uneven_rows_are_put_on_an_even_grid() {
     let t: Vec<f64> = (0..20_000)
         .map(|k| (k as f64 + rng.random_range(-0.4..0.4)) * 1e-3)
         .collect();
-    let (rows, summary) = run(&t, &Settings::default()).expect("usable");
+    let (rows, summary) = run(&t, &FilterSettings::default()).expect("usable");
     assert!(summary.segments == 1 && summary.interpolated > 15_000);
     let [v, a, tau] = errors(&rows);
     assert!(v < 1e-5 && a < 1e-4 && tau < 1e-5, "{v:e} {a:e} {tau:e}");
@@ -132,7 +134,7 @@ fn nothing_is_differentiated_across_a_gap() {
                 + if k >= 10_300 { 3.0 } else { 0.0 }
         })
         .collect();
-    let settings = Settings::default();
+    let settings = FilterSettings::default();
     let (rows, summary) = run(&t, &settings).expect("usable");
     assert_eq!((summary.segments, summary.skipped.segments), (2, 1));
     assert_eq!(summary.skipped.samples, 300);
@@ -150,7 +152,7 @@ fn a_clock_that_drifts_is_followed() {
     let t: Vec<f64> = (0..60_000)
         .map(|k| k as f64 * 1e-3 * (1.0 + 5e-3 * k as f64 / 60_000.0))
         .collect();
-    let (rows, summary) = run(&t, &Settings::default()).expect("usable");
+    let (rows, summary) = run(&t, &FilterSettings::default()).expect("usable");
     assert_eq!(summary.segments, 1);
     let [v, a, _] = errors(&rows);
     assert!(v < 2e-3 && a < 4e-3, "{v:e} {a:e}");
@@ -165,7 +167,7 @@ fn times_that_are_rounded_do_no_harm() {
         tau: exact.iter().map(|&t| torque(t)).collect(),
         ..Block::default()
     };
-    let (rows, summary) = run_block(block, &Settings::default()).expect("usable");
+    let (rows, summary) = run_block(block, &FilterSettings::default()).expect("usable");
     assert_eq!(summary.interpolated, 0);
     assert!((summary.dt * 1024.0 - 1.0).abs() < 1e-7);
     let [v, a, tau] = errors(&rows);
@@ -174,9 +176,9 @@ fn times_that_are_rounded_do_no_harm() {
 
 #[test]
 fn a_slow_log_keeps_every_row() {
-    let settings = Settings {
+    let settings = FilterSettings {
         cutoff_hz: 5.0,
-        ..Settings::default()
+        ..FilterSettings::default()
     };
     let (rows, summary) = run(&even(3_000, 0.02), &settings).expect("usable");
     assert_eq!((summary.decimation, summary.q_cutoff_hz), (1, Some(20.0)));
@@ -186,7 +188,7 @@ fn a_slow_log_keeps_every_row() {
 
 #[test]
 fn logs_that_cannot_be_used_say_why() {
-    let settings = Settings::default();
+    let settings = FilterSettings::default();
     let outcome = |t: &[f64]| run(t, &settings).map(|_| ()).expect_err("not usable");
     assert_eq!(outcome(&[]), MotionError::TooFewSamples { samples: 0 });
     assert_eq!(outcome(&[1.0]), MotionError::TooFewSamples { samples: 1 });
@@ -216,7 +218,7 @@ fn logs_that_cannot_be_used_say_why() {
 fn time_that_runs_backwards_late_in_a_log_is_found() {
     let mut t = even(30_000, 1e-3);
     t[25_000] = 1.0;
-    let error = run(&t, &Settings::default()).expect_err("not usable");
+    let error = run(&t, &FilterSettings::default()).expect_err("not usable");
     assert!(matches!(error, MotionError::Time { after, .. } if after == 1.0));
 }
 
@@ -224,21 +226,21 @@ fn time_that_runs_backwards_late_in_a_log_is_found() {
 fn settings_out_of_range_are_named() {
     let t = even(5_000, 1e-3);
     let broken = [
-        Settings {
+        FilterSettings {
             decimation: Some(0),
-            ..Settings::default()
+            ..FilterSettings::default()
         },
-        Settings {
+        FilterSettings {
             gap_factor: 0.5,
-            ..Settings::default()
+            ..FilterSettings::default()
         },
-        Settings {
+        FilterSettings {
             trim_s: Some(-1.0),
-            ..Settings::default()
+            ..FilterSettings::default()
         },
-        Settings {
+        FilterSettings {
             q_trim_s: Some(f64::NAN),
-            ..Settings::default()
+            ..FilterSettings::default()
         },
     ];
     for (settings, expected) in
@@ -250,10 +252,10 @@ fn settings_out_of_range_are_named() {
         assert!(matches!(error, MotionError::Setting { name, .. } if name == expected));
     }
     for cutoff_hz in [0.0, -1.0, f64::NAN, 600.0] {
-        let settings = Settings {
+        let settings = FilterSettings {
             cutoff_hz,
             q_cutoff_hz: Some(60.0),
-            ..Settings::default()
+            ..FilterSettings::default()
         };
         assert!(matches!(
             run(&t, &settings),
@@ -270,7 +272,7 @@ fn a_block_of_another_width_is_refused() {
         tau: vec![0.0; 2],
         ..Block::default()
     };
-    let error = run_block(block, &Settings::default()).expect_err("two joints");
+    let error = run_block(block, &FilterSettings::default()).expect_err("two joints");
     assert!(matches!(
         error,
         MotionError::Shape {
@@ -296,10 +298,10 @@ fn a_channel_that_is_not_finite_is_placed_in_time() {
             Ok(!std::mem::replace(&mut read, true))
         },
         1,
-        &Settings::default(),
+        &FilterSettings::default(),
         None,
         3,
-        &|s: &Sample<'_>, y: &mut [f64]| {
+        &|s: &MotionSample<'_>, y: &mut [f64]| {
             y.fill(1.0);
             if s.t >= 15.0 {
                 y[2] = f64::NAN;
@@ -318,10 +320,10 @@ fn an_error_of_the_source_is_passed_on() {
     let outcome = motion::run::<&str>(
         &mut |_: &mut Block| Err("interrupted"),
         1,
-        &Settings::default(),
+        &FilterSettings::default(),
         None,
         1,
-        &|_: &Sample<'_>, _: &mut [f64]| {},
+        &|_: &MotionSample<'_>, _: &mut [f64]| {},
         &mut |_| {},
     );
     assert!(matches!(outcome, Err(RunError::Source("interrupted"))));
@@ -335,7 +337,7 @@ fn a_record_in_memory_gives_motion_at_its_own_rows() {
             .map(|k| (k as f64 + jitter * rng.random_range(-1.0..1.0)) * 1e-3)
             .collect();
         let q: Vec<f64> = t.iter().map(|&t| position(t)).collect();
-        let smooth = motion::full_rate(&t, &q, 1, &Settings::default()).expect("usable");
+        let smooth = motion::full_rate(&t, &q, 1, &FilterSettings::default()).expect("usable");
         assert_eq!(smooth.v.len(), t.len());
         assert!(smooth.settled.len() > 7_700 && smooth.settled.start > 10);
         for k in smooth.settled.clone() {
@@ -353,7 +355,7 @@ fn a_record_with_a_gap_is_cut_by_the_caller() {
         *time += 1.0;
     }
     let q: Vec<f64> = t.iter().map(|&t| position(t)).collect();
-    let error = motion::full_rate(&t, &q, 1, &Settings::default());
+    let error = motion::full_rate(&t, &q, 1, &FilterSettings::default());
     assert!(
         matches!(error, Err(MotionError::Gap { from, to }) if from < 1.5 && to > 2.4),
         "{error:?}"

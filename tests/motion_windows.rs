@@ -6,7 +6,8 @@ use cft_ident::log::Block;
 use cft_ident::math::sos::Sos;
 use cft_ident::math::zero_phase::ZeroPhase;
 use cft_ident::motion::{
-    self, Differences, ParallelFilter, Row, Sample, Settings, Summary, TorqueTiming,
+    self, Differences, FilterSettings, FilteredRow, MotionSample, ParallelFilter, Summary,
+    TorqueTiming,
 };
 use proptest::prelude::*;
 
@@ -56,7 +57,7 @@ fn log(stretches: &[usize], dt: f64) -> Log {
     Log { t, q, tau }
 }
 
-fn fill(sample: &Sample<'_>, channels: &mut [f64]) {
+fn fill(sample: &MotionSample<'_>, channels: &mut [f64]) {
     channels[0] = sample.tau[0];
     channels[1] = sample.tau[1];
     for j in 0..JOINTS {
@@ -69,7 +70,7 @@ fn fill(sample: &Sample<'_>, channels: &mut [f64]) {
     channels[10] = 1.0;
 }
 
-fn run(log: &Log, settings: &Settings, block: usize) -> (Vec<Kept>, Summary) {
+fn run(log: &Log, settings: &FilterSettings, block: usize) -> (Vec<Kept>, Summary) {
     let mut at = 0;
     let mut kept = Vec::new();
     let summary = motion::run::<Infallible>(
@@ -87,7 +88,7 @@ fn run(log: &Log, settings: &Settings, block: usize) -> (Vec<Kept>, Summary) {
         None,
         CHANNELS,
         &fill,
-        &mut |row: &Row<'_>| {
+        &mut |row: &FilteredRow<'_>| {
             kept.push(Kept {
                 t: row.t,
                 segment: row.segment,
@@ -104,7 +105,7 @@ fn run(log: &Log, settings: &Settings, block: usize) -> (Vec<Kept>, Summary) {
 }
 
 /// The same by plain means: every segment as a whole.
-fn whole(log: &Log, stretches: &[usize], settings: &Settings, dt: f64) -> Vec<Kept> {
+fn whole(log: &Log, stretches: &[usize], settings: &FilterSettings, dt: f64) -> Vec<Kept> {
     let rate = 1.0 / dt;
     let q_cutoff = settings.q_cutoff_hz.expect("given");
     let position =
@@ -137,7 +138,7 @@ fn whole(log: &Log, stretches: &[usize], settings: &Settings, dt: f64) -> Vec<Ke
         for (k, &time) in t.iter().enumerate().take(length - edge).skip(edge) {
             let row = k * JOINTS..(k + 1) * JOINTS;
             let mut channels = [0.0; CHANNELS];
-            let sample = Sample {
+            let sample = MotionSample {
                 t: time,
                 q: &q[row.clone()],
                 v: &v[row.clone()],
@@ -200,19 +201,23 @@ fn largest_difference(found: &[Kept], expected: &[Kept]) -> f64 {
     .fold(0.0, f64::max)
 }
 
-fn settings() -> Settings {
-    Settings {
+fn settings() -> FilterSettings {
+    FilterSettings {
         cutoff_hz: 10.0,
         filter: ParallelFilter::Butterworth { order: 4 },
         decimation: Some(10),
         q_cutoff_hz: Some(60.0),
         q_trim_s: Some(0.06),
         trim_s: Some(0.1),
-        ..Settings::default()
+        ..FilterSettings::default()
     }
 }
 
-fn check(stretches: &[usize], settings: &Settings, block: usize) -> Result<(), TestCaseError> {
+fn check(
+    stretches: &[usize],
+    settings: &FilterSettings,
+    block: usize,
+) -> Result<(), TestCaseError> {
     let dt = 1e-3;
     let log = log(stretches, dt);
     let (found, summary) = run(&log, settings, block);
@@ -240,7 +245,7 @@ fn a_long_log_in_windows_equals_the_whole_log() {
     ] {
         for differences in [Differences::Central, Differences::HighOrder] {
             for (q_trim, trim) in [(0.0, 0.0), (0.06, 0.1), (0.5, 2.0)] {
-                let settings = Settings {
+                let settings = FilterSettings {
                     filter,
                     differences,
                     q_trim_s: Some(q_trim),
@@ -268,7 +273,7 @@ proptest! {
     ) {
         let mut stretches = stretches;
         stretches.push(long);
-        let settings = Settings {
+        let settings = FilterSettings {
             cutoff_hz,
             q_cutoff_hz: Some(q_factor * cutoff_hz),
             decimation: Some(decimation),
@@ -305,8 +310,8 @@ fn how_a_reader_cuts_its_blocks_changes_no_bit() {
     for (k, t) in log.t.iter_mut().enumerate() {
         *t += 2e-4 * ((k * k) as f64).sin();
     }
-    let settings = Settings {
-        torque: TorqueTiming::HeldOverSample,
+    let settings = FilterSettings {
+        torque: TorqueTiming::ZeroOrderHold,
         ..settings()
     };
     let (whole, summary) = run(&log, &settings, log.t.len());

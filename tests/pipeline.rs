@@ -6,10 +6,10 @@ use std::path::Path;
 use std::process::Command;
 
 use cft_ident::inertia::accumulate;
-use cft_ident::inertia::columns::{Columns, KnownFriction};
-use cft_ident::inertia::solve::{Estimator, Fit, fit};
+use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
+use cft_ident::inertia::solve::{Fit, Weighting, fit};
 use cft_ident::log::Block;
-use cft_ident::motion::{HeldForces, Settings as Processing};
+use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::simulate::cft_experiment::{excitation, follow};
@@ -31,14 +31,14 @@ fn fitted(robot: &Robot, truth: &CftTruth, recording: &Recording<4>) -> Fit {
         tau: recording.torque.concat(),
         ..Block::default()
     };
-    HeldForces::new(4).centre(robot, &mut log);
+    ZeroOrderHold::new(4).centre(robot, &mut log);
     let known = truth.friction.map(|law| {
         Some(KnownFriction {
             law,
             covariance: [[0.0; 5]; 5],
         })
     });
-    let columns = Columns {
+    let columns = RegressorColumns {
         joints: 4,
         shared: 12,
         own: vec![Vec::new(); 4],
@@ -49,7 +49,7 @@ fn fitted(robot: &Robot, truth: &CftTruth, recording: &Recording<4>) -> Fit {
         ..Processing::default()
     };
     let (sums, _) = accumulate(robot, &columns, &processing, &mut source(&log)).unwrap();
-    fit(&sums, Estimator::Wls).unwrap()
+    fit(&sums, Weighting::Wls).unwrap()
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
         chance ^= chance << 17;
         (chance >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     };
-    let columns = Columns {
+    let columns = RegressorColumns {
         joints: 4,
         shared: 12,
         own: vec![Vec::new(); 4],
@@ -111,7 +111,7 @@ fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
         columns.fill(&robot, &q, &v, &a, &tau, &mut channels);
         sums.add(0, f64::from(k) * 0.01, &channels);
     }
-    let fit = fit(&sums.finish(), Estimator::Wls).unwrap();
+    let fit = fit(&sums.finish(), Weighting::Wls).unwrap();
     assert_eq!(fit.rank, 11);
     assert!(!fit.determined[0]);
     assert_eq!(fit.confounded.len(), 1);

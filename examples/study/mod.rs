@@ -11,9 +11,9 @@ use cft_ident::config::Trajectory;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
 use cft_ident::friction::inputs::Inputs;
 use cft_ident::friction::motions::motions;
-use cft_ident::friction::prepare::{Prepared, Sensors as Read, prepare};
+use cft_ident::friction::prepare::{Prepared, SensorModel as Read, prepare};
 use cft_ident::log::Block;
-use cft_ident::motion::Settings as Processing;
+use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;
 use cft_ident::simulate::reference::Fourier;
 use cft_ident::simulate::{Frame, Noise, Path as Motion, Recording, Reference, Settings};
@@ -172,7 +172,7 @@ pub fn estimated(
     let variance = |q: &[f64]| robot.encoder_variance(joint, q).unwrap_or(f64::NAN);
     let sensors = Read {
         variance: &variance,
-        held: true,
+        zero_order_hold: true,
     };
     let wide = found(&processing());
     let narrower = found(&narrowed(&processing(), 1000.0));

@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use cft_ident::diagnose::{Candidate, Case, Diagnosis, Limits, LogRole, Open, Prior, diagnose};
 use cft_ident::effect::{Added, Refined};
 use cft_ident::inertia::accumulate;
-use cft_ident::inertia::columns::{Columns, KnownFriction};
-use cft_ident::inertia::solve::{Estimator, fit};
+use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
+use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::log::Block;
-use cft_ident::motion::{HeldForces, Parallel, Settings as Processing, Stretch, stretches};
+use cft_ident::motion::{
+    FilterSettings as Processing, Parallel, Stretch, ZeroOrderHold, stretches,
+};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::robot::model::{JointFriction, Model};
@@ -347,7 +349,7 @@ impl Lab {
 
     fn log(&self, recording: &Recording<4>) -> Block {
         let mut log = block(recording);
-        HeldForces::new(4).centre(&self.robot, &mut log);
+        ZeroOrderHold::new(4).centre(&self.robot, &mut log);
         log
     }
 
@@ -501,7 +503,7 @@ impl Campaign {
                 all.extend(arm(all.len(), &lab.log(&recording)));
             }
         }
-        let columns = Columns {
+        let columns = RegressorColumns {
             joints: 4,
             shared: 12,
             own: vec![Vec::new(); 4],
@@ -509,7 +511,7 @@ impl Campaign {
         };
         let training = lab.run(truth, before, motion(seed), 10 * seed + 5);
         let sums = accumulate(robot, &columns, &processing(), &mut source(&training));
-        let fitted = fit(&sums.expect("a log").0, Estimator::Wls).expect("a fit");
+        let fitted = fit(&sums.expect("a log").0, Weighting::Wls).expect("a fit");
         let declared = Refined::plain(Model {
             robot: robot.clone(),
             theta: fitted.theta.iter().copied().collect(),

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use cft_ident::diagnose::{LogRole, Prior};
 use cft_ident::effect::Refined;
 use cft_ident::inertia::accumulate;
-use cft_ident::inertia::columns::{Columns, Own};
-use cft_ident::inertia::solve::{Estimator, fit};
+use cft_ident::inertia::columns::{Own, RegressorColumns};
+use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::log::Block;
-use cft_ident::motion::{HeldForces, Settings as Processing};
+use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::robot::{JointKind, Robot};
@@ -106,14 +106,14 @@ pub fn log(truth: &SingleJointTruth, specs: &[EffectSpec], noise: f64, seed: u64
         tau: recording.torque.concat(),
         ..Block::default()
     };
-    HeldForces::new(1).centre(&robot(truth), &mut log);
+    ZeroOrderHold::new(1).centre(&robot(truth), &mut log);
     log
 }
 
 /// Its logs and the declared model.
 pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Campaign {
     let robot = robot(truth);
-    let columns = Columns {
+    let columns = RegressorColumns {
         joints: 1,
         shared: 1,
         own: vec![vec![Own::Viscous, Own::Coulomb]],
@@ -126,7 +126,7 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
         &settings(),
         &mut crate::study::source(&training),
     );
-    let fitted = fit(&sums.expect("a log").0, Estimator::Wls).expect("a fit");
+    let fitted = fit(&sums.expect("a log").0, Weighting::Wls).expect("a fit");
     let declared = Refined::plain(model(
         &robot,
         [fitted.theta[0], fitted.theta[1], fitted.theta[2]],

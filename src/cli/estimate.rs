@@ -6,18 +6,18 @@ use serde_json::{Value, json};
 use super::context::Progress;
 use super::machine::{Machine, narrowed, run_error, summary_warnings};
 use super::{CliError, Context};
-use crate::inertia::accumulate::Sums;
+use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::closed_loop::Gains;
-use crate::inertia::columns::Columns;
+use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use crate::inertia::feasible::nearest;
-use crate::inertia::instruments::{self, Instrumental, Reference};
-use crate::inertia::refine::{self, Refined};
+use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
+use crate::inertia::refine::{self, RefinedFit};
 use crate::inertia::robust::{self, Robust, Status, Weigher};
 use crate::inertia::solve::{self, Fit, FitError, fit};
 use crate::inertia::{accumulate_weighted, add_processing};
 use crate::log::{Block, LogSpec, Provenance};
-use crate::motion::{Settings, Summary};
+use crate::motion::{FilterSettings, Summary};
 use crate::number;
 
 /// How parameters are estimated from the rows.
@@ -78,7 +78,7 @@ pub struct Account {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
     pub gains: Gains,
-    pub reference: Reference,
+    pub reference: ReferenceSource,
     /// Share of the steps at which the simulation failed a joint.
     pub indefinite: f64,
 }
@@ -111,8 +111,8 @@ impl Account {
         }
         if let Some(simulated) = &self.simulated {
             out["reference"] = match simulated.reference {
-                Reference::Logged => json!("logged"),
-                Reference::Smoothed => json!("smoothed"),
+                ReferenceSource::Logged => json!("logged"),
+                ReferenceSource::Smoothed => json!("smoothed"),
             };
             out["loop_frequency"] = json!(simulated.gains.frequency);
             out["failed_steps_share"] = json!(simulated.indefinite);
@@ -213,12 +213,12 @@ impl<'a> Passes<'a> {
 
     fn read(
         &mut self,
-        settings: &Settings,
-        columns: &Columns,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
         mut weigher: Option<&mut Weigher>,
-    ) -> Result<Sums, CliError> {
+    ) -> Result<BlockFactors, CliError> {
         let first = self.summary.is_none();
-        let mut total: Option<Sums> = None;
+        let mut total: Option<BlockFactors> = None;
         for spec in self.logs {
             let mut log = self.machine.open(spec, self.context)?;
             let (sums, summary) = accumulate_weighted(
@@ -247,18 +247,18 @@ impl<'a> Passes<'a> {
     /// Rows with instruments from the loop under `theta`.
     fn read_instruments(
         &mut self,
-        settings: &Settings,
-        columns: &Columns,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
         theta: &DVector<f64>,
-    ) -> Result<(Sums, Simulated), CliError> {
+    ) -> Result<(BlockFactors, Simulated), CliError> {
         let step = self.summary.as_ref().map_or(1e-3, |s| s.dt);
-        let mut total: Option<(Sums, Simulated)> = None;
+        let mut total: Option<(BlockFactors, Simulated)> = None;
         for spec in self.logs {
             let mut log = self.machine.open(spec, self.context)?;
             let mut logged = self.machine.open_reference(spec)?;
             let reference = match logged {
-                Some(_) => Reference::Logged,
-                None => Reference::Smoothed,
+                Some(_) => ReferenceSource::Logged,
+                None => ReferenceSource::Smoothed,
             };
             let mut source = |block: &mut Block| {
                 let more = log.read(block)?;
@@ -285,10 +285,10 @@ impl<'a> Passes<'a> {
                         reference,
                         indefinite: read.indefinite,
                     };
-                    total = Some((read.sums, simulated));
+                    total = Some((read.factors, simulated));
                 }
                 Some((sums, simulated)) => {
-                    sums.merge(read.sums);
+                    sums.merge(read.factors);
                     simulated.indefinite = simulated.indefinite.max(read.indefinite);
                 }
             }
@@ -300,12 +300,12 @@ impl<'a> Passes<'a> {
     /// Positions rounded anew on a shifted grid of the encoders.
     fn read_shifted(
         &mut self,
-        settings: &Settings,
-        columns: &Columns,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
         grid: u32,
         mut weigher: Option<&mut Weigher>,
-    ) -> Result<Option<Sums>, CliError> {
-        let mut total: Option<Sums> = None;
+    ) -> Result<Option<BlockFactors>, CliError> {
+        let mut total: Option<BlockFactors> = None;
         for spec in self.logs {
             let mut log = self.machine.open(spec, self.context)?;
             let sums = accumulate_shifted(
@@ -329,7 +329,7 @@ impl<'a> Passes<'a> {
 
 /// A fit, the columns that its unknowns belong to, and how it came about.
 pub struct Estimated {
-    pub columns: Columns,
+    pub columns: RegressorColumns,
     pub fit: Fit,
     pub basis: Basis,
     pub account: Account,
@@ -337,23 +337,23 @@ pub struct Estimated {
 
 /// The rows that the fit is about, reduced.
 pub struct Basis {
-    pub sums: Sums,
+    pub sums: BlockFactors,
     /// What their solution lacks to the fit's parameters: a law that they are linear about.
     pub shift: DVector<f64>,
 }
 
 /// What turns other readings of the logs into a fit of the same kind.
 enum Solver {
-    Linear(solve::Estimator),
+    Linear(solve::Weighting),
     Robust(Box<Weigher>),
-    Refined(Box<Refined>),
+    Refined(Box<RefinedFit>),
     /// The fit, and the parameters that were simulated.
     Instrumental(Box<(Fit, DVector<f64>)>),
 }
 
 impl Solver {
-    /// Columns of the rows.
-    fn columns<'a>(&'a self, linear: &'a Columns) -> &'a Columns {
+    /// RegressorColumns of the rows.
+    fn columns<'a>(&'a self, linear: &'a RegressorColumns) -> &'a RegressorColumns {
         match self {
             Solver::Refined(refined) => &refined.columns,
             _ => linear,
@@ -367,13 +367,13 @@ impl Solver {
         }
     }
 
-    fn solve(&self, sums: Sums, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
+    fn solve(&self, sums: BlockFactors, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
         match self {
             Solver::Refined(refined) => refined.solve(sums),
             Solver::Robust(own) => weigher.unwrap_or(own).solve(&sums),
             Solver::Linear(estimator) => fit(&sums, *estimator),
             // rows without instruments: what moves the plain fit moves this one
-            Solver::Instrumental(_) => fit(&sums, solve::Estimator::Wls),
+            Solver::Instrumental(_) => fit(&sums, solve::Weighting::Wls),
         }
     }
 }
@@ -385,7 +385,7 @@ impl Solver {
 /// Every [`CliError`] of logs that are read, and of a fit.
 pub fn estimate(
     passes: &mut Passes,
-    columns: Columns,
+    columns: RegressorColumns,
     estimator: Estimator,
     law: bool,
 ) -> Result<Estimated, CliError> {
@@ -394,7 +394,7 @@ pub fn estimate(
     let (mut fit, sums, solver) = match estimator {
         Estimator::Oe | Estimator::Wls if law || estimator == Estimator::Oe => {
             passes.bar.label("friction law");
-            let mut pass = |columns: &Columns| passes.read(&settings, columns, None);
+            let mut pass = |columns: &RegressorColumns| passes.read(&settings, columns, None);
             let start = match law {
                 true => refine::begin(&columns, &mut pass)?,
                 false => columns.clone(),
@@ -404,7 +404,7 @@ pub fn estimate(
             account.status = refined.status;
             account.iterations = refined.iterations;
             account.before = Some(refined.before.clone());
-            let sums = refined.sums.in_one_block();
+            let sums = refined.factors.in_one_block();
             (
                 refined.fit.clone(),
                 sums,
@@ -415,7 +415,7 @@ pub fn estimate(
             passes.bar.label("robust regression");
             let Robust {
                 fit,
-                sums,
+                factors: sums,
                 weigher,
                 status,
                 iterations,
@@ -430,17 +430,17 @@ pub fn estimate(
         Estimator::Iv => {
             passes.bar.label("instrumental variables");
             let sums = passes.read(&settings, &columns, None)?;
-            let plain = fit(&sums, solve::Estimator::Wls)?;
+            let plain = fit(&sums, solve::Weighting::Wls)?;
             let map = passes.machine.robot.standard_map();
             let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
-            let worth = plain.effective_rows / plain.rows as f64;
+            let effective = plain.effective_rows / plain.rows as f64;
             let mut simulate_by = plain.theta.clone();
             let Instrumental {
                 fit,
                 status,
                 iterations,
             } = instruments::iterate(&columns, &plain, &mut |theta| {
-                simulate_by = nearest(&map, &whole, worth, theta)?;
+                simulate_by = nearest(&map, &whole, effective, theta)?;
                 let (sums, simulated) =
                     passes.read_instruments(&settings, &columns, &simulate_by)?;
                 account.simulated = Some(simulated);
@@ -453,8 +453,8 @@ pub fn estimate(
         }
         Estimator::Ols | Estimator::Wls | Estimator::Oe => {
             let estimator = match estimator {
-                Estimator::Ols => solve::Estimator::Ols,
-                _ => solve::Estimator::Wls,
+                Estimator::Ols => solve::Weighting::Ols,
+                _ => solve::Weighting::Wls,
             };
             let sums = passes.read(&settings, &columns, None)?;
             let found = fit(&sums, estimator)?;

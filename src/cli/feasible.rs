@@ -1,4 +1,4 @@
-//! `lsq --feasible`: links that can exist, and by how much the fit suffers.
+//! `lsq --feasible`: physically consistent links, and by how much the fit suffers.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use super::estimate::Estimated;
 use super::machine::Machine;
 use crate::config::ModelFile;
 use crate::config::model_file::LinkBody;
-use crate::inertia::feasible::{Feasible, PRIOR_WEIGHT, Task, feasible};
+use crate::inertia::feasible::{ConsistencyProblem, Feasible, PRIOR_WEIGHT, feasible};
 use crate::inertia::robust::Status;
 use crate::inertia::solve::{factor, residual_of, weights_of};
 use crate::number;
 use crate::report::table::{Align, Table, hanging, unbroken};
 use crate::robot::standard::{Body, StandardMap, pseudo_inertia};
 
-/// Links that can exist, and what they cost.
+/// Physically consistent links, and what they cost.
 pub struct Physical {
     map: StandardMap,
     found: Feasible,
@@ -43,11 +43,11 @@ pub fn physical(machine: &Machine, estimated: &mut Estimated) -> Result<Physical
         &basis.sums,
         &residual_of(&basis.sums, &(&fit.theta - &basis.shift))?,
     );
-    let found = feasible(&Task {
+    let found = feasible(&ConsistencyProblem {
         map: &map,
         bodies: &bodies,
         factor: &factor(&basis.sums, &weights)?,
-        worth: fit.effective_rows / fit.rows as f64,
+        effective: fit.effective_rows / fit.rows as f64,
     })?;
     // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
     let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;

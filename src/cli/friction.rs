@@ -14,8 +14,8 @@ use crate::config::model_file::{ModelProvenance, Parameter};
 use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::inputs::Inputs;
-use crate::friction::passes::{Ending, Given};
-use crate::friction::prepare::{Motion, Sensors, prepare, resolution};
+use crate::friction::passes::{Ending, GivenNoise};
+use crate::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
 use crate::log::{LogSpec, Provenance, did_you_mean};
 use crate::number;
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
@@ -138,8 +138,8 @@ pub fn identify(
 /// Logs of one joint.
 #[derive(Default)]
 struct Group {
-    motions: Vec<Motion>,
-    narrower: Vec<Motion>,
+    motions: Vec<SmoothedMotion>,
+    narrower: Vec<SmoothedMotion>,
     held: bool,
     logs: Vec<String>,
 }
@@ -163,9 +163,9 @@ fn one_joint(
         };
         known.unwrap_or(resolution * resolution / 12.0)
     };
-    let sensors = Sensors {
+    let sensors = SensorModel {
         variance: &variance,
-        held: group.held,
+        zero_order_hold: group.held,
     };
     let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
         undetermined(FrictionError::StandsStill {
@@ -174,7 +174,7 @@ fn one_joint(
     })?;
     let options = Options {
         start: start_of(machine, name),
-        noise: Given {
+        noise: GivenNoise {
             torque: noise.and_then(|n| n.torque_std),
             position_factor: None,
         },

@@ -14,9 +14,9 @@ use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::{FrictionLawKind, ModelKind};
-use crate::inertia::columns::{Columns, KnownFriction, Own};
+use crate::inertia::columns::{KnownFriction, Own, RegressorColumns};
 use crate::inertia::essential::{Essential, essential};
-use crate::inertia::instruments::Reference;
+use crate::inertia::instruments::ReferenceSource;
 use crate::inertia::robust::Status;
 use crate::inertia::solve::{Fit, factor, residual_of, weights_of};
 use crate::inertia::verdict::verdict;
@@ -81,7 +81,7 @@ pub struct Unknown {
 
 /// Result of the stage.
 pub struct Identified {
-    pub columns: Columns,
+    pub columns: RegressorColumns,
     pub fit: Fit,
     /// What the estimator did.
     pub account: Account,
@@ -143,7 +143,7 @@ pub fn identify(
             .push("no parameter of this model is nonlinear: oe gives what wls gives".to_owned());
     }
     if let Some(simulated) = &account.simulated {
-        if simulated.reference == Reference::Smoothed {
+        if simulated.reference == ReferenceSource::Smoothed {
             warnings.push("iv: no log channel is named as the reference, so the measured position, smoothed to half the cut-off, stands for it; a part of its noise stays in the instruments. Name the channel: `reference = \"COLUMN\"` in [log.joint.NAME]".to_owned());
         }
         if simulated.indefinite > 0.0 {
@@ -227,7 +227,10 @@ fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), CliError> 
 }
 
 /// Which columns this robot's rows have.
-fn columns(machine: &Machine, friction: Option<(&str, &ModelFile)>) -> Result<Columns, CliError> {
+fn columns(
+    machine: &Machine,
+    friction: Option<(&str, &ModelFile)>,
+) -> Result<RegressorColumns, CliError> {
     let robot = &machine.robot;
     let n = robot.joints();
     let section = &machine.file.friction;
@@ -251,7 +254,7 @@ fn columns(machine: &Machine, friction: Option<(&str, &ModelFile)>) -> Result<Co
             own[j].push(Own::Offset);
         }
     }
-    Ok(Columns {
+    Ok(RegressorColumns {
         joints: n,
         shared: robot.parameters().len(),
         own,
@@ -259,7 +262,7 @@ fn columns(machine: &Machine, friction: Option<(&str, &ModelFile)>) -> Result<Co
     })
 }
 
-fn unknowns(machine: &Machine, columns: &Columns, fit: &Fit) -> Vec<Unknown> {
+fn unknowns(machine: &Machine, columns: &RegressorColumns, fit: &Fit) -> Vec<Unknown> {
     let robot = &machine.robot;
     let rate = |i: usize, value: f64| {
         let std = fit.covariance[(i, i)].max(0.0).sqrt();

@@ -11,11 +11,11 @@ use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
 use crate::friction::motions::motions;
-use crate::friction::prepare::Motion;
+use crate::friction::prepare::SmoothedMotion;
 use crate::inspect::{Cutter, Fault, Gate};
 use crate::log::{Block, Instant, Layout, LogError, LogSpec, Provenance, Reader, escape};
 use crate::motion::{
-    Differences, HeldForces, ParallelFilter, RunError, Settings, Summary, TorqueTiming,
+    Differences, FilterSettings, ParallelFilter, RunError, Summary, TorqueTiming, ZeroOrderHold,
 };
 use crate::robot::{JointKind, Robot};
 
@@ -31,9 +31,9 @@ const MOST_ROWS: usize = 2_000_000;
 
 /// A one-joint log, read and smoothed.
 pub struct OneJointLog {
-    pub motions: Vec<Motion>,
+    pub motions: Vec<SmoothedMotion>,
     /// The same with a narrower position filter.
-    pub narrower: Vec<Motion>,
+    pub narrower: Vec<SmoothedMotion>,
     /// The torque is held from row to row.
     pub held: bool,
     pub provenance: Provenance,
@@ -42,9 +42,9 @@ pub struct OneJointLog {
 }
 
 /// The same processing with a narrower position filter.
-pub fn narrowed(settings: &Settings, rate_hz: f64) -> Settings {
+pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
     let plain = (6.0 * settings.cutoff_hz).min(0.4 * rate_hz);
-    Settings {
+    FilterSettings {
         q_cutoff_hz: Some(NARROWER * settings.q_cutoff_hz.unwrap_or(plain)),
         ..settings.clone()
     }
@@ -95,7 +95,7 @@ pub struct Open<'a> {
     reader: Reader,
     context: &'a Context,
     /// Brings held motor forces to the rows' own time and pose.
-    centre: Option<(&'a Robot, HeldForces)>,
+    centre: Option<(&'a Robot, ZeroOrderHold)>,
     name: String,
     gate: Arc<Gate>,
     cutter: Cutter,
@@ -251,16 +251,16 @@ impl Machine {
     /// Opens a log with every torque at the time and pose of its row.
     pub fn open<'a>(&'a self, spec: &LogSpec, context: &'a Context) -> Result<Open<'a>, CliError> {
         let (mut open, held) = self.open_raw(spec, context)?;
-        open.centre = held.then(|| (&self.robot, HeldForces::new(self.robot.joints())));
+        open.centre = held.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
         Ok(open)
     }
 
     /// Processing of logs for least squares and validation.
-    pub fn settings(&self) -> Settings {
+    pub fn settings(&self) -> FilterSettings {
         let f = &self.file.filter;
-        let plain = Settings::default();
+        let plain = FilterSettings::default();
         let order = f.order.map(|o| o as usize);
-        Settings {
+        FilterSettings {
             cutoff_hz: f.cutoff_hz.unwrap_or(plain.cutoff_hz),
             filter: match f.kind {
                 Some(FilterKind::ChebyshevDecimate) => ParallelFilter::Chebyshev {
@@ -287,8 +287,8 @@ impl Machine {
     }
 
     /// Smoothing of the motion that the friction filter takes as known.
-    fn friction_settings(&self, rate_hz: f64) -> Settings {
-        Settings {
+    fn friction_settings(&self, rate_hz: f64) -> FilterSettings {
+        FilterSettings {
             q_cutoff_hz: Some(
                 self.file
                     .filter
@@ -334,7 +334,7 @@ impl Machine {
         };
         let declared = self.friction_settings(rate);
         let narrower = narrowed(&declared, rate);
-        let smooth = |settings: &Settings| {
+        let smooth = |settings: &FilterSettings| {
             let n = self.robot.joints();
             motions(&whole.t, &whole.q, &whole.tau, n, settings)
                 .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))

@@ -10,7 +10,7 @@ use super::refined::refined;
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::log::LogSpec;
-use crate::motion::{self, Settings};
+use crate::motion::{self, FilterSettings};
 use crate::number;
 use crate::output::LogWriter;
 use crate::report::json::Document;
@@ -62,7 +62,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .collect();
     let mut out = LogWriter::create(&args.output, &columns)?;
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
-    let settings = Settings {
+    let settings = FilterSettings {
         decimation: Some(1),
         q_trim_s: Some(0.0),
         trim_s: Some(0.0),

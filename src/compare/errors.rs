@@ -31,9 +31,9 @@ impl Difference {
     }
 }
 
-/// Differences of all joints.
+/// ErrorDifferences of all joints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Differences {
+pub struct ErrorDifferences {
     /// Joint by joint, in the robot's order.
     pub joints: Vec<Difference>,
     /// Of the root mean square over joints of the relative errors.
@@ -49,8 +49,8 @@ const SHORTEST: usize = 10;
 /// Resamplings.
 const DRAWS: usize = 1000;
 
-/// Sums of one joint over one piece: squared errors of both, squared torque.
-type Sums = [f64; 3];
+/// PieceSquares of one joint over one piece: squared errors of both, squared torque.
+type PieceSquares = [f64; 3];
 
 /// Compares two models on stretches that are filtered alike.
 ///
@@ -60,11 +60,11 @@ pub fn differences(
     models: [&Refined; 2],
     stretches: &[Stretch],
     parallel: &Parallel,
-) -> Result<Differences, MotionError> {
+) -> Result<ErrorDifferences, MotionError> {
     let n = models[0].model.robot.joints();
     let total: usize = stretches.iter().map(|s| parallel.rows(s.len())).sum();
     let length = total.div_ceil(PIECES).max(SHORTEST);
-    let mut pieces: Vec<Vec<Sums>> = Vec::new();
+    let mut pieces: Vec<Vec<PieceSquares>> = Vec::new();
     for stretch in stretches {
         let hats = models.map(|model| model.reconstruct(stretch));
         let channels: Vec<&[f64]> = stretch
@@ -79,7 +79,7 @@ pub fn differences(
             let last = (first + length).min(count);
             let joint = |j: usize| {
                 let (tau, a, b) = (&rows[j], &rows[n + j], &rows[2 * n + j]);
-                (first..last).fold([0.0; 3], |sums: Sums, i| {
+                (first..last).fold([0.0; 3], |sums: PieceSquares, i| {
                     [
                         sums[0] + (tau[i] - a[i]).powi(2),
                         sums[1] + (tau[i] - b[i]).powi(2),
@@ -93,7 +93,7 @@ pub fn differences(
     Ok(bootstrapped(&pieces, n))
 }
 
-fn bootstrapped(pieces: &[Vec<Sums>], n: usize) -> Differences {
+fn bootstrapped(pieces: &[Vec<PieceSquares>], n: usize) -> ErrorDifferences {
     // of each joint, then of the mean over joints
     let of = |picked: &[usize]| -> Vec<f64> {
         let mut squares = [0.0; 2];
@@ -139,14 +139,18 @@ fn bootstrapped(pieces: &[Vec<Sums>], n: usize) -> Differences {
         difference: f64::NAN,
         interval_95: None,
     });
-    Differences { joints, overall }
+    ErrorDifferences { joints, overall }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn pieces(a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64, count: usize) -> Vec<Vec<Sums>> {
+    fn pieces(
+        a: impl Fn(usize) -> f64,
+        b: impl Fn(usize) -> f64,
+        count: usize,
+    ) -> Vec<Vec<PieceSquares>> {
         (0..count).map(|k| vec![[a(k), b(k), 1.0]]).collect()
     }
 

@@ -4,5 +4,5 @@
 mod errors;
 mod parameters;
 
-pub use errors::{Difference, Differences, differences};
-pub use parameters::{Apart, Estimate, Pair, Reason, SideBySide, side_by_side};
+pub use errors::{Difference, ErrorDifferences, differences};
+pub use parameters::{Apart, ParameterEstimate, ParameterPair, Reason, SideBySide, side_by_side};

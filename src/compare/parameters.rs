@@ -11,7 +11,7 @@ use crate::verdict::Verdict;
 
 /// One model's estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct ParameterEstimate {
     /// Value [unit of the pair].
     pub value: f64,
     /// Standard deviation; none where the data say nothing.
@@ -22,7 +22,7 @@ pub struct Estimate {
 
 /// A parameter that both models have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Pair {
+pub struct ParameterPair {
     /// Name; `effect.key` for a number of an effect.
     pub name: String,
     /// Joint; none for what concerns all of them.
@@ -31,8 +31,8 @@ pub struct Pair {
     pub theta: Option<u32>,
     /// Unit of values and deviations.
     pub unit: String,
-    pub a: Estimate,
-    pub b: Estimate,
+    pub a: ParameterEstimate,
+    pub b: ParameterEstimate,
     /// b - a [unit].
     pub difference: f64,
     /// Root of the summed variances [unit]; none where one of them is unknown, where both are 0, and
@@ -69,7 +69,7 @@ pub struct Apart {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SideBySide {
     /// What both have, in the order of the first.
-    pub parameters: Vec<Pair>,
+    pub parameters: Vec<ParameterPair>,
     pub only_in_a: Vec<Apart>,
     pub only_in_b: Vec<Apart>,
 }
@@ -82,7 +82,7 @@ struct Entry {
     unit: String,
     /// What the robot's structure means by it; empty where the name says all.
     meaning: String,
-    estimate: Estimate,
+    estimate: ParameterEstimate,
 }
 
 /// Pairs the parameters of two models by name, joint, unit and meaning.
@@ -116,13 +116,13 @@ fn partner<'a>(entry: &Entry, among: &'a [Entry]) -> Result<&'a Entry, Reason> {
     }
 }
 
-fn pair(a: &Entry, b: &Entry) -> Pair {
+fn pair(a: &Entry, b: &Entry) -> ParameterPair {
     let difference = b.estimate.value - a.estimate.value;
     let difference_std = spread(&a.estimate)
         .zip(spread(&b.estimate))
         .map(|(a, b)| a.hypot(b))
         .filter(|std| *std > 0.0 && std.is_finite());
-    Pair {
+    ParameterPair {
         name: a.name.clone(),
         joint: a.joint.clone(),
         theta: a.theta,
@@ -136,7 +136,7 @@ fn pair(a: &Entry, b: &Entry) -> Pair {
 }
 
 /// Standard deviation of a value that is an estimate; a bound and a free choice have none.
-fn spread(estimate: &Estimate) -> Option<f64> {
+fn spread(estimate: &ParameterEstimate) -> Option<f64> {
     match estimate.verdict {
         Some(Verdict::LowerBound | Verdict::NotIdentifiable) => None,
         _ => estimate.std,
@@ -170,7 +170,7 @@ fn entries(model: &ModelFile) -> Vec<Entry> {
             theta: p.theta,
             unit: p.unit.clone(),
             meaning: meaning(p),
-            estimate: Estimate {
+            estimate: ParameterEstimate {
                 value: p.value,
                 std: p.std,
                 verdict: p.verdict,
@@ -191,7 +191,7 @@ fn entries(model: &ModelFile) -> Vec<Entry> {
             theta: None,
             unit: p.unit.clone(),
             meaning: String::new(),
-            estimate: Estimate {
+            estimate: ParameterEstimate {
                 value: p.value,
                 std: p.std,
                 verdict: None,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::trajectory::{Fourier, FourierCoordinate};
 use crate::config::{ModelFile, RobotFile};
-use crate::inertia::columns::{Columns, Own};
+use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::cft::pantograph::TURN_OFFSET;
 use crate::robot::cft::{COORDINATES, JOINTS, geometry};
 use crate::robot::model::{JointFriction, Model};
@@ -60,7 +60,7 @@ pub fn machine(
         Robot::SingleJoint(_) | Robot::Serial(_) => Motors::Joints,
     };
     let mut machine = Machine {
-        columns: Columns {
+        columns: RegressorColumns {
             joints: n,
             shared: robot.parameters().len(),
             own,

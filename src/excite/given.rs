@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::inertia::accumulate::Sums;
+use crate::inertia::accumulate::BlockFactors;
 
 use super::information::Information;
 use super::machine::Machine;
@@ -24,7 +24,7 @@ impl Given {
     }
 
     /// Adds a log's sums, whose filtered and decimated rows stand for `samples` of the log.
-    pub fn add_log(&mut self, sums: &Sums, samples: f64) {
+    pub fn add_log(&mut self, sums: &BlockFactors, samples: f64) {
         let columns = &sums.columns;
         let weight = samples / (sums.rows as f64).max(1.0);
         for (j, g) in self.joints.iter_mut().enumerate() {

@@ -1,7 +1,7 @@
 //! A machine as a design sees it: designed coordinates to joints, torques and volts, and what a fit
 //! would estimate from them.
 
-use crate::inertia::columns::{Columns, Own};
+use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::cft::pantograph::{joint_accelerations, joint_velocities, joints};
 use crate::robot::cft::{COORDINATES, Setup};
 use crate::robot::model::{JointFriction, Model};
@@ -24,7 +24,7 @@ pub enum Motors {
 pub struct Machine {
     pub model: Model,
     /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
-    pub columns: Columns,
+    pub columns: RegressorColumns,
     pub motors: Motors,
     /// Limits that a motion must keep.
     pub channels: Vec<Channel>,

@@ -5,12 +5,12 @@ use serde::Serialize;
 
 use super::excitation::{FrictionError, Speeds, speeds};
 use super::inputs::Inputs;
-use super::passes::{Ending, Given, Maximum, add_choices, bands, maximise};
+use super::passes::{Ending, GivenNoise, Maximum, add_choices, bands, maximise};
 use super::plateau::{Plateau, plateaus};
 use super::prepare::Prepared;
 use super::problem::FRICTION;
 use super::slope::{open_above, profile_slope};
-use super::start::{Start, constant_inertia, from_log};
+use super::start::{FrictionStart, constant_inertia, from_log};
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 
@@ -24,12 +24,12 @@ pub struct Options {
     /// Only the user's start, none from the log.
     pub only_start: bool,
     /// Noise levels that the user overrides.
-    pub noise: Given,
+    pub noise: GivenNoise,
 }
 
 /// One friction parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Value {
+pub struct EstimatedValue {
     pub value: f64,
     pub std: f64,
     pub verdict: Verdict,
@@ -37,7 +37,7 @@ pub struct Value {
 
 /// One point of the friction curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CurvePoint {
+pub struct FrictionCurvePoint {
     /// Velocity [m/s or rad/s].
     pub v: f64,
     /// Friction torque [N or Nm].
@@ -88,12 +88,12 @@ pub struct JointEstimate {
     /// The law at the maximum of the likelihood.
     pub law: DoubleTanh,
     /// Bv, Bf1, Bf2, w1, w2 with verdicts; a slope with a bound holds the bound.
-    pub values: [Value; FRICTION],
+    pub values: [EstimatedValue; FRICTION],
     /// Covariance of the five parameters in SI units.
     pub covariance: [[f64; FRICTION]; FRICTION],
     pub nuisance: Vec<Nuisance>,
     pub speeds: Speeds,
-    pub curve: Vec<CurvePoint>,
+    pub curve: Vec<FrictionCurvePoint>,
     pub plateaus: Vec<Plateau>,
     pub nis: Nis,
     /// Torque residual along the measured motion [N or Nm], and relative to the torque.
@@ -152,7 +152,7 @@ pub fn estimate(
         }
         starts.insert(
             0,
-            Start {
+            FrictionStart {
                 parameters: p,
                 residual: f64::INFINITY,
             },
@@ -220,7 +220,7 @@ fn assemble(
     let std = |i: usize| covariance[i][i].max(0.0).sqrt();
     let values = std::array::from_fn(|i| {
         let verdict = verdict_of(si[i], std(i));
-        let plain = Value {
+        let plain = EstimatedValue {
             value: si[i],
             std: std(i),
             verdict,
@@ -241,12 +241,12 @@ fn assemble(
         // where its own term is there
         let term = i == 3 || height != Verdict::NotIdentifiable;
         match profile_slope(problem, &maximum, i).filter(|_| term) {
-            Some(bound) => Value {
+            Some(bound) => EstimatedValue {
                 value: bound,
                 std: f64::NAN,
                 verdict: Verdict::LowerBound,
             },
-            None => Value {
+            None => EstimatedValue {
                 verdict: Verdict::NotIdentifiable,
                 ..plain
             },
@@ -290,14 +290,14 @@ fn curve(
     law: &DoubleTanh,
     covariance: &[[f64; FRICTION]; FRICTION],
     covered: [f64; 2],
-) -> Vec<CurvePoint> {
+) -> Vec<FrictionCurvePoint> {
     let [lo, hi] = covered;
     let step = |i: usize| lo + (hi - lo) * i as f64 / (CURVE_STEPS - 1) as f64;
     (0..CURVE_STEPS)
         .rev()
         .map(|i| -step(i))
         .chain((0..CURVE_STEPS).map(step))
-        .map(|v| CurvePoint {
+        .map(|v| FrictionCurvePoint {
             v,
             torque: law.torque(v),
             std: curve_std(law, covariance, v),
@@ -403,7 +403,7 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
 
 #[cfg(test)]
 mod tests {
-    use super::super::prepare::{Sensors, prepare};
+    use super::super::prepare::{SensorModel, prepare};
     use super::super::trial::Trial;
     use super::*;
     use crate::robot::{JointKind, Robot};
@@ -491,9 +491,9 @@ mod tests {
         }
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let variance = trial.step * trial.step / 12.0;
-        let sensors = Sensors {
+        let sensors = SensorModel {
             variance: &|_| variance,
-            held: true,
+            zero_order_hold: true,
         };
         let prepared = prepare(&robot, 0, &[motion], &sensors).unwrap();
         let e = estimate(

@@ -1,6 +1,6 @@
 //! Which joint a log moves, and whether its motion can show friction at all.
 
-use super::prepare::{Motion, rms};
+use super::prepare::{SmoothedMotion, rms};
 
 /// Why a log cannot give a joint's friction. Each message says what motion is missing.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -55,7 +55,7 @@ const AMBIGUOUS: f64 = 0.3;
 /// The joint that moves. `range` is each joint's full travel [m or rad]; ones where unknown.
 pub fn moving_joint(
     names: &[String],
-    motions: &[Motion],
+    motions: &[SmoothedMotion],
     range: &[f64],
 ) -> Result<usize, FrictionError> {
     let n = names.len();

@@ -5,7 +5,7 @@
 //! non-zero rows only for `q` and `v`, so that the parameters' block of `P` changes in updates
 //! alone.
 
-use super::problem::{FRICTION, Noise, Problem};
+use super::problem::{FRICTION, FrictionProblem, NoiseLevels};
 use super::propagate::{Interval, Law, Transition, with_sensitivities};
 
 /// Estimate of the filter after a pass over all records.
@@ -23,7 +23,7 @@ pub struct Pass {
 }
 
 /// Working memory of the filter; made once, used for any number of passes.
-pub struct Filter {
+pub struct ExtendedKalmanFilter {
     n: usize,
     x: Vec<f64>,
     p: Vec<f64>,
@@ -34,10 +34,10 @@ pub struct Filter {
     transition: Transition,
 }
 
-impl Filter {
-    pub fn new(problem: &Problem) -> Self {
+impl ExtendedKalmanFilter {
+    pub fn new(problem: &FrictionProblem) -> Self {
         let n = 2 + problem.parameters();
-        Filter {
+        ExtendedKalmanFilter {
             n,
             x: vec![0.0; n],
             p: vec![0.0; n * n],
@@ -53,7 +53,13 @@ impl Filter {
     ///
     /// Linearised along the running estimate, as (32) says. Between records the states are
     /// forgotten and the parameters kept.
-    pub fn pass(&mut self, problem: &Problem, start: &[f64], spread: &[f64], noise: Noise) -> Pass {
+    pub fn pass(
+        &mut self,
+        problem: &FrictionProblem,
+        start: &[f64],
+        spread: &[f64],
+        noise: NoiseLevels,
+    ) -> Pass {
         let np = self.n - 2;
         self.x[2..].copy_from_slice(start);
         self.p.fill(0.0);
@@ -101,7 +107,7 @@ impl Filter {
     }
 
     /// State at the first sample of a record: measured position, guessed velocity.
-    fn begin(&mut self, problem: &Problem, y: f64, v0: f64, r: f64) {
+    fn begin(&mut self, problem: &FrictionProblem, y: f64, v0: f64, r: f64) {
         let n = self.n;
         self.x[0] = y;
         self.x[1] = v0;
@@ -115,7 +121,7 @@ impl Filter {
         self.p[n + 1] = (0.1 * problem.velocity_scale).powi(2);
     }
 
-    fn predict(&mut self, problem: &Problem, interval: &Interval, noise: Noise) {
+    fn predict(&mut self, problem: &FrictionProblem, interval: &Interval, noise: NoiseLevels) {
         let n = self.n;
         let law = Law::new(problem, &self.x[2..2 + FRICTION]);
         let (q, v) = with_sensitivities(
@@ -208,13 +214,13 @@ impl Filter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::passes::{Given, first_noise, spread};
+    use super::super::passes::{GivenNoise, first_noise, spread};
     use super::super::score::score;
     use super::super::trial::Trial;
     use super::*;
     use nalgebra::DMatrix;
 
-    fn start(trial: &Trial, problem: &Problem) -> Vec<f64> {
+    fn start(trial: &Trial, problem: &FrictionProblem) -> Vec<f64> {
         let mut p = vec![0.0; problem.parameters()];
         problem.coordinates(&trial.law, &mut p);
         p
@@ -225,10 +231,10 @@ mod tests {
         let trial = Trial::usual();
         let prepared = trial.prepared(1);
         let problem = &prepared.problem;
-        let noise = first_noise(problem, &Given::default());
+        let noise = first_noise(problem, &GivenNoise::default());
         let mut p = start(&trial, problem);
         p[FRICTION..].copy_from_slice(&super::super::start::constant_inertia(&prepared, 12.0));
-        let mut filter = Filter::new(problem);
+        let mut filter = ExtendedKalmanFilter::new(problem);
         let pass = filter.pass(problem, &p, &spread(problem), noise);
         let n = problem.parameters();
         let c = DMatrix::from_row_slice(n, n, &pass.covariance);
@@ -243,14 +249,16 @@ mod tests {
         let prepared = trial.prepared(2);
         let problem = &prepared.problem;
         let starts = super::super::start::from_log(&prepared, 2);
-        let top = super::super::passes::maximise(&prepared, &starts, &Given::default()).unwrap();
+        let top =
+            super::super::passes::maximise(&prepared, &starts, &GivenNoise::default()).unwrap();
         let spread = spread(problem);
         // a filter that begins at the maximum, sure to within a few standard deviations, moves
         // little and so linearises there
         let tight: Vec<f64> = (0..problem.parameters())
             .map(|i| 3.0 * top.covariance[(i, i)].sqrt())
             .collect();
-        let pass = Filter::new(problem).pass(problem, &top.parameters, &tight, top.noise);
+        let pass =
+            ExtendedKalmanFilter::new(problem).pass(problem, &top.parameters, &tight, top.noise);
         let mut h = score(problem, &top.parameters, top.noise, 100).information;
         for (i, s) in tight.iter().enumerate() {
             h[(i, i)] += 1.0 / (s * s);

@@ -7,8 +7,8 @@
 //! then leans on the friction. How far each of these accelerations can be narrowed before it loses
 //! more than it gains, the innovation likelihood of the moving joint says (`bands`).
 
-use super::prepare::{Motion, Prepared, Sensors, prepare_again};
-use super::problem::Problem;
+use super::prepare::{Prepared, SensorModel, SmoothedMotion, prepare_again};
+use super::problem::FrictionProblem;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 use crate::robot::Robot;
@@ -20,34 +20,44 @@ const ORDER: usize = 4;
 pub struct Inputs<'a> {
     pub robot: &'a Robot,
     pub joint: usize,
-    pub motions: &'a [Motion],
+    pub motions: &'a [SmoothedMotion],
     /// The same with a narrower position filter.
-    pub narrower: &'a [Motion],
-    pub sensors: &'a Sensors<'a>,
+    pub narrower: &'a [SmoothedMotion],
+    pub sensors: &'a SensorModel<'a>,
 }
 
 impl Inputs<'_> {
     /// The problem `like`, the accelerations of the other joints kept below `cutoffs` [Hz], one per
     /// joint; as they are where it is infinite or beyond what the sampling rate allows.
-    pub fn problem(&self, like: &Prepared, cutoffs: &[f64]) -> Option<Problem> {
+    pub fn problem(&self, like: &Prepared, cutoffs: &[f64]) -> Option<FrictionProblem> {
         self.build(self.motions, like, cutoffs)
     }
 
     /// The same from the narrower smoothing, its cut-offs lowered by the same `factor`.
-    pub fn narrower(&self, like: &Prepared, cutoffs: &[f64], factor: f64) -> Option<Problem> {
+    pub fn narrower(
+        &self,
+        like: &Prepared,
+        cutoffs: &[f64],
+        factor: f64,
+    ) -> Option<FrictionProblem> {
         let lowered: Vec<f64> = cutoffs.iter().map(|c| factor * c).collect();
         self.build(self.narrower, like, &lowered)
     }
 
-    fn build(&self, motions: &[Motion], like: &Prepared, cutoffs: &[f64]) -> Option<Problem> {
+    fn build(
+        &self,
+        motions: &[SmoothedMotion],
+        like: &Prepared,
+        cutoffs: &[f64],
+    ) -> Option<FrictionProblem> {
         if cutoffs.iter().all(|c| c.is_infinite()) {
             return prepare_again(self.robot, self.joint, motions, self.sensors, like);
         }
-        let banded: Vec<Motion> = motions.iter().map(|m| self.banded(m, cutoffs)).collect();
+        let banded: Vec<SmoothedMotion> = motions.iter().map(|m| self.banded(m, cutoffs)).collect();
         prepare_again(self.robot, self.joint, &banded, self.sensors, like)
     }
 
-    fn banded(&self, motion: &Motion, cutoffs: &[f64]) -> Motion {
+    fn banded(&self, motion: &SmoothedMotion, cutoffs: &[f64]) -> SmoothedMotion {
         let n = self.robot.joints();
         let mut out = motion.clone();
         let samples = motion.t.len();

@@ -1,10 +1,10 @@
 //! A one-joint log in memory, smoothed: what `prepare` starts from.
 //!
-//! The filter passes over a log many times, so its samples are held (40 bytes per joint and sample);
+//! The filter passes over a log many times, so its samples stay in memory (40 bytes per joint and sample);
 //! a one-joint experiment lasts seconds to minutes. Commands refuse logs beyond their limit.
 
-use super::prepare::Motion;
-use crate::motion::{self, MotionError, Settings};
+use super::prepare::SmoothedMotion;
+use crate::motion::{self, FilterSettings, MotionError};
 
 /// Smooths the positions of all joints of a log (`q`, `tau` row-major, samples x joints) on every
 /// stretch between gaps. The ends of a stretch, where the smoothing filter has nothing to look
@@ -17,8 +17,8 @@ pub fn motions(
     q: &[f64],
     tau: &[f64],
     joints: usize,
-    settings: &Settings,
-) -> Result<Vec<Motion>, MotionError> {
+    settings: &FilterSettings,
+) -> Result<Vec<SmoothedMotion>, MotionError> {
     let n = joints;
     let mut out = Vec::new();
     let mut longest = 0;
@@ -35,7 +35,7 @@ pub fn motions(
         }
         let (from, to) = (stretch.start + kept.start, stretch.start + kept.end);
         let rows = kept.start * n..kept.end * n;
-        out.push(Motion {
+        out.push(SmoothedMotion {
             t: t[from..to].to_vec(),
             measured: q[from * n..to * n].to_vec(),
             q: smooth.q[rows.clone()].to_vec(),

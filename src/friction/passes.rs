@@ -8,12 +8,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::Filter;
+use super::filter::ExtendedKalmanFilter;
 use super::inputs::Inputs;
 use super::prepare::Prepared;
-use super::problem::{FRICTION, Noise, Parameters, Problem};
-use super::score::{Score, log_likelihood, score};
-use super::start::Start;
+use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Parameters};
+use super::score::{LikelihoodScore, log_likelihood, score};
+use super::start::FrictionStart;
 use crate::math::minimise;
 
 /// Factors on both noises in the annealed passes from a start that may be far off, and from one
@@ -54,7 +54,7 @@ pub enum Ending {
 
 /// Levels that the user gives; what is not given comes from the log.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Given {
+pub struct GivenNoise {
     /// Standard deviation of the torque noise [N or Nm].
     pub torque: Option<f64>,
     /// Factor on the position variance.
@@ -67,8 +67,8 @@ pub struct Maximum {
     pub parameters: Parameters,
     /// Covariance in the filter's coordinates, widened where the score is coloured.
     pub covariance: DMatrix<f64>,
-    pub noise: Noise,
-    pub score: Score,
+    pub noise: NoiseLevels,
+    pub score: LikelihoodScore,
     pub ending: Ending,
     /// Factor by which coloured innovations widened the covariance.
     pub widening: f64,
@@ -80,7 +80,7 @@ pub struct Maximum {
 }
 
 /// Prior standard deviations of all parameters.
-pub fn spread(problem: &Problem) -> Vec<f64> {
+pub fn spread(problem: &FrictionProblem) -> Vec<f64> {
     let mut s = vec![SPREAD_LINEAR; problem.parameters()];
     s[3] = SPREAD_SLOPE;
     s[4] = SPREAD_SLOPE;
@@ -89,7 +89,7 @@ pub fn spread(problem: &Problem) -> Vec<f64> {
 
 /// Noise levels to begin with, from the log alone: a tenth of the torque's second differences
 /// (a controller's own reaction is in them) and the encoder's resolution.
-pub fn first_noise(problem: &Problem, given: &Given) -> Noise {
+pub fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> NoiseLevels {
     let mut d: Vec<f64> = problem
         .records
         .iter()
@@ -99,18 +99,22 @@ pub fn first_noise(problem: &Problem, given: &Given) -> Noise {
     let median = d.get(d.len() / 2).copied().unwrap_or(0.0);
     // median of |N(0, 6 s^2)| is 0.6745 sqrt(6) s
     let torque = (median / 1.652).max(1e-3 * problem.torque_scale);
-    Noise {
+    NoiseLevels {
         torque: given.torque.unwrap_or(torque),
         position_factor: given.position_factor.unwrap_or(1.0).max(1.0),
     }
 }
 
 /// Runs every start through the annealed passes, then refines the best.
-pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<Maximum> {
+pub fn maximise(
+    prepared: &Prepared,
+    starts: &[FrictionStart],
+    given: &GivenNoise,
+) -> Option<Maximum> {
     let problem = &prepared.problem;
     let noise = first_noise(problem, given);
     let spread = spread(problem);
-    let mut filter = Filter::new(problem);
+    let mut filter = ExtendedKalmanFilter::new(problem);
     let mut ends: Vec<(usize, Parameters, f64)> = Vec::new();
     for (i, start) in starts.iter().enumerate() {
         let mut p = start.parameters.clone();
@@ -120,7 +124,7 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
             false => &ANNEALING,
         };
         for &factor in annealing {
-            let raised = Noise {
+            let raised = NoiseLevels {
                 torque: noise.torque * factor,
                 position_factor: noise.position_factor * factor * factor,
             };
@@ -140,7 +144,7 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
         }
     }
     ends.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let mut best: Option<(usize, Refined)> = None;
+    let mut best: Option<(usize, RefinedParameters)> = None;
     for (i, p, _) in ends.into_iter().take(REFINED) {
         let refined = refine(problem, p, noise, &spread, FIRST_STEPS);
         if best
@@ -157,10 +161,10 @@ pub fn maximise(prepared: &Prepared, starts: &[Start], given: &Given) -> Option<
 
 /// Noise levels and parameters in turn: each is little moved by the other.
 fn settle(
-    problem: &Problem,
-    mut refined: Refined,
-    mut noise: Noise,
-    given: &Given,
+    problem: &FrictionProblem,
+    mut refined: RefinedParameters,
+    mut noise: NoiseLevels,
+    given: &GivenNoise,
     spread: &[f64],
     counts: (usize, usize),
 ) -> Option<Maximum> {
@@ -178,11 +182,11 @@ pub fn bands(
     prepared: &Prepared,
     inputs: &Inputs,
     maximum: &Maximum,
-    given: &Given,
-) -> Option<(Vec<f64>, Problem, Maximum)> {
+    given: &GivenNoise,
+) -> Option<(Vec<f64>, FrictionProblem, Maximum)> {
     let spread = spread(&prepared.problem);
     let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
-    let mut best: Option<(Problem, Refined)> = None;
+    let mut best: Option<(FrictionProblem, RefinedParameters)> = None;
     let mut top = maximum.score.log_likelihood;
     for i in (0..cutoffs.len()).filter(|i| *i != inputs.joint) {
         for band in BANDS_HZ {
@@ -214,13 +218,13 @@ pub fn bands(
 }
 
 /// Parameters at which a refinement ended.
-pub(super) struct Refined {
+pub(super) struct RefinedParameters {
     pub parameters: Parameters,
-    pub score: Score,
+    pub score: LikelihoodScore,
     pub ending: Ending,
 }
 
-fn block(problem: &Problem) -> usize {
+fn block(problem: &FrictionProblem) -> usize {
     let record = &problem.records[0];
     let n = record.t.len();
     let step = (record.t[n - 1] - record.t[0]) / (n - 1) as f64;
@@ -229,10 +233,15 @@ fn block(problem: &Problem) -> usize {
 
 /// Penalised information and its right side: prior around zero for the linear part would bias, so
 /// the prior only limits the step.
-fn damped(score: &Score, spread: &[f64], damping: f64, held: &[usize]) -> Option<DVector<f64>> {
+fn damped(
+    score: &LikelihoodScore,
+    spread: &[f64],
+    damping: f64,
+    fixed: &[usize],
+) -> Option<DVector<f64>> {
     let mut h = score.information.clone();
     let mut gradient = score.gradient.clone();
-    for &j in held {
+    for &j in fixed {
         h.row_mut(j).fill(0.0);
         h.column_mut(j).fill(0.0);
         h[(j, j)] = 1.0;
@@ -246,31 +255,31 @@ fn damped(score: &Score, spread: &[f64], damping: f64, held: &[usize]) -> Option
 
 /// Gauss-Newton with step control on the innovation likelihood.
 fn refine(
-    problem: &Problem,
+    problem: &FrictionProblem,
     start: Parameters,
-    noise: Noise,
+    noise: NoiseLevels,
     spread: &[f64],
     most: usize,
-) -> Refined {
+) -> RefinedParameters {
     refine_others(problem, start, noise, spread, most, &[])
 }
 
-/// The same with some parameters held where they are.
+/// The same with some parameters fixed.
 pub(super) fn refine_others(
-    problem: &Problem,
+    problem: &FrictionProblem,
     start: Parameters,
-    noise: Noise,
+    noise: NoiseLevels,
     spread: &[f64],
     most: usize,
-    held: &[usize],
-) -> Refined {
+    fixed: &[usize],
+) -> RefinedParameters {
     let block = block(problem);
     let mut p = start;
     let mut at = score(problem, &p, noise, block);
     let mut damping = 1e-3;
     for _ in 0..most {
-        let Some(step) = damped(&at, spread, damping, held) else {
-            return Refined {
+        let Some(step) = damped(&at, spread, damping, fixed) else {
+            return RefinedParameters {
                 parameters: p,
                 score: at,
                 ending: Ending::Diverged,
@@ -295,14 +304,14 @@ pub(super) fn refine_others(
             at = next;
             damping = (damping * 0.1).max(1e-9);
             if gain < 1e-4 {
-                return Refined {
+                return RefinedParameters {
                     parameters: p,
                     score: at,
                     ending: Ending::Converged,
                 };
             }
         } else if gain.is_finite() && gain > -1e-4 * (1.0 + 1e-9 * at.log_likelihood.abs()) {
-            return Refined {
+            return RefinedParameters {
                 parameters: p,
                 score: at,
                 ending: Ending::Converged,
@@ -310,7 +319,7 @@ pub(super) fn refine_others(
         } else {
             damping = damping.max(1e-4) * 10.0;
             if damping > 1e8 {
-                return Refined {
+                return RefinedParameters {
                     parameters: p,
                     score: at,
                     ending: Ending::Converged,
@@ -318,7 +327,7 @@ pub(super) fn refine_others(
             }
         }
     }
-    Refined {
+    RefinedParameters {
         parameters: p,
         score: at,
         ending: Ending::IterationLimit,
@@ -328,10 +337,10 @@ pub(super) fn refine_others(
 /// Adds to the covariance what another smoothing of the known inputs, and another weight of the
 /// encoder, change in the estimate: the innovations cannot show an error that is the same at every
 /// reversal.
-pub fn add_choices(problem: &Problem, again: &Problem, maximum: &mut Maximum) {
+pub fn add_choices(problem: &FrictionProblem, again: &FrictionProblem, maximum: &mut Maximum) {
     let spread = spread(again);
     let p = maximum.parameters.clone();
-    let coarser = Noise {
+    let coarser = NoiseLevels {
         position_factor: COARSER * maximum.noise.position_factor,
         ..maximum.noise
     };
@@ -346,12 +355,17 @@ pub fn add_choices(problem: &Problem, again: &Problem, maximum: &mut Maximum) {
 
 /// Noise levels of highest likelihood at fixed parameters; the position's never below the
 /// resolution's own.
-fn tune(problem: &Problem, p: &[f64], noise: Noise, given: &Given) -> Noise {
+fn tune(
+    problem: &FrictionProblem,
+    p: &[f64],
+    noise: NoiseLevels,
+    given: &GivenNoise,
+) -> NoiseLevels {
     let free = (given.torque.is_none(), given.position_factor.is_none());
     if !free.0 && !free.1 {
         return noise;
     }
-    let at = |x: &[f64]| Noise {
+    let at = |x: &[f64]| NoiseLevels {
         torque: if free.0 {
             x[0].clamp(-30.0, 30.0).exp()
         } else {
@@ -385,9 +399,9 @@ fn tune(problem: &Problem, p: &[f64], noise: Noise, given: &Given) -> Noise {
 
 /// Covariance at the maximum.
 fn finish(
-    problem: &Problem,
-    refined: Refined,
-    noise: Noise,
+    problem: &FrictionProblem,
+    refined: RefinedParameters,
+    noise: NoiseLevels,
     spread: &[f64],
     (starts, best_start): (usize, usize),
 ) -> Option<Maximum> {

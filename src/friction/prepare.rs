@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::problem::{Problem, Record};
+use super::problem::{FrictionProblem, Record};
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
 use crate::robot::Robot;
@@ -16,7 +16,7 @@ use crate::robot::Robot;
 /// Motion of all joints over one uninterrupted stretch, at full rate. Arrays are row-major,
 /// samples x joints.
 #[derive(Debug, Clone, Default)]
-pub struct Motion {
+pub struct SmoothedMotion {
     pub t: Vec<f64>,
     /// Position as measured.
     pub measured: Vec<f64>,
@@ -35,7 +35,7 @@ const DIRECTION_TOLERANCE: f64 = 2e-3;
 /// The problem of one joint with the map from its nuisance states back to the robot's parameters.
 #[derive(Debug, Clone)]
 pub struct Prepared {
-    pub problem: Problem,
+    pub problem: FrictionProblem,
     /// Robot parameters (and the offset, last) = `back` times the nuisance states.
     pub back: DMatrix<f64>,
     /// Smoothed velocity of the moving joint, samples of all records one after the other.
@@ -45,11 +45,11 @@ pub struct Prepared {
 }
 
 /// How the position noise and the torque's timing enter.
-pub struct Sensors<'a> {
+pub struct SensorModel<'a> {
     /// Variance of the measured position of the moving joint at a pose of all joints.
     pub variance: &'a dyn Fn(&[f64]) -> f64,
     /// True where the torque logged at `t_k` acts until `t_k+1`; else it is a sample at `t_k`.
-    pub held: bool,
+    pub zero_order_hold: bool,
 }
 
 /// Root mean square; zero for nothing.
@@ -67,8 +67,8 @@ pub(super) fn rms(x: impl Iterator<Item = f64>) -> f64 {
 pub fn prepare(
     robot: &Robot,
     joint: usize,
-    motions: &[Motion],
-    sensors: &Sensors,
+    motions: &[SmoothedMotion],
+    sensors: &SensorModel,
 ) -> Option<Prepared> {
     let n = robot.joints();
     let p = robot.parameters().len();
@@ -150,7 +150,7 @@ pub fn prepare(
     let acceleration_scale = rms(built.acceleration.iter().copied()).max(f64::MIN_POSITIVE);
     let step = median_step(&built.records);
     Some(Prepared {
-        problem: Problem {
+        problem: FrictionProblem {
             records: built.records,
             nuisance: e,
             torque_scale,
@@ -169,19 +169,19 @@ pub fn prepare(
 pub fn prepare_again(
     robot: &Robot,
     joint: usize,
-    motions: &[Motion],
-    sensors: &Sensors,
+    motions: &[SmoothedMotion],
+    sensors: &SensorModel,
     like: &Prepared,
-) -> Option<Problem> {
+) -> Option<FrictionProblem> {
     let built = build(robot, joint, motions, sensors, &like.back)?;
-    Some(Problem {
+    Some(FrictionProblem {
         records: built.records,
         ..like.problem.clone()
     })
 }
 
 /// Records of all motions, with velocity and acceleration of the moving joint.
-struct Built {
+struct BuiltRecords {
     records: Vec<Record>,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -190,10 +190,10 @@ struct Built {
 fn build(
     robot: &Robot,
     joint: usize,
-    motions: &[Motion],
-    sensors: &Sensors,
+    motions: &[SmoothedMotion],
+    sensors: &SensorModel,
     back: &DMatrix<f64>,
-) -> Option<Built> {
+) -> Option<BuiltRecords> {
     let n = robot.joints();
     let p = robot.parameters().len();
     let columns = p + 1;
@@ -246,8 +246,8 @@ fn build(
         // intervals: mean of their ends; the torque as it is timed
         for k in 0..samples - 1 {
             let row = |x: &'_ [f64], k: usize| -> Vec<f64> { x[k * n..(k + 1) * n].to_vec() };
-            record.tau.push(if sensors.held {
-                // the motor's force is held; as a joint torque it is that of the middle pose
+            record.tau.push(if sensors.zero_order_hold {
+                // the motor's force is constant; as a joint torque it is that of the middle pose
                 let (here, next) = (row(&motion.q, k), row(&motion.q, k + 1));
                 let middle: Vec<f64> = here.iter().zip(&next).map(|(a, b)| 0.5 * (a + b)).collect();
                 robot.carry_torque(&here, &middle, &row(&motion.tau, k), &mut a);
@@ -265,7 +265,7 @@ fn build(
     if records.is_empty() {
         return None;
     }
-    Some(Built {
+    Some(BuiltRecords {
         records,
         velocity,
         acceleration,
@@ -293,7 +293,7 @@ fn slope_range(velocity: &[f64], acceleration: f64, step: f64) -> (f64, f64) {
 
 /// Step of a position channel: the smallest change between neighbouring samples; where positions
 /// are not quantised it is tiny, and the filter finds the noise by itself.
-pub fn resolution(motions: &[Motion], joints: usize, joint: usize) -> f64 {
+pub fn resolution(motions: &[SmoothedMotion], joints: usize, joint: usize) -> f64 {
     let mut least = f64::INFINITY;
     for motion in motions {
         let position = motion.measured.iter().skip(joint).step_by(joints);

@@ -1,7 +1,7 @@
 //! The one-joint problem of eq. (29) as the filter sees it: known inputs, parameters, scales.
 //!
 //! `m(t) a + h(t) + F(v) = tau` with `m = m_k . eta`, `h = h_k . eta`: inertia and gravity of the
-//! joint, and the reaction of the joints that are held, enter as known functions of the measured
+//! joint, and the reaction of the stationary joints, enter as known functions of the measured
 //! motion with unknown coefficients `eta` (the nuisance). Only `q` and `v` of the moving joint are
 //! filter states; the friction law is eq. (18).
 
@@ -18,7 +18,7 @@ pub struct Record {
     pub t: Vec<f64>,
     /// Measured position [m or rad].
     pub y: Vec<f64>,
-    /// Variance of each measured position [m^2 or rad^2], before `Noise::position_factor`.
+    /// Variance of each measured position [m^2 or rad^2], before `NoiseLevels::position_factor`.
     pub r: Vec<f64>,
     /// Torque that acts during each interval [N or Nm].
     pub tau: Vec<f64>,
@@ -32,11 +32,11 @@ pub struct Record {
 
 /// All records of one joint and the scales of its parameters.
 #[derive(Debug, Clone)]
-pub struct Problem {
+pub struct FrictionProblem {
     pub records: Vec<Record>,
     /// Number of nuisance parameters.
     pub nuisance: usize,
-    /// Scale of the torque [N or Nm] and of the velocity [1/s]: parameters are held relative to
+    /// Scale of the torque [N or Nm] and of the velocity [1/s]: parameters are relative to
     /// them, since Bv, Bf and w differ by orders of magnitude.
     pub torque_scale: f64,
     pub velocity_scale: f64,
@@ -52,7 +52,7 @@ pub type Parameters = Vec<f64>;
 
 /// Levels of the two noises.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub struct NoiseLevels {
     /// Standard deviation of the torque that acts but is not in the log [N or Nm], white from
     /// interval to interval: the process noise `W` of (30).
     pub torque: f64,
@@ -60,7 +60,7 @@ pub struct Noise {
     pub position_factor: f64,
 }
 
-impl Problem {
+impl FrictionProblem {
     /// Total number of parameters beside the two states.
     pub fn parameters(&self) -> usize {
         FRICTION + self.nuisance

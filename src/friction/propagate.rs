@@ -5,7 +5,7 @@
 //! transition matrix and the sensitivities to the parameters are integrals along the same steps by
 //! Simpson's rule with the exact exponential of the local decay.
 
-use super::problem::{FRICTION, Problem};
+use super::problem::{FRICTION, FrictionProblem};
 
 /// Longest sub-step relative to the local time constant of the friction.
 const STEP_LIMIT: f64 = 0.8;
@@ -51,7 +51,7 @@ pub struct Law {
 
 /// Friction at one velocity: torque, slope, and the two tanh and sech^2.
 #[derive(Debug, Clone, Copy)]
-struct At {
+struct FrictionAt {
     v: f64,
     force: f64,
     slope: f64,
@@ -66,7 +66,7 @@ fn tanh(x: f64) -> f64 {
 }
 
 impl Law {
-    pub fn new(problem: &Problem, p: &[f64]) -> Self {
+    pub fn new(problem: &FrictionProblem, p: &[f64]) -> Self {
         let (fs, vs) = (problem.torque_scale, problem.velocity_scale);
         Law {
             viscous: p[0] * fs / vs,
@@ -85,10 +85,10 @@ impl Law {
     }
 
     #[inline(always)]
-    fn at(&self, v: f64) -> At {
+    fn at(&self, v: f64) -> FrictionAt {
         let t = [tanh(self.slope[0] * v), tanh(self.slope[1] * v)];
         let s = [1.0 - t[0] * t[0], 1.0 - t[1] * t[1]];
-        At {
+        FrictionAt {
             v,
             force: self.viscous * v + self.coulomb[0] * t[0] + self.coulomb[1] * t[1],
             slope: self.viscous
@@ -259,7 +259,7 @@ pub fn with_sensitivities(
 impl Law {
     /// dF/d(filter coordinate) for the five friction parameters.
     #[inline(always)]
-    fn gradient(&self, x: &At) -> [f64; FRICTION] {
+    fn gradient(&self, x: &FrictionAt) -> [f64; FRICTION] {
         [
             self.viscous_scale * x.v,
             self.torque_scale * x.tanh[0],
@@ -274,8 +274,8 @@ impl Law {
 mod tests {
     use super::*;
 
-    fn problem() -> Problem {
-        Problem {
+    fn problem() -> FrictionProblem {
+        FrictionProblem {
             records: Vec::new(),
             nuisance: 2,
             torque_scale: 8.0,

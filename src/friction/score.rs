@@ -10,12 +10,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{FRICTION, Noise, Problem};
+use super::problem::{FRICTION, FrictionProblem, NoiseLevels};
 use super::propagate::{Interval, Law, Transition, state, with_sensitivities};
 
 /// Result of a pass at fixed parameters.
 #[derive(Debug, Clone)]
-pub struct Score {
+pub struct LikelihoodScore {
     /// Gaussian log-likelihood of the innovations (less the constant).
     pub log_likelihood: f64,
     /// Gradient of the log-likelihood.
@@ -73,7 +73,7 @@ const FEWEST: usize = 30;
 /// encoder step per sample the rounding error is alike too: such windows count only in a log that
 /// has no others.
 #[derive(Debug, Clone, Copy, Default)]
-struct Windows {
+struct InnovationWindows {
     sum: f64,
     length: usize,
     slow: bool,
@@ -82,7 +82,7 @@ struct Windows {
     all: (f64, usize),
 }
 
-impl Windows {
+impl InnovationWindows {
     /// The record ends.
     fn cut(&mut self) {
         (self.sum, self.length, self.slow) = (0.0, 0, false);
@@ -116,12 +116,17 @@ impl Windows {
 
 /// Likelihood, score and information of `parameters`. `block` is the number of samples over which
 /// the score is summed before its outer product is taken.
-pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) -> Score {
+pub fn score(
+    problem: &FrictionProblem,
+    parameters: &[f64],
+    noise: NoiseLevels,
+    block: usize,
+) -> LikelihoodScore {
     let np = problem.parameters();
     let law = Law::new(problem, parameters);
     let e = problem.nuisance;
     let mut t = Transition::new(np);
-    let mut out = Score {
+    let mut out = LikelihoodScore {
         log_likelihood: 0.0,
         gradient: DVector::zeros(np),
         information: DMatrix::zeros(np, np),
@@ -134,7 +139,7 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
         window_nis: f64::NAN,
         windows: 0,
     };
-    let mut windows = Windows::default();
+    let mut windows = InnovationWindows::default();
     let s2 = noise.torque * noise.torque;
     let mut info = vec![0.0; np * np];
     let (mut nis, mut inside, mut square) = (0.0, 0usize, 0.0);
@@ -233,7 +238,7 @@ pub fn score(problem: &Problem, parameters: &[f64], noise: Noise, block: usize) 
 const CHI2_95: f64 = 3.841_458_820_694_124;
 
 /// Log-likelihood alone, at a quarter of the cost.
-pub fn log_likelihood(problem: &Problem, parameters: &[f64], noise: Noise) -> f64 {
+pub fn log_likelihood(problem: &FrictionProblem, parameters: &[f64], noise: NoiseLevels) -> f64 {
     let law = Law::new(problem, parameters);
     let eta = &parameters[FRICTION..];
     let e = problem.nuisance;

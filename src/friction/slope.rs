@@ -1,7 +1,7 @@
 //! What a log says of a slope that it cannot determine: a bound by the profile likelihood.
 
 use super::passes::{Maximum, refine_others, spread};
-use super::problem::Problem;
+use super::problem::FrictionProblem;
 
 /// Drop of the log-likelihood at a one-sided 95 % bound: half of 1.645 squared.
 const BOUND_DROP: f64 = 1.353;
@@ -19,7 +19,7 @@ fn drop(maximum: &Maximum, value: f64) -> f64 {
 /// Whether the slope with index `i` (3 or 4) may be as steep as any that is tried, the other
 /// parameters fitted anew. A standard deviation cannot tell: it knows the curvature at the maximum
 /// alone, and a likelihood that rises to a plateau is curved at its edge.
-pub fn open_above(problem: &Problem, maximum: &Maximum, i: usize) -> bool {
+pub fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
     let mut p = maximum.parameters.clone();
     p[i] = (problem.slope_range.1 * problem.velocity_scale).ln();
     let spread = spread(problem);
@@ -30,7 +30,7 @@ pub fn open_above(problem: &Problem, maximum: &Maximum, i: usize) -> bool {
 /// One-sided 95 % lower bound of the slope with index `i` (3 or 4) by its profile likelihood: the
 /// slope steps down while everything else is fitted anew. The steeper slope, 3, takes the other
 /// with it, which would step into its place. `None` where the whole range is as likely.
-pub fn profile_slope(problem: &Problem, maximum: &Maximum, i: usize) -> Option<f64> {
+pub fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> Option<f64> {
     let spread = spread(problem);
     let lowest = (problem.slope_range.0 * problem.velocity_scale).ln();
     let mut p = maximum.parameters.clone();
@@ -42,8 +42,9 @@ pub fn profile_slope(problem: &Problem, maximum: &Maximum, i: usize) -> Option<f
         if i == 3 && refined.parameters[4] > refined.parameters[3] {
             let mut both = from;
             both[4] = both[4].min(both[3]);
-            let held = [3, 4];
-            let merged = refine_others(problem, both.clone(), maximum.noise, &spread, STEPS, &held);
+            let fixed = [3, 4];
+            let merged =
+                refine_others(problem, both.clone(), maximum.noise, &spread, STEPS, &fixed);
             // apart again, should the data want that
             both = merged.parameters.clone();
             both[4] -= 1.0;

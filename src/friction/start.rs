@@ -12,7 +12,7 @@ use super::problem::{FRICTION, Parameters};
 
 /// Slopes of the ladder, geometric over the range.
 const LADDER: usize = 14;
-/// Windows that the records are averaged into, and most samples of one.
+/// WindowAverages that the records are averaged into, and most samples of one.
 const WINDOWS: usize = 800;
 const LONGEST: usize = 20;
 /// Rounds of the pattern search that polishes a pair of slopes.
@@ -20,14 +20,14 @@ const ROUNDS: usize = 10;
 
 /// A start of the filter.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct FrictionStart {
     pub parameters: Parameters,
     /// Squared residual of the linear fit; infinite where there was none.
     pub residual: f64,
 }
 
 /// The records averaged over windows: what stays the same for every pair of slopes.
-struct Windows {
+struct WindowAverages {
     /// Number of nuisance columns.
     nuisance: usize,
     /// Rows of [nuisance, v, tau], row-major.
@@ -39,7 +39,7 @@ struct Windows {
     torque_scale: f64,
 }
 
-impl Windows {
+impl WindowAverages {
     fn new(prepared: &Prepared) -> Self {
         let problem = &prepared.problem;
         let e = problem.nuisance;
@@ -70,7 +70,7 @@ impl Windows {
             }
             first += record.t.len();
         }
-        Windows {
+        WindowAverages {
             nuisance: e,
             rows,
             spans,
@@ -129,9 +129,9 @@ impl Windows {
 }
 
 /// The best `most` pairs of slopes with their linear fits, pairs apart from one another.
-pub fn from_log(prepared: &Prepared, most: usize) -> Vec<Start> {
+pub fn from_log(prepared: &Prepared, most: usize) -> Vec<FrictionStart> {
     let problem = &prepared.problem;
-    let windows = Windows::new(prepared);
+    let windows = WindowAverages::new(prepared);
     let (lo, hi) = problem.slope_range;
     // far beyond the inverse speed a slope is a sign function to averages over windows
     let hi = hi.min(300.0 / problem.velocity_scale).max(10.0 * lo);
@@ -157,7 +157,11 @@ pub fn from_log(prepared: &Prepared, most: usize) -> Vec<Start> {
 }
 
 /// Pattern search over the logarithms of the slopes.
-fn polish(prepared: &Prepared, windows: &Windows, slopes: [f64; 2]) -> Option<Start> {
+fn polish(
+    prepared: &Prepared,
+    windows: &WindowAverages,
+    slopes: [f64; 2],
+) -> Option<FrictionStart> {
     let problem = &prepared.problem;
     let (lo, hi) = problem.slope_range;
     let mut at = slopes;
@@ -190,7 +194,7 @@ fn polish(prepared: &Prepared, windows: &Windows, slopes: [f64; 2]) -> Option<St
     p[3] = (at[0] * problem.velocity_scale).ln();
     p[4] = (at[1] * problem.velocity_scale).ln();
     p[FRICTION..].copy_from_slice(&x.as_slice()[..e]);
-    Some(Start {
+    Some(FrictionStart {
         parameters: p,
         residual: best.1,
     })

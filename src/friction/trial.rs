@@ -1,7 +1,7 @@
 //! One-joint records for the tests of this room: integrated here, by Euler steps of 10 us, so that
 //! they share no code with the filter.
 
-use super::prepare::{Motion, Prepared, Sensors, prepare};
+use super::prepare::{Prepared, SensorModel, SmoothedMotion, prepare};
 use crate::robot::friction::DoubleTanh;
 use crate::robot::{JointKind, Robot};
 
@@ -33,7 +33,7 @@ impl Trial {
     }
 
     /// Motion as a log would show it; `seed` draws the noise.
-    pub fn motion(&self, seed: u64) -> Motion {
+    pub fn motion(&self, seed: u64) -> SmoothedMotion {
         let mut bits = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut uniform = move || {
             bits ^= bits << 13;
@@ -50,7 +50,7 @@ impl Trial {
             })
         };
         let (mut q, mut v) = (0.0, wanted(0.0).1);
-        let mut out = Motion::default();
+        let mut out = SmoothedMotion::default();
         let (dt, parts) = (1e-3, 100);
         for k in 0..(self.seconds / dt) as usize {
             let t = k as f64 * dt;
@@ -76,9 +76,9 @@ impl Trial {
     pub fn prepared(&self, seed: u64) -> Prepared {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let variance = self.step * self.step / 12.0;
-        let sensors = Sensors {
+        let sensors = SensorModel {
             variance: &|_| variance,
-            held: true,
+            zero_order_hold: true,
         };
         prepare(&robot, 0, &[self.motion(seed)], &sensors).expect("it moves")
     }

@@ -1,4 +1,4 @@
-//! Sums that replace the stacked matrix (42): one R factor per joint and block of time.
+//! Block factors that replace the stacked matrix (42): one R factor per joint and block of time.
 //!
 //! Blocks keep what a covariance under correlated residuals needs, the score of any parameter
 //! vector over a stretch of time, without a second reading. Their number is bounded: when there
@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::columns::Columns;
+use super::columns::RegressorColumns;
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
@@ -14,25 +14,25 @@ const MOST_BLOCKS: usize = 512;
 
 /// One block of time: the R factor of each joint's rows.
 #[derive(Debug, Clone)]
-pub struct Block {
+pub struct BlockFactor {
     /// Uninterrupted stretch that the block belongs to; correlation ends at its borders.
     pub stretch: usize,
     /// Rows per joint.
     pub rows: u64,
-    /// Upper triangle per joint, columns as in [`Columns::of_joint`].
+    /// Upper triangle per joint, columns as in [`RegressorColumns::row_width`].
     pub r: Vec<DMatrix<f64>>,
 }
 
 /// Accumulates filtered, decimated rows.
 #[derive(Debug, Clone)]
 pub struct Accumulator {
-    columns: Columns,
+    columns: RegressorColumns,
     open: Vec<RFactor>,
     open_rows: u64,
     stretch: usize,
     began: f64,
     block_seconds: f64,
-    blocks: Vec<Block>,
+    blocks: Vec<BlockFactor>,
     /// Squared norm of the filtered torque per joint.
     torque_square: Vec<f64>,
     rows: u64,
@@ -40,9 +40,9 @@ pub struct Accumulator {
 
 impl Accumulator {
     /// `block_seconds` is the length of a block to begin with [s].
-    pub fn new(columns: Columns, block_seconds: f64) -> Self {
+    pub fn new(columns: RegressorColumns, block_seconds: f64) -> Self {
         let open = (0..columns.joints)
-            .map(|j| RFactor::new(columns.of_joint(j)))
+            .map(|j| RFactor::new(columns.row_width(j)))
             .collect();
         let torque_square = vec![0.0; columns.joints];
         Accumulator {
@@ -58,7 +58,7 @@ impl Accumulator {
         }
     }
 
-    /// Adds one row of every joint; `channels` as [`Columns::fill`] writes them. A new `stretch`
+    /// Adds one row of every joint; `channels` as [`RegressorColumns::fill`] writes them. A new `stretch`
     /// closes the open block.
     pub fn add(&mut self, stretch: usize, t: f64, channels: &[f64]) {
         if stretch != self.stretch {
@@ -73,7 +73,7 @@ impl Accumulator {
         }
         let mut at = 0;
         for (j, open) in self.open.iter_mut().enumerate() {
-            let c = self.columns.of_joint(j);
+            let c = self.columns.row_width(j);
             open.fold(&channels[at..at + c]);
             at += c;
         }
@@ -90,9 +90,9 @@ impl Accumulator {
         }
         let r = self.open.iter().map(RFactor::r).collect();
         for (j, open) in self.open.iter_mut().enumerate() {
-            *open = RFactor::new(self.columns.of_joint(j));
+            *open = RFactor::new(self.columns.row_width(j));
         }
-        self.blocks.push(Block {
+        self.blocks.push(BlockFactor {
             stretch: self.stretch,
             rows: self.open_rows,
             r,
@@ -110,7 +110,7 @@ impl Accumulator {
         while let Some(mut first) = old.next() {
             if let Some(second) = old.next_if(|b| b.stretch == first.stretch) {
                 for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
-                    *a = merged([&*a, b], self.columns.of_joint(j));
+                    *a = merged([&*a, b], self.columns.row_width(j));
                 }
                 first.rows += second.rows;
             }
@@ -119,9 +119,9 @@ impl Accumulator {
     }
 
     /// Closes the last block and hands everything over.
-    pub fn finish(mut self) -> Sums {
+    pub fn finish(mut self) -> BlockFactors {
         self.close();
-        Sums {
+        BlockFactors {
             columns: self.columns,
             blocks: self.blocks,
             torque_square: self.torque_square,
@@ -147,17 +147,17 @@ fn merged<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize)
 
 /// All rows of all logs, reduced.
 #[derive(Debug, Clone)]
-pub struct Sums {
-    pub columns: Columns,
-    pub blocks: Vec<Block>,
+pub struct BlockFactors {
+    pub columns: RegressorColumns,
+    pub blocks: Vec<BlockFactor>,
     pub torque_square: Vec<f64>,
     /// Rows per joint.
     pub rows: u64,
 }
 
-impl Sums {
-    /// Joins the sums of another set of logs with the same columns; stretches stay apart.
-    pub fn merge(&mut self, other: Sums) {
+impl BlockFactors {
+    /// Joins the block factors of another set of logs with the same columns; stretches stay apart.
+    pub fn merge(&mut self, other: BlockFactors) {
         let shift = self.blocks.last().map_or(0, |b| b.stretch + 1);
         self.blocks.extend(other.blocks.into_iter().map(|mut b| {
             b.stretch += shift;
@@ -170,19 +170,19 @@ impl Sums {
     }
 
     /// The same rows with the parameters of the known friction among the unknowns.
-    pub fn with_free_friction(mut self) -> Sums {
+    pub fn with_free_friction(mut self) -> BlockFactors {
         self.columns = self.columns.with_free_friction();
         self
     }
 
     /// The same rows with those of each joint's own terms alone that `keep` names by their place.
-    pub fn with_own(&self, keep: &[Vec<usize>]) -> Sums {
+    pub fn with_own(&self, keep: &[Vec<usize>]) -> BlockFactors {
         let (n, p) = (self.columns.joints, self.columns.shared);
         let mut columns = self.columns.clone();
         let mut places: Vec<Vec<usize>> = Vec::with_capacity(n);
         for (j, keep) in keep.iter().enumerate().take(n) {
             columns.own[j] = keep.iter().map(|k| self.columns.own[j][*k]).collect();
-            let rest = p + self.columns.own[j].len()..self.columns.of_joint(j);
+            let rest = p + self.columns.own[j].len()..self.columns.row_width(j);
             places.push(
                 (0..p)
                     .chain(keep.iter().map(|k| p + k))
@@ -191,12 +191,12 @@ impl Sums {
             );
         }
         let chosen = |r: &DMatrix<f64>, j: usize| r.select_columns(&places[j]);
-        let blocks = self.blocks.iter().map(|b| Block {
+        let blocks = self.blocks.iter().map(|b| BlockFactor {
             stretch: b.stretch,
             rows: b.rows,
             r: b.r.iter().enumerate().map(|(j, r)| chosen(r, j)).collect(),
         });
-        Sums {
+        BlockFactors {
             blocks: blocks.collect(),
             columns,
             torque_square: self.torque_square.clone(),
@@ -205,11 +205,11 @@ impl Sums {
     }
 
     /// The same rows in one block: enough for a fit, too little for its covariance.
-    pub fn in_one_block(&self) -> Sums {
+    pub fn in_one_block(&self) -> BlockFactors {
         let r = (0..self.columns.joints).map(|j| self.joint(j)).collect();
-        Sums {
+        BlockFactors {
             columns: self.columns.clone(),
-            blocks: vec![Block {
+            blocks: vec![BlockFactor {
                 stretch: 0,
                 rows: self.rows,
                 r,
@@ -223,19 +223,19 @@ impl Sums {
     pub fn joint(&self, j: usize) -> DMatrix<f64> {
         merged(
             self.blocks.iter().map(|b| &b.r[j]),
-            self.columns.of_joint(j),
+            self.columns.row_width(j),
         )
     }
 }
 
 /// Normal quantities of one joint's triangle: X'X, X'G, X't, and |t - X theta|^2 by parts.
-pub struct Parts<'a> {
+pub struct JointFactor<'a> {
     pub r: &'a DMatrix<f64>,
     pub unknowns: usize,
     pub gradient: usize,
 }
 
-impl Parts<'_> {
+impl JointFactor<'_> {
     /// X' (t - X theta) for the joint's own unknowns.
     pub fn score(&self, theta: &DVector<f64>) -> DVector<f64> {
         let c = self.unknowns;

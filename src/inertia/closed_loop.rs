@@ -6,7 +6,7 @@
 //! a natural frequency at critical damping. The step is of first order only: instruments have to move
 //! as the robot does, not to be exact.
 
-use super::columns::{Columns, Own};
+use super::columns::{Own, RegressorColumns};
 use crate::robot::Robot;
 use crate::robot::serial::chain::MOST_JOINTS;
 
@@ -36,7 +36,7 @@ pub struct Gains {
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<'a> {
     robot: &'a Robot,
-    columns: &'a Columns,
+    columns: &'a RegressorColumns,
     theta: Vec<f64>,
     pub gains: Gains,
     q: [f64; MOST_JOINTS],
@@ -50,7 +50,7 @@ impl<'a> ClosedLoop<'a> {
     /// `columns`.
     pub fn new(
         robot: &'a Robot,
-        columns: &'a Columns,
+        columns: &'a RegressorColumns,
         theta: Vec<f64>,
         q: &[f64],
         cutoff_hz: f64,
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn a_joint_follows_its_reference_and_lags_by_what_friction_and_inertia_ask() {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = Columns {
+        let columns = RegressorColumns {
             joints: 1,
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]],

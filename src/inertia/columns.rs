@@ -32,7 +32,7 @@ impl Own {
         }
     }
 
-    /// Its column at velocity v; 0 for a law's, which [`Columns::fill`] writes by its gradient.
+    /// Its column at velocity v; 0 for a law's, which [`RegressorColumns::fill`] writes by its gradient.
     #[inline]
     pub fn column(self, v: f64) -> f64 {
         match self {
@@ -55,7 +55,7 @@ pub struct KnownFriction {
 
 /// Columns of the rows of every joint.
 #[derive(Debug, Clone)]
-pub struct Columns {
+pub struct RegressorColumns {
     /// Number of joints n.
     pub joints: usize,
     /// Number of shared inertial parameters p.
@@ -69,7 +69,7 @@ pub struct Columns {
 /// Columns that the gradient of a known friction law takes.
 pub const GRADIENT: usize = 5;
 
-impl Columns {
+impl RegressorColumns {
     /// Number of unknowns: shared ones first, then each joint's own in turn.
     pub fn unknowns(&self) -> usize {
         self.shared + self.own.iter().map(Vec::len).sum::<usize>()
@@ -80,8 +80,8 @@ impl Columns {
         self.shared + self.own[..j].iter().map(Vec::len).sum::<usize>()
     }
 
-    /// Columns of one row of joint j: unknowns, gradient, target b = tau - F(v).
-    pub fn of_joint(&self, j: usize) -> usize {
+    /// Width of one row of joint j: unknowns, gradient, target b = tau - F(v).
+    pub fn row_width(&self, j: usize) -> usize {
         self.shared + self.own[j].len() + self.gradient(j) + 1
     }
 
@@ -102,7 +102,7 @@ impl Columns {
     /// Where joint j's columns begin in a row of all channels; after all joints' columns stand the
     /// n measured torques.
     pub fn offset(&self, j: usize) -> usize {
-        (0..j).map(|i| self.of_joint(i)).sum()
+        (0..j).map(|i| self.row_width(i)).sum()
     }
 
     /// Channels per sample over all joints, measured torques included.
@@ -112,14 +112,14 @@ impl Columns {
 
     /// The same columns with the parameters of the known friction among the unknowns: their
     /// gradient, which stands after the own terms, becomes own terms. Rows need no change.
-    pub fn with_free_friction(&self) -> Columns {
+    pub fn with_free_friction(&self) -> RegressorColumns {
         let mut own = self.own.clone();
         for (own, known) in own.iter_mut().zip(&self.known) {
             if known.is_some() {
                 own.extend((0..GRADIENT).map(Own::Law));
             }
         }
-        Columns {
+        RegressorColumns {
             joints: self.joints,
             shared: self.shared,
             own,

@@ -2,15 +2,15 @@
 //!
 //! Filtered residuals are correlated over many rows: the textbook covariance, which counts rows as
 //! independent, is far too small. The middle of the sandwich is the long-run covariance of the
-//! score, from block sums with Bartlett's weights (Newey and West 1987, Econometrica 55) and the
+//! score, from block factors with Bartlett's weights (Newey and West 1987, Econometrica 55) and the
 //! bandwidth of Andrews (1991, Econometrica 59). The friction's parameters enter through
 //! b = tau - F(v): d theta/d theta_f = -A^-1 X' W G.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::accumulate::Sums;
+use super::accumulate::BlockFactors;
 use super::columns::GRADIENT;
-use super::solve::{Solution, Told, of_joint, parts};
+use super::solve::{FitInputs, WeightedSolution, own_unknowns, parts};
 use crate::math::long_run::long_run;
 
 /// The two parts and their sum.
@@ -21,17 +21,17 @@ pub(super) struct Covariances {
 
 /// Sandwich, textbook covariance, and the sensitivities to each joint's known friction.
 pub(super) fn covariance(
-    sums: &Sums,
+    factors: &BlockFactors,
     joints: &[DMatrix<f64>],
-    solution: &Solution,
-    told: Told,
+    solution: &WeightedSolution,
+    inputs: FitInputs,
     residual: &[f64],
 ) -> (Covariances, DMatrix<f64>, Vec<Option<DMatrix<f64>>>) {
-    let columns = &sums.columns;
-    let weights = told.weights;
+    let columns = &factors.columns;
+    let weights = inputs.weights;
     let u = columns.unknowns();
-    let rows = sums.rows as f64;
-    let known = told.prior.map_or(DMatrix::zeros(u, u), |prior| {
+    let rows = factors.rows as f64;
+    let known = inputs.prior.map_or(DMatrix::zeros(u, u), |prior| {
         let rows = prior.rows.columns(0, u);
         rows.tr_mul(&rows) * prior.variance
     });
@@ -51,14 +51,14 @@ pub(super) fn covariance(
     let textbook = &solution.inverse * (meat + &known) * &solution.inverse * freedom;
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
-    let scores: Vec<(usize, DVector<f64>)> = sums
+    let scores: Vec<(usize, DVector<f64>)> = factors
         .blocks
         .iter()
         .map(|block| {
             let mut g = DVector::zeros(u);
             for j in 0..columns.joints {
-                let theta = of_joint(sums, &solution.theta, j);
-                let s = parts(sums, &block.r[j], j).score(&theta);
+                let theta = own_unknowns(factors, &solution.theta, j);
+                let s = parts(factors, &block.r[j], j).score(&theta);
                 for (c, x) in s.iter().enumerate() {
                     g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
                 }
@@ -81,7 +81,7 @@ pub(super) fn covariance(
             sensitivity.push(None);
             continue;
         };
-        let xg = parts(sums, r, j).with_gradient();
+        let xg = parts(factors, r, j).with_gradient();
         let mut global = DMatrix::zeros(u, GRADIENT);
         for c in 0..xg.nrows() {
             for k in 0..GRADIENT {

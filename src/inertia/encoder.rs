@@ -9,12 +9,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 use nalgebra::DMatrix;
 
-use super::accumulate::Sums;
-use super::columns::Columns;
+use super::accumulate::BlockFactors;
+use super::columns::RegressorColumns;
 use super::robust::Weigher;
 use super::solve::Fit;
 use crate::log::Block;
-use crate::motion::{self, RunError, Settings};
+use crate::motion::{self, FilterSettings, RunError};
 use crate::robot::Robot;
 
 /// Number of shifted grids.
@@ -41,19 +41,19 @@ fn shifts(grid: u32) -> [f64; 4] {
 /// Those of the source and of [`motion::run`].
 pub fn accumulate_shifted<E: Send>(
     robot: &Robot,
-    columns: &Columns,
+    columns: &RegressorColumns,
     weigher: Option<&mut Weigher>,
-    settings: &Settings,
+    settings: &FilterSettings,
     grid: u32,
     source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
-) -> Result<Option<Sums>, RunError<E>> {
+) -> Result<Option<BlockFactors>, RunError<E>> {
     if !robot.knows_encoders() {
         return Ok(None);
     }
     let n = columns.joints;
     let shift = shifts(grid);
     let (sender, receiver) = sync_channel::<Block>(WAITING);
-    let smooth = Settings {
+    let smooth = FilterSettings {
         decimation: Some(1),
         ..settings.clone()
     };
@@ -99,7 +99,7 @@ pub fn accumulate_shifted<E: Send>(
             Err(panic) => std::panic::resume_unwind(panic),
         }
         match second {
-            Ok((sums, _)) => Ok(Some(sums)),
+            Ok((factors, _)) => Ok(Some(factors)),
             Err(RunError::Motion(error)) => Err(RunError::Motion(error)),
             Err(RunError::Source(never)) => match never {},
         }

@@ -28,20 +28,20 @@ pub struct Essential {
 }
 
 /// Chooses the essential unknowns from the R factor of the weighted rows (unknowns, then the
-/// target). `rows` is their number, `worth` the number of independent ones over it.
+/// target). `rows` is their number, `effective` the effective sample size over it.
 ///
 /// # Errors
 /// [`FitError::NothingExcited`] where no column is.
-pub fn essential(factor: &DMatrix<f64>, rows: f64, worth: f64) -> Result<Essential, FitError> {
+pub fn essential(factor: &DMatrix<f64>, rows: f64, effective: f64) -> Result<Essential, FitError> {
     let u = factor.ncols() - 1;
     // of columns that depend on one another the first stay
     let all: Vec<usize> = (0..u).collect();
-    let whole = Reduced::of(factor, &all);
+    let whole = ReducedFactor::of(factor, &all);
     let own = |c: &usize| whole.r[(*c, *c)].abs() > DEPENDENT * factor.column(*c).norm();
     let mut kept: Vec<usize> = all.iter().copied().filter(own).collect();
-    let freedom = (worth * rows - u as f64).max(1.0);
-    let whole = Reduced::of(factor, &kept).square;
-    // residuals of correlated rows count for what they are worth
+    let freedom = (effective * rows - u as f64).max(1.0);
+    let whole = ReducedFactor::of(factor, &kept).square;
+    // residuals of correlated rows count by their effective sample size
     let variance = whole / freedom;
     let limit = |gone: usize| -> f64 {
         FisherSnedecor::new(gone as f64, freedom)
@@ -49,7 +49,7 @@ pub fn essential(factor: &DMatrix<f64>, rows: f64, worth: f64) -> Result<Essenti
     };
     let mut gone = 0;
     loop {
-        let Some(fit) = Reduced::of(factor, &kept).solved() else {
+        let Some(fit) = ReducedFactor::of(factor, &kept).solved() else {
             return Err(FitError::NothingExcited);
         };
         let (worst, largest) = fit.extreme(|a, b| a > b);
@@ -68,7 +68,7 @@ pub fn essential(factor: &DMatrix<f64>, rows: f64, worth: f64) -> Result<Essenti
         }
         let mut fewer = kept.clone();
         fewer.remove(worst);
-        let square = Reduced::of(factor, &fewer).square;
+        let square = ReducedFactor::of(factor, &fewer).square;
         let grown = (square - whole) / (gone + 1) as f64;
         if grown > limit(gone + 1) * variance && grown > 1e-12 * square {
             return Ok(stays(&fit));
@@ -79,7 +79,7 @@ pub fn essential(factor: &DMatrix<f64>, rows: f64, worth: f64) -> Result<Essenti
 }
 
 /// R factor of some columns, and the square of what they leave.
-struct Reduced {
+struct ReducedFactor {
     r: DMatrix<f64>,
     square: f64,
 }
@@ -90,7 +90,7 @@ struct Solved {
     relative: Vec<f64>,
 }
 
-impl Reduced {
+impl ReducedFactor {
     fn of(factor: &DMatrix<f64>, kept: &[usize]) -> Self {
         let last = factor.ncols() - 1;
         let mut small = RFactor::new(kept.len() + 1);
@@ -103,7 +103,7 @@ impl Reduced {
         }
         let r = small.r();
         let square = r[(kept.len(), kept.len())].powi(2);
-        Reduced { r, square }
+        ReducedFactor { r, square }
     }
 
     /// `None` without a column.

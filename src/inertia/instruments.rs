@@ -13,9 +13,9 @@ use std::sync::mpsc::sync_channel;
 use nalgebra::{DMatrix, DVector};
 
 use super::BLOCK_SECONDS;
-use super::accumulate::{Accumulator, Sums};
+use super::accumulate::{Accumulator, BlockFactors};
 use super::closed_loop::{ClosedLoop, Gains};
-use super::columns::{Columns, GRADIENT};
+use super::columns::{GRADIENT, RegressorColumns};
 use super::covariance::{at_least, bandwidth};
 use super::encoder::next;
 use super::robust::Status;
@@ -23,7 +23,7 @@ use super::solve::{Fit, FitError, weights_of};
 use crate::log::Block;
 use crate::math::long_run::long_run;
 use crate::math::rank;
-use crate::motion::{self, ParallelFilter, RunError, Settings, Summary};
+use crate::motion::{self, FilterSettings, ParallelFilter, RunError, Summary};
 use crate::robot::Robot;
 
 /// The reference that no log gives is the measured position below this share of the rows' cut-off.
@@ -39,7 +39,7 @@ const OPEN: f64 = 1e-11;
 
 /// Where the reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reference {
+pub enum ReferenceSource {
     /// The log: positions of the blocks hold n measured ones and n of the reference.
     Logged,
     /// The measured positions through a narrower zero-phase filter.
@@ -47,9 +47,9 @@ pub enum Reference {
 }
 
 /// Columns that hold the instruments of `columns` before the regressor itself.
-fn doubled(columns: &Columns) -> Columns {
+fn doubled(columns: &RegressorColumns) -> RegressorColumns {
     let twice = |own: &Vec<super::columns::Own>| own.iter().chain(own).copied().collect();
-    Columns {
+    RegressorColumns {
         joints: columns.joints,
         shared: 2 * columns.shared,
         own: columns.own.iter().map(twice).collect(),
@@ -58,8 +58,8 @@ fn doubled(columns: &Columns) -> Columns {
 }
 
 /// What one reading gives.
-pub struct Reading {
-    pub sums: Sums,
+pub struct InstrumentReading {
+    pub factors: BlockFactors,
     pub summary: Summary,
     pub gains: Gains,
     /// Share of the steps at which the mass matrix was not positive definite, or a joint went astray.
@@ -72,21 +72,21 @@ pub struct Reading {
 /// Those of the source and of [`motion::run`].
 pub fn accumulate<E: Send>(
     robot: &Robot,
-    columns: &Columns,
+    columns: &RegressorColumns,
     theta: &DVector<f64>,
-    reference: Reference,
-    settings: &Settings,
+    reference: ReferenceSource,
+    settings: &FilterSettings,
     step: f64,
     source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
-) -> Result<Reading, RunError<E>> {
+) -> Result<InstrumentReading, RunError<E>> {
     let n = columns.joints;
     let wide = doubled(columns);
     let (sender, receiver) = sync_channel::<Block>(WAITING);
     let (width, share) = match reference {
-        Reference::Logged => (2 * n, ABOVE),
-        Reference::Smoothed => (n, REFERENCE_SHARE),
+        ReferenceSource::Logged => (2 * n, ABOVE),
+        ReferenceSource::Smoothed => (n, REFERENCE_SHARE),
     };
-    let first_settings = Settings {
+    let first_settings = FilterSettings {
         cutoff_hz: (share * settings.cutoff_hz).min(HIGHEST_SHARE / step),
         filter: ParallelFilter::Butterworth { order: 4 },
         decimation: Some(1),
@@ -171,7 +171,7 @@ pub fn accumulate<E: Send>(
                 )
             })
         });
-        let mut sums = Accumulator::new(wide.clone(), BLOCK_SECONDS);
+        let mut factors = Accumulator::new(wide.clone(), BLOCK_SECONDS);
         let second = motion::run(
             &mut next(&receiver),
             2 * n,
@@ -179,7 +179,7 @@ pub fn accumulate<E: Send>(
             None,
             wide.channels(),
             &|s, out| fill(robot, columns, &wide, s, out),
-            &mut |row| sums.add(row.segment, row.t, row.filtered),
+            &mut |row| factors.add(row.segment, row.t, row.filtered),
         );
         drop(receiver);
         let (ran, steps) = match first.join() {
@@ -200,8 +200,8 @@ pub fn accumulate<E: Send>(
             },
             0,
         ));
-        Ok(Reading {
-            sums: sums.finish(),
+        Ok(InstrumentReading {
+            factors: factors.finish(),
             summary,
             gains,
             indefinite: indefinite as f64 / steps.max(1) as f64,
@@ -215,7 +215,13 @@ const ABOVE: f64 = 3.0;
 const HIGHEST_SHARE: f64 = 0.4;
 
 /// Writes instruments and regressor of one sample.
-fn fill(robot: &Robot, columns: &Columns, wide: &Columns, s: &motion::Sample<'_>, out: &mut [f64]) {
+fn fill(
+    robot: &Robot,
+    columns: &RegressorColumns,
+    wide: &RegressorColumns,
+    s: &motion::MotionSample<'_>,
+    out: &mut [f64],
+) {
     let n = columns.joints;
     let half = columns.channels();
     let mut buffer = [0.0; MOST_CHANNELS];
@@ -225,7 +231,7 @@ fn fill(robot: &Robot, columns: &Columns, wide: &Columns, s: &motion::Sample<'_>
     columns.fill(robot, &s.q[..n], &s.v[..n], &s.a[..n], &s.tau[..n], x);
     for j in 0..n {
         let own = columns.shared + columns.own[j].len();
-        let (from, whole) = (columns.offset(j), columns.of_joint(j));
+        let (from, whole) = (columns.offset(j), columns.row_width(j));
         let at = wide.offset(j);
         out[at..at + own].copy_from_slice(&z[from..from + own]);
         out[at + own..at + own + whole].copy_from_slice(&x[from..from + whole]);
@@ -241,11 +247,11 @@ const MOST_CHANNELS: usize = 2 * 8 * 115;
 ///
 /// # Errors
 /// [`FitError`].
-fn solve(sums: &Sums, columns: &Columns, plain: &Fit) -> Result<Fit, FitError> {
+fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Result<Fit, FitError> {
     let (n, u) = (columns.joints, columns.unknowns());
-    let weights = weights_of(sums, &plain.residual_std);
+    let weights = weights_of(factors, &plain.residual_std);
     let own = |j: usize| columns.shared + columns.own[j].len();
-    let joints: Vec<DMatrix<f64>> = (0..n).map(|j| sums.joint(j)).collect();
+    let joints: Vec<DMatrix<f64>> = (0..n).map(|j| factors.joint(j)).collect();
     let mut normal: DMatrix<f64> = DMatrix::zeros(u, u);
     let mut square = DMatrix::zeros(u, u);
     let mut target = DVector::zeros(u);
@@ -278,7 +284,7 @@ fn solve(sums: &Sums, columns: &Columns, plain: &Fit) -> Result<Fit, FitError> {
     let inverse = DMatrix::from_fn(u, u, |a, b| inverse[(a, b)] * right[a] * left[b]);
     let theta = &inverse * target;
     let of = |j: usize| DVector::from_fn(own(j), |c, _| theta[columns.unknown(j, c)]);
-    let rows = sums.rows as f64;
+    let rows = factors.rows as f64;
     let mut fit = plain.clone();
     for (j, r) in joints.iter().enumerate() {
         let left = r.column(r.ncols() - 1) - r.columns(own(j), own(j)) * of(j);
@@ -288,7 +294,7 @@ fn solve(sums: &Sums, columns: &Columns, plain: &Fit) -> Result<Fit, FitError> {
             _ => f64::NAN,
         };
     }
-    let scores: Vec<(usize, DVector<f64>)> = sums
+    let scores: Vec<(usize, DVector<f64>)> = factors
         .blocks
         .iter()
         .map(|block| {
@@ -346,9 +352,9 @@ pub struct Instrumental {
 /// # Errors
 /// Those of `pass`, and [`FitError`].
 pub fn iterate<E: From<FitError>>(
-    columns: &Columns,
+    columns: &RegressorColumns,
     plain: &Fit,
-    pass: &mut dyn FnMut(&DVector<f64>) -> Result<Sums, E>,
+    pass: &mut dyn FnMut(&DVector<f64>) -> Result<BlockFactors, E>,
 ) -> Result<Instrumental, E> {
     let mut fit = plain.clone();
     for iterations in 1..=MOST {
@@ -382,14 +388,18 @@ pub fn iterate<E: From<FitError>>(
 ///
 /// # Errors
 /// [`FitError`].
-pub fn again(columns: &Columns, fit: &Fit, sums: &Sums) -> Result<Fit, FitError> {
-    solve(sums, columns, fit)
+pub fn again(
+    columns: &RegressorColumns,
+    fit: &Fit,
+    factors: &BlockFactors,
+) -> Result<Fit, FitError> {
+    solve(factors, columns, fit)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::columns::Own;
-    use super::super::solve::{Estimator, fit};
+    use super::super::solve::{Weighting, fit};
     use super::*;
     use crate::robot::JointKind;
     use rand::{RngExt, SeedableRng};
@@ -399,8 +409,8 @@ mod tests {
     const STEP: f64 = 0.002;
     const FORCE_NOISE: f64 = 2.0;
 
-    fn columns() -> Columns {
-        Columns {
+    fn columns() -> RegressorColumns {
+        RegressorColumns {
             joints: 1,
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Offset]],
@@ -408,13 +418,13 @@ mod tests {
         }
     }
 
-    fn settings() -> Settings {
-        Settings {
+    fn settings() -> FilterSettings {
+        FilterSettings {
             cutoff_hz: 30.0,
             // raw positions, so that their noise reaches the regressor
             q_order: 0,
             decimation: Some(5),
-            ..Settings::default()
+            ..FilterSettings::default()
         }
     }
 
@@ -467,16 +477,16 @@ mod tests {
     fn plain(noise: f64, seed: u64) -> Fit {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let mut source = once(log(noise, seed, false));
-        let (sums, _) =
+        let (factors, _) =
             super::super::accumulate(&robot, &columns(), &settings(), &mut source).unwrap();
-        fit(&sums, Estimator::Wls).unwrap()
+        fit(&factors, Weighting::Wls).unwrap()
     }
 
-    fn instrumental(noise: f64, seed: u64, reference: Reference) -> Instrumental {
+    fn instrumental(noise: f64, seed: u64, reference: ReferenceSource) -> Instrumental {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let start = plain(noise, seed);
         iterate(&columns(), &start, &mut |theta| {
-            let mut source = once(log(noise, seed, reference == Reference::Logged));
+            let mut source = once(log(noise, seed, reference == ReferenceSource::Logged));
             accumulate(
                 &robot,
                 &columns(),
@@ -486,7 +496,7 @@ mod tests {
                 STEP,
                 &mut source,
             )
-            .map(|read| read.sums)
+            .map(|read| read.factors)
             .map_err(failed)
         })
         .unwrap()
@@ -494,7 +504,7 @@ mod tests {
 
     #[test]
     fn without_noise_in_position_instruments_change_nothing() {
-        let (plain, found) = (plain(0.0, 1), instrumental(0.0, 1, Reference::Logged));
+        let (plain, found) = (plain(0.0, 1), instrumental(0.0, 1, ReferenceSource::Logged));
         assert_eq!(found.status, Status::Converged);
         for i in 0..3 {
             let std = plain.covariance[(i, i)].sqrt();
@@ -507,7 +517,7 @@ mod tests {
         let noise = 1.5e-4;
         let (mut covered, mut mean, runs) = ([0; 3], [0.0; 2], 100);
         for seed in 0..runs {
-            let found = instrumental(noise, seed, Reference::Logged).fit;
+            let found = instrumental(noise, seed, ReferenceSource::Logged).fit;
             mean[0] += plain(noise, seed).theta[0] / runs as f64;
             mean[1] += found.theta[0] / runs as f64;
             for (i, truth) in TRUTH.into_iter().enumerate() {
@@ -527,7 +537,7 @@ mod tests {
 
     #[test]
     fn a_smoothed_reference_removes_most_of_the_bias() {
-        let found = instrumental(1.5e-4, 3, Reference::Smoothed).fit;
+        let found = instrumental(1.5e-4, 3, ReferenceSource::Smoothed).fit;
         let (off, before) = (
             found.theta[0] - TRUTH[0],
             plain(1.5e-4, 3).theta[0] - TRUTH[0],

@@ -19,26 +19,26 @@ pub mod solve;
 pub mod verdict;
 
 use crate::log::Block;
-use crate::motion::{self, RunError, Settings, Summary};
+use crate::motion::{self, FilterSettings, RunError, Summary};
 use crate::robot::Robot;
 
-use accumulate::{Accumulator, Sums};
-use columns::Columns;
+use accumulate::{Accumulator, BlockFactors};
+use columns::RegressorColumns;
 use robust::Weigher;
 
 /// Length of the blocks whose scores make the covariance, to begin with [s].
 const BLOCK_SECONDS: f64 = 0.25;
 
-/// Reads one log and reduces its filtered, decimated rows to sums. Sums of several logs merge.
+/// Reads one log and reduces its filtered, decimated rows to block factors. Those of several logs merge.
 ///
 /// # Errors
 /// Those of the source and of [`motion::run`].
 pub fn accumulate<E>(
     robot: &Robot,
-    columns: &Columns,
-    settings: &Settings,
+    columns: &RegressorColumns,
+    settings: &FilterSettings,
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
-) -> Result<(Sums, Summary), RunError<E>> {
+) -> Result<(BlockFactors, Summary), RunError<E>> {
     accumulate_weighted(robot, columns, None, settings, source)
 }
 
@@ -48,12 +48,12 @@ pub fn accumulate<E>(
 /// Those of the source and of [`motion::run`].
 pub fn accumulate_weighted<E>(
     robot: &Robot,
-    columns: &Columns,
+    columns: &RegressorColumns,
     mut weigher: Option<&mut Weigher>,
-    settings: &Settings,
+    settings: &FilterSettings,
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
-) -> Result<(Sums, Summary), RunError<E>> {
-    let mut sums = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+) -> Result<(BlockFactors, Summary), RunError<E>> {
+    let mut factors = Accumulator::new(columns.clone(), BLOCK_SECONDS);
     let summary = motion::run(
         source,
         columns.joints,
@@ -66,10 +66,10 @@ pub fn accumulate_weighted<E>(
                 Some(weigher) => weigher.weigh(columns, row.filtered),
                 None => row.filtered,
             };
-            sums.add(row.segment, row.t, channels);
+            factors.add(row.segment, row.t, channels);
         },
     )?;
-    Ok((sums.finish(), summary))
+    Ok((factors.finish(), summary))
 }
 
 /// Adds to a fit's covariance what another processing of the same logs changes in its parameters.

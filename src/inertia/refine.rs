@@ -12,11 +12,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::accumulate::Sums;
-use super::columns::{Columns, GRADIENT, KnownFriction, Own};
+use super::accumulate::BlockFactors;
+use super::columns::{GRADIENT, KnownFriction, Own, RegressorColumns};
 use super::robust::Status;
 use super::solve::{
-    Estimator, Fit, FitError, Prior, Told, fit, fit_told, least_square, weights_of,
+    Fit, FitError, FitInputs, PriorRows, Weighting, fit, fit_with, least_square, weights_of,
 };
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
@@ -37,10 +37,10 @@ const STEEPEST: f64 = 1e4;
 
 /// A refined fit.
 #[derive(Debug, Clone)]
-pub struct Refined {
+pub struct RefinedFit {
     /// The columns with the friction as it was refined; its covariance is that of before.
-    pub columns: Columns,
-    /// All unknowns in the order of [`Columns::with_free_friction`].
+    pub columns: RegressorColumns,
+    /// All unknowns in the order of [`RegressorColumns::with_free_friction`].
     pub fit: Fit,
     pub status: Status,
     /// Passes over the logs.
@@ -48,31 +48,31 @@ pub struct Refined {
     /// Relative residual per joint before the refinement.
     pub before: Vec<f64>,
     /// The rows of the last pass, the laws' changes among the unknowns.
-    pub sums: Sums,
+    pub factors: BlockFactors,
     weights: Vec<f64>,
-    prior: Option<Prior>,
+    prior: Option<PriorRows>,
 }
 
-impl Refined {
-    /// The fit of other sums of [`Self::columns`], linear about the refined friction.
+impl RefinedFit {
+    /// The fit of other block factors of [`Self::columns`], linear about the refined friction.
     ///
     /// # Errors
     /// [`FitError`].
-    pub fn solve(&self, sums: Sums) -> Result<Fit, FitError> {
-        let sums = sums.with_free_friction();
-        let told = Told {
+    pub fn solve(&self, factors: BlockFactors) -> Result<Fit, FitError> {
+        let factors = factors.with_free_friction();
+        let inputs = FitInputs {
             weights: &self.weights,
             slope: None,
             prior: self.prior.as_ref(),
         };
-        let mut fit = fit_told(&sums, told)?;
+        let mut fit = fit_with(&factors, inputs)?;
         add_laws(&self.columns, &mut fit.theta);
         Ok(fit)
     }
 }
 
-impl Refined {
-    /// What the unknowns of [`Self::sums`] lack to those of [`Self::fit`]: the laws as they stand.
+impl RefinedFit {
+    /// What the unknowns of [`Self::factors`] lack to those of [`Self::fit`]: the laws as they stand.
     pub fn shift(&self) -> DVector<f64> {
         let mut shift = DVector::zeros(self.fit.theta.len());
         add_laws(&self.columns, &mut shift);
@@ -81,7 +81,7 @@ impl Refined {
 }
 
 /// Adds the laws' parameters to their changes.
-fn add_laws(columns: &Columns, theta: &mut DVector<f64>) {
+fn add_laws(columns: &RegressorColumns, theta: &mut DVector<f64>) {
     let free = columns.with_free_friction();
     for (j, known) in columns.known.iter().enumerate() {
         if let Some(known) = known {
@@ -95,7 +95,11 @@ fn add_laws(columns: &Columns, theta: &mut DVector<f64>) {
 
 /// Rows of the friction that was known before: L (phi - phi_0) of unit noise, L'L the inverse of its
 /// covariance, times the root of `strength`. `None` where nothing was known.
-fn prior(before: &Columns, now: &Columns, strength: f64) -> Result<Option<Prior>, FitError> {
+fn prior(
+    before: &RegressorColumns,
+    now: &RegressorColumns,
+    strength: f64,
+) -> Result<Option<PriorRows>, FitError> {
     let free = now.with_free_friction();
     let u = free.unknowns();
     let mut rows: Vec<Vec<f64>> = Vec::new();
@@ -129,37 +133,42 @@ fn prior(before: &Columns, now: &Columns, strength: f64) -> Result<Option<Prior>
             rows.push(row);
         }
     }
-    Ok((!rows.is_empty()).then(|| Prior {
+    Ok((!rows.is_empty()).then(|| PriorRows {
         rows: DMatrix::from_fn(rows.len(), u + 1, |r, c| rows[r][c]),
         variance: strength,
     }))
 }
 
-/// Rows that hold the law's parameters where they are: `damping` parts of their own columns.
-fn damped(sums: &Sums, weights: &[f64], prior: Option<&Prior>, damping: f64) -> Prior {
-    let u = sums.columns.unknowns();
+/// Rows that keep the law's parameters where they are: `damping` parts of their own columns.
+fn damped(
+    factors: &BlockFactors,
+    weights: &[f64],
+    prior: Option<&PriorRows>,
+    damping: f64,
+) -> PriorRows {
+    let u = factors.columns.unknowns();
     let mut rows = prior.map_or(DMatrix::zeros(0, u + 1), |p| p.rows.clone());
-    for (j, own) in sums.columns.own.iter().enumerate() {
-        let r = sums.joint(j);
+    for (j, own) in factors.columns.own.iter().enumerate() {
+        let r = factors.joint(j);
         for (k, _) in own
             .iter()
             .enumerate()
             .filter(|(_, o)| matches!(o, Own::Law(_)))
         {
-            let size = weights[j] * r.column(sums.columns.shared + k).norm();
+            let size = weights[j] * r.column(factors.columns.shared + k).norm();
             let at = rows.nrows();
             rows = rows.insert_row(at, 0.0);
-            rows[(at, sums.columns.first_own(j) + k)] = damping.sqrt() * size;
+            rows[(at, factors.columns.first_own(j) + k)] = damping.sqrt() * size;
         }
     }
-    Prior {
+    PriorRows {
         rows,
         variance: 1.0,
     }
 }
 
 /// Places of each joint's own terms that are no part of a law.
-fn without_law(columns: &Columns) -> Vec<Vec<usize>> {
+fn without_law(columns: &RegressorColumns) -> Vec<Vec<usize>> {
     let linear = |own: &Vec<Own>| {
         let all = own.iter().enumerate();
         let kept = all.filter(|(_, o)| !matches!(o, Own::Law(_)));
@@ -169,14 +178,18 @@ fn without_law(columns: &Columns) -> Vec<Vec<usize>> {
 }
 
 /// Least cost that the linear parameters reach with the law as it stands.
-fn cost(sums: &Sums, weights: &[f64], prior: Option<&Prior>) -> Result<f64, FitError> {
-    let u = sums.columns.unknowns();
-    let told = Told {
+fn cost(
+    factors: &BlockFactors,
+    weights: &[f64],
+    prior: Option<&PriorRows>,
+) -> Result<f64, FitError> {
+    let u = factors.columns.unknowns();
+    let inputs = FitInputs {
         weights,
-        ..Told::default()
+        ..FitInputs::default()
     };
     let known = prior.map_or(0.0, |p| p.rows.column(u).norm_squared());
-    Ok(least_square(&sums.with_own(&without_law(&sums.columns)), told)? + known)
+    Ok(least_square(&factors.with_own(&without_law(&factors.columns)), inputs)? + known)
 }
 
 /// Fits all parameters, from the friction in `start` and drawn to it by its covariance. `pass`
@@ -185,46 +198,52 @@ fn cost(sums: &Sums, weights: &[f64], prior: Option<&Prior>) -> Result<f64, FitE
 /// # Errors
 /// Those of `pass`, and [`FitError`].
 pub fn refine<E: From<FitError>>(
-    start: Columns,
-    pass: &mut dyn FnMut(&Columns) -> Result<Sums, E>,
-) -> Result<Refined, E> {
-    let speeds = |sums: &Sums| -> Vec<f64> {
+    start: RegressorColumns,
+    pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
+) -> Result<RefinedFit, E> {
+    let speeds = |factors: &BlockFactors| -> Vec<f64> {
         let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
         let speed = |(j, own)| match place(own) {
             Some(k) => {
-                sums.joint(j).column(sums.columns.shared + k).norm() / (sums.rows as f64).sqrt()
+                factors.joint(j).column(factors.columns.shared + k).norm()
+                    / (factors.rows as f64).sqrt()
             }
             None => 0.0,
         };
-        sums.columns.own.iter().enumerate().map(speed).collect()
+        factors.columns.own.iter().enumerate().map(speed).collect()
     };
     let mut now = sorted(start.clone());
-    let mut sums = pass(&now)?.with_free_friction();
-    let linear = |sums: &Sums| fit(&sums.with_own(&without_law(&sums.columns)), Estimator::Wls);
-    let first = linear(&sums)?;
+    let mut factors = pass(&now)?.with_free_friction();
+    let linear = |factors: &BlockFactors| {
+        fit(
+            &factors.with_own(&without_law(&factors.columns)),
+            Weighting::Wls,
+        )
+    };
+    let first = linear(&factors)?;
     // correlated rows hold less than their number says: what was known must not drown among them
     let strength = (first.rows as f64 / first.effective_rows).max(1.0);
     let before = first.relative_error.clone();
-    let mut weights = weights_of(&sums, &first.residual_std);
+    let mut weights = weights_of(&factors, &first.residual_std);
     let mut known = prior(&start, &now, strength)?;
-    let mut lowest = cost(&sums, &weights, known.as_ref())?;
+    let mut lowest = cost(&factors, &weights, known.as_ref())?;
     let (mut damping, mut iterations) = (DAMPING[0], 1);
     let mut status = Status::IterationLimit;
-    let speed = speeds(&sums);
+    let speed = speeds(&factors);
     while iterations < MOST {
-        let held = damped(&sums, &weights, known.as_ref(), damping);
-        let told = Told {
+        let damped_rows = damped(&factors, &weights, known.as_ref(), damping);
+        let inputs = FitInputs {
             weights: &weights,
             slope: None,
-            prior: Some(&held),
+            prior: Some(&damped_rows),
         };
-        let promised = lowest - least_square(&sums, told)?;
+        let promised = lowest - least_square(&factors, inputs)?;
         // a cost of one a row is one of the noise: far below it there is none
-        if promised <= SETTLED * lowest || lowest <= 1e-6 * sums.rows as f64 {
+        if promised <= SETTLED * lowest || lowest <= 1e-6 * factors.rows as f64 {
             status = Status::Converged;
             break;
         }
-        let step = fit_told(&sums, told)?.theta;
+        let step = fit_with(&factors, inputs)?.theta;
         let next = sorted(moved(&now, &step, &speed));
         let trial = pass(&next)?.with_free_friction();
         iterations += 1;
@@ -232,9 +251,9 @@ pub fn refine<E: From<FitError>>(
         let found = cost(&trial, &weights, trial_known.as_ref())?;
         if found < lowest {
             let little = lowest - found <= SETTLED * lowest;
-            (now, sums, known) = (next, trial, trial_known);
-            weights = weights_of(&sums, &linear(&sums)?.residual_std);
-            lowest = cost(&sums, &weights, known.as_ref())?;
+            (now, factors, known) = (next, trial, trial_known);
+            weights = weights_of(&factors, &linear(&factors)?.residual_std);
+            lowest = cost(&factors, &weights, known.as_ref())?;
             damping = (damping / 10.0).max(DAMPING[1]);
             if little {
                 status = Status::Converged;
@@ -248,23 +267,23 @@ pub fn refine<E: From<FitError>>(
             break;
         }
     }
-    let at_end = linear(&sums)?;
-    let mut refined = Refined {
+    let at_end = linear(&factors)?;
+    let mut refined = RefinedFit {
         columns: now,
         fit: at_end.clone(),
         status,
         iterations,
         before,
-        sums,
+        factors,
         weights,
         prior: known,
     };
-    let told = Told {
+    let inputs = FitInputs {
         weights: &refined.weights,
         slope: None,
         prior: refined.prior.as_ref(),
     };
-    let mut fit = fit_told(&refined.sums, told)?;
+    let mut fit = fit_with(&refined.factors, inputs)?;
     // the values are those of the last step that was taken; the fit about them gives the covariance
     fit.theta.fill(0.0);
     let linear_columns = &refined.columns;
@@ -273,7 +292,7 @@ pub fn refine<E: From<FitError>>(
     }
     for j in 0..linear_columns.joints {
         for k in 0..linear_columns.own[j].len() {
-            fit.theta[refined.sums.columns.first_own(j) + k] =
+            fit.theta[refined.factors.columns.first_own(j) + k] =
                 at_end.theta[linear_columns.first_own(j) + k];
         }
     }
@@ -285,7 +304,7 @@ pub fn refine<E: From<FitError>>(
 }
 
 /// The steeper part first.
-fn sorted(mut columns: Columns) -> Columns {
+fn sorted(mut columns: RegressorColumns) -> RegressorColumns {
     for known in columns.known.iter_mut().flatten() {
         let law = &mut known.law;
         if law.slope_1 < law.slope_2 {
@@ -303,7 +322,7 @@ fn sorted(mut columns: Columns) -> Columns {
 }
 
 /// The columns with their laws moved by a step of the unknowns; slopes stay positive and in bounds.
-fn moved(columns: &Columns, step: &DVector<f64>, speed: &[f64]) -> Columns {
+fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> RegressorColumns {
     let free = columns.with_free_friction();
     let mut next = columns.clone();
     for (j, known) in next.known.iter_mut().enumerate() {
@@ -335,12 +354,12 @@ fn moved(columns: &Columns, step: &DVector<f64>, speed: &[f64]) -> Columns {
 /// # Errors
 /// Those of `pass`, and [`FitError`].
 pub fn begin<E: From<FitError>>(
-    linear: &Columns,
-    pass: &mut dyn FnMut(&Columns) -> Result<Sums, E>,
-) -> Result<Columns, E> {
+    linear: &RegressorColumns,
+    pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
+) -> Result<RegressorColumns, E> {
     let viscous = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Viscous);
     let first = pass(linear)?;
-    let plain = fit(&first, Estimator::Wls)?;
+    let plain = fit(&first, Weighting::Wls)?;
     let mut many = linear.clone();
     let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
     for (j, slopes) in slopes.iter_mut().enumerate() {
@@ -353,8 +372,8 @@ pub fn begin<E: From<FitError>>(
         many.own[j].retain(|o| *o != Own::Coulomb);
         many.own[j].extend(slopes.map(Own::Saturating));
     }
-    let sums = pass(&many)?;
-    let weights = weights_of(&sums, &plain.residual_std);
+    let factors = pass(&many)?;
+    let weights = weights_of(&factors, &plain.residual_std);
     let base = |j: usize| -> Vec<usize> {
         let all = many.own[j].iter().enumerate();
         all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
@@ -370,11 +389,11 @@ pub fn begin<E: From<FitError>>(
         keep
     };
     // one block of each joint's R factor is all that a choice needs
-    let small = sums.in_one_block();
+    let small = factors.in_one_block();
     let mut pairs = vec![[SLOPES.len() - 2, 2]; linear.joints];
-    let told = Told {
+    let inputs = FitInputs {
         weights: &weights,
-        ..Told::default()
+        ..FitInputs::default()
     };
     for j in 0..linear.joints {
         if viscous(&linear.own[j]).is_none() {
@@ -386,7 +405,7 @@ pub fn begin<E: From<FitError>>(
                 pairs[j] = [steep, flat];
                 let chosen: Vec<Vec<usize>> =
                     (0..linear.joints).map(|i| keep(i, pairs[i])).collect();
-                let square = least_square(&small.with_own(&chosen), told)?;
+                let square = least_square(&small.with_own(&chosen), inputs)?;
                 if square < best.0 {
                     best = (square, pairs[j]);
                 }
@@ -395,7 +414,7 @@ pub fn begin<E: From<FitError>>(
         pairs[j] = best.1;
     }
     let chosen: Vec<Vec<usize>> = (0..linear.joints).map(|j| keep(j, pairs[j])).collect();
-    let found = fit_told(&small.with_own(&chosen), told)?;
+    let found = fit_with(&small.with_own(&chosen), inputs)?;
     let mut start = linear.clone();
     for j in 0..linear.joints {
         let Some(k) = viscous(&linear.own[j]) else {
@@ -432,8 +451,8 @@ mod tests {
     const INERTIA: f64 = 3.0;
     const LAW: [f64; 5] = [2.0, 1.4, -0.5, 60.0, 6.0];
 
-    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> Columns {
-        Columns {
+    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> RegressorColumns {
+        RegressorColumns {
             joints: 1,
             shared: 1,
             own: vec![own],
@@ -442,7 +461,7 @@ mod tests {
     }
 
     /// Rows of a joint with inertia and law, of which every speed is seen often.
-    fn read(columns: &Columns, noise: f64, seed: u64) -> Result<Sums, FitError> {
+    fn read(columns: &RegressorColumns, noise: f64, seed: u64) -> Result<BlockFactors, FitError> {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let law = DoubleTanh::from_parameters(LAW);
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
@@ -486,7 +505,7 @@ mod tests {
     fn a_law_without_one_joint_logs_is_found_with_the_inertia() {
         let linear = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
         let mut passes = 0;
-        let mut pass = |c: &Columns| {
+        let mut pass = |c: &RegressorColumns| {
             passes += 1;
             read(c, 0.0, 1)
         };
@@ -507,7 +526,7 @@ mod tests {
         let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
         let mut covered = [0; 7];
         for seed in 0..60 {
-            let mut pass = |c: &Columns| read(c, 0.05, seed);
+            let mut pass = |c: &RegressorColumns| read(c, 0.05, seed);
             let start = begin(&linear, &mut pass).unwrap();
             let found = refine(start, &mut pass).unwrap();
             for (i, truth) in truth.into_iter().enumerate() {
@@ -530,7 +549,7 @@ mod tests {
             }
             let law = DoubleTanh::from_parameters(off);
             let known = columns(vec![Own::Offset], Some(KnownFriction { law, covariance }));
-            let found = refine(known, &mut |c: &Columns| read(c, 0.02, 5)).unwrap();
+            let found = refine(known, &mut |c: &RegressorColumns| read(c, 0.02, 5)).unwrap();
             let viscous = found.fit.theta[2];
             let near = if stays { off[0] } else { LAW[0] };
             assert!((viscous - near).abs() < 0.02, "{sure}: {viscous}");

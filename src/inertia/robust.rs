@@ -10,9 +10,9 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::accumulate::Sums;
-use super::columns::Columns;
-use super::solve::{Estimator, Fit, FitError, Told, fit, fit_told};
+use super::accumulate::BlockFactors;
+use super::columns::RegressorColumns;
+use super::solve::{Fit, FitError, FitInputs, Weighting, fit, fit_with};
 
 /// Tuning of Huber's loss: 95 % efficiency where residuals are normal.
 const HUBER: f64 = 1.345;
@@ -171,12 +171,12 @@ impl Weigher {
     }
 
     /// The channels of one instant with each joint's row times the root of its weight.
-    pub fn weigh(&mut self, columns: &Columns, channels: &[f64]) -> &[f64] {
+    pub fn weigh(&mut self, columns: &RegressorColumns, channels: &[f64]) -> &[f64] {
         self.row.clear();
         self.row.extend_from_slice(channels);
         let mut rest = self.row.as_mut_slice();
         for j in 0..columns.joints {
-            let (row, after) = std::mem::take(&mut rest).split_at_mut(columns.of_joint(j));
+            let (row, after) = std::mem::take(&mut rest).split_at_mut(columns.row_width(j));
             rest = after;
             let mut residual = row.last().copied().unwrap_or_default();
             for (c, x) in row[..columns.shared + columns.own[j].len()]
@@ -207,11 +207,11 @@ impl Weigher {
             .collect()
     }
 
-    /// The fit of sums that this weigher has weighted.
+    /// The fit of block factors that this weigher has weighted.
     ///
     /// # Errors
     /// [`FitError`].
-    pub fn solve(&self, sums: &Sums) -> Result<Fit, FitError> {
+    pub fn solve(&self, factors: &BlockFactors) -> Result<Fit, FitError> {
         let inverse = |s: &f64| if *s > 0.0 { 1.0 / s } else { 0.0 };
         let weights: Vec<f64> = self.scale.iter().map(inverse).collect();
         let share = |t: &Tally| {
@@ -222,12 +222,12 @@ impl Weigher {
             }
         };
         let slope: Vec<f64> = self.tally.iter().map(share).collect();
-        let told = Told {
+        let inputs = FitInputs {
             weights: &weights,
             slope: Some(&slope),
             prior: None,
         };
-        let mut fit = fit_told(sums, told)?;
+        let mut fit = fit_with(factors, inputs)?;
         // the residual of all rows as they are, outliers among them
         for (j, tally) in self.tally.iter().enumerate() {
             fit.residual_std[j] = (tally.square / tally.rows.max(1) as f64).sqrt();
@@ -258,7 +258,7 @@ pub enum Status {
 pub struct Robust {
     pub fit: Fit,
     /// The weighted rows of the last pass.
-    pub sums: Sums,
+    pub factors: BlockFactors,
     /// Gives other readings of the logs the weights of the fit.
     pub weigher: Weigher,
     pub status: Status,
@@ -275,9 +275,9 @@ pub struct Robust {
 /// # Errors
 /// Those of `pass`, and [`FitError`].
 pub fn irls<E: From<FitError>>(
-    pass: &mut dyn FnMut(Option<&mut Weigher>) -> Result<Sums, E>,
+    pass: &mut dyn FnMut(Option<&mut Weigher>) -> Result<BlockFactors, E>,
 ) -> Result<Robust, E> {
-    let mut fit = fit(&pass(None)?, Estimator::Wls)?;
+    let mut fit = fit(&pass(None)?, Weighting::Wls)?;
     let rms: Vec<f64> = fit.residual_std.clone();
     let floor: Vec<f64> = fit.torque_rms.iter().map(|rms| 1e-9 * rms).collect();
     let mut seen = Weigher::new(Loss::Square, fit.theta.clone(), rms.clone(), &rms);
@@ -290,8 +290,8 @@ pub fn irls<E: From<FitError>>(
         status = Status::IterationLimit;
         for _ in 0..MOST {
             seen = Weigher::new(loss, fit.theta.clone(), scale, &rms);
-            let sums = pass(Some(&mut seen))?;
-            let next = seen.solve(&sums)?;
+            let factors = pass(Some(&mut seen))?;
+            let next = seen.solve(&factors)?;
             iterations += 1;
             scale = seen.scales(&floor);
             let moved = |i: usize| {
@@ -301,7 +301,7 @@ pub fn irls<E: From<FitError>>(
             };
             let settled = !(0..next.theta.len()).any(moved);
             fit = next;
-            last = Some(sums);
+            last = Some(factors);
             if settled {
                 status = Status::Converged;
                 break;
@@ -309,9 +309,9 @@ pub fn irls<E: From<FitError>>(
         }
     }
     let share = |t: &Tally| t.down as f64 / t.rows.max(1) as f64;
-    let sums = last.ok_or(FitError::NothingExcited)?;
+    let factors = last.ok_or(FitError::NothingExcited)?;
     Ok(Robust {
-        sums,
+        factors,
         down_weighted: seen.tally.iter().map(share).collect(),
         scale: seen.scale.clone(),
         weigher: seen,
@@ -334,9 +334,13 @@ mod tests {
 
     /// Rows of a joint with inertia 3, Fv 2 and Fc 0.7, read as often as a fit asks for them; a
     /// share of them is hit by a force of 40 that always pushes forward.
-    fn read(hit: f64, seed: u64, mut weigher: Option<&mut Weigher>) -> Result<Sums, FitError> {
+    fn read(
+        hit: f64,
+        seed: u64,
+        mut weigher: Option<&mut Weigher>,
+    ) -> Result<BlockFactors, FitError> {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let columns = Columns {
+        let columns = RegressorColumns {
             joints: 1,
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Coulomb]],
@@ -365,7 +369,7 @@ mod tests {
 
     #[test]
     fn two_per_cent_of_spikes_ruin_least_squares_and_not_the_robust_fit() {
-        let plain = fit(&read(0.02, 3, None).unwrap(), Estimator::Wls).unwrap();
+        let plain = fit(&read(0.02, 3, None).unwrap(), Weighting::Wls).unwrap();
         assert!((plain.theta[2] - 0.7).abs() > 0.4, "{}", plain.theta);
         let robust = irls(&mut |w| read(0.02, 3, w)).unwrap();
         assert_eq!(robust.status, Status::Converged);
@@ -390,7 +394,7 @@ mod tests {
     fn on_clean_rows_both_agree_and_the_robust_intervals_cover() {
         let mut covered = [0; 3];
         for seed in 0..100 {
-            let plain = fit(&read(0.0, seed, None).unwrap(), Estimator::Wls).unwrap();
+            let plain = fit(&read(0.0, seed, None).unwrap(), Weighting::Wls).unwrap();
             let robust = irls(&mut |w| read(0.0, seed, w)).unwrap();
             for (i, truth) in TRUTH.into_iter().enumerate() {
                 let std = |fit: &Fit| fit.covariance[(i, i)].sqrt();

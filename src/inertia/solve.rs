@@ -1,10 +1,10 @@
-//! The fit itself: column-normalised least squares (41) on the sums, weighted by each joint's
+//! The fit itself: column-normalised least squares (41) on the block factors, weighted by each joint's
 //! noise, with rank, condition numbers and a covariance that correlated residuals do not break.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::accumulate::{Parts, Sums};
+use super::accumulate::{BlockFactors, JointFactor};
 use super::columns::GRADIENT;
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
@@ -12,7 +12,7 @@ use crate::math::rfactor::RFactor;
 /// Which rows count how much.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Estimator {
+pub enum Weighting {
     /// Rows weighted by each joint's residual of an ordinary fit (two steps).
     #[default]
     Wls,
@@ -42,7 +42,7 @@ pub enum FitError {
 
 /// Condition numbers of the unweighted stacked regressor.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Condition {
+pub struct ConditionNumbers {
     /// Ratio of its extreme singular values as it stands; null where the rank is short.
     pub raw: Option<f64>,
     /// With columns scaled to norm 1.
@@ -56,7 +56,7 @@ pub struct Confounded {
     pub terms: Vec<(usize, f64)>,
 }
 
-/// Result of the fit, unknowns in the order of `Columns`.
+/// Result of the fit, unknowns in the order of `RegressorColumns`.
 #[derive(Debug, Clone)]
 pub struct Fit {
     pub theta: DVector<f64>,
@@ -69,7 +69,7 @@ pub struct Fit {
     /// False where the unknown has a part in a combination that the data leave open.
     pub determined: Vec<bool>,
     pub confounded: Vec<Confounded>,
-    pub condition: Condition,
+    pub condition: ConditionNumbers,
     pub rank: usize,
     /// Standard deviation of each joint's residual [N or Nm], filtered.
     pub residual_std: Vec<f64>,
@@ -84,21 +84,21 @@ pub struct Fit {
     pub effective_rows: f64,
 }
 
-/// What a fit is told besides the rows.
+/// What a fit is given besides the rows.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Told<'a> {
+pub struct FitInputs<'a> {
     /// Weight of each joint's rows [1/N or 1/Nm].
     pub weights: &'a [f64],
     /// Per joint, by which part of X'X the score falls where theta grows: 1 for least squares, the
     /// mean of psi' over that of the row weights for a robust fit.
     pub slope: Option<&'a [f64]>,
     /// What is known of the unknowns beforehand.
-    pub prior: Option<&'a Prior>,
+    pub prior: Option<&'a PriorRows>,
 }
 
 /// What is known of the unknowns beforehand, as rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prior {
+pub struct PriorRows {
     /// k x (unknowns + 1), the target last.
     pub rows: DMatrix<f64>,
     /// Variance of the rows' noise: above 1 where they are given more weight than one row of data,
@@ -106,62 +106,68 @@ pub struct Prior {
     pub variance: f64,
 }
 
-/// Fits all unknowns of the sums.
+/// Fits all unknowns of the block factors.
 ///
 /// # Errors
 /// [`FitError`].
-pub fn fit(sums: &Sums, estimator: Estimator) -> Result<Fit, FitError> {
-    let joints = joints(sums)?;
-    let mut weights = vec![1.0; sums.columns.joints];
-    if estimator == Estimator::Wls {
+pub fn fit(factors: &BlockFactors, estimator: Weighting) -> Result<Fit, FitError> {
+    let joints = joints(factors)?;
+    let mut weights = vec![1.0; factors.columns.joints];
+    if estimator == Weighting::Wls {
         // noise of each joint from the step before; two steps settle it
         for _ in 0..2 {
-            let theta = solve(sums, &joints, &weights, None)?.theta;
-            weights = weights_of(sums, &residual_std(sums, &joints, &theta));
+            let theta = solve(factors, &joints, &weights, None)?.theta;
+            weights = weights_of(factors, &residual_std(factors, &joints, &theta));
         }
     }
-    let told = Told {
+    let inputs = FitInputs {
         weights: &weights,
-        ..Told::default()
+        ..FitInputs::default()
     };
-    finish(sums, &joints, told)
+    finish(factors, &joints, inputs)
 }
 
-/// Fits all unknowns of the sums with weights and prior given.
+/// Fits all unknowns of the block factors with weights and prior given.
 ///
 /// # Errors
 /// [`FitError`].
-pub fn fit_told(sums: &Sums, told: Told) -> Result<Fit, FitError> {
-    finish(sums, &joints(sums)?, told)
+pub fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit, FitError> {
+    finish(factors, &joints(factors)?, inputs)
 }
 
 /// Weight of each joint's rows from the standard deviation of its residual [N or Nm].
-pub fn weights_of(sums: &Sums, residual: &[f64]) -> Vec<f64> {
+pub fn weights_of(factors: &BlockFactors, residual: &[f64]) -> Vec<f64> {
     let of = |(s, t): (&f64, &f64)| {
-        let floor = 1e-9 * (t / sums.rows as f64).sqrt();
+        let floor = 1e-9 * (t / factors.rows as f64).sqrt();
         match s.max(floor) {
             0.0 => 0.0,
             s => 1.0 / s,
         }
     };
-    residual.iter().zip(&sums.torque_square).map(of).collect()
+    residual
+        .iter()
+        .zip(&factors.torque_square)
+        .map(of)
+        .collect()
 }
 
 /// R factor of each joint, where there are rows enough.
-fn joints(sums: &Sums) -> Result<Vec<DMatrix<f64>>, FitError> {
-    let u = sums.columns.unknowns();
-    if sums.rows < 2 * u as u64 {
+fn joints(factors: &BlockFactors) -> Result<Vec<DMatrix<f64>>, FitError> {
+    let u = factors.columns.unknowns();
+    if factors.rows < 2 * u as u64 {
         return Err(FitError::TooFewRows {
-            rows: sums.rows,
+            rows: factors.rows,
             unknowns: u,
         });
     }
-    Ok((0..sums.columns.joints).map(|j| sums.joint(j)).collect())
+    Ok((0..factors.columns.joints)
+        .map(|j| factors.joint(j))
+        .collect())
 }
 
 /// Lowest weighted sum of squares that any values of the unknowns reach, prior included.
-pub fn least_square(sums: &Sums, told: Told) -> Result<f64, FitError> {
-    let r = stacked(sums, &joints(sums)?, told.weights, told.prior);
+pub fn least_square(factors: &BlockFactors, inputs: FitInputs) -> Result<f64, FitError> {
+    let r = stacked(factors, &joints(factors)?, inputs.weights, inputs.prior);
     let u = r.ncols() - 1;
     Ok(r[(u, u)] * r[(u, u)])
 }
@@ -170,35 +176,39 @@ pub fn least_square(sums: &Sums, told: Told) -> Result<f64, FitError> {
 ///
 /// # Errors
 /// [`FitError::TooFewRows`].
-pub fn factor(sums: &Sums, weights: &[f64]) -> Result<DMatrix<f64>, FitError> {
-    Ok(stacked(sums, &joints(sums)?, weights, None))
+pub fn factor(factors: &BlockFactors, weights: &[f64]) -> Result<DMatrix<f64>, FitError> {
+    Ok(stacked(factors, &joints(factors)?, weights, None))
 }
 
 /// Residual of each joint under other values of the unknowns [N or Nm].
-pub fn residual_of(sums: &Sums, theta: &DVector<f64>) -> Result<Vec<f64>, FitError> {
-    Ok(residual_std(sums, &joints(sums)?, theta))
+pub fn residual_of(factors: &BlockFactors, theta: &DVector<f64>) -> Result<Vec<f64>, FitError> {
+    Ok(residual_std(factors, &joints(factors)?, theta))
 }
 
-fn finish(sums: &Sums, joints: &[DMatrix<f64>], told: Told) -> Result<Fit, FitError> {
-    let columns = &sums.columns;
+fn finish(
+    factors: &BlockFactors,
+    joints: &[DMatrix<f64>],
+    inputs: FitInputs,
+) -> Result<Fit, FitError> {
+    let columns = &factors.columns;
     let (n, u) = (columns.joints, columns.unknowns());
-    let whole = stacked(sums, joints, &vec![1.0; n], None);
+    let whole = stacked(factors, joints, &vec![1.0; n], None);
     let (condition, rank) = conditions(&whole.columns(0, u).into_owned())?;
-    let weights = told.weights;
-    let mut solution = solve(sums, joints, weights, told.prior)?;
-    let residual = residual_std(sums, joints, &solution.theta);
-    if let Some(slope) = told.slope {
+    let weights = inputs.weights;
+    let mut solution = solve(factors, joints, weights, inputs.prior)?;
+    let residual = residual_std(factors, joints, &solution.theta);
+    if let Some(slope) = inputs.slope {
         let bread: Vec<f64> = weights
             .iter()
             .zip(slope)
             .map(|(w, s)| w * s.sqrt())
             .collect();
-        solution.inverse = solve(sums, joints, &bread, told.prior)?.inverse;
+        solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
     }
     let (covariance, textbook, sensitivity) =
-        super::covariance::covariance(sums, joints, &solution, told, &residual);
-    let rows = sums.rows as f64;
-    let torque_rms: Vec<f64> = sums
+        super::covariance::covariance(factors, joints, &solution, inputs, &residual);
+    let rows = factors.rows as f64;
+    let torque_rms: Vec<f64> = factors
         .torque_square
         .iter()
         .map(|s| (s / rows).sqrt())
@@ -236,13 +246,13 @@ fn finish(sums: &Sums, joints: &[DMatrix<f64>], told: Told) -> Result<Fit, FitEr
         relative_error,
         torque_rms,
         column_rms,
-        rows: sums.rows,
+        rows: factors.rows,
         effective_rows,
     })
 }
 
-/// Weighted solution with the directions that the data leave open held at zero.
-pub(super) struct Solution {
+/// Weighted solution with the directions that the data leave open fixed at zero.
+pub(super) struct WeightedSolution {
     pub theta: DVector<f64>,
     /// Inverse of the weighted normal matrix on the directions that are open to the data.
     pub inverse: DMatrix<f64>,
@@ -252,12 +262,12 @@ pub(super) struct Solution {
 
 /// R factor of all joints' rows, unknowns and target, each joint times its weight, and of a prior.
 pub(super) fn stacked(
-    sums: &Sums,
+    factors: &BlockFactors,
     joints: &[DMatrix<f64>],
     weights: &[f64],
-    prior: Option<&Prior>,
+    prior: Option<&PriorRows>,
 ) -> DMatrix<f64> {
-    let columns = &sums.columns;
+    let columns = &factors.columns;
     let u = columns.unknowns();
     let mut factor = RFactor::new(u + 1);
     let mut row = vec![0.0; u + 1];
@@ -279,7 +289,7 @@ pub(super) fn stacked(
     factor.r()
 }
 
-fn conditions(x: &DMatrix<f64>) -> Result<(Condition, usize), FitError> {
+fn conditions(x: &DMatrix<f64>) -> Result<(ConditionNumbers, usize), FitError> {
     let raw = rank::svd(x)?;
     let mut scaled = x.clone();
     for mut c in scaled.column_iter_mut() {
@@ -300,7 +310,7 @@ fn conditions(x: &DMatrix<f64>) -> Result<(Condition, usize), FitError> {
     let full = k == x.ncols();
     let ratio = |s: &DVector<f64>| full.then(|| s[0] / s[s.len() - 1]);
     Ok((
-        Condition {
+        ConditionNumbers {
             raw: ratio(&raw.s),
             normalised: ratio(&normalised.s),
         },
@@ -315,13 +325,13 @@ const RANK_TOLERANCE: f64 = 1e-8;
 const SHARE: f64 = 1e-3;
 
 fn solve(
-    sums: &Sums,
+    factors: &BlockFactors,
     joints: &[DMatrix<f64>],
     weights: &[f64],
-    prior: Option<&Prior>,
-) -> Result<Solution, FitError> {
-    let u = sums.columns.unknowns();
-    let r = stacked(sums, joints, weights, prior);
+    prior: Option<&PriorRows>,
+) -> Result<WeightedSolution, FitError> {
+    let u = factors.columns.unknowns();
+    let r = stacked(factors, joints, weights, prior);
     let x = r.columns(0, u);
     let scale: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
     let unscale = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
@@ -354,7 +364,7 @@ fn solve(
     }
     let theta = DVector::from_fn(u, |i, _| z[i] * unscale(i));
     let inverse = DMatrix::from_fn(u, u, |i, j| inverse[(i, j)] * unscale(i) * unscale(j));
-    Ok(Solution {
+    Ok(WeightedSolution {
         theta,
         inverse,
         determined,
@@ -363,18 +373,18 @@ fn solve(
 }
 
 /// Restriction of the global unknowns to those of joint j.
-pub(super) fn of_joint(sums: &Sums, theta: &DVector<f64>, j: usize) -> DVector<f64> {
-    let columns = &sums.columns;
+pub(super) fn own_unknowns(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> DVector<f64> {
+    let columns = &factors.columns;
     DVector::from_fn(columns.shared + columns.own[j].len(), |c, _| {
         theta[columns.unknown(j, c)]
     })
 }
 
-pub(super) fn parts<'a>(sums: &Sums, r: &'a DMatrix<f64>, j: usize) -> Parts<'a> {
-    Parts {
+pub(super) fn parts<'a>(factors: &BlockFactors, r: &'a DMatrix<f64>, j: usize) -> JointFactor<'a> {
+    JointFactor {
         r,
-        unknowns: sums.columns.shared + sums.columns.own[j].len(),
-        gradient: if sums.columns.known[j].is_some() {
+        unknowns: factors.columns.shared + factors.columns.own[j].len(),
+        gradient: if factors.columns.known[j].is_some() {
             GRADIENT
         } else {
             0
@@ -382,13 +392,13 @@ pub(super) fn parts<'a>(sums: &Sums, r: &'a DMatrix<f64>, j: usize) -> Parts<'a>
     }
 }
 
-fn residual_std(sums: &Sums, joints: &[DMatrix<f64>], theta: &DVector<f64>) -> Vec<f64> {
+fn residual_std(factors: &BlockFactors, joints: &[DMatrix<f64>], theta: &DVector<f64>) -> Vec<f64> {
     joints
         .iter()
         .enumerate()
         .map(|(j, r)| {
-            let own = of_joint(sums, theta, j);
-            (parts(sums, r, j).residual_square(&own) / sums.rows as f64).sqrt()
+            let own = own_unknowns(factors, theta, j);
+            (parts(factors, r, j).residual_square(&own) / factors.rows as f64).sqrt()
         })
         .collect()
 }
@@ -396,7 +406,7 @@ fn residual_std(sums: &Sums, joints: &[DMatrix<f64>], theta: &DVector<f64>) -> V
 #[cfg(test)]
 mod tests {
     use super::super::accumulate::Accumulator;
-    use super::super::columns::{Columns, KnownFriction, Own};
+    use super::super::columns::{KnownFriction, Own, RegressorColumns};
     use super::*;
     use crate::robot::friction::DoubleTanh;
     use crate::robot::{JointKind, Robot};
@@ -412,8 +422,8 @@ mod tests {
         }
     }
 
-    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> Columns {
-        Columns {
+    fn columns(own: Vec<Own>, known: Option<KnownFriction>) -> RegressorColumns {
+        RegressorColumns {
             joints: 1,
             shared: 1,
             own: vec![own],
@@ -422,18 +432,24 @@ mod tests {
     }
 
     /// Rows of a joint with inertia 3, Fv 2, Fc 0.7 and, where it is known, that friction.
-    fn sums(columns: &Columns, rows: usize, noise: f64, correlation: f64, seed: u64) -> Sums {
+    fn factors(
+        columns: &RegressorColumns,
+        rows: usize,
+        noise: f64,
+        correlation: f64,
+        seed: u64,
+    ) -> BlockFactors {
         in_blocks(0.25, columns, rows, noise, correlation, seed)
     }
 
     fn in_blocks(
         block: f64,
-        columns: &Columns,
+        columns: &RegressorColumns,
         rows: usize,
         noise: f64,
         correlation: f64,
         seed: u64,
-    ) -> Sums {
+    ) -> BlockFactors {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let mut chance = Chance(seed * 2 + 12345);
         let mut all = Accumulator::new(columns.clone(), block);
@@ -457,7 +473,7 @@ mod tests {
     #[test]
     fn exact_rows_give_the_exact_parameters() {
         let c = columns(vec![Own::Viscous, Own::Coulomb], None);
-        let fit = fit(&sums(&c, 3000, 0.0, 0.0, 1), Estimator::Ols).unwrap();
+        let fit = fit(&factors(&c, 3000, 0.0, 0.0, 1), Weighting::Ols).unwrap();
         for (found, truth) in fit.theta.iter().zip([3.0, 2.0, 0.7]) {
             assert!((found - truth).abs() < 1e-12, "{found} {truth}");
         }
@@ -468,14 +484,14 @@ mod tests {
     #[test]
     fn blocks_that_merge_change_neither_fit_nor_score() {
         let c = columns(vec![Own::Viscous, Own::Coulomb], None);
-        let many = sums(&c, 60_000, 0.1, 0.9, 2);
+        let many = factors(&c, 60_000, 0.1, 0.9, 2);
         assert!(many.blocks.len() <= 512);
         assert_eq!(many.blocks.iter().map(|b| b.rows).sum::<u64>(), 60_000);
-        let halved = fit(&many, Estimator::Ols).unwrap();
-        let whole = fit(&in_blocks(1e9, &c, 60_000, 0.1, 0.9, 2), Estimator::Ols).unwrap();
+        let halved = fit(&many, Weighting::Ols).unwrap();
+        let whole = fit(&in_blocks(1e9, &c, 60_000, 0.1, 0.9, 2), Weighting::Ols).unwrap();
         assert!((&halved.theta - &whole.theta).amax() < 1e-12);
-        let mut merged = sums(&c, 60_000, 0.1, 0.9, 2);
-        merged.merge(sums(&c, 500, 0.1, 0.9, 3));
+        let mut merged = factors(&c, 60_000, 0.1, 0.9, 2);
+        merged.merge(factors(&c, 500, 0.1, 0.9, 3));
         assert_eq!(merged.rows, 60_500);
         // of two logs the second begins a stretch of its own
         assert!(merged.blocks.last().unwrap().stretch > many.blocks.last().unwrap().stretch);
@@ -487,8 +503,8 @@ mod tests {
         for correlation in [0.0, 0.95] {
             let (mut covered, mut textbook, runs) = ([0; 3], [0; 3], 200);
             for seed in 0..runs {
-                let s = sums(&c, 4000, 0.3, correlation, 10 + seed);
-                let fit = fit(&s, Estimator::Wls).unwrap();
+                let s = factors(&c, 4000, 0.3, correlation, 10 + seed);
+                let fit = fit(&s, Weighting::Wls).unwrap();
                 for (i, truth) in [3.0, 2.0, 0.7].into_iter().enumerate() {
                     let off = (fit.theta[i] - truth).abs();
                     covered[i] += u64::from(off < 1.96 * fit.covariance[(i, i)].sqrt());
@@ -526,7 +542,7 @@ mod tests {
             c.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
             all.add(0, k as f64 * 0.01, &channels);
         }
-        let fit = fit(&all.finish(), Estimator::Wls).unwrap();
+        let fit = fit(&all.finish(), Weighting::Wls).unwrap();
         assert_eq!(fit.rank, 3);
         assert_eq!(fit.determined, [true, true, false, false]);
         assert_eq!(fit.condition.raw, None);
@@ -545,7 +561,7 @@ mod tests {
             row[i] = (0.05 * law.parameters()[i]).powi(2);
         }
         let with = columns(vec![], Some(KnownFriction { law, covariance }));
-        let base = fit(&sums(&with, 3000, 0.0, 0.0, 4), Estimator::Ols).unwrap();
+        let base = fit(&factors(&with, 3000, 0.0, 0.0, 4), Weighting::Ols).unwrap();
         let s = base.friction_sensitivity[0].clone().unwrap();
         // the same torque, read with each friction parameter a little off
         for k in 0..5 {
@@ -571,7 +587,7 @@ mod tests {
                 off.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
                 all.add(0, t, &channels);
             }
-            let moved = fit(&all.finish(), Estimator::Ols).unwrap();
+            let moved = fit(&all.finish(), Weighting::Ols).unwrap();
             let difference = (moved.theta[0] - base.theta[0]) / step;
             let size = s[(0, k)].abs().max(1e-6);
             assert!(

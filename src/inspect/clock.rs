@@ -3,7 +3,7 @@
 use super::fault::Episodes;
 use super::histogram::Histogram;
 
-/// A step longer than this many median ones is a gap (as `motion::Settings::gap_factor`).
+/// A step longer than this many median ones is a gap (as `motion::FilterSettings::gap_factor`).
 pub(super) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
 const EVEN: f64 = 0.10;

@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use super::run::Skipped;
-use super::settings::Chain;
+use super::settings::FilterChain;
 use super::time_base::Event;
-use super::window::Window;
+use super::window::FilterWindow;
 
 /// Spans of skipped stretches that are listed; more are only counted.
 const LISTED: usize = 20;
 
 /// Cuts the segments of a log into windows.
-pub(super) struct Cutter {
-    pub chain: Arc<Chain>,
+pub(super) struct WindowCutter {
+    pub chain: Arc<FilterChain>,
     joints: usize,
     /// Samples of the segment in work, from index `first` of the segment on.
     t: Vec<f64>,
@@ -27,12 +27,12 @@ pub(super) struct Cutter {
     pub longest: usize,
     pub skipped: Skipped,
     /// Windows, the first `ready` of them cut and not yet run.
-    pub windows: Vec<Window>,
+    pub windows: Vec<FilterWindow>,
     pub ready: usize,
 }
 
-impl Cutter {
-    pub fn new(chain: Chain, joints: usize) -> Self {
+impl WindowCutter {
+    pub fn new(chain: FilterChain, joints: usize) -> Self {
         Self {
             chain: Arc::new(chain),
             joints,
@@ -89,10 +89,10 @@ impl Cutter {
         }
     }
 
-    /// Makes a window of what is held, for the rows from `self.core` to `core_end`.
+    /// Makes a window of the samples in memory, for the rows from `self.core` to `core_end`.
     fn cut(&mut self, core_end: usize, ends: bool) {
         if self.ready == self.windows.len() {
-            self.windows.push(Window::default());
+            self.windows.push(FilterWindow::default());
         }
         let window = &mut self.windows[self.ready];
         self.ready += 1;

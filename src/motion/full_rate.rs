@@ -1,10 +1,10 @@
-//! Smooth positions, velocities and accelerations at every row of one record held in memory.
+//! Smooth positions, velocities and accelerations at every row of one record in memory.
 
 use std::ops::Range;
 
 use super::MotionError;
-use super::settings::{Settings, edge, position_filter};
-use super::time_base::{Clock, Event, TimeBase, lagrange};
+use super::settings::{FilterSettings, edge, position_filter};
+use super::time_base::{Event, SampleClock, TimeBase, lagrange};
 use super::window::step_of;
 use crate::log::Block;
 
@@ -28,7 +28,7 @@ pub struct Smooth {
 /// # Errors
 /// [`MotionError::TooFewSamples`], [`MotionError::Time`].
 pub fn segments(t: &[f64], gap_factor: f64) -> Result<Vec<Range<usize>>, MotionError> {
-    let clock = Clock::of(t)?;
+    let clock = SampleClock::of(t)?;
     let mut found = Vec::new();
     let mut start = 0;
     for k in 1..t.len() {
@@ -52,7 +52,7 @@ pub fn full_rate(
     t: &[f64],
     q: &[f64],
     joints: usize,
-    settings: &Settings,
+    settings: &FilterSettings,
 ) -> Result<Smooth, MotionError> {
     if joints == 0 || q.len() != t.len() * joints {
         return Err(MotionError::Shape {
@@ -62,7 +62,7 @@ pub fn full_rate(
             joints,
         });
     }
-    let clock = Clock::of(t)?;
+    let clock = SampleClock::of(t)?;
     let (grid_t, mut grid_q) = even_grid(t, q, joints, settings, clock)?;
     let dt = step_of(&grid_t, clock.dt);
     let (filter, _) = position_filter(settings, 1.0 / dt)?;
@@ -96,8 +96,8 @@ fn even_grid(
     t: &[f64],
     q: &[f64],
     joints: usize,
-    settings: &Settings,
-    clock: Clock,
+    settings: &FilterSettings,
+    clock: SampleClock,
 ) -> Result<(Vec<f64>, Vec<f64>), MotionError> {
     let mut base = TimeBase::new(joints, settings, None)?;
     base.use_clock(clock);

@@ -19,30 +19,30 @@
 //! | file | what |
 //! |---|---|
 //! | [`settings`] | what the user chooses |
-//! | [`time_base`] | uniform steps, gaps, torque held over a sample |
+//! | [`time_base`] | uniform steps, gaps, torque by a zero-order hold |
 //! | [`differences`] | v and a from q |
 //! | [`run`](mod@run) | the windows of a streamed log |
-//! | [`held_force`] | motor forces held over a sample, where a linkage turns them |
+//! | [`zero_order_hold`] | motor forces between two samples, where a linkage turns them |
 //! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
 //! | [`stretch`] | whole stretches in memory, for searches |
-//! | `once_more` | a stretch smoothed once more, or with its noise once more |
+//! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
 
+mod added_noise;
 mod cutter;
 pub mod differences;
 pub mod full_rate;
-pub mod held_force;
-mod once_more;
 pub mod run;
 pub mod settings;
 pub mod stretch;
 pub mod time_base;
 mod window;
+pub mod zero_order_hold;
 
 pub use full_rate::{Smooth, full_rate, segments};
-pub use held_force::HeldForces;
 pub use run::{RunError, Skipped, Summary, run};
-pub use settings::{Differences, ParallelFilter, Settings, TorqueTiming};
+pub use settings::{Differences, FilterSettings, ParallelFilter, TorqueTiming};
 pub use stretch::{Parallel, Stretch, stretches};
+pub use zero_order_hold::ZeroOrderHold;
 
 use thiserror::Error;
 
@@ -50,7 +50,7 @@ use crate::math::MathError;
 
 /// One sample at full rate, after smoothing and differentiation.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample<'a> {
+pub struct MotionSample<'a> {
     /// Time (s).
     pub t: f64,
     /// Smoothed positions [m or rad].
@@ -65,7 +65,7 @@ pub struct Sample<'a> {
 
 /// One row that is kept.
 #[derive(Debug, Clone, Copy)]
-pub struct Row<'a> {
+pub struct FilteredRow<'a> {
     /// Time (s).
     pub t: f64,
     /// Segment of the log, counted from 0 over the segments that are used.

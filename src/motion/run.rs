@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::cutter::Cutter;
-use super::settings::{Chain, Settings};
+use super::cutter::WindowCutter;
+use super::settings::{FilterChain, FilterSettings};
 use super::time_base::TimeBase;
-use super::window::Window;
-use super::{MotionError, Row, Sample};
+use super::window::FilterWindow;
+use super::{FilteredRow, MotionError, MotionSample};
 use crate::log::Block;
 
 /// Why a log could not be run through: its source failed, or it cannot be turned into rows.
@@ -74,14 +74,14 @@ pub struct Skipped {
 pub fn run<E>(
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
     joints: usize,
-    settings: &Settings,
+    settings: &FilterSettings,
     rate_hz: Option<f64>,
     channels: usize,
-    fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
-    sink: &mut dyn FnMut(&Row<'_>),
+    fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
+    sink: &mut dyn FnMut(&FilteredRow<'_>),
 ) -> Result<Summary, RunError<E>> {
     let mut intake = Intake::new(joints, settings, rate_hz)?;
-    let mut batch: Vec<Window> = Vec::new();
+    let mut batch: Vec<FilterWindow> = Vec::new();
     let (mut waiting, mut rows, mut more) = (0, 0, true);
     while more || waiting > 0 {
         // The next windows are read while those of the batch are computed.
@@ -117,12 +117,12 @@ pub fn run<E>(
 
 /// What is between the source and the windows.
 struct Intake<'a> {
-    settings: &'a Settings,
+    settings: &'a FilterSettings,
     joints: usize,
     block: Block,
     time_base: TimeBase,
     /// There once the sampling step is known.
-    cutter: Option<Cutter>,
+    cutter: Option<WindowCutter>,
     samples: u64,
     span: Option<[f64; 2]>,
 }
@@ -130,7 +130,7 @@ struct Intake<'a> {
 impl<'a> Intake<'a> {
     fn new(
         joints: usize,
-        settings: &'a Settings,
+        settings: &'a FilterSettings,
         rate_hz: Option<f64>,
     ) -> Result<Self, MotionError> {
         if joints == 0 {
@@ -173,8 +173,8 @@ impl<'a> Intake<'a> {
             let Some(clock) = clock else { continue };
             let cutter = match &mut self.cutter {
                 Some(cutter) => cutter,
-                none => none.insert(Cutter::new(
-                    Chain::design(self.settings, clock.dt)?,
+                none => none.insert(WindowCutter::new(
+                    FilterChain::design(self.settings, clock.dt)?,
                     self.joints,
                 )),
             };
@@ -187,7 +187,7 @@ impl<'a> Intake<'a> {
     }
 
     /// Gives away the windows that are cut, and takes others to cut into; returns how many.
-    fn swap(&mut self, batch: &mut Vec<Window>) -> usize {
+    fn swap(&mut self, batch: &mut Vec<FilterWindow>) -> usize {
         match &mut self.cutter {
             Some(cutter) => {
                 std::mem::swap(&mut cutter.windows, batch);

@@ -1,7 +1,5 @@
 //! What the user chooses about filtering, and the filters that follow for one sampling step.
 
-use serde::{Deserialize, Serialize};
-
 use super::MotionError;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
@@ -17,9 +15,8 @@ const WINDOW_CORE: usize = 8192;
 const HIGHEST_SHARE: f64 = 0.4;
 
 /// How a log is filtered.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Settings {
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilterSettings {
     /// Cut-off of the parallel filter (Hz): the band of motion and torque that is kept.
     pub cutoff_hz: f64,
     /// Kind of the parallel filter.
@@ -45,7 +42,7 @@ pub struct Settings {
     pub trim_s: Option<f64>,
 }
 
-impl Default for Settings {
+impl Default for FilterSettings {
     fn default() -> Self {
         Self {
             cutoff_hz: 10.0,
@@ -63,8 +60,7 @@ impl Default for Settings {
 }
 
 /// The filter that runs, forward and backward, over torque and computed columns alike.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ParallelFilter {
     /// Flat in the pass band.
     Butterworth {
@@ -82,8 +78,7 @@ pub enum ParallelFilter {
 }
 
 /// Difference formula for velocity and acceleration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
     /// Three points, once for the velocity and once more for the acceleration.
     Central,
@@ -92,19 +87,18 @@ pub enum Differences {
 }
 
 /// Time at which a logged torque acts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TorqueTiming {
     /// The value at the instant of the row.
     Sampled,
-    /// The row's value acts from its instant to the next row (a held command): its mean about the
+    /// The row's value acts from its instant to the next row (a command of a sampled controller): its mean about the
     /// instant is formed from the values before and after.
-    HeldOverSample,
+    ZeroOrderHold,
 }
 
 /// The filters and lengths for one sampling step.
 #[derive(Debug, Clone)]
-pub(super) struct Chain {
+pub(super) struct FilterChain {
     /// Sampling step (s).
     pub dt: f64,
     pub differences: Differences,
@@ -126,7 +120,7 @@ pub(super) struct Chain {
     pub shortest: usize,
 }
 
-impl Settings {
+impl FilterSettings {
     /// Every how many samples of step `dt` [s] a row is kept: the declared decimation, else ten rows
     /// a period of the cut-off.
     pub fn decimation_at(&self, dt: f64) -> usize {
@@ -136,8 +130,8 @@ impl Settings {
     }
 }
 
-impl Chain {
-    pub(super) fn design(settings: &Settings, dt: f64) -> Result<Self, MotionError> {
+impl FilterChain {
+    pub(super) fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
         let rate = 1.0 / dt;
         let decimation = match settings.decimation {
             Some(0) => {
@@ -192,7 +186,7 @@ impl Chain {
 
 /// The position filter and its cut-off (Hz).
 pub(super) fn position_filter(
-    settings: &Settings,
+    settings: &FilterSettings,
     rate: f64,
 ) -> Result<(Option<ZeroPhase>, Option<f64>), MotionError> {
     if settings.q_order == 0 {
@@ -207,7 +201,7 @@ pub(super) fn position_filter(
 
 /// Samples at a segment's end where the position filter lacks what it would look ahead to.
 pub(super) fn edge(
-    settings: &Settings,
+    settings: &FilterSettings,
     position: Option<&ZeroPhase>,
     dt: f64,
 ) -> Result<usize, MotionError> {
@@ -217,7 +211,7 @@ pub(super) fn edge(
 
 /// Samples after which `factor` time constants of the position filter have passed, and the
 /// differences reach no further back.
-fn settled(settings: &Settings, position: Option<&ZeroPhase>, factor: f64) -> usize {
+fn settled(settings: &FilterSettings, position: Option<&ZeroPhase>, factor: f64) -> usize {
     position.map_or(0, |f| f.sos().settle_samples(factor)) + settings.differences.reach()
 }
 

@@ -3,7 +3,7 @@
 
 use super::MotionError;
 use super::run::{RunError, Summary, run};
-use super::settings::{Chain, Differences, Settings};
+use super::settings::{Differences, FilterChain, FilterSettings};
 use crate::log::Block;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -62,10 +62,10 @@ impl Stretch {
 pub fn stretches<E>(
     log: usize,
     joints: usize,
-    settings: &Settings,
+    settings: &FilterSettings,
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
 ) -> Result<(Vec<Stretch>, Summary), RunError<E>> {
-    let every = Settings {
+    let every = FilterSettings {
         decimation: Some(1),
         trim_s: Some(0.0),
         ..settings.clone()
@@ -117,7 +117,7 @@ pub fn stretches<E>(
         stretch.began -= first.unwrap_or(0.0);
     }
     // what was done to the log is told with its own decimation
-    let declared = Chain::design(settings, summary.dt)?;
+    let declared = FilterChain::design(settings, summary.dt)?;
     Ok((
         found,
         Summary {
@@ -148,8 +148,8 @@ impl Parallel {
     ///
     /// # Errors
     /// [`MotionError`] for settings that the sampling rate does not carry.
-    pub fn design(settings: &Settings, dt: f64) -> Result<Self, MotionError> {
-        let chain = Chain::design(settings, dt)?;
+    pub fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
+        let chain = FilterChain::design(settings, dt)?;
         Ok(Parallel {
             filter: chain.parallel,
             position: chain.position,

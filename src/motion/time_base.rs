@@ -6,7 +6,7 @@
 //! factor ends a stretch.
 
 use super::MotionError;
-use super::settings::{Settings, TorqueTiming};
+use super::settings::{FilterSettings, TorqueTiming};
 use crate::log::Block;
 
 /// Rows from which the sampling step is estimated.
@@ -37,14 +37,14 @@ pub(super) enum Event<'a> {
 
 /// Sampling step and evenness of a list of times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Clock {
+pub(super) struct SampleClock {
     /// Sampling step (s).
     pub dt: f64,
     /// Whether most steps are even, so that rows are taken as they are.
     pub even: bool,
 }
 
-impl Clock {
+impl SampleClock {
     /// The clock of the rows at times `t` (s): the mean of the even steps, or the median step
     /// where fewer than half are even.
     pub fn of(t: &[f64]) -> Result<Self, MotionError> {
@@ -86,7 +86,7 @@ fn checked_step(before: f64, after: f64) -> Result<f64, MotionError> {
 /// Turns rows of a log into stretches of evenly spaced samples.
 pub(super) struct TimeBase {
     joints: usize,
-    clock: Option<Clock>,
+    clock: Option<SampleClock>,
     gap_factor: f64,
     torque: TorqueTiming,
     /// Rows of the stretch in work; before the clock is known, the log's first rows.
@@ -112,7 +112,7 @@ impl TimeBase {
     /// `rate_hz` gives it.
     pub fn new(
         joints: usize,
-        settings: &Settings,
+        settings: &FilterSettings,
         rate_hz: Option<f64>,
     ) -> Result<Self, MotionError> {
         if !(settings.gap_factor > 1.0 && settings.gap_factor.is_finite()) {
@@ -124,7 +124,7 @@ impl TimeBase {
         }
         let clock = match rate_hz {
             None => None,
-            Some(rate) if rate > 0.0 && rate.is_finite() => Some(Clock {
+            Some(rate) if rate > 0.0 && rate.is_finite() => Some(SampleClock {
                 dt: 1.0 / rate,
                 even: true,
             }),
@@ -156,12 +156,12 @@ impl TimeBase {
     }
 
     /// The clock, once known.
-    pub fn clock(&self) -> Option<Clock> {
+    pub fn clock(&self) -> Option<SampleClock> {
         self.clock
     }
 
     /// Takes a clock that is known already.
-    pub fn use_clock(&mut self, clock: Clock) {
+    pub fn use_clock(&mut self, clock: SampleClock) {
         self.clock = Some(clock);
     }
 
@@ -187,16 +187,16 @@ impl TimeBase {
         self.q.extend_from_slice(&block.q);
         self.tau.extend_from_slice(&block.tau);
         if self.clock.is_none() && self.t.len() >= PREFIX {
-            self.clock = Some(Clock::of(&self.t[..PREFIX])?);
+            self.clock = Some(SampleClock::of(&self.t[..PREFIX])?);
         }
         Ok(())
     }
 
     /// Finds the clock of a log shorter than the rows it is usually found from.
-    pub fn settle_clock(&mut self) -> Result<Clock, MotionError> {
+    pub fn settle_clock(&mut self) -> Result<SampleClock, MotionError> {
         match self.clock {
             Some(clock) => Ok(clock),
-            None => Ok(*self.clock.insert(Clock::of(&self.t)?)),
+            None => Ok(*self.clock.insert(SampleClock::of(&self.t)?)),
         }
     }
 
@@ -234,7 +234,7 @@ impl TimeBase {
     }
 
     /// Checks the rows that are new; the first row behind a gap, if there is one.
-    fn find_gap(&mut self, clock: Clock) -> Result<Option<usize>, MotionError> {
+    fn find_gap(&mut self, clock: SampleClock) -> Result<Option<usize>, MotionError> {
         while self.checked < self.t.len() {
             if self.checked > 0 {
                 let step = checked_step(self.t[self.checked - 1], self.t[self.checked])?;
@@ -249,7 +249,13 @@ impl TimeBase {
 
     /// Hands out the samples that the rows before `end` determine; `closed` when no more rows of
     /// this stretch follow.
-    fn advance(&mut self, clock: Clock, end: usize, closed: bool, out: &mut impl FnMut(Event<'_>)) {
+    fn advance(
+        &mut self,
+        clock: SampleClock,
+        end: usize,
+        closed: bool,
+        out: &mut impl FnMut(Event<'_>),
+    ) {
         let n = self.joints;
         self.bring_torques(clock, end, closed);
         let ready = self.acting.len() / n;
@@ -294,17 +300,17 @@ impl TimeBase {
 
     /// Extends `acting` over the rows before `end` whose neighbours are known.
     ///
-    /// A held torque is a staircase. Its mean over the step about t_k, corrected so that the first
+    /// A torque by a zero-order hold is a staircase. Its mean over the step about t_k, corrected so that the first
     /// error is of fourth order in frequency, is
     /// (13 (tau_k-1 + tau_k) - (tau_k-2 + tau_k+1)) / 24.
-    fn bring_torques(&mut self, clock: Clock, end: usize, closed: bool) {
+    fn bring_torques(&mut self, clock: SampleClock, end: usize, closed: bool) {
         let n = self.joints;
         let from = self.acting.len() / n;
         match self.torque {
             TorqueTiming::Sampled => {
                 self.acting.extend_from_slice(&self.tau[from * n..end * n]);
             }
-            TorqueTiming::HeldOverSample => {
+            TorqueTiming::ZeroOrderHold => {
                 let to = if closed { end } else { end.saturating_sub(1) };
                 let t = &self.t;
                 let even = |k: usize| (t[k + 1] - t[k] - clock.dt).abs() <= EVEN * clock.dt;

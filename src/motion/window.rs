@@ -1,7 +1,7 @@
 //! One window of a segment: smoothing, differentiation, the computed channels and their filter.
 
-use super::settings::Chain;
-use super::{MotionError, Row, Sample};
+use super::settings::FilterChain;
+use super::{FilteredRow, MotionError, MotionSample};
 
 /// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in
 /// a second-level cache.
@@ -10,10 +10,10 @@ const GROUP: usize = 8;
 /// A stretch of one segment, with the overlaps that its filters need, and the rows that come of it.
 /// Its memory is reused from window to window.
 #[derive(Debug, Default)]
-pub(super) struct Window {
+pub(super) struct FilterWindow {
     /// Number of the segment among those that are used.
     pub segment: usize,
-    /// Index within the segment of the first sample held.
+    /// Index within the segment of the window's first sample.
     pub first: usize,
     /// Samples of the segment whose rows this window gives, as indices within the segment.
     pub core: std::ops::Range<usize>,
@@ -36,14 +36,14 @@ pub(super) struct Window {
     filtered: Vec<f64>,
 }
 
-impl Window {
+impl FilterWindow {
     /// Computes the rows.
     pub fn process(
         &mut self,
-        chain: &Chain,
+        chain: &FilterChain,
         joints: usize,
         channels: usize,
-        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+        fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) -> Result<(), MotionError> {
         let samples = self.t.len();
         let dt = step_of(&self.t, chain.dt);
@@ -92,11 +92,11 @@ impl Window {
     }
 
     /// The rows, in order of time.
-    pub fn rows(&self, joints: usize, channels: usize) -> impl Iterator<Item = Row<'_>> {
+    pub fn rows(&self, joints: usize, channels: usize) -> impl Iterator<Item = FilteredRow<'_>> {
         self.kept.iter().enumerate().map(move |(row, &k)| {
             let state = k * joints..(k + 1) * joints;
             let values = row * channels..(row + 1) * channels;
-            Row {
+            FilteredRow {
                 t: self.t[k],
                 segment: self.segment,
                 q: &self.q[state.clone()],
@@ -110,7 +110,7 @@ impl Window {
 
     /// Every m-th sample of the core, counted from where the segment's parallel filter starts, and
     /// none within the trim.
-    fn choose_rows(&mut self, chain: &Chain, samples: usize) {
+    fn choose_rows(&mut self, chain: &FilterChain, samples: usize) {
         let lowest = chain.edge + chain.trim;
         let highest = if self.ends {
             (self.first + samples).saturating_sub(lowest)
@@ -133,7 +133,7 @@ impl Window {
         span: std::ops::Range<usize>,
         joints: usize,
         channels: usize,
-        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+        fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) {
         let size = span.len() * GROUP;
         let needed = channels.div_ceil(GROUP) * size;
@@ -167,7 +167,7 @@ impl Window {
         span: std::ops::Range<usize>,
         joints: usize,
         channels: usize,
-        fill: &(dyn Fn(&Sample<'_>, &mut [f64]) + Sync),
+        fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) -> MotionError {
         let mut values = vec![0.0; channels];
         for k in span {
@@ -190,9 +190,9 @@ impl Window {
         }
     }
 
-    fn sample(&self, k: usize, joints: usize) -> Sample<'_> {
+    fn sample(&self, k: usize, joints: usize) -> MotionSample<'_> {
         let row = k * joints..(k + 1) * joints;
-        Sample {
+        MotionSample {
             t: self.t[k],
             q: &self.q[row.clone()],
             v: &self.v[row.clone()],

@@ -14,7 +14,7 @@ use super::machine::Machine;
 use super::pages::{self, Look, curve, speeds};
 use super::refined::{Held, hold, refined, refined_or_friction};
 use super::{CliError, Context, Outcome, arguments, files, outputs};
-use crate::compare::{self, Differences, Pair, SideBySide};
+use crate::compare::{self, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, escape};
@@ -67,7 +67,7 @@ pub struct Side {
 pub struct Tried {
     pub held: Held,
     pub validations: [Validation; 2],
-    pub differences: Differences,
+    pub differences: ErrorDifferences,
 }
 
 /// Result of the comparison.
@@ -299,10 +299,10 @@ impl Compared {
     }
 
     /// Parameters that differ by more than chance explains, the largest deviation first.
-    pub fn different(&self) -> Vec<&Pair> {
-        let beyond = |p: &&Pair| p.deviation.is_some_and(|d| d.abs() > DIFFERENT);
-        let mut found: Vec<&Pair> = self.table.parameters.iter().filter(beyond).collect();
-        let size = |p: &Pair| p.deviation.unwrap_or(0.0).abs();
+    pub fn different(&self) -> Vec<&ParameterPair> {
+        let beyond = |p: &&ParameterPair| p.deviation.is_some_and(|d| d.abs() > DIFFERENT);
+        let mut found: Vec<&ParameterPair> = self.table.parameters.iter().filter(beyond).collect();
+        let size = |p: &ParameterPair| p.deviation.unwrap_or(0.0).abs();
         found.sort_by(|x, y| size(y).total_cmp(&size(x)));
         found
     }

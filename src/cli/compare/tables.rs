@@ -2,7 +2,7 @@
 
 use super::{Compared, LETTERS, Tried};
 use crate::cli::machine::Machine;
-use crate::compare::{Apart, Difference, Estimate, Reason};
+use crate::compare::{Apart, Difference, ParameterEstimate, Reason};
 use crate::number;
 use crate::report::table::{Align, Table, paragraph};
 
@@ -27,7 +27,7 @@ pub fn parameter_table(of: &Compared) -> Table {
         of.name(1)
     ));
     for p in &of.table.parameters {
-        let cells = |e: &Estimate| {
+        let cells = |e: &ParameterEstimate| {
             let (value, std) = number::value_and_std(e.value, e.std.unwrap_or(f64::NAN));
             [value, std]
         };

@@ -259,7 +259,7 @@ fn set_aside(rows: usize, share: f64, veto: bool, holdout: bool) -> Vec<(Range<u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Settings;
+    use crate::motion::FilterSettings;
 
     fn stretch(log: usize, seconds: f64) -> Stretch {
         let samples = (seconds * 1000.0) as usize;
@@ -272,7 +272,7 @@ mod tests {
     }
 
     fn plan(roles: &[LogRole]) -> Plan {
-        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let stretches: Vec<Stretch> = (0..roles.len()).map(|l| stretch(l, 30.0)).collect();
         Plan::of(&stretches, roles, &parallel, 10.0)
     }

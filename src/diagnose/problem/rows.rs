@@ -448,7 +448,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::effect::Cover;
-    use crate::motion::Settings;
+    use crate::motion::FilterSettings;
     use crate::robot::cft::{Setup, Structure};
     use crate::robot::model::Model;
     use std::collections::BTreeMap;
@@ -465,9 +465,9 @@ mod tests {
 
     #[test]
     fn rows_near_a_rest_are_those_that_the_filter_reaches_from_it() {
-        let settings = Settings {
+        let settings = FilterSettings {
             cutoff_hz: 20.0,
-            ..Settings::default()
+            ..FilterSettings::default()
         };
         let (dt, n) = (1e-3, 4000);
         let parallel = Parallel::design(&settings, dt).unwrap();
@@ -528,7 +528,7 @@ mod tests {
             tau: (0..4).map(|j| wave(3 - j, 0)).collect(),
             ..Stretch::default()
         };
-        let parallel = Parallel::design(&Settings::default(), stretch.dt).unwrap();
+        let parallel = Parallel::design(&FilterSettings::default(), stretch.dt).unwrap();
         let held = |j: usize| j == 1;
         let kept = inertial(&robot, &stretch, &parallel, &held).unwrap();
         let plain = Refined::plain(Model {

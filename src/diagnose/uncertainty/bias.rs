@@ -20,7 +20,7 @@ pub fn by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, Motion
             again.push(stretch.clone());
             continue;
         }
-        match ground.parallel.twice(stretch)? {
+        match ground.parallel.smoothed_twice(stretch)? {
             Some(stretch) => again.push(stretch),
             None => return Ok(none),
         }
@@ -39,7 +39,7 @@ pub fn by_noise(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionErro
     for sign in [1.0, -1.0] {
         let noisier = |(i, stretch): (usize, &Stretch)| match ground.plan.idle(i) {
             true => Ok(stretch.clone()),
-            false => ground.parallel.noisier(stretch, i as u64, sign),
+            false => ground.parallel.with_added_noise(stretch, i as u64, sign),
         };
         let stretches = ground.stretches.iter().enumerate().map(noisier);
         let stretches = stretches.collect::<Result<Vec<_>, MotionError>>()?;
@@ -111,7 +111,7 @@ mod tests {
     use crate::diagnose::problem::plan::{LogRole, Plan};
     use crate::diagnose::problem::unknowns::Open;
     use crate::effect::{Cover, Refined};
-    use crate::motion::{Parallel, Settings};
+    use crate::motion::{FilterSettings, Parallel};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
@@ -120,11 +120,11 @@ mod tests {
     const DT: f64 = 1e-3;
     const SAMPLES: usize = 60_000;
 
-    fn settings() -> Settings {
-        Settings {
+    fn settings() -> FilterSettings {
+        FilterSettings {
             cutoff_hz: 30.0,
             q_cutoff_hz: Some(60.0),
-            ..Settings::default()
+            ..FilterSettings::default()
         }
     }
 

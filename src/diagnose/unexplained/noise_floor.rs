@@ -213,7 +213,7 @@ impl Middle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Settings;
+    use crate::motion::FilterSettings;
     use rand::{RngExt, SeedableRng};
 
     #[test]
@@ -260,7 +260,7 @@ mod tests {
     /// or cut in four.
     #[test]
     fn white_noise_beside_an_encoders_has_its_floor_in_one_log_and_in_four() {
-        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(12);
         let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
         let n = 80_000;
@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn white_noise_is_its_own_floor_and_a_smooth_residual_adds_nothing() {
-        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let n = 40_000;
         let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };

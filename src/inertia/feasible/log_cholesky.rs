@@ -1,4 +1,4 @@
-//! Ten numbers of any size for a body that can exist.
+//! Ten numbers of any size for a physically consistent body.
 //!
 //! A body of positive mass density has a positive definite pseudo-inertia J (Wensing, Kim and
 //! Slotine 2018). J = e^(2 a) U U' with U upper triangular, diagonal (e^d1, e^d2, e^d3, 1), reaches
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_exist_has_no_such_numbers() {
+    fn an_inconsistent_body_has_no_such_numbers() {
         let (mut s, _) = standard(&X);
         s[0] += 10.0;
         assert_eq!(of(&pseudo_inertia(&s)), None);

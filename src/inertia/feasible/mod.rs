@@ -1,4 +1,4 @@
-//! Link parameters that can exist: positive definite pseudo-inertias and drive inertias above zero.
+//! Physically consistent link parameters: positive definite pseudo-inertias and drive inertias above zero.
 //!
 //! The fit's R factor says how much the torques suffer for any parameters, so the nearest feasible
 //! ones are found on it, without reading a log again: least squares over ten free numbers a link
@@ -39,17 +39,17 @@ const FARTHEST: f64 = 2.0;
 
 /// What the search is given.
 #[derive(Debug, Clone)]
-pub struct Task<'a> {
+pub struct ConsistencyProblem<'a> {
     pub map: &'a StandardMap,
     /// Prior of each link, where there is one.
     pub bodies: &'a [Option<Body>],
     /// R factor of the weighted rows: shared parameters first, then other unknowns, then the target.
     pub factor: &'a DMatrix<f64>,
-    /// Independent rows over rows, by which correlated rows are counted for what they are worth.
-    pub worth: f64,
+    /// Effective sample size over rows: what correlated rows count.
+    pub effective: f64,
 }
 
-/// Parameters that can exist.
+/// Physically consistent parameters.
 #[derive(Debug, Clone)]
 pub struct Feasible {
     /// All unknowns, in the order of the factor's columns.
@@ -64,11 +64,11 @@ pub struct Feasible {
     pub iterations: usize,
 }
 
-/// Least squares over links that can exist.
+/// Least squares over physically consistent links.
 ///
 /// # Errors
-/// [`FitError::Prior`] where a given prior is no body that can exist.
-pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
+/// [`FitError::Prior`] where a given prior is not physically consistent.
+pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     let links = task.map.links.len();
     let drives = task.map.drives.len();
     let size = STANDARD * links + drives;
@@ -85,12 +85,12 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
         .rows_mut(STANDARD * links, drives)
         .fill(PLAIN_DRIVE.ln());
 
-    let reduced = Reduced::of(task);
+    let reduced = EliminatedFactor::of(task);
     let mut x = prior.clone();
     let mut iterations = 0;
     let mut status = Status::IterationLimit;
-    // from the prior outward: a search that begins without it runs along the border of what can
-    // exist, where its numbers go to infinity and it hardly moves
+    // from the prior outward: a search that begins without it runs along the border of what
+    // is consistent, where its numbers go to infinity and it hardly moves
     for weight in WEIGHTS {
         let (mut damping, limit) = (1e-3, iterations + MOST);
         let (mut lowest, mut jacobian, mut residual) = reduced.at(task.map, &x, &prior, weight);
@@ -135,7 +135,7 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
     })
 }
 
-/// The unknowns that can exist and give nearly the torques of `theta` on the rows of `factor`: for
+/// The physically consistent unknowns that give nearly the torques of `theta` on the rows of `factor`: for
 /// simulations, which a mass matrix that is not positive definite lets run away.
 ///
 /// # Errors
@@ -143,7 +143,7 @@ pub fn feasible(task: &Task) -> Result<Feasible, FitError> {
 pub fn nearest(
     map: &StandardMap,
     factor: &DMatrix<f64>,
-    worth: f64,
+    effective: f64,
     theta: &DVector<f64>,
 ) -> Result<DVector<f64>, FitError> {
     let u = theta.len();
@@ -151,11 +151,11 @@ pub fn nearest(
     let torque = factor.columns(0, u) * theta;
     factor.set_column(u, &torque);
     let bodies = vec![None; map.links.len()];
-    let task = Task {
+    let task = ConsistencyProblem {
         map,
         bodies: &bodies,
         factor: &factor,
-        worth,
+        effective,
     };
     Ok(feasible(&task)?.theta)
 }
@@ -184,16 +184,16 @@ fn standard_at(x: &DVector<f64>, links: usize, drives: usize) -> (DVector<f64>, 
 }
 
 /// The factor with the unknowns that no link has a part in solved for.
-struct Reduced {
+struct EliminatedFactor {
     /// Columns of the factor: free ones first, then mapped ones.
     order: Vec<usize>,
     free: usize,
     r: DMatrix<f64>,
-    worth: f64,
+    effective: f64,
 }
 
-impl Reduced {
-    fn of(task: &Task) -> Self {
+impl EliminatedFactor {
+    fn of(task: &ConsistencyProblem) -> Self {
         let u = task.factor.ncols() - 1;
         let p = task.map.matrix.nrows();
         let mapped = |c: &usize| *c < p && task.map.matrix.row(*c).amax() > 0.0;
@@ -209,11 +209,11 @@ impl Reduced {
             row[u] = task.factor[(i, u)];
             factor.fold(&row);
         }
-        Reduced {
+        EliminatedFactor {
             order,
             free,
             r: factor.r(),
-            worth: task.worth,
+            effective: task.effective,
         }
     }
 
@@ -230,9 +230,9 @@ impl Reduced {
         let u = self.order.len();
         let m = u - self.free;
         let chosen = map.matrix.select_rows(&self.order[self.free..]);
-        let block = self.r.view((self.free, self.free), (m, m)) * self.worth.sqrt();
+        let block = self.r.view((self.free, self.free), (m, m)) * self.effective.sqrt();
         let to_rows = block * chosen;
-        let target = self.r.view((self.free, u), (m, 1)) * self.worth.sqrt();
+        let target = self.r.view((self.free, u), (m, 1)) * self.effective.sqrt();
         let off = &to_rows * s - target;
         let data = to_rows * slopes;
         let weight = weight.sqrt();
@@ -373,18 +373,19 @@ mod tests {
         DVector::from_vec((0..count).flat_map(|i| body(i).standard()).collect())
     }
 
-    fn all_exist(found: &Feasible) -> bool {
-        let exists = |s: &[f64; STANDARD]| pseudo_inertia(s).symmetric_eigenvalues().min() > 0.0;
-        found.links.iter().all(exists) && found.drives.iter().all(|d| *d > 0.0)
+    fn all_consistent(found: &Feasible) -> bool {
+        let consistent =
+            |s: &[f64; STANDARD]| pseudo_inertia(s).symmetric_eigenvalues().min() > 0.0;
+        found.links.iter().all(consistent) && found.drives.iter().all(|d| *d > 0.0)
     }
 
     fn without_priors(map: &StandardMap, factor: &DMatrix<f64>) -> Feasible {
         let bodies = vec![None; map.links.len()];
-        let task = Task {
+        let task = ConsistencyProblem {
             map,
             bodies: &bodies,
             factor,
-            worth: 1.0,
+            effective: 1.0,
         };
         feasible(&task).unwrap()
     }
@@ -412,7 +413,7 @@ mod tests {
         )
     }
 
-    /// Nearest squared distance of parameters to what can exist, without a prior to speak of.
+    /// Nearest squared distance of parameters to physically consistent ones, without a prior to speak of.
     fn beyond(robot: &Robot, free: &DVector<f64>) -> f64 {
         let p = robot.parameters().len();
         let mut factor = DMatrix::zeros(p + 1, p + 1);
@@ -426,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_truth_can_exist_the_fit_hardly_suffers() {
+    fn where_the_truth_is_consistent_the_fit_hardly_suffers() {
         for robot in [
             arm(),
             Robot::cft(Setup::default(), Structure::Full22),
@@ -437,7 +438,7 @@ mod tests {
             standard.extend(map.drives.iter().map(|_| 0.2));
             let truth = &map.matrix * standard;
             let (before, after, found, _) = both(&robot, &truth, 400, 0.5);
-            assert!(all_exist(&found));
+            assert!(all_consistent(&found));
             // 22 parameters that are fitted freely save about 22 of the noise's own 1200 or more
             assert!(after < before + 30.0, "{before} {after}");
             let own = truth.len();
@@ -446,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_whose_free_fit_cannot_exist_give_links_that_do() {
+    fn rows_whose_free_fit_is_inconsistent_give_links_that_are_not() {
         for robot in [arm(), Robot::cft(Setup::default(), Structure::Full22)] {
             let map = robot.standard_map();
             let mut standard = bodies(map.links.len());
@@ -455,7 +456,7 @@ mod tests {
             // few rows and much noise: some moment of inertia comes out below zero
             let (before, after, found, free) = both(&robot, &truth, 12, 8.0);
             assert!(beyond(&robot, &free) > 0.01, "{}", beyond(&robot, &free));
-            assert!(all_exist(&found));
+            assert!(all_consistent(&found));
             assert!(after > before && after < before + 60.0, "{before} {after}");
         }
     }
@@ -475,11 +476,11 @@ mod tests {
                 })))
             })
             .collect();
-        let task = Task {
+        let task = ConsistencyProblem {
             map: &map,
             bodies: &given,
             factor: &factor,
-            worth: 1.0,
+            effective: 1.0,
         };
         let found = feasible(&task).unwrap();
         for (i, link) in found.links.iter().enumerate() {
@@ -491,7 +492,7 @@ mod tests {
             ..PLAIN
         };
         let wrong = vec![Some(wrong); 3];
-        let task = Task {
+        let task = ConsistencyProblem {
             bodies: &wrong,
             ..task
         };

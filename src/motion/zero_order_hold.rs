@@ -1,27 +1,27 @@
-//! Motor forces that are held from row to row, brought to the time and pose of each row.
+//! Motor forces by a zero-order hold, brought to the time and pose of each row.
 //!
 //! Amplifiers hold their voltage until the next sample. Where motors act on the joints through a
-//! linkage, a held force is no held joint torque: the joint torque that is logged at one pose
+//! linkage, a constant force is no constant joint torque: the joint torque that is logged at one pose
 //! turns into another as the arm moves. At 2 rad/s and 1 kHz the difference is a thousandth of the
 //! torque, which biases small parameters by many standard deviations.
 
 use crate::log::Block;
 use crate::robot::Robot;
 
-/// Forms, row by row, the torque at the row's pose of the mean of the forces held before and after
-/// its instant.
+/// Forms, row by row, the torque at the row's pose of the mean of the forces before and after its
+/// instant.
 #[derive(Debug, Clone)]
-pub struct HeldForces {
+pub struct ZeroOrderHold {
     /// Pose and torque of the row before, as logged; empty before the first.
     pose: Vec<f64>,
     torque: Vec<f64>,
     carried: Vec<f64>,
 }
 
-impl HeldForces {
+impl ZeroOrderHold {
     /// For a robot of `joints` joints.
     pub fn new(joints: usize) -> Self {
-        HeldForces {
+        ZeroOrderHold {
             pose: Vec::with_capacity(joints),
             torque: Vec::with_capacity(joints),
             carried: vec![0.0; joints],
@@ -72,7 +72,7 @@ mod tests {
             block.tau.extend(forces_to_torques(&q, &force));
         }
         let logged = block.tau.clone();
-        HeldForces::new(4).centre(&robot, &mut block);
+        ZeroOrderHold::new(4).centre(&robot, &mut block);
         for (a, b) in block.tau.iter().zip(&logged) {
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn on_a_joint_of_its_own_it_is_the_mean_of_neighbours_across_blocks() {
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
-        let mut held = HeldForces::new(1);
+        let mut hold = ZeroOrderHold::new(1);
         let mut block = |tau: &[f64]| {
             let mut b = Block {
                 t: vec![0.0; tau.len()],
@@ -89,7 +89,7 @@ mod tests {
                 tau: tau.to_vec(),
                 ..Block::default()
             };
-            held.centre(&robot, &mut b);
+            hold.centre(&robot, &mut b);
             b.tau
         };
         assert_eq!(block(&[1.0, 3.0]), [1.0, 2.0]);

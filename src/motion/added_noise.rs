@@ -1,5 +1,5 @@
-//! What was done to positions once, done once more: through the filter that smoothed them, or with noise like
-//! theirs beside it. What estimates make of it tells how far the first time has moved them.
+//! What biased the positions, done to them again: the filter that smoothed them, or added noise of their own level
+//! (SIMEX). What estimates make of it tells their bias.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ impl Parallel {
     ///
     /// # Errors
     /// [`MotionError`] where the stretch is too short for the filter.
-    pub fn twice(&self, stretch: &Stretch) -> Result<Option<Stretch>, MotionError> {
+    pub fn smoothed_twice(&self, stretch: &Stretch) -> Result<Option<Stretch>, MotionError> {
         let Some(filter) = &self.position else {
             return Ok(None);
         };
@@ -32,9 +32,14 @@ impl Parallel {
     ///
     /// # Errors
     /// [`MotionError`] where the stretch is too short for the filter.
-    pub fn noisier(&self, stretch: &Stretch, seed: u64, sign: f64) -> Result<Stretch, MotionError> {
+    pub fn with_added_noise(
+        &self,
+        stretch: &Stretch,
+        seed: u64,
+        sign: f64,
+    ) -> Result<Stretch, MotionError> {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
-        let mut noisier = stretch.clone();
+        let mut noisy = stretch.clone();
         let lag = self.rough_lag(stretch.dt);
         for j in 0..stretch.joints() {
             let [q, v, a] = self.motion_of_noise(stretch, &mut chance)?;
@@ -42,14 +47,14 @@ impl Parallel {
             if !level.is_finite() {
                 continue;
             }
-            let channels = [&mut noisier.q[j], &mut noisier.v[j], &mut noisier.a[j]];
+            let channels = [&mut noisy.q[j], &mut noisy.v[j], &mut noisy.a[j]];
             for (channel, noise) in channels.into_iter().zip([q, v, a]) {
                 for (x, n) in channel.iter_mut().zip(&noise) {
                     *x += sign * level * n;
                 }
             }
         }
-        Ok(noisier)
+        Ok(noisy)
     }
 
     /// Samples over which a difference shows most of what is as fast as the position filter lets through, and next
@@ -108,13 +113,13 @@ fn middle_roughness(x: &[f64], lag: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Settings;
+    use crate::motion::FilterSettings;
 
     #[test]
     fn smoothing_once_more_doubles_what_the_filter_takes_of_a_slow_wave() {
-        let settings = Settings {
+        let settings = FilterSettings {
             q_cutoff_hz: Some(60.0),
-            ..Settings::default()
+            ..FilterSettings::default()
         };
         let parallel = Parallel::design(&settings, 1e-3).unwrap();
         let filter = parallel.position.clone().unwrap();
@@ -131,7 +136,7 @@ mod tests {
             tau: vec![vec![0.0; 3000]],
             ..Stretch::default()
         };
-        let twice = parallel.twice(&stretch).unwrap().unwrap();
+        let twice = parallel.smoothed_twice(&stretch).unwrap().unwrap();
         let off = |x: &[f64]| -> f64 {
             let inner = 500..2500;
             let pairs = x[inner.clone()].iter().zip(&raw[inner]);
@@ -144,12 +149,17 @@ mod tests {
 
     #[test]
     fn without_a_position_filter_there_is_nothing_to_double() {
-        let settings = Settings {
+        let settings = FilterSettings {
             q_order: 0,
-            ..Settings::default()
+            ..FilterSettings::default()
         };
         let parallel = Parallel::design(&settings, 1e-3).unwrap();
-        assert!(parallel.twice(&Stretch::default()).unwrap().is_none());
+        assert!(
+            parallel
+                .smoothed_twice(&Stretch::default())
+                .unwrap()
+                .is_none()
+        );
     }
 
     /// A slow motion read by an encoder of a known count, sampled slowly and fast, filtered wide and narrow: the
@@ -162,9 +172,9 @@ mod tests {
             (8000.0, 100.0, 1e-5),
         ] {
             let (dt, n) = (1.0 / rate, 20_000);
-            let settings = Settings {
+            let settings = FilterSettings {
                 q_cutoff_hz: Some(hz),
-                ..Settings::default()
+                ..FilterSettings::default()
             };
             let parallel = Parallel::design(&settings, dt).unwrap();
             let motion = |k: usize| {
@@ -190,7 +200,8 @@ mod tests {
                     .map(|k| (motion(k) / count).round() * count)
                     .collect(),
             );
-            let [more, less] = [1.0, -1.0].map(|sign| parallel.noisier(&read, 1, sign).unwrap());
+            let [more, less] =
+                [1.0, -1.0].map(|sign| parallel.with_added_noise(&read, 1, sign).unwrap());
             let rms_off = |x: &[f64], y: &[f64]| {
                 let inner = 1000..n - 1000;
                 let pairs = x[inner.clone()].iter().zip(&y[inner]);
@@ -207,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_holds_no_noise_gets_none() {
-        let parallel = Parallel::design(&Settings::default(), 1e-3).unwrap();
+        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let still = Stretch {
             dt: 1e-3,
             t: vec![0.0; 3000],
@@ -216,6 +227,6 @@ mod tests {
             a: vec![vec![0.0; 3000]],
             ..Stretch::default()
         };
-        assert_eq!(parallel.noisier(&still, 1, 1.0).unwrap(), still);
+        assert_eq!(parallel.with_added_noise(&still, 1, 1.0).unwrap(), still);
     }
 }
