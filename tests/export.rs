@@ -192,7 +192,7 @@ fn the_c_header_gives_the_torques_of_the_model() {
     for (name, model) in models() {
         let n = model.friction.len();
         let states = states(n, 11);
-        let header = export::header::header(&Program::of(&model).unwrap(), name, &note(&model));
+        let header = export::header::header(&Program::of(&model), name, &note(&model));
         std::fs::write(folder.path().join(format!("{name}.h")), header).unwrap();
         let rows: Vec<String> = states
             .iter()
@@ -244,7 +244,7 @@ fn the_rust_module_gives_the_torques_of_the_model() {
     let models = models();
     for (name, model) in &models {
         let n = model.friction.len();
-        let text = export::module::module(&Program::of(model).unwrap(), &note(model));
+        let text = export::module::module(&Program::of(model), &note(model));
         std::fs::write(folder.path().join(format!("{name}.rs")), text).unwrap();
         let _ = writeln!(driver, "#[allow(dead_code)]\nmod {name};");
         let rows: Vec<String> = states(n, 11)
@@ -276,13 +276,13 @@ fn the_rust_module_gives_the_torques_of_the_model() {
 #[test]
 fn constants_stand_in_the_files_to_the_last_bit() {
     let model = model(gantry().robot(), false, 3);
-    let program = Program::of(&model).unwrap();
+    let program = Program::of(&model);
     let header = export::header::header(&program, "gantry", &note(&model));
     let module = export::module::module(&program, &note(&model));
     let own = program.bodies.iter().flatten().copied();
     let numbers = own.chain(
         program
-            .chain
+            .tree
             .links()
             .iter()
             .flat_map(|l| l.rotation)
@@ -345,12 +345,10 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
 
 /// Parameters of links that could be, and of some couplings.
 fn bodies(model: &Model, seed: u64) -> Vec<f64> {
-    let Robot::Serial(robot) = &model.robot else {
-        panic!("a serial robot");
-    };
+    let robot = &model.robot;
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
     let mut standard = Vec::new();
-    for _ in robot.chain().links() {
+    for _ in robot.tree().links() {
         let centre: [f64; 3] = std::array::from_fn(|_| draw.one(0.2));
         let small: [f64; 3] = std::array::from_fn(|_| draw.one(0.002));
         let inertia = [0.03, small[0], small[1], 0.04, small[2], 0.05];
@@ -429,12 +427,10 @@ fn links_of_a_feasible_fit_go_into_the_urdf_as_they_are() {
     let panda = include_str!("../configs/panda.toml");
     let panda = RobotFile::parse("panda.toml", panda).unwrap();
     let mut model = model(panda.robot(), false, 9);
-    let Robot::Serial(robot) = &model.robot else {
-        panic!("a serial robot");
-    };
+    let robot = &model.robot;
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(31));
     let links: Vec<LinkBody> = robot
-        .chain()
+        .tree()
         .links()
         .iter()
         .map(|link| LinkBody {
@@ -457,7 +453,7 @@ fn links_of_a_feasible_fit_go_into_the_urdf_as_they_are() {
         .collect();
     let mut drives = std::collections::BTreeMap::new();
     if robot.drive_inertia() {
-        for name in robot.names() {
+        for name in robot.joint_names() {
             drives.insert(name.clone(), 0.2 + draw.one(0.1));
             standard.push(drives[name]);
         }

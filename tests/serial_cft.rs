@@ -7,19 +7,13 @@ use cft_ident::config::RobotFile;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::links::{PseudoInertia, base_parameters};
 use cft_ident::robot::cft::{Setup, Structure};
-use cft_ident::robot::serial::SerialRobot;
 use robot_oracle::{Draw, Oracle};
-use std::sync::Arc;
 
 /// Frames 8 of Table 2 carry the tool; gravity acts along -z0.
 const ARM: &str = include_str!("../fixtures/robots/cft-chain.toml");
 
-fn arm() -> (Robot, Arc<SerialRobot>) {
-    let robot = RobotFile::parse("cft-chain.toml", ARM).unwrap().robot();
-    match &robot {
-        Robot::Serial(serial) => (robot.clone(), Arc::clone(serial)),
-        other => panic!("{other:?}"),
-    }
+fn arm() -> Robot {
+    RobotFile::parse("cft-chain.toml", ARM).unwrap().robot()
 }
 
 /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the frame's origin, first moments and mass of a
@@ -55,16 +49,16 @@ fn torque(robot: &Robot, theta: &[f64], q: &[f64], v: &[f64], a: &[f64]) -> Vec<
 
 #[test]
 fn the_arm_has_22_base_parameters() {
-    let (robot, serial) = arm();
-    assert_eq!(serial.chain().links().len(), 8);
+    let robot = arm();
+    assert_eq!(robot.tree().links().len(), 8);
     assert_eq!(robot.parameters().len(), 22);
 }
 
 #[test]
 fn the_chain_gives_the_general_links_of_the_reference() {
-    let (robot, serial) = arm();
+    let robot = arm();
     for g in &Oracle::load().general {
-        let theta = serial.base_of(&standard(&g.links));
+        let theta = robot.base_of(&standard(&g.links));
         let got = torque(&robot, &theta, &g.q, &g.v, &g.a);
         for (i, got) in got.iter().enumerate() {
             let inertial: f64 = (0..4).map(|j| g.m[i][j] * g.a[j]).sum();
@@ -77,7 +71,7 @@ fn the_chain_gives_the_general_links_of_the_reference() {
 
 #[test]
 fn its_regressor_has_rank_22_and_spans_the_closed_form() {
-    let (chain, _) = arm();
+    let chain = arm();
     let closed = Robot::cft(Setup::Tuedacs, Structure::Full22);
     let mut draw = Draw::new(22);
     let states = 60;
@@ -103,11 +97,11 @@ fn its_regressor_has_rank_22_and_spans_the_closed_form() {
 
 #[test]
 fn torques_agree_with_the_closed_form_on_random_links() {
-    let (chain, serial) = arm();
+    let chain = arm();
     let closed = Robot::cft(Setup::Tuedacs, Structure::Full22);
     let mut draw = Draw::new(7);
     for g in &Oracle::load().general {
-        let ours = serial.base_of(&standard(&g.links));
+        let ours = chain.base_of(&standard(&g.links));
         let theirs = base_parameters(&g.links.map(PseudoInertia));
         for _ in 0..20 {
             let (q, v, a) = draw.state();

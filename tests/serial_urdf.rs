@@ -1,13 +1,12 @@
 //! URDF files as robots: placements, lumping, mimic joints and limits, against Pinocchio.
 
 use cft_ident::config::RobotFile;
-use cft_ident::robot::serial::{SerialRobot, space};
+use cft_ident::robot::JointKind;
 use cft_ident::robot::standard::STANDARD;
-use cft_ident::robot::{JointKind, Robot};
+use cft_ident::robot::tree::space;
 use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Place in Pinocchio's list (m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz) of ours (Ixx, Ixy, Ixz,
 /// Iyy, Iyz, Izz, mx, my, mz, m).
@@ -38,13 +37,6 @@ fn file_of(urdf: &Path, more: &str) -> RobotFile {
         urdf.file_name().unwrap().to_str().unwrap()
     );
     RobotFile::parse_in("robot.toml", &text, urdf.parent()).unwrap()
-}
-
-fn serial(file: &RobotFile) -> Arc<SerialRobot> {
-    match file.robot() {
-        Robot::Serial(robot) => robot,
-        other => panic!("{other:?}"),
-    }
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -82,18 +74,18 @@ fn prior(file: &RobotFile) -> Vec<f64> {
 fn compare(file: &RobotFile, oracle: &str) -> f64 {
     let text = std::fs::read_to_string(fixture("oracle").join(oracle)).unwrap();
     let oracle: Value = serde_json::from_str(&text).unwrap();
-    let robot = serial(file);
+    let robot = file.robot();
     let names = |key: &str| -> Vec<String> {
         let list = oracle[key].as_array().unwrap().iter();
         list.map(|x| x.as_str().unwrap().to_owned()).collect()
     };
     let joint_of: Vec<usize> = robot
-        .names()
+        .joint_names()
         .iter()
         .map(|joint| names("joints").iter().position(|n| n == joint).unwrap())
         .collect();
     let link_of: Vec<usize> = robot
-        .chain()
+        .tree()
         .links()
         .iter()
         .map(|link| names("links").iter().position(|n| *n == link.name).unwrap())
@@ -103,7 +95,6 @@ fn compare(file: &RobotFile, oracle: &str) -> f64 {
     let p = robot.standard_parameters();
     let standard = prior(file);
     let theta = robot.base_of(&standard);
-    let whole = Robot::Serial(Arc::clone(&robot));
     let mut worst: f64 = 0.0;
     let states = oracle["states"].as_array().unwrap();
     assert_eq!(states.len(), 20);
@@ -116,7 +107,7 @@ fn compare(file: &RobotFile, oracle: &str) -> f64 {
         let mut y = vec![0.0; n * p];
         robot.standard_regressor(&q, &v, &a, &mut y);
         let mut base = vec![0.0; n * theta.len()];
-        whole.regressor(&q, &v, &a, &mut base);
+        robot.regressor(&q, &v, &a, &mut base);
         for j in 0..n {
             let row = numbers(&state["Y"][joint_of[j]]);
             let size = row.iter().fold(0.0_f64, |m, x| m.max(x.abs()));

@@ -169,7 +169,12 @@ pub fn estimated(
     let found = |settings: &Processing| {
         motions(&log.t, &log.q, &log.tau, 4, settings).expect("a whole log")
     };
-    let variance = |q: &[f64]| robot.encoder_variance(joint, q).unwrap_or(f64::NAN);
+    let variance = |q: &[f64]| {
+        robot
+            .transmission()
+            .encoder_variance(joint, q)
+            .unwrap_or(f64::NAN)
+    };
     let sensors = Read {
         variance: &variance,
         zero_order_hold: true,

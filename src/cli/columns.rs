@@ -4,7 +4,6 @@ use super::CliError;
 use super::machine::Machine;
 use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
 use crate::log::{self, Channels, Layout, Table};
-use crate::robot::Robot;
 
 /// Channels by their names alone.
 ///
@@ -86,11 +85,11 @@ fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<
                 continue;
             };
             let joint = &layout.joints[j];
-            let position = match (raw, j) {
-                (true, 2) => "rad",
-                (true, _) => "m",
-                (false, j) => machine.robot.joint_kind(j).position_unit(),
+            let kind = match raw {
+                true => machine.robot.coordinate_kind(j),
+                false => machine.robot.joint_kind(j),
             };
+            let position = kind.position_unit();
             let unit = match role {
                 Role::Velocity => format!("{position}/s"),
                 Role::Torque if raw => "V".to_owned(),
@@ -155,18 +154,11 @@ fn limits(
     let applied = raw && role == Role::Torque;
     let Some(limits) = machine.file.limits.get(joint) else {
         // Table 5 of the report
-        let of_set_up = match (&machine.robot, role, raw) {
-            (Robot::Cft(robot), Role::Position, true) => {
-                let limits = robot.setup.limits();
-                limits
-                    .lower
-                    .get(j)
-                    .copied()
-                    .zip(limits.upper.get(j).copied())
-            }
+        let of_set_up = match (machine.robot.transmission().limits(), role, raw) {
+            (Some(limits), Role::Position, true) => limits.of(j),
             _ => None,
         };
-        return (of_set_up.map(|(low, high)| [low, high]), applied);
+        return (of_set_up, applied);
     };
     let both = |limit: Option<f64>| limit.map(|limit| [-limit, limit]);
     match role {

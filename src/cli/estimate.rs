@@ -479,7 +479,13 @@ pub fn estimate(
         }
     };
     add_processing(&mut fit, &again);
-    if passes.machine.robot.knows_encoders() {
+    if passes
+        .machine
+        .robot
+        .transmission()
+        .encoder_steps()
+        .is_some()
+    {
         let mut shifted = Vec::new();
         for grid in 0..GRIDS {
             let mut weigher = solver.weigher();

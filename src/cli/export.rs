@@ -90,8 +90,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .hint("export the rest with --without-effects")
         .hint("`cft-ident torque` computes the torque with all effects"));
     }
-    let program =
-        Program::of(&model).map_err(|error| CliError::input(format!("{}: {error}", given.name)))?;
+    let program = Program::of(&model);
     let mut lines = vec![
         format!(
             "Dynamic model written by cft-ident {} from {} (SHA-256 {}).",

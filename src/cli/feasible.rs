@@ -14,7 +14,8 @@ use crate::inertia::robust::Status;
 use crate::inertia::solve::{factor, residual_of, weights_of};
 use crate::number;
 use crate::report::table::{Align, Table, hanging, unbroken};
-use crate::robot::standard::{Body, StandardMap, pseudo_inertia};
+use crate::robot::bodies::StandardMap;
+use crate::robot::standard::{Body, pseudo_inertia};
 
 /// Physically consistent links, and what they cost.
 pub struct Physical {

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::machine::Machine;
 use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
 use crate::config::ModelFile;
-use crate::config::identified::{friction_meaning, friction_theta, friction_unit};
+use crate::config::identified::{friction_meaning, friction_unit};
 use crate::config::model_file::{ModelProvenance, Parameter};
 use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
@@ -159,7 +159,7 @@ fn one_joint(
     let variance = |q: &[f64]| -> f64 {
         let known = match given {
             Some(_) => None,
-            None => machine.robot.encoder_variance(j, q),
+            None => machine.robot.transmission().encoder_variance(j, q),
         };
         known.unwrap_or(resolution * resolution / 12.0)
     };
@@ -265,7 +265,7 @@ pub fn file_parameters(machine: &Machine, j: usize, e: &JointEstimate) -> Vec<Pa
             }
             Parameter {
                 name: name.to_owned(),
-                theta: friction_theta(&machine.robot, j, k),
+                theta: machine.robot.friction_theta(j, k),
                 joint: Some(joint.clone()),
                 value: law[k],
                 std: (v.std.is_finite()).then_some(v.std),
@@ -325,7 +325,7 @@ pub fn json(machine: &Machine, found: &Identified) -> Value {
                         "value": known.then_some(v.value),
                         "std": known.then_some(v.std),
                         "unit": friction_unit(&machine.robot, *j, name, machine.file.torque_unit(*j)),
-                        "theta": friction_theta(&machine.robot, *j, k),
+                        "theta": machine.robot.friction_theta(*j, k),
                         "verdict": v.verdict,
                     }),
                 );
@@ -368,7 +368,7 @@ pub fn text(machine: &Machine, found: &Identified) -> String {
                 summary::Parameter {
                     joint,
                     name: DoubleTanh::NAMES[k],
-                    theta: friction_theta(&machine.robot, *j, k),
+                    theta: machine.robot.friction_theta(*j, k),
                     value: if known { v.value } else { f64::NAN },
                     std: if known { v.std } else { f64::NAN },
                     unit: &units[k],

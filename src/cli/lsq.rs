@@ -13,7 +13,7 @@ use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
-use crate::config::robot_file::{FrictionLawKind, ModelKind};
+use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::{KnownFriction, Own, RegressorColumns};
 use crate::inertia::essential::{Essential, essential};
 use crate::inertia::instruments::ReferenceSource;
@@ -24,7 +24,6 @@ use crate::log::{LogSpec, Provenance};
 use crate::motion::Summary;
 use crate::number;
 use crate::report::json::Document;
-use crate::robot::Robot;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::Verdict;
 
@@ -277,7 +276,7 @@ fn unknowns(machine: &Machine, columns: &RegressorColumns, fit: &Fit) -> Vec<Unk
     for (i, info) in robot.parameters().iter().enumerate() {
         let value = fit.theta[i];
         let (std, verdict, negligible) = rate(i, value);
-        let grouped = matches!(robot, Robot::Serial(serial) if i < serial.groupings().len());
+        let grouped = i < robot.groupings().len();
         out.push(Unknown {
             name: info.name.to_string(),
             grouping: grouped.then(|| info.meaning.to_string()),
@@ -412,11 +411,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             Some((model.name, model.value))
         }
     };
-    if friction.is_none()
-        && machine.file.robot.model == ModelKind::Cft
-        && !machine.file.friction.fitted_with_inertias
-        && machine.file.friction_law() == FrictionLawKind::DoubleTanh
-    {
+    if friction.is_none() && machine.file.needs_friction_first() {
         return Err(CliError::usage("lsq needs the friction of every joint")
             .hint("identify it first with `cft-ident friction`, and give its model with -m")
             .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));

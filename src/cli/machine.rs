@@ -351,7 +351,7 @@ impl Machine {
     /// Travel of a joint by its machine, else by the file's limits; a turn, or a metre, where neither
     /// has one.
     fn range(&self, j: usize, name: &str) -> f64 {
-        if let Some(range) = self.robot.full_travel(j) {
+        if let Some(range) = self.robot.transmission().full_travel(j) {
             return range;
         }
         let limits = self.file.limits.get(name).and_then(|l| l.position);
@@ -364,7 +364,7 @@ impl Machine {
 
     /// Full travel of each joint, by which motions of metres and radians are compared.
     pub fn ranges(&self) -> Vec<f64> {
-        if let Robot::SingleJoint(_) = self.robot {
+        if self.robot.joints() == 1 {
             return vec![f64::MIN_POSITIVE];
         }
         let names = self.robot.joint_names().iter().enumerate();

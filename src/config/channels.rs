@@ -11,6 +11,7 @@ use crate::log::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Sta
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::ENCODER_SCALE;
 use crate::robot::cft::{COORDINATES, Setup, pantograph};
+use crate::robot::tree::MOST_JOINTS;
 
 impl RobotFile {
     /// The columns that a log of this robot has, and how their numbers become SI.
@@ -267,14 +268,12 @@ fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<Conversion> {
         .map(|row| row.iter().copied().collect())
         .collect();
     let gears = gears.to_vec();
-    // Gears of up to this many joints need no memory of their own.
-    const JOINTS: usize = 16;
     Some(Conversion::new(move |positions, torques, velocities| {
-        if n > JOINTS || positions.len() != n {
+        if n > MOST_JOINTS || positions.len() != n {
             return false;
         }
         let times = |side: &mut [f64], entry: &dyn Fn(usize, usize) -> f64| {
-            let mut out = [0.0; JOINTS];
+            let mut out = [0.0; MOST_JOINTS];
             for (row, out) in out.iter_mut().enumerate().take(n) {
                 let products = side.iter().enumerate();
                 *out = products.map(|(column, x)| entry(row, column) * x).sum();

@@ -3,7 +3,6 @@
 use super::ConfigError;
 use super::model_file::{Covariance, ModelFile, Parameter};
 use crate::robot::Robot;
-use crate::robot::cft::FRICTION;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::{JointFriction, Model};
 
@@ -20,20 +19,9 @@ pub fn friction_unit(robot: &Robot, j: usize, name: &str, torque_unit: &str) -> 
 /// Unit of an inertial parameter: the robot's own `si`, or, for a joint whose torque channel is left
 /// in A, current per acceleration.
 pub fn inertia_unit(robot: &Robot, si: &str, torque_unit: &str) -> String {
-    match robot {
-        Robot::SingleJoint(_) if torque_unit == "A" => {
-            format!("A s^2/{}", robot.joint_kind(0).position_unit())
-        }
+    match (robot.parameters(), torque_unit) {
+        ([_], "A") => format!("A s^2/{}", robot.joint_kind(0).position_unit()),
         _ => si.to_owned(),
-    }
-}
-
-/// Number in the report's Table 4 of friction parameter `k` (order of [`DoubleTanh::NAMES`]) of
-/// joint `j`: 13 + 4 k + j on the CFT robot.
-pub fn friction_theta(robot: &Robot, j: usize, k: usize) -> Option<u32> {
-    match robot {
-        Robot::Cft(_) => FRICTION[4 * k + j].theta,
-        Robot::SingleJoint(_) | Robot::Serial(_) => None,
     }
 }
 

@@ -342,6 +342,14 @@ impl RobotFile {
         names
     }
 
+    /// Whether the torques need friction that only `friction` can find before the inertias are fitted: the
+    /// report's law, which is not linear in its slopes, on the report's robot.
+    pub fn needs_friction_first(&self) -> bool {
+        self.robot.model == ModelKind::Cft
+            && !self.friction.fitted_with_inertias
+            && self.friction_law() == FrictionLawKind::DoubleTanh
+    }
+
     /// The friction law: the declared one, or the model's own.
     pub fn friction_law(&self) -> FrictionLawKind {
         self.friction.law.unwrap_or(match self.robot.model {

@@ -9,10 +9,8 @@ use super::ConfigError;
 use super::document::Document;
 use super::robot_file::RobotSection;
 use crate::log::{list, nearest};
-use crate::robot::serial::{
-    Chain, ChainError, Coordinate, Coupling, Dependence, Link, SerialRobot, Sine,
-};
 use crate::robot::standard::Body;
+use crate::robot::tree::{Coordinate, Coupling, Dependence, Link, Sine, Tree, TreeError};
 use crate::robot::{JointKind, Robot};
 
 /// A sine in a dependent coordinate: amplitude sin(phase + sum of `of`).
@@ -179,7 +177,7 @@ impl RobotSection {
     /// # Errors
     /// What is wrong, the index of the link or coupling and the key where one can be named, and
     /// what to do.
-    pub(super) fn serial(&self) -> Result<SerialRobot, Misfit> {
+    pub(super) fn serial(&self) -> Result<Robot, Misfit> {
         let joints = self.chain_joints();
         let names = self.link_names();
         let find = |joint: &str| joints.iter().position(|name| name == joint);
@@ -330,12 +328,10 @@ impl RobotSection {
             }
             couplings.push(coupling);
         }
-        let chain = Chain::new(links, joints.len(), self.gravity.unwrap_or(GRAVITY));
-        chain
-            .and_then(|chain| {
-                SerialRobot::new(chain, joints, self.drive_inertia.unwrap_or(true), couplings)
-            })
-            .map_err(|error| Misfit::of_chain(&error))
+        let tree = Tree::new(links, joints.len(), self.gravity.unwrap_or(GRAVITY))
+            .map_err(|error| Misfit::of_tree(&error))?;
+        let drive_inertia = self.drive_inertia.unwrap_or(true);
+        Ok(Robot::of_tree(tree, joints, drive_inertia, couplings))
     }
 
     /// The robot of a section that was checked.
@@ -343,7 +339,7 @@ impl RobotSection {
     /// # Panics
     /// Where it was not: [`super::check`] lets no such file through.
     pub(super) fn checked_serial(&self) -> Robot {
-        Robot::serial(self.serial().expect("the robot section was checked"))
+        self.serial().expect("the robot section was checked")
     }
 }
 
@@ -367,7 +363,7 @@ impl Misfit {
         }
     }
 
-    fn of_chain(error: &ChainError) -> Self {
+    fn of_tree(error: &TreeError) -> Self {
         let text = error.to_string();
         let (problem, remedy) = text
             .rsplit_once("; ")

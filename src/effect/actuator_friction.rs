@@ -2,7 +2,6 @@
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
 use super::{Family, Key, Kind, Place, Role, Unit};
-use crate::robot::Robot;
 use crate::robot::cft::pantograph::reference_jacobian;
 
 pub const KIND: Kind = Kind {
@@ -14,9 +13,9 @@ pub const KIND: Kind = Kind {
         Key::new("viscous", Unit::Text("N s/m")),
         Key::new("coulomb", Unit::Text("N")),
     ],
-    places: |robot, _| match robot {
-        Robot::Cft(_) => (0..2).map(Place::Actuator).collect(),
-        _ => Vec::new(),
+    places: |robot, _| {
+        let screws = 0..robot.transmission().screws().len();
+        screws.map(Place::Actuator).collect()
     },
     starts: |cover, _| {
         if cover.joints.iter().all(|j| j.reversals < 2) {

@@ -357,12 +357,11 @@ fn place(
             _ => Err(nowhere()),
         };
     };
-    if matches!(robot, Robot::Cft(_)) && matches!(name, "actuator-friction" | "rotor-inertia") {
-        match joint {
-            "x_r" => return Ok(Place::Actuator(0)),
-            "y_r" => return Ok(Place::Actuator(1)),
-            _ => {}
-        }
+    let mut screws = robot.transmission().screws().iter();
+    if matches!(name, "actuator-friction" | "rotor-inertia")
+        && let Some(screw) = screws.position(|screw| *screw == joint)
+    {
+        return Ok(Place::Actuator(screw));
     }
     let names = robot.joint_names();
     let on = names

@@ -6,10 +6,8 @@
 
 use super::payload::SEPARATE_BY;
 use super::{Family, Key, Kind, Place, Role, Unit};
-use crate::robot::Robot;
-use crate::robot::serial::chain::MOST_JOINTS;
-use crate::robot::serial::newton_euler::walk;
 use crate::robot::standard::Body;
+use crate::robot::tree::MOST_JOINTS;
 
 /// Distance from the link's origin at which the search begins, along each axis \[m\].
 const NEAR: f64 = 0.1;
@@ -29,9 +27,9 @@ pub const KIND: Kind = Kind {
         Key::new("mass", Unit::Text("kg")),
         Key::new("inertia", Unit::Text("kg m^2")),
     ],
-    places: |robot, _| match robot {
-        Robot::Serial(_) => vec![Place::All],
-        Robot::Cft(_) | Robot::SingleJoint(_) => Vec::new(),
+    places: |robot, _| match robot.tool_stays_level() {
+        true => Vec::new(),
+        false => vec![Place::All],
     },
     starts: |_, _| {
         let corner = |k: usize, axis: usize| if k >> axis & 1 == 0 { NEAR } else { -NEAR };
@@ -40,9 +38,7 @@ pub const KIND: Kind = Kind {
     },
     limits: |_, _| vec![[-FAR, FAR]; 3],
     columns: |scene, _, centre, joint, out| {
-        let (Robot::Serial(robot), [of_mass, of_inertia]) = (scene.robot, out) else {
-            return;
-        };
+        let [of_mass, of_inertia] = out else { return };
         let &[x, y, z] = centre else { return };
         let point = Body {
             mass: 1.0,
@@ -57,19 +53,15 @@ pub const KIND: Kind = Kind {
         }
         .standard();
         let s = scene.stretch;
-        let n = robot.chain().joints();
+        let n = scene.robot.joints();
         let mut state = [[0.0; MOST_JOINTS]; 3];
-        let last = robot.chain().links().len() - 1;
         for k in 0..s.len() {
-            let [q, v, a] = &mut state;
-            s.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
-            walk(robot.chain(), &*q, &*v, &*a, |link, on, row| {
-                if link == last && on == joint {
-                    let of = |body: &[f64]| row.iter().zip(body).map(|(y, x)| y * x).sum();
-                    of_mass[k] = of(&point);
-                    of_inertia[k] = of(&ball);
-                }
-            });
+            let [q, v, a] = state.each_mut().map(|x| &mut x[..n]);
+            s.at(k, q, v, a);
+            let row = scene.robot.tool_row(joint, q, v, a);
+            let of = |body: &[f64]| row.iter().zip(body).map(|(y, x)| y * x).sum();
+            of_mass[k] = of(&point);
+            of_inertia[k] = of(&ball);
         }
     },
     separate_by: SEPARATE_BY,

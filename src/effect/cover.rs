@@ -72,7 +72,7 @@ impl Cover {
             let least = 1e-3 * (position[1] - position[0]);
             joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least)).sum();
             joint.position = position;
-            joint.full_range = robot.full_travel(j);
+            joint.full_range = robot.transmission().full_travel(j);
         }
         for s in stretches {
             let end = s.began + s.dt * s.len() as f64;
@@ -153,7 +153,7 @@ pub fn held_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
         .collect();
     let widest = |j: usize| {
         let seen = travels.iter().map(|t| t[j]).fold(0.0, f64::max);
-        seen.max(robot.full_travel(j).unwrap_or(0.0))
+        seen.max(robot.transmission().full_travel(j).unwrap_or(0.0))
     };
     let widest: Vec<f64> = (0..n).map(widest).collect();
     let held = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < HELD * w).collect();

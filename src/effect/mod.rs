@@ -299,8 +299,8 @@ pub fn kind(name: &str) -> Option<&'static Kind> {
 
 /// The kind of a name on a robot: that with the robot's own columns where there are several.
 pub fn kind_on(robot: &Robot, name: &str) -> Option<&'static Kind> {
-    match (name, robot) {
-        ("payload", Robot::Serial(_)) => Some(&carried::KIND),
+    match (name, robot.tool_stays_level()) {
+        ("payload", false) => Some(&carried::KIND),
         _ => kind(name),
     }
 }

@@ -2,9 +2,7 @@
 //! the CFT robot with 12 parameters the other ten of its 22.
 
 use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
-use crate::robot::Robot;
-use crate::robot::cft::regressor::regressor22;
-use crate::robot::cft::{Structure, UNPRINTED};
+use crate::robot::cft::UNPRINTED;
 
 /// Name and unit of an extra parameter of the full chain.
 const fn extra(i: usize) -> Key {
@@ -28,20 +26,20 @@ pub const KIND: Kind = Kind {
         extra(8),
         extra(9),
     ],
-    places: |robot, _| match robot {
-        Robot::Cft(cft) if cft.structure == Structure::Printed12 => vec![Place::All],
-        _ => Vec::new(),
+    places: |robot, _| match robot.dropped_parameters() {
+        [] => Vec::new(),
+        _ => vec![Place::All],
     },
     starts: no_shape,
     limits: no_limits,
     columns: |scene, _, _, joint, out| {
         let s = scene.stretch;
         let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        let mut y = [[0.0; 22]; 4];
+        let mut row = [0.0; UNPRINTED.len()];
         for k in 0..s.len() {
             s.at(k, &mut q, &mut v, &mut a);
-            regressor22(&q, &v, &a, &mut y);
-            for (column, x) in out.iter_mut().zip(&y[joint][12..]) {
+            scene.robot.dropped_row(joint, &q, &v, &a, &mut row);
+            for (column, x) in out.iter_mut().zip(&row) {
                 column[k] = *x;
             }
         }

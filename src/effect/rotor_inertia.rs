@@ -3,7 +3,6 @@
 //! tau = J' m (J a + Jdot v).
 
 use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
-use crate::robot::Robot;
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
 pub const KIND: Kind = Kind {
@@ -12,12 +11,10 @@ pub const KIND: Kind = Kind {
     role: Role::Columns,
     shape: &[],
     linear: &[Key::new("J", Unit::Inertia)],
-    places: |robot, _| match robot {
-        Robot::Cft(_) => {
-            let joints = (0..robot.joints()).map(Place::Joint);
-            joints.chain((0..2).map(Place::Actuator)).collect()
-        }
-        _ => (0..robot.joints()).map(Place::Joint).collect(),
+    places: |robot, _| {
+        let joints = (0..robot.joints()).map(Place::Joint);
+        let screws = 0..robot.transmission().screws().len();
+        joints.chain(screws.map(Place::Actuator)).collect()
     },
     starts: no_shape,
     limits: no_limits,

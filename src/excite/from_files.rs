@@ -55,10 +55,8 @@ pub fn machine(
             }
         }
     }
-    let motors = match &robot {
-        Robot::Cft(cft) => Motors::Cft(cft.setup),
-        Robot::SingleJoint(_) | Robot::Serial(_) => Motors::Joints,
-    };
+    let setup = robot.transmission().setup();
+    let motors = setup.map_or(Motors::Joints, Motors::Cft);
     let mut machine = Machine {
         columns: RegressorColumns {
             joints: n,
@@ -91,9 +89,9 @@ pub fn machine(
 /// Numbers of a robot that no model was given for: the synthetic CFT robot; a single joint of
 /// inertia 1 with the friction that its file starts from.
 fn nominal(file: &RobotFile, robot: &Robot) -> Model {
-    match robot {
-        Robot::Cft(cft) => {
-            let truth = CftTruth::synthetic(cft.setup);
+    match robot.transmission().setup() {
+        Some(setup) => {
+            let truth = CftTruth::synthetic(setup);
             Model {
                 theta: truth.theta[..robot.parameters().len()].to_vec(),
                 friction: truth.friction.map(JointFriction::DoubleTanh).to_vec(),
@@ -101,7 +99,7 @@ fn nominal(file: &RobotFile, robot: &Robot) -> Model {
                 robot: robot.clone(),
             }
         }
-        Robot::SingleJoint(_) | Robot::Serial(_) => {
+        None => {
             let friction = robot.joint_names().iter().map(|joint| {
                 let start = file.friction.joint.get(joint).cloned().unwrap_or_default();
                 match (start.viscous, start.coulomb) {

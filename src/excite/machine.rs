@@ -5,7 +5,7 @@ use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::cft::pantograph::{joint_accelerations, joint_velocities, joints};
 use crate::robot::cft::{COORDINATES, Setup};
 use crate::robot::model::{JointFriction, Model};
-use crate::robot::{JointKind, Robot, RobotError};
+use crate::robot::{JointKind, RobotError};
 
 use super::limits::{Channel, Quantity};
 use super::series::{Kinematics, MOST};
@@ -135,7 +135,7 @@ impl Machine {
 
     /// Whether nothing but the position of coordinate i itself depends on it.
     pub(super) fn is_uniform(&self, i: usize) -> bool {
-        matches!((&self.model.robot, self.motors), (Robot::Cft(_), Motors::Cft(_)) if i == 3)
+        matches!(self.motors, Motors::Cft(_)) && i == 3
     }
 
     /// Joint positions, velocities and accelerations of the coordinates.

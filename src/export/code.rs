@@ -6,7 +6,7 @@ use super::Program;
 use super::note::Note;
 use crate::robot::JointKind;
 use crate::robot::model::JointFriction;
-use crate::robot::serial::{Coordinate, Dependence};
+use crate::robot::tree::{Coordinate, Dependence};
 
 /// The words of a language.
 pub(super) struct Language {
@@ -82,7 +82,7 @@ impl Language {
 
     /// The tables of the chain; `parents` and `slides` as the language writes them.
     pub(super) fn tables(&self, program: &Program) -> String {
-        let links = program.chain.links();
+        let links = program.tree.links();
         let (n, l) = (program.joints.len(), links.len());
         let shift = links.iter().map(|link| match &link.coordinate {
             Coordinate::Joint(_) => 0.0,
@@ -141,11 +141,7 @@ impl Language {
         }
         out += &self.numbers("BODY", &[l, 10], program.bodies.iter().flatten().copied());
         // what is at rest seems to be pushed up
-        out += &self.numbers(
-            "FALL",
-            &[3],
-            program.chain.gravity().map(|g| -g).into_iter(),
-        );
+        out += &self.numbers("FALL", &[3], program.tree.gravity().map(|g| -g).into_iter());
         out
     }
 
@@ -257,7 +253,7 @@ pub(super) fn sines(program: &Program) -> Vec<(usize, Vec<f64>)> {
             })
             .collect()
     };
-    let links = program.chain.links().iter().enumerate();
+    let links = program.tree.links().iter().enumerate();
     links
         .flat_map(|(i, link)| {
             let rows = match &link.coordinate {

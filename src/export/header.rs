@@ -36,7 +36,7 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
         .replace("@FRICTION@", &C.friction(program))
         .replace("@DRIVES@", &C.drives(program))
         .replace("@N@", &program.joints.len().to_string())
-        .replace("@L@", &program.chain.links().len().to_string())
+        .replace("@L@", &program.tree.links().len().to_string())
         .replace("@name@", name)
         .replace("@GUARD@", &name.to_uppercase())
         // last, so that no name in it is taken for a mark

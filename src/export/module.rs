@@ -57,7 +57,7 @@ pub fn module(program: &Program, note: &Note) -> String {
             },
         )
         .replace("@N@", &program.joints.len().to_string())
-        .replace("@L@", &program.chain.links().len().to_string())
+        .replace("@L@", &program.tree.links().len().to_string())
         // last, so that no name in it is taken for a mark
         .replace("@HEADER@", &RUST.header(program, note))
 }

@@ -22,11 +22,7 @@ const SLIDING_SIZE: f64 = 1e-3;
 ///
 /// # Errors
 /// [`ExportError::NotInUrdf`] where the torque is a current.
-pub(super) fn chain(
-    file: &ModelFile,
-    model: &Model,
-    kind: JointKind,
-) -> Result<(ModelFile, Model), ExportError> {
+pub(super) fn chain(file: &ModelFile, model: &Model) -> Result<(ModelFile, Model), ExportError> {
     if file.robot.torque_unit(0) == "A" {
         return Err(ExportError::NotInUrdf {
             what: "an inertia in A per acceleration".to_owned(),
@@ -34,6 +30,7 @@ pub(super) fn chain(
                      --c or --rust",
         });
     }
+    let kind = model.robot.joint_kind(0);
     let inertia = model.theta.first().copied().unwrap_or_default();
     let mut file = file.clone();
     let joint = file.robot.robot.joint.take();

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::config::serial_section::InertialSection;
-use crate::robot::serial::SerialRobot;
+use crate::robot::Robot;
 use crate::robot::standard::STANDARD;
 
 /// What torques say of a standard parameter.
@@ -40,13 +40,13 @@ const SAME: f64 = 1e-9;
 /// The standard parameters nearest to the priors of the links and drives that give these base
 /// parameters. Without a prior a link is 1 kg in its origin, and a drive has no inertia.
 pub fn nearest(
-    robot: &SerialRobot,
+    robot: &Robot,
     theta: &[f64],
     priors: &[Option<InertialSection>],
     drives: &[f64],
 ) -> Standard {
     let p = robot.standard_parameters();
-    let links = robot.chain().links().len();
+    let links = robot.tree().links().len();
     let mut x = DVector::zeros(p);
     for (x, drive) in x.iter_mut().skip(links * STANDARD).zip(drives) {
         *x = *drive;

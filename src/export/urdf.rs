@@ -10,9 +10,9 @@ use crate::config::model_file::Parameter;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::InertialSection;
 use crate::robot::model::{JointFriction, Model};
-use crate::robot::serial::space::roll_pitch_yaw;
-use crate::robot::serial::{Coordinate, Link, STANDARD_NAMES, SerialRobot};
-use crate::robot::standard::{Body, STANDARD};
+use crate::robot::standard::{Body, STANDARD, STANDARD_NAMES};
+use crate::robot::tree::space::{about, add, product, roll_pitch_yaw, times, turn};
+use crate::robot::tree::{Coordinate, Link};
 use crate::robot::{JointKind, Robot};
 
 /// The two files.
@@ -33,21 +33,19 @@ pub fn urdf(
     urdf_name: &str,
     notes: &[String],
 ) -> Result<Exported, ExportError> {
-    let robot = match &model.robot {
-        Robot::Serial(robot) => robot,
-        Robot::Cft(_) => {
-            return Err(ExportError::NotInUrdf {
-                what: "the pantograph: its q3 = d + L4 sin(q4 + q5) + L4 sin q4 is no multiple of another \
-                       joint, which is all that <mimic> can say"
-                    .to_owned(),
-                remedy: "export it with --c or --rust",
-            });
-        }
-        Robot::SingleJoint(joint) => {
-            let (file, model) = single::chain(file, model, joint.kind)?;
-            return urdf(&file, &model, urdf_name, notes);
-        }
-    };
+    let robot = &model.robot;
+    if robot.transmission().coordinates().is_some() {
+        return Err(ExportError::NotInUrdf {
+            what: "the pantograph: its q3 = d + L4 sin(q4 + q5) + L4 sin q4 is no multiple of another \
+                   joint, which is all that <mimic> can say"
+                .to_owned(),
+            remedy: "export it with --c or --rust",
+        });
+    }
+    if !robot.knows_links() {
+        let (file, model) = single::chain(file, model)?;
+        return urdf(&file, &model, urdf_name, notes);
+    }
     let found = feasible(file, robot);
     let (priors, drives) = match &found {
         Some((bodies, drives)) => (bodies.clone(), drives.as_slice()),
@@ -73,7 +71,7 @@ pub fn urdf(
         "-->\n<robot name=\"identified\">\n  <link name=\"{}\"/>",
         root(robot, file)
     );
-    for (i, link) in robot.chain().links().iter().enumerate() {
+    for (i, link) in robot.tree().links().iter().enumerate() {
         joint(&mut out, robot, model, file, i, link)?;
         body(&mut out, i, link, &standard)?;
     }
@@ -111,11 +109,8 @@ const IN_GENERAL: [&str; 4] = [
 ];
 
 /// Bodies and drives of a feasible fit, where the model has them for every link.
-fn feasible(
-    file: &ModelFile,
-    robot: &SerialRobot,
-) -> Option<(Vec<Option<InertialSection>>, Vec<f64>)> {
-    let bodies = robot.chain().links().iter().map(|link| {
+fn feasible(file: &ModelFile, robot: &Robot) -> Option<(Vec<Option<InertialSection>>, Vec<f64>)> {
+    let bodies = robot.tree().links().iter().map(|link| {
         let body = file.links.iter().find(|body| body.name == link.name)?;
         Some(InertialSection {
             mass: body.mass,
@@ -126,7 +121,7 @@ fn feasible(
     let bodies: Vec<Option<InertialSection>> = bodies.collect();
     let drives = match robot.drive_inertia() {
         true => {
-            let names = robot.names().iter();
+            let names = robot.joint_names().iter();
             names
                 .map(|name| file.drive_inertia.get(name).copied())
                 .collect()
@@ -140,8 +135,8 @@ fn feasible(
 }
 
 /// Frames that are fixed to links, each as a link without inertia.
-fn frames(out: &mut String, robot: &SerialRobot, file: &ModelFile) {
-    let mut taken: BTreeSet<String> = robot.names().iter().cloned().collect();
+fn frames(out: &mut String, robot: &Robot, file: &ModelFile) {
+    let mut taken: BTreeSet<String> = robot.joint_names().iter().cloned().collect();
     for frame in &file.robot.robot.frame {
         let mut joint = format!("{}_fixed", frame.name);
         while !taken.insert(joint.clone()) {
@@ -161,10 +156,10 @@ fn frames(out: &mut String, robot: &SerialRobot, file: &ModelFile) {
 }
 
 /// Name of the link that stands still.
-fn root(robot: &SerialRobot, file: &ModelFile) -> String {
+fn root(robot: &Robot, file: &ModelFile) -> String {
     let mut name = "base".to_owned();
     let frames = &file.robot.robot.frame;
-    while robot.chain().links().iter().any(|l| l.name == name)
+    while robot.tree().links().iter().any(|l| l.name == name)
         || frames.iter().any(|f| f.name == name)
     {
         name.push_str("_frame");
@@ -188,13 +183,13 @@ fn words(values: &[f64]) -> String {
 
 fn joint(
     out: &mut String,
-    robot: &SerialRobot,
+    robot: &Robot,
     model: &Model,
     file: &ModelFile,
     i: usize,
     link: &Link,
 ) -> Result<(), ExportError> {
-    let names = robot.names();
+    let names = robot.joint_names();
     let section = file.robot.robot.link.get(i);
     let mut mimic = None;
     let mut driven = None;
@@ -238,7 +233,7 @@ fn joint(
     };
     let parent = match link.parent {
         None => root(robot, file),
-        Some(parent) => robot.chain().links()[parent].name.clone(),
+        Some(parent) => robot.tree().links()[parent].name.clone(),
     };
     // what the robot file says in these words is kept to the last digit
     let said = section.filter(|s| s.xyz.is_some() || s.rpy.is_some());
@@ -247,7 +242,6 @@ fn joint(
         None => (link.origin, roll_pitch_yaw(&link.rotation)),
     };
     if rests && let Coordinate::Follows(d) = &link.coordinate {
-        use crate::robot::serial::space::{about, add, product, times, turn};
         match link.kind {
             JointKind::Revolute => {
                 rpy = roll_pitch_yaw(&product(&link.rotation, &about(&link.axis, d.offset)));
@@ -349,7 +343,7 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
 /// A model file that takes links and inertials from the URDF beside it.
 fn side_file(
     file: &ModelFile,
-    robot: &SerialRobot,
+    robot: &Robot,
     standard: &Standard,
     urdf_name: &str,
     notes: &[String],
@@ -371,19 +365,15 @@ fn side_file(
         .collect();
     side.parameters
         .retain(|p| p.joint.is_some() || !base.contains(&p.name.as_str()));
-    let first = robot.chain().links().len() * STANDARD;
+    let first = robot.tree().links().len() * STANDARD;
     for (j, value) in standard.values.iter().skip(first).enumerate() {
         side.parameters.push(Parameter {
             name: crate::config::DRIVE_INERTIA.to_owned(),
             theta: None,
-            joint: robot.names().get(j).cloned(),
+            joint: robot.joint_names().get(j).cloned(),
             value: *value,
             std: None,
-            unit: match robot.joint_kind(j) {
-                JointKind::Revolute => "kg m^2",
-                JointKind::Prismatic => "kg",
-            }
-            .to_owned(),
+            unit: robot.joint_kind(j).inertia_unit().to_owned(),
             meaning: "inertia of the drive at the joint".to_owned(),
             verdict: None,
         });

@@ -250,7 +250,9 @@ fn build(
                 // the motor's force is constant; as a joint torque it is that of the middle pose
                 let (here, next) = (row(&motion.q, k), row(&motion.q, k + 1));
                 let middle: Vec<f64> = here.iter().zip(&next).map(|(a, b)| 0.5 * (a + b)).collect();
-                robot.carry_torque(&here, &middle, &row(&motion.tau, k), &mut a);
+                robot
+                    .transmission()
+                    .carry_torque(&here, &middle, &row(&motion.tau, k), &mut a);
                 a[joint]
             } else {
                 0.5 * (motion.tau[k * n + joint] + motion.tau[(k + 1) * n + joint])

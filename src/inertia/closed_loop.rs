@@ -8,10 +8,8 @@
 
 use super::columns::{Own, RegressorColumns};
 use crate::robot::Robot;
-use crate::robot::serial::chain::MOST_JOINTS;
+use crate::robot::tree::MOST_JOINTS;
 
-/// Most entries of a regressor on the stack.
-const MOST: usize = crate::robot::serial::MOST_ENTRIES;
 /// The frequency of the loop stays below this share of the sampling rate.
 const FASTEST: f64 = 0.1;
 /// Frequency of the loop over the cut-off of the rows.
@@ -94,14 +92,8 @@ impl<'a> ClosedLoop<'a> {
 
     /// Torque of the shared parameters at a state.
     fn inertial(&self, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64; MOST_JOINTS]) {
-        let (n, p) = (self.columns.joints, self.columns.shared);
-        let mut buffer = [0.0; MOST];
-        let y = &mut buffer[..n * p];
-        self.robot.regressor(q, v, a, y);
-        for (j, out) in out.iter_mut().enumerate().take(n) {
-            let row = y[j * p..(j + 1) * p].iter();
-            *out = row.zip(&self.theta).map(|(y, t)| y * t).sum();
-        }
+        let (n, shared) = (self.columns.joints, &self.theta[..self.columns.shared]);
+        self.robot.torque(shared, q, v, a, &mut out[..n]);
     }
 
     /// Mass matrix and the torque that needs no acceleration, friction aside.

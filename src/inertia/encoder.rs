@@ -47,7 +47,7 @@ pub fn accumulate_shifted<E: Send>(
     grid: u32,
     source: &mut (dyn FnMut(&mut Block) -> Result<bool, E> + Send),
 ) -> Result<Option<BlockFactors>, RunError<E>> {
-    if !robot.knows_encoders() {
+    if robot.transmission().encoder_steps().is_none() {
         return Ok(None);
     }
     let n = columns.joints;
@@ -74,7 +74,9 @@ pub fn accumulate_shifted<E: Send>(
                         block.t.push(row.t);
                         let at = block.q.len();
                         block.q.extend_from_slice(row.q);
-                        robot.round_at_encoders(&mut block.q[at..], &shift);
+                        robot
+                            .transmission()
+                            .round_at_encoders(&mut block.q[at..], &shift);
                         block.tau.extend_from_slice(row.raw);
                         if block.len() == Block::ROWS {
                             // a receiver that is gone has failed, and says so itself

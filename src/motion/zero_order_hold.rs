@@ -38,7 +38,8 @@ impl ZeroOrderHold {
                 self.torque.extend_from_slice(tau);
                 self.pose.copy_from_slice(q);
             }
-            robot.carry_torque(&self.pose, q, &self.torque, &mut self.carried);
+            let transmission = robot.transmission();
+            transmission.carry_torque(&self.pose, q, &self.torque, &mut self.carried);
             self.pose.copy_from_slice(q);
             self.torque.copy_from_slice(tau);
             for (t, before) in tau.iter_mut().zip(&self.carried) {

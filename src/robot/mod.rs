@@ -1,185 +1,152 @@
 //! The physical model: pure functions of q, v, a and parameters; no files, no estimation.
 //!
 //! Vectors are in joint order, units are SI and radians.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`joint`] | kinds of joints, words of parameters |
+//! | [`friction`] | friction laws of a joint |
+//! | [`standard`] | bodies in standard parameters |
+//! | [`tree`] | links as a tree, its regressor and base parameters |
+//! | [`cft`] | the report's closed forms of the CFT robot |
+//! | [`transmission`] | from motors to joints |
+//! | this one | a robot: a tree of links, its parameters, its transmission |
+//! | [`bodies`] | its parameters from those of links and drives, and back |
+//! | [`dynamics`] | its inertia matrix and bias |
+//! | [`undeclared`] | what a declared model leaves out: tilt, payload, dropped parameters |
+//! | [`model`] | a robot with its numbers |
 
+pub mod bodies;
 pub mod cft;
+pub mod dynamics;
+pub mod error;
 pub mod friction;
+pub mod joint;
 pub mod model;
-pub mod serial;
 pub mod standard;
+pub mod transmission;
+pub mod tree;
+pub mod undeclared;
+
+use std::borrow::Cow;
+use std::sync::{Arc, LazyLock};
 
 use cft::regressor::{regressor12, regressor22};
 use cft::{Setup, Structure};
-use serial::SerialRobot;
-use std::borrow::Cow;
-use std::sync::Arc;
+use tree::{Coordinate, Coupling, Grouping, Link, Parameters, Tree};
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+pub use error::RobotError;
+pub use joint::{JointKind, ParameterInfo};
+pub use transmission::Transmission;
 
-/// What the model cannot answer for.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum RobotError {
-    /// The pantograph cannot reach these references.
-    #[error(
-        "the pantograph cannot reach x_r = {x_r:.6} m, y_r = {y_r:.6} m: their distance from the \
-         origin is {r:.6} m and must be above 0 and at most {reach:.6} m; keep x_c1 and x_c2 \
-         inside the limits of Table 5"
-    )]
-    OutOfReach {
-        x_r: f64,
-        y_r: f64,
-        r: f64,
-        reach: f64,
-    },
-    /// Links 4 and 5 are in line.
-    #[error(
-        "the arm is singular at q5 = {q5:.6} rad, where links 4 and 5 are in line; keep q5 inside \
-         [0.78, 2.48] rad, where Table 5 keeps it"
-    )]
-    Singular { q5: f64 },
+/// A robot whose inverse dynamics are linear in its inertial parameters: links on joints, what a fit can
+/// tell of them, and how the motors move the joints. Cheap to clone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot(Arc<Parts>);
+
+#[derive(Debug, PartialEq)]
+struct Parts {
+    names: Vec<String>,
+    tree: Arc<Tree>,
+    /// Whether each joint's drive has an inertia of its own.
+    drive_inertia: bool,
+    transmission: Transmission,
+    form: Form,
 }
 
-/// Name, unit and meaning of one inertial parameter.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ParameterInfo {
-    /// Name in files and reports.
-    pub name: Cow<'static, str>,
-    /// Number in the report's Table 4, where it has one.
-    pub theta: Option<u32>,
-    /// SI unit.
-    pub unit: Cow<'static, str>,
-    /// What it stands for, in link masses, centres of gravity and pseudo-inertias.
-    pub meaning: Cow<'static, str>,
+/// How the torques are computed, and with it which parameters they are linear in.
+#[derive(Debug, PartialEq)]
+enum Form {
+    /// One joint with a constant inertia, free of gravity: tau = inertia a + F(v).
+    Inertia,
+    /// The closed forms of the CFT robot's report, with 12 or 22 parameters.
+    Report(Structure),
+    /// The recursion along the tree, in base parameters.
+    Recursion(Parameters),
 }
 
-/// Kind of a joint: it decides the units of position and torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum JointKind {
-    /// Position in m, force in N.
-    Prismatic,
-    /// Position in rad, torque in N m.
-    Revolute,
-}
+static INERTIA_KG: [ParameterInfo; 1] = [inertia("kg", "moving mass")];
+static INERTIA_KG_M2: [ParameterInfo; 1] =
+    [inertia("kg m^2", "moment of inertia about the joint axis")];
 
-impl JointKind {
-    /// "N" or "Nm".
-    pub const fn torque_unit(self) -> &'static str {
-        match self {
-            Self::Prismatic => "N",
-            Self::Revolute => "Nm",
-        }
-    }
-
-    /// "m" or "rad".
-    pub const fn position_unit(self) -> &'static str {
-        match self {
-            Self::Prismatic => "m",
-            Self::Revolute => "rad",
-        }
+const fn inertia(unit: &'static str, meaning: &'static str) -> ParameterInfo {
+    ParameterInfo {
+        name: Cow::Borrowed("inertia"),
+        theta: None,
+        unit: Cow::Borrowed(unit),
+        meaning: Cow::Borrowed(meaning),
     }
 }
 
-/// A robot whose inverse dynamics are linear in its inertial parameters.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Robot {
-    /// The CFT transposer robot: joints q1, q2, q4, q5.
-    Cft(CftRobot),
-    /// One joint that carries one inertia: tau = inertia a + F(v).
-    SingleJoint(SingleJoint),
-    /// A chain of links on revolute and prismatic joints, in its base parameters.
-    Serial(Arc<SerialRobot>),
-}
-
-/// The CFT robot as it is set up and modelled.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CftRobot {
-    /// Amplifiers and limits.
-    pub setup: Setup,
-    /// 12 or 22 inertial parameters.
-    pub structure: Structure,
-    names: [String; 4],
-}
-
-/// One joint with a constant inertia.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SingleJoint {
-    /// Prismatic (inertia in kg) or revolute (kg m^2).
-    pub kind: JointKind,
-    names: [String; 1],
-}
-
-static INERTIA_KG: [ParameterInfo; 1] = [ParameterInfo {
-    name: Cow::Borrowed("inertia"),
-    theta: None,
-    unit: Cow::Borrowed("kg"),
-    meaning: Cow::Borrowed("moving mass"),
-}];
-static INERTIA_KG_M2: [ParameterInfo; 1] = [ParameterInfo {
-    name: Cow::Borrowed("inertia"),
-    theta: None,
-    unit: Cow::Borrowed("kg m^2"),
-    meaning: Cow::Borrowed("moment of inertia about the joint axis"),
-}];
+/// The chain of Table 2 of the report.
+static OF_REPORT: LazyLock<Arc<Tree>> =
+    LazyLock::new(|| Arc::new(cft::linkage::chain().expect("Table 2 is a chain")));
 
 impl Robot {
     /// The CFT robot with a set-up and a structure of the inertial parameters.
     pub fn cft(setup: Setup, structure: Structure) -> Self {
-        Self::Cft(CftRobot {
-            setup,
-            structure,
-            names: cft::JOINTS.map(String::from),
-        })
+        Self(Arc::new(Parts {
+            names: cft::JOINTS.map(String::from).to_vec(),
+            tree: Arc::clone(&OF_REPORT),
+            drive_inertia: false,
+            transmission: Transmission::pantograph(setup),
+            form: Form::Report(structure),
+        }))
     }
 
-    /// A single joint of the name and kind given.
+    /// A single joint of the name and kind given: a link that turns about, or slides along, the z axis of
+    /// its base, where gravity does nothing to it.
     pub fn single_joint(name: impl Into<String>, kind: JointKind) -> Self {
-        Self::SingleJoint(SingleJoint {
+        let link = Link {
+            name: "link_1".to_owned(),
+            parent: None,
+            rotation: tree::space::UNTURNED,
+            origin: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
             kind,
-            names: [name.into()],
-        })
+            coordinate: Coordinate::Joint(0),
+        };
+        let tree = Tree::new(vec![link], 1, [0.0; 3]).expect("one link is a tree");
+        Self(Arc::new(Parts {
+            names: vec![name.into()],
+            tree: Arc::new(tree),
+            drive_inertia: false,
+            transmission: Transmission::default(),
+            form: Form::Inertia,
+        }))
     }
 
-    /// A serial robot.
-    pub fn serial(robot: SerialRobot) -> Self {
-        Self::Serial(Arc::new(robot))
+    /// A tree of links whose joints have these names, with or without a drive inertia per joint, and gear
+    /// trains of which some may be coupled.
+    pub fn of_tree(
+        tree: Tree,
+        names: Vec<String>,
+        drive_inertia: bool,
+        couplings: Vec<Coupling>,
+    ) -> Self {
+        let form = Form::Recursion(Parameters::new(&tree, &names, drive_inertia, &couplings));
+        Self(Arc::new(Parts {
+            names,
+            tree: Arc::new(tree),
+            drive_inertia,
+            transmission: Transmission::geared(couplings),
+            form,
+        }))
     }
 
     /// Number of joints n.
     pub fn joints(&self) -> usize {
-        self.joint_names().len()
+        self.0.names.len()
     }
 
     /// Joint names, in the order of every vector.
     pub fn joint_names(&self) -> &[String] {
-        match self {
-            Self::Cft(robot) => &robot.names,
-            Self::SingleJoint(robot) => &robot.names,
-            Self::Serial(robot) => robot.names(),
-        }
+        &self.0.names
     }
 
     /// Kind of joint i; on the CFT robot q1 slides and the others turn.
     pub fn joint_kind(&self, i: usize) -> JointKind {
-        match self {
-            Self::Cft(_) if i == 0 => JointKind::Prismatic,
-            Self::Cft(_) => JointKind::Revolute,
-            Self::SingleJoint(robot) => robot.kind,
-            Self::Serial(robot) => robot.joint_kind(i),
-        }
-    }
-
-    /// Full travel of joint i by Table 5 of the CFT robot's report: q1 by x_c4, q2 by x_c3, q4 and q5
-    /// as x_c1 and x_c2 leave them \[m or rad\]. Of other robots only their files know it.
-    pub fn full_travel(&self, i: usize) -> Option<f64> {
-        match self {
-            Self::Cft(robot) => {
-                let spans = robot.setup.limits().spans();
-                [spans[3], spans[2], 2.2, 1.7].get(i).copied()
-            }
-            Self::SingleJoint(_) | Self::Serial(_) => None,
-        }
+        self.0.tree.joint_kind(i)
     }
 
     /// Unit of joint i's force or torque: "N" or "Nm".
@@ -187,65 +154,68 @@ impl Robot {
         self.joint_kind(i).torque_unit()
     }
 
+    /// The moving links, and gravity.
+    pub fn tree(&self) -> &Tree {
+        &self.0.tree
+    }
+
+    /// Whether the links have places and centres of gravity in the model. Those of a single joint do not.
+    pub fn knows_links(&self) -> bool {
+        !matches!(self.0.form, Form::Inertia)
+    }
+
+    /// Whether each joint's drive has an inertia of its own.
+    pub fn drive_inertia(&self) -> bool {
+        self.0.drive_inertia
+    }
+
+    /// How the motors move the joints.
+    pub fn transmission(&self) -> &Transmission {
+        &self.0.transmission
+    }
+
+    /// Names of the motors' coordinates: the joints, where the motors are there.
+    pub fn coordinate_names(&self) -> Vec<String> {
+        match self.transmission().coordinates() {
+            Some(names) => names.iter().map(|&name| name.to_owned()).collect(),
+            None => self.joint_names().to_vec(),
+        }
+    }
+
+    /// Kind of the motors' coordinate i.
+    pub fn coordinate_kind(&self, i: usize) -> JointKind {
+        let own = self.transmission().coordinate_kind(i);
+        own.unwrap_or_else(|| self.joint_kind(i))
+    }
+
     /// The inertial parameters, in the order of the regressor's columns.
     pub fn parameters(&self) -> &[ParameterInfo] {
-        match self {
-            Self::Cft(robot) => match robot.structure {
-                Structure::Printed12 => &cft::EXTENDED[..cft::PRINTED],
-                Structure::Full22 => &cft::EXTENDED,
-            },
-            Self::SingleJoint(robot) => match robot.kind {
+        match &self.0.form {
+            Form::Inertia => match self.joint_kind(0) {
                 JointKind::Prismatic => &INERTIA_KG,
                 JointKind::Revolute => &INERTIA_KG_M2,
             },
-            Self::Serial(robot) => robot.parameters(),
+            Form::Report(Structure::Printed12) => &cft::EXTENDED[..cft::PRINTED],
+            Form::Report(Structure::Full22) => &cft::EXTENDED,
+            Form::Recursion(parameters) => parameters.infos(),
         }
     }
 
-    /// Torques at pose `there` of the motor forces that give `tau` at pose `here`: held motor
-    /// forces turn into other joint torques as the arm moves (eq. (63)-(66)). Where motors act on
-    /// the joints directly, and at a singular pose, `tau` itself.
-    #[inline]
-    pub fn carry_torque(&self, here: &[f64], there: &[f64], tau: &[f64], out: &mut [f64]) {
-        out.copy_from_slice(tau);
-        if let Self::Cft(_) = self
-            && let Ok(forces) = cft::actuation::torques_to_forces(four(here), four(tau))
-        {
-            out.copy_from_slice(&cft::actuation::forces_to_torques(four(there), &forces));
+    /// How base parameters that were found from the links are grouped, in the order of the first
+    /// parameters; empty where the parameters are declared.
+    pub fn groupings(&self) -> &[Grouping] {
+        match &self.0.form {
+            Form::Recursion(parameters) => parameters.groupings(),
+            Form::Inertia | Form::Report(_) => &[],
         }
     }
 
-    /// Whether the steps of the robot's encoders are known.
-    pub fn knows_encoders(&self) -> bool {
-        matches!(self, Self::Cft(_))
-    }
-
-    /// Rounds a pose as the encoders would whose grid is shifted by parts of a step per motor.
-    /// Leaves the pose as it is where the encoders are not known or the pose is out of reach.
-    pub fn round_at_encoders(&self, q: &mut [f64], shift: &[f64; 4]) {
-        if let Self::Cft(_) = self {
-            let mut x = cft::pantograph::cartesian(four(q));
-            for ((x, step), shift) in x.iter_mut().zip(cft::actuation::ENCODER_SCALE).zip(shift) {
-                *x = ((*x / step + shift).round() - shift) * step;
-            }
-            if let Ok(rounded) = cft::pantograph::joints(&x) {
-                q.copy_from_slice(&rounded);
-            }
-        }
-    }
-
-    /// Variance of a position measured at the motors, seen at joint i, from the encoders' steps
-    /// (resolution^2 / 12 each); pose-dependent on the CFT robot. `None` where the robot's
-    /// encoders are not known.
-    pub fn encoder_variance(&self, i: usize, q: &[f64]) -> Option<f64> {
-        match self {
-            Self::Cft(_) => {
-                let steps = cft::actuation::quantisation_variance();
-                cft::actuation::joint_covariance(four(q), &steps)
-                    .ok()
-                    .map(|c| c[i][i])
-            }
-            Self::SingleJoint(_) | Self::Serial(_) => None,
+    /// Number in the report's Table 4 of friction parameter `k` (order of
+    /// [`friction::DoubleTanh::NAMES`]) of joint `j`, where it has one: 13 + 4 k + j.
+    pub fn friction_theta(&self, j: usize, k: usize) -> Option<u32> {
+        match &self.0.form {
+            Form::Report(_) => cft::FRICTION[4 * k + j].theta,
+            Form::Inertia | Form::Recursion(_) => None,
         }
     }
 
@@ -256,25 +226,61 @@ impl Robot {
     /// Where q, v or a does not hold n numbers or y not n p: a mistake of the caller's code.
     #[inline]
     pub fn regressor(&self, q: &[f64], v: &[f64], a: &[f64], y: &mut [f64]) {
-        match self {
-            Self::Cft(robot) => {
-                let (q, v, a) = (four(q), four(v), four(a));
-                match robot.structure {
-                    Structure::Printed12 => regressor12(q, v, a, rows(y)),
-                    Structure::Full22 => regressor22(q, v, a, rows(y)),
-                }
-            }
-            Self::SingleJoint(_) => {
+        match &self.0.form {
+            Form::Inertia => {
                 assert!(
                     q.len() == 1 && v.len() == 1 && y.len() == 1,
                     "one joint, one parameter"
                 );
                 y[0] = a[0];
             }
-            Self::Serial(robot) => robot.regressor(q, v, a, y),
+            Form::Report(Structure::Printed12) => regressor12(four(q), four(v), four(a), rows(y)),
+            Form::Report(Structure::Full22) => regressor22(four(q), four(v), four(a), rows(y)),
+            Form::Recursion(parameters) => parameters.regressor(self.tree(), q, v, a, y),
+        }
+    }
+
+    /// Writes row `joint` of Y(q, v, a): p numbers. Does not allocate.
+    ///
+    /// # Panics
+    /// As [`Self::regressor`].
+    pub fn regressor_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
+        match &self.0.form {
+            Form::Inertia => out[0] = a[0],
+            Form::Report(_) => {
+                let (mut buffer, p) = ([0.0; MOST_OF_REPORT], out.len());
+                self.regressor(q, v, a, &mut buffer[..4 * p]);
+                out.copy_from_slice(&buffer[joint * p..(joint + 1) * p]);
+            }
+            Form::Recursion(parameters) => parameters.row(self.tree(), joint, [q, v, a], out),
+        }
+    }
+
+    /// Writes Y(q, v, a) theta: the torque of every joint \[N or N m\], friction aside. Does not allocate.
+    ///
+    /// # Panics
+    /// As [`Self::regressor`].
+    #[inline]
+    pub fn torque(&self, theta: &[f64], q: &[f64], v: &[f64], a: &[f64], tau: &mut [f64]) {
+        match &self.0.form {
+            Form::Inertia => tau[0] = a[0] * theta[0],
+            Form::Report(_) => {
+                let (mut buffer, p) = ([0.0; MOST_OF_REPORT], theta.len());
+                let y = &mut buffer[..4 * p];
+                self.regressor(q, v, a, y);
+                for (tau, row) in tau.iter_mut().zip(y.chunks_exact(p)) {
+                    *tau = row.iter().zip(theta).map(|(y, t)| y * t).sum();
+                }
+            }
+            Form::Recursion(parameters) => {
+                parameters.torque(self.tree(), theta, [q, v, a], tau);
+            }
         }
     }
 }
+
+/// Entries of the 4 x 22 regressor.
+const MOST_OF_REPORT: usize = 88;
 
 #[inline(always)]
 fn four(x: &[f64]) -> &[f64; 4] {

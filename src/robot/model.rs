@@ -50,9 +50,6 @@ impl JointFriction {
     }
 }
 
-/// Most regressor entries that a model holds on the stack: 8 joints times 104 parameters.
-const MOST: usize = 832;
-
 /// A robot with its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -72,17 +69,10 @@ impl Model {
     /// Where a slice does not hold n numbers: a mistake of the caller's code.
     #[inline]
     pub fn torque(&self, q: &[f64], v: &[f64], a: &[f64], tau: &mut [f64]) {
-        let (n, p) = (self.friction.len(), self.theta.len());
-        let mut buffer = [0.0; MOST];
-        let y = &mut buffer[..n * p];
-        self.robot.regressor(q, v, a, y);
+        let n = self.friction.len();
+        self.robot.torque(&self.theta, q, v, a, &mut tau[..n]);
         for (j, tau) in tau.iter_mut().enumerate().take(n) {
-            let inertial: f64 = y[j * p..(j + 1) * p]
-                .iter()
-                .zip(&self.theta)
-                .map(|(y, t)| y * t)
-                .sum();
-            *tau = inertial + self.friction[j].torque(v[j]) + self.offset[j];
+            *tau = *tau + self.friction[j].torque(v[j]) + self.offset[j];
         }
     }
 
@@ -94,12 +84,9 @@ impl Model {
 
     /// d tau_j / d(parameters) at q, v, a into `out` of [`Self::parameters`] numbers.
     pub fn gradient(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
-        let (n, p) = (self.friction.len(), self.theta.len());
-        let mut buffer = [0.0; MOST];
-        let y = &mut buffer[..n * p];
-        self.robot.regressor(q, v, a, y);
+        let p = self.theta.len();
         out.fill(0.0);
-        out[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
+        self.robot.regressor_row(joint, q, v, a, &mut out[..p]);
         let mut at = p;
         for (j, friction) in self.friction.iter().enumerate() {
             let k = friction.parameters();

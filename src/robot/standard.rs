@@ -1,36 +1,15 @@
-//! From the standard parameters of links and drives to the parameters that torques can tell.
+//! Bodies in standard parameters: what the torques of a link are linear in.
 
-use nalgebra::{DMatrix, Matrix4};
-
-use super::Robot;
-use super::cft::Structure;
-use super::cft::links::{PseudoInertia, base_parameters};
+use nalgebra::Matrix4;
 
 /// Standard parameters of a body: Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the origin of its frame
 /// [kg m^2], first moments mx, my, mz [kg m], mass [kg]. Ixy is an entry of the tensor, the
 /// negative of the integral of x y dm.
 pub const STANDARD: usize = 10;
-/// Moving links of the CFT robot.
-const CFT_LINKS: usize = 8;
-
-/// How a robot's inertial parameters follow from links and drives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StandardMap {
-    /// Names of the links.
-    pub links: Vec<String>,
-    /// Joints whose drives have an inertia of their own.
-    pub drives: Vec<usize>,
-    /// Parameters x (ten a link, then the drives). Rows of zeros belong to parameters that no link
-    /// and no drive has a part in: couplings of gear trains.
-    pub matrix: DMatrix<f64>,
-}
-
-impl StandardMap {
-    /// Number of standard parameters.
-    pub fn columns(&self) -> usize {
-        self.matrix.ncols()
-    }
-}
+/// Their names, in this order.
+pub const STANDARD_NAMES: [&str; STANDARD] = [
+    "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mx", "my", "mz", "m",
+];
 
 /// Pseudo-inertia (4 x 4, about the frame's origin) of standard parameters.
 pub fn pseudo_inertia(s: &[f64; STANDARD]) -> Matrix4<f64> {
@@ -123,76 +102,9 @@ impl Body {
     }
 }
 
-impl Robot {
-    /// How the inertial parameters follow from the standard parameters of links and drives.
-    pub fn standard_map(&self) -> StandardMap {
-        let p = self.parameters().len();
-        match self {
-            Robot::Serial(robot) => {
-                let links = robot.chain().links();
-                let first = STANDARD * links.len();
-                let count = robot.standard_parameters();
-                let mut matrix = DMatrix::zeros(p, count);
-                for (row, grouping) in robot.groupings().iter().enumerate() {
-                    matrix[(row, grouping.kept)] = 1.0;
-                    for (index, c) in &grouping.terms {
-                        matrix[(row, *index)] = *c;
-                    }
-                }
-                StandardMap {
-                    links: links.iter().map(|l| l.name.clone()).collect(),
-                    drives: (0..count - first).collect(),
-                    matrix,
-                }
-            }
-            Robot::Cft(robot) => {
-                let count = STANDARD * CFT_LINKS;
-                let kept = match robot.structure {
-                    Structure::Printed12 => 12,
-                    Structure::Full22 => 22,
-                };
-                let mut matrix = DMatrix::zeros(p, count);
-                for column in 0..count {
-                    let mut unit = [0.0; STANDARD];
-                    unit[column % STANDARD] = 1.0;
-                    let mut links = [PseudoInertia([[0.0; 4]; 4]); CFT_LINKS];
-                    // symmetric: rows are columns
-                    links[column / STANDARD] = PseudoInertia(pseudo_inertia(&unit).into());
-                    for (row, x) in base_parameters(&links).into_iter().enumerate().take(kept) {
-                        matrix[(row, column)] = x;
-                    }
-                }
-                StandardMap {
-                    links: (1..=CFT_LINKS).map(|i| format!("link_{i}")).collect(),
-                    drives: Vec::new(),
-                    matrix,
-                }
-            }
-            // one moving body: all that shows is its mass, or its moment about the axis
-            Robot::SingleJoint(robot) => {
-                let mut matrix = DMatrix::zeros(1, STANDARD);
-                matrix[(
-                    0,
-                    if robot.kind.torque_unit() == "N" {
-                        9
-                    } else {
-                        5
-                    },
-                )] = 1.0;
-                StandardMap {
-                    links: vec!["link_1".to_owned()],
-                    drives: Vec::new(),
-                    matrix,
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::cft::{Setup, links::Link};
 
     #[test]
     fn a_body_and_its_standard_parameters_belong_together() {
@@ -213,27 +125,6 @@ mod tests {
         let round = standard_of(&pseudo_inertia(&s));
         for (a, b) in round.iter().zip(&s) {
             assert!((a - b).abs() < 1e-15, "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn the_map_of_the_cft_robot_gives_its_base_parameters() {
-        let link = |i: f64| Link {
-            mass: 2.0 + i,
-            centre: [0.1 * i, -0.03, 0.02 * i],
-            moments: [0.2 + 0.01 * i, 0.3, 0.25],
-            products: [0.01, -0.02 * i, 0.004],
-        };
-        let links: [Link; CFT_LINKS] = std::array::from_fn(|i| link(i as f64));
-        let pseudo: [PseudoInertia; CFT_LINKS] = std::array::from_fn(|i| (&links[i]).into());
-        let robot = Robot::cft(Setup::default(), Structure::Full22);
-        let mut standard = Vec::new();
-        for p in &pseudo {
-            standard.extend(standard_of(&Matrix4::from(p.0)));
-        }
-        let found = robot.standard_map().matrix * nalgebra::DVector::from_vec(standard);
-        for (a, b) in found.iter().zip(base_parameters(&pseudo)) {
-            assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{a} {b}");
         }
     }
 }

@@ -8,7 +8,6 @@ use super::controller::Control;
 use super::effects::{Place, Site};
 use super::plant::Plant;
 use super::single_joint::{SingleJointFriction, SingleJointTruth};
-use crate::robot::serial::MOST_ENTRIES;
 use crate::robot::{JointKind, Robot};
 
 /// The true parameters of a simulated serial robot of J joints.
@@ -134,14 +133,9 @@ impl<const J: usize> SerialTruth<J> {
     /// Y(q, v, a) theta.
     #[inline]
     fn inverse(&self, q: &[f64; J], v: &[f64; J], a: &[f64; J]) -> [f64; J] {
-        let p = self.theta.len();
-        let mut buffer = [0.0; MOST_ENTRIES];
-        let y = &mut buffer[..J * p];
-        self.robot.regressor(q, v, a, y);
-        std::array::from_fn(|j| {
-            let row = &y[j * p..(j + 1) * p];
-            row.iter().zip(&self.theta).map(|(y, t)| y * t).sum()
-        })
+        let mut tau = [0.0; J];
+        self.robot.torque(&self.theta, q, v, a, &mut tau);
+        tau
     }
 }
 

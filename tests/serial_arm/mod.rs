@@ -117,12 +117,9 @@ pub fn standard() -> Vec<f64> {
 
 /// Base parameters of the arm by name.
 pub fn base(robot: &Robot) -> Vec<(String, f64)> {
-    let Robot::Serial(serial) = robot else {
-        panic!("a serial robot");
-    };
-    assert_eq!(serial.standard_parameters(), 3 * STANDARD);
-    let values = serial.base_of(&standard());
-    let names = serial.parameters().iter().map(|p| p.name.to_string());
+    assert_eq!(robot.standard_parameters(), 3 * STANDARD);
+    let values = robot.base_of(&standard());
+    let names = robot.parameters().iter().map(|p| p.name.to_string());
     names.zip(values).collect()
 }
 

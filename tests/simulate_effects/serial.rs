@@ -72,10 +72,7 @@ fn standard(payload: [f64; STANDARD]) -> Vec<f64> {
 /// The robot with its last link carrying the payload.
 fn truth(gravity: [f64; 3], payload: [f64; STANDARD]) -> SerialTruth<3> {
     let robot = robot(gravity);
-    let Robot::Serial(serial) = &robot else {
-        panic!("a serial robot");
-    };
-    let theta = serial.base_of(&standard(payload));
+    let theta = robot.base_of(&standard(payload));
     let law = ViscousCoulomb {
         viscous: 2.0,
         coulomb: 1.0,

@@ -4,7 +4,6 @@ use crate::config::ConfigError;
 use crate::config::document::Document;
 use crate::config::model_file::Parameter;
 use crate::config::robot_file::RobotFile;
-use crate::robot::Robot;
 use crate::robot::standard::STANDARD;
 
 /// Name of the parameter that gives a joint's drive inertia in such a file.
@@ -17,10 +16,8 @@ pub(in crate::config) fn base_parameters(
     parameters: &mut Vec<Parameter>,
     document: &Document,
 ) -> Result<(), ConfigError> {
-    let Robot::Serial(serial) = robot.robot() else {
-        return Ok(());
-    };
-    let mut standard = vec![0.0; serial.standard_parameters()];
+    let described = robot.robot();
+    let mut standard = vec![0.0; described.standard_parameters()];
     for (i, link) in robot.robot.link.iter().enumerate() {
         if let Some(given) = &link.inertial {
             let values = given.body().standard();
@@ -33,21 +30,24 @@ pub(in crate::config) fn base_parameters(
             continue;
         }
         let joint = parameter.joint.as_deref().unwrap_or_default();
-        let place = serial.names().iter().position(|name| name == joint);
+        let place = described
+            .joint_names()
+            .iter()
+            .position(|name| name == joint);
         match place.and_then(|j| standard.get_mut(drives + j)) {
             Some(value) => *value = parameter.value,
             None => {
                 return Err(document.value(
                     &["parameter", &index.to_string(), "joint"],
                     "is no joint of this robot with a drive inertia",
-                    &format!("this robot has {}", serial.names().join(", ")),
+                    &format!("this robot has {}", described.joint_names().join(", ")),
                 ));
             }
         }
     }
     parameters.retain(|p| p.name != DRIVE_INERTIA);
-    let base = serial.base_of(&standard);
-    for (info, value) in serial.parameters().iter().zip(base) {
+    let base = described.base_of(&standard);
+    for (info, value) in described.parameters().iter().zip(base) {
         if parameters
             .iter()
             .any(|p| p.joint.is_none() && p.name == info.name)

@@ -24,7 +24,7 @@ use super::document::Document;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
 use crate::log::{remedy, shown};
-use crate::robot::serial::space::{Rotation, product};
+use crate::robot::tree::space::{Rotation, product};
 
 /// Largest file. A URDF names its meshes and does not hold them.
 const MOST_BYTES: u64 = 16 << 20;

@@ -6,7 +6,7 @@ use super::Place;
 use super::xml::Element;
 use crate::config::ConfigError;
 use crate::log::{escape, list, nearest};
-use crate::robot::serial::space::{Rotation, Vector, of_roll_pitch_yaw};
+use crate::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 
 /// A mass with its centre and inertia, in the frame of the link that carries it.
 #[derive(Debug, Clone, Copy)]

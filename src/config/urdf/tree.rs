@@ -12,7 +12,7 @@ use crate::config::serial_section::{
 };
 use crate::log::{escape, list, nearest};
 use crate::robot::JointKind;
-use crate::robot::serial::space::{
+use crate::robot::tree::space::{
     Rotation, UNTURNED, Vector, add, of_roll_pitch_yaw, product, roll_pitch_yaw, turn,
 };
 

@@ -13,7 +13,8 @@ use nalgebra::{DMatrix, DVector};
 use super::robust::Status;
 use super::solve::FitError;
 use crate::math::rfactor::RFactor;
-use crate::robot::standard::{Body, STANDARD, StandardMap, pseudo_inertia};
+use crate::robot::bodies::StandardMap;
+use crate::robot::standard::{Body, STANDARD, pseudo_inertia};
 use log_cholesky::LogCholesky;
 
 /// Weight of the prior: a number off by 1 (a factor e in mass or size) costs as much as one
@@ -306,7 +307,7 @@ mod tests {
     use crate::robot::JointKind;
     use crate::robot::Robot;
     use crate::robot::cft::{Setup, Structure};
-    use crate::robot::serial::{Chain, Coordinate, Link, SerialRobot};
+    use crate::robot::tree::{Coordinate, Link, Tree};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -326,9 +327,9 @@ mod tests {
             }
         };
         let links = vec![link(0, 0.0, 0.0), link(1, -1.57, 0.1), link(2, 0.0, 0.4)];
-        let chain = Chain::new(links, 3, [0.0, 0.0, -9.81]).unwrap();
+        let chain = Tree::new(links, 3, [0.0, 0.0, -9.81]).unwrap();
         let names = joints.map(str::to_owned).to_vec();
-        Robot::serial(SerialRobot::new(chain, names, true, Vec::new()).unwrap())
+        Robot::of_tree(chain, names, true, Vec::new())
     }
 
     fn draw(chance: &mut ChaCha8Rng) -> f64 {

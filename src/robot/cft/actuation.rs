@@ -6,7 +6,7 @@
 
 use super::geometry::L4;
 use super::pantograph::{DOWNWARD_RATIO, OUTWARD_RATIO, inverse_reference_jacobian};
-use crate::robot::RobotError;
+use crate::robot::error::RobotError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,11 @@ impl Limits {
     /// Index 0..3 of the first coordinate that lies outside (or is not a number).
     pub fn first_outside(&self, x: &[f64; 4]) -> Option<usize> {
         (0..4).find(|&i| !(self.lower[i]..=self.upper[i]).contains(&x[i]))
+    }
+
+    /// Ends of coordinate i.
+    pub fn of(&self, i: usize) -> Option<[f64; 2]> {
+        Some([*self.lower.get(i)?, *self.upper.get(i)?])
     }
 
     /// upper - lower of each coordinate.

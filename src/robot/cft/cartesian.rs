@@ -4,7 +4,7 @@ use super::dynamics::{Coefficients, coriolis, gravity_torque, inertia};
 use super::pantograph::{
     DOWNWARD_RATIO, OUTWARD_RATIO, inverse_reference_jacobian, reference_jacobian_rate,
 };
-use crate::robot::RobotError;
+use crate::robot::error::RobotError;
 
 /// Which coordinates x = h(q) the dynamics are written in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,18 +3,18 @@
 
 use super::geometry::{D, D6, GRAVITY, L2, L4, L5, L6, L7};
 use super::links::PseudoInertia;
-use crate::robot::JointKind;
-use crate::robot::serial::{Chain, ChainError, Coordinate, Dependence, Link, Sine};
+use crate::robot::joint::JointKind;
+use crate::robot::tree::{Coordinate, Dependence, Link, Sine, Tree, TreeError};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Moving links 1..8; link 8 is at rest on link 7 and a frame of its own in Table 2.
-const LINKS: usize = 8;
+pub const LINKS: usize = 8;
 
 /// The chain of Table 2, its joints q1, q2, q4, q5.
 ///
 /// # Errors
 /// None: a test builds it.
-pub fn chain() -> Result<Chain, ChainError> {
+pub fn chain() -> Result<Tree, TreeError> {
     use JointKind::{Prismatic, Revolute};
     let sine = |of: Vec<(usize, f64)>| Sine {
         amplitude: L4,
@@ -68,7 +68,7 @@ pub fn chain() -> Result<Chain, ChainError> {
             }
         })
         .collect();
-    Chain::new(links, super::JOINTS.len(), [0.0, 0.0, -GRAVITY])
+    Tree::new(links, super::JOINTS.len(), [0.0, 0.0, -GRAVITY])
 }
 
 /// Links with the 22 base parameters given (order of [`super::EXTENDED`]): of the many the one with

@@ -5,7 +5,7 @@
 //! x_c2 move the pantograph's references y_r and x_r; the wrist moves 7 and 6 times as far.
 
 use super::geometry::{BASE_ANGLE, D, DS, L4, L6, LEVEL};
-use crate::robot::RobotError;
+use crate::robot::error::RobotError;
 use std::f64::consts::FRAC_PI_2;
 
 /// dx_c2/dx_r = L6/L4 (eq. (48)).

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::robot::ParameterInfo;
+use crate::robot::joint::ParameterInfo;
 
 const fn printed(
     name: &'static str,

@@ -4,8 +4,7 @@
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 use crate::robot::JointKind;
-use crate::robot::serial::chain::{MOST_JOINTS, MOST_LINKS};
-use crate::robot::serial::{Chain, Coordinate};
+use crate::robot::tree::{Coordinate, MOST_JOINTS, MOST_LINKS, Tree};
 
 /// The frame of a link, all in the base's axes. Accelerations are those without any of the joints.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +55,7 @@ fn moved(coordinate: &Coordinate, q: &[f64], v: &[f64]) -> ([f64; 3], [f64; MOST
 }
 
 /// Calls `visit` with every link's frame, from the base outward.
-pub(super) fn frames(chain: &Chain, q: &[f64], v: &[f64], mut visit: impl FnMut(usize, &Frame)) {
+pub(super) fn frames(chain: &Tree, q: &[f64], v: &[f64], mut visit: impl FnMut(usize, &Frame)) {
     let base = Frame {
         rotation: Matrix3::identity(),
         origin: Vector3::zeros(),

@@ -12,8 +12,8 @@ use nalgebra::Vector3;
 use super::frames::{Frame, frames};
 use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
 use crate::robot::cft::dynamics::Coefficients;
-use crate::robot::serial::{Chain, SerialRobot};
 use crate::robot::standard::STANDARD;
+use crate::robot::tree::Tree;
 use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 
@@ -42,16 +42,11 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
                 force: -truth.inertia * gx,
             })
         }
-        Machine::Serial {
-            robot: Robot::Serial(robot),
-            theta,
-            ..
-        } => Built::plant(Askew {
-            chain: robot.chain().clone(),
+        Machine::Serial { robot, theta, .. } => Built::plant(Askew {
+            chain: robot.tree().clone(),
             moments: moments(robot, theta),
             gravity: Vector3::new(gx, gy, 0.0),
         }),
-        Machine::Serial { .. } => Err(site.refuse(KIND.name, "it has no chain of links")),
         Machine::SingleJoint(_) => Err(site.refuse(
             KIND.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
@@ -104,8 +99,8 @@ impl Effect for Constant {
 }
 
 /// Mass and first moments of each link in its own frame, as far as base parameters know them.
-fn moments(robot: &SerialRobot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
-    let mut moments = vec![(0.0, Vector3::zeros()); robot.chain().links().len()];
+fn moments(robot: &Robot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
+    let mut moments = vec![(0.0, Vector3::zeros()); robot.tree().links().len()];
     for (grouping, value) in robot.groupings().iter().zip(theta) {
         let Some((mass, moment)) = moments.get_mut(grouping.kept / STANDARD) else {
             continue; // a drive's inertia
@@ -124,7 +119,7 @@ fn moments(robot: &SerialRobot, theta: &[f64]) -> Vec<(f64, Vector3<f64>)> {
 /// A serial robot in gravity that has something beside what is declared.
 #[derive(Debug)]
 struct Askew {
-    chain: Chain,
+    chain: Tree,
     moments: Vec<(f64, Vector3<f64>)>,
     /// Beside the declared one, in the base's frame \[m/s^2\].
     gravity: Vector3<f64>,

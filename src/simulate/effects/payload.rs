@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
 use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use crate::robot::JointKind;
 use crate::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
-use crate::robot::serial::Chain;
-use crate::robot::{JointKind, Robot};
+use crate::robot::tree::Tree;
 use crate::simulate::SimulateError;
 
 pub const KIND: Kind = Kind {
@@ -29,7 +29,7 @@ pub const KIND: Kind = Kind {
     build,
 };
 
-fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     if mass <= 0.0 {
         return Err(SimulateError::EffectNumber {
@@ -46,16 +46,12 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
             sideways: mz / mass,
             inertia,
         }),
-        Machine::Serial {
-            robot: Robot::Serial(robot),
-            ..
-        } => Built::plant(Held {
-            chain: robot.chain().clone(),
+        Machine::Serial { robot, .. } => Built::plant(Held {
+            chain: robot.tree().clone(),
             mass,
             centre: Vector3::new(mx, my, mz) / mass,
             inertia,
         }),
-        Machine::Serial { .. } => Err(site.refuse(KIND.name, "it has no chain of links")),
         Machine::SingleJoint(truth) => Built::plant(Added {
             inertia: match truth.kind {
                 JointKind::Prismatic => mass,
@@ -134,7 +130,7 @@ impl Effect for Added {
 /// spin of a ball has no torque of its own.
 #[derive(Debug)]
 struct Held {
-    chain: Chain,
+    chain: Tree,
     mass: f64,
     /// In the last link's frame \[m\].
     centre: Vector3<f64>,

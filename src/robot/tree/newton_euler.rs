@@ -13,79 +13,94 @@
 //! column of the link's Jacobian, carried outward with the recursion, so that no wrench has to be
 //! carried back (Atkeson, An and Hollerbach 1986 in the frames of the links).
 
-use super::chain::{Chain, MOST_JOINTS, MOST_LINKS};
+use super::links::{Coordinate, MOST_JOINTS, MOST_LINKS, Tree};
 use super::space::{Vector, about, add, cross, dot, product, times, turn, turn_back};
-use crate::robot::JointKind;
+use crate::robot::joint::JointKind;
 use crate::robot::standard::STANDARD;
 
-/// Motion of a link, in its own frame.
+/// Motion of a link, in its own frame, of whose joints up to DEPTH move it.
 #[derive(Clone, Copy)]
-struct State {
+struct State<const DEPTH: usize> {
     /// Angular velocity [rad/s].
     w: Vector,
     /// Angular acceleration [rad/s^2].
     dw: Vector,
     /// Acceleration of the origin less that of free fall [m/s^2].
     a: Vector,
-    /// Per independent joint, angular and linear velocity of the frame at unit speed.
-    jacobian: [[Vector; 2]; MOST_JOINTS],
+    /// Per joint that moves the link, angular and linear velocity of the frame at unit speed.
+    jacobian: [[Vector; 2]; DEPTH],
 }
 
-const AT_REST: State = State {
-    w: [0.0; 3],
-    dw: [0.0; 3],
-    a: [0.0; 3],
-    jacobian: [[[0.0; 3]; 2]; MOST_JOINTS],
-};
+impl<const DEPTH: usize> State<DEPTH> {
+    const AT_REST: Self = Self {
+        w: [0.0; 3],
+        dw: [0.0; 3],
+        a: [0.0; 3],
+        jacobian: [[[0.0; 3]; 2]; DEPTH],
+    };
+}
 
 /// Calls `visit(link, joint, row)` for every link and every independent joint that moves it, with
-/// the derivatives of that joint's torque by the link's ten standard parameters.
+/// the derivatives of that joint's torque by the link's ten standard parameters. Those of the other
+/// joints are zero.
 ///
 /// # Panics
 /// Where q, v or a holds fewer than n numbers: a mistake of the caller's code.
 #[inline]
 pub fn walk(
-    chain: &Chain,
+    tree: &Tree,
     q: &[f64],
     v: &[f64],
     a: &[f64],
     visit: impl FnMut(usize, usize, &[f64; STANDARD]),
 ) {
-    let n = chain.joints();
+    let n = tree.joints();
     assert!(
         q.len() >= n && v.len() >= n && a.len() >= n,
         "{n} joints each"
     );
-    // most arms have few links, and clearing the states of many takes a tenth of the time
-    match chain.links().len() {
-        ..=FEW_LINKS => walk_within::<FEW_LINKS>(chain, q, v, a, visit),
-        _ => walk_within::<MOST_LINKS>(chain, q, v, a, visit),
+    // clearing the states takes time: those of an arm or of two are few and short
+    match tree.size() {
+        (..=FEW_STATES, ..=FEW_JOINTS) => {
+            walk_within::<FEW_STATES, FEW_JOINTS>(tree, q, v, a, visit);
+        }
+        (..=FEW_STATES, _) => walk_within::<FEW_STATES, MOST_JOINTS>(tree, q, v, a, visit),
+        _ => walk_within::<MOST_LINKS, MOST_JOINTS>(tree, q, v, a, visit),
     }
 }
 
-/// Links up to which a smaller set of states serves.
-const FEW_LINKS: usize = 8;
+/// States and joints up to which a smaller memory serves.
+const FEW_STATES: usize = 4;
+const FEW_JOINTS: usize = 8;
 
 #[inline(always)]
-fn walk_within<const LINKS: usize>(
-    chain: &Chain,
+fn walk_within<const STATES: usize, const DEPTH: usize>(
+    tree: &Tree,
     q: &[f64],
     v: &[f64],
     a: &[f64],
     mut visit: impl FnMut(usize, usize, &[f64; STANDARD]),
 ) {
-    let n = chain.joints();
-    let mut states = [AT_REST; LINKS];
+    let mut states = [State::<DEPTH>::AT_REST; STATES];
     let base = State {
-        a: times(-1.0, &chain.gravity()),
-        ..AT_REST
+        a: times(-1.0, &tree.gravity()),
+        ..State::AT_REST
     };
-    for (i, link) in chain.links().iter().enumerate() {
-        let (done, rest) = states.split_at_mut(i);
-        let state = &mut rest[0];
-        let before = link.parent.map_or(&base, |parent| &done[parent]);
+    for (i, link) in tree.links().iter().enumerate() {
+        let step = tree.step(i);
+        let (state, before) = match step.parent_slot {
+            None => (&mut states[step.slot], &base),
+            Some(parent) => {
+                let both = states.get_disjoint_mut([step.slot, parent]);
+                let [state, before] = both.expect("a link is kept apart from the one before it");
+                (state, &*before)
+            }
+        };
         let mut slope = [0.0; MOST_JOINTS];
-        let [u, du, ddu] = link.coordinate.motion(q, v, a, &mut slope);
+        let [u, du, ddu] = match &link.coordinate {
+            Coordinate::Joint(j) => [q[*j], v[*j], a[*j]],
+            follows => follows.motion(q, v, a, &mut slope),
+        };
         let (rotation, origin) = match link.kind {
             JointKind::Revolute => (product(&link.rotation, &about(&link.axis, u)), link.origin),
             JointKind::Prismatic => {
@@ -113,22 +128,26 @@ fn walk_within<const LINKS: usize>(
                 state.a = add(&state.a, &add(&pushed, &coriolis));
             }
         }
-        for k in (0..n).filter(|k| chain.moves(*k, i)) {
+        for (place, &k) in step.upstream.iter().enumerate() {
             // a joint's first link has nothing of it from the link before
             let (mut wk_here, mut lk_here) = ([0.0; 3], [0.0; 3]);
-            if link.parent.is_some_and(|parent| chain.moves(k, parent)) {
-                let [wk, lk] = &before.jacobian[k];
+            if place < step.inherited {
+                let [wk, lk] = &before.jacobian[place];
                 wk_here = turn_back(&rotation, wk);
                 lk_here = turn_back(&rotation, &add(lk, &cross(wk, &origin)));
             }
-            if slope[k] != 0.0 {
-                let own = times(slope[k], &link.axis);
+            let slope = match &link.coordinate {
+                Coordinate::Joint(_) => f64::from(u8::from(place == step.driver)),
+                Coordinate::Follows(_) => slope[k],
+            };
+            if slope != 0.0 {
+                let own = times(slope, &link.axis);
                 match link.kind {
                     JointKind::Revolute => wk_here = add(&wk_here, &own),
                     JointKind::Prismatic => lk_here = add(&lk_here, &own),
                 }
             }
-            state.jacobian[k] = [wk_here, lk_here];
+            state.jacobian[place] = [wk_here, lk_here];
             visit(i, k, &row(state, &wk_here, &lk_here));
         }
     }
@@ -136,7 +155,7 @@ fn walk_within<const LINKS: usize>(
 
 /// l . f + w . n for unit standard parameters.
 #[inline(always)]
-fn row(state: &State, wk: &Vector, lk: &Vector) -> [f64; STANDARD] {
+fn row<const DEPTH: usize>(state: &State<DEPTH>, wk: &Vector, lk: &Vector) -> [f64; STANDARD] {
     let State { w, dw, a, .. } = state;
     // w_k . (w x (I w)) = (w_k x w) . (I w)
     let c = cross(wk, w);

@@ -6,9 +6,9 @@
 //! into which parameters it is grouped. The order, and with it the grouping, is the same from run to
 //! run and is that of Khalil and Dombre: a link's mass goes into the link before it.
 
-use super::chain::{Chain, Coordinate, Link, MOST_JOINTS};
+use super::links::{MOST_JOINTS, Tree};
 use super::newton_euler::walk;
-use crate::robot::JointKind;
+use crate::robot::joint::JointKind;
 use crate::robot::standard::STANDARD;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,25 +28,25 @@ pub struct Grouping {
 }
 
 /// Number of standard parameters: ten a link, then a drive inertia a joint where they are modelled.
-pub fn standard_parameters(chain: &Chain, drive_inertia: bool) -> usize {
-    chain.links().len() * STANDARD + if drive_inertia { chain.joints() } else { 0 }
+pub fn standard_parameters(tree: &Tree, drive_inertia: bool) -> usize {
+    tree.links().len() * STANDARD + if drive_inertia { tree.joints() } else { 0 }
 }
 
 /// The base parameters in the order of their kept parameters.
-pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
-    let n = chain.joints();
-    let p = standard_parameters(chain, drive_inertia);
+pub fn groupings(tree: &Tree, drive_inertia: bool) -> Vec<Grouping> {
+    let n = tree.joints();
+    let p = standard_parameters(tree, drive_inertia);
     let states = (3 * p).div_ceil(n) + 8;
     let rows = states * n;
     let mut columns = vec![vec![0.0; rows]; p];
     let mut chance = ChaCha8Rng::seed_from_u64(0x0ba5e);
     let mut draw = |scale: f64| scale * (2.0 * chance.random::<f64>() - 1.0);
-    let slides = |j: usize| {
-        let own = |l: &Link| l.coordinate == Coordinate::Joint(j);
-        let link = chain.links().iter().find(|l| own(l));
-        link.is_some_and(|l| l.kind == JointKind::Prismatic)
-    };
-    let reach: Vec<f64> = (0..n).map(|j| if slides(j) { 0.7 } else { 3.0 }).collect();
+    let reach: Vec<f64> = (0..n)
+        .map(|j| match tree.joint_kind(j) {
+            JointKind::Prismatic => 0.7,
+            JointKind::Revolute => 3.0,
+        })
+        .collect();
     for s in 0..states {
         let mut state = [[0.0; MOST_JOINTS]; 3];
         for (x, reach) in state[0].iter_mut().zip(&reach) {
@@ -55,7 +55,7 @@ pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
         for (k, scale) in [(1, 2.0), (2, 8.0)] {
             state[k][..n].fill_with(|| draw(scale));
         }
-        walk(chain, &state[0], &state[1], &state[2], |i, k, row| {
+        walk(tree, &state[0], &state[1], &state[2], |i, k, row| {
             for (c, x) in row.iter().enumerate() {
                 columns[i * STANDARD + c][s * n + k] = *x;
             }
@@ -66,14 +66,22 @@ pub fn groupings(chain: &Chain, drive_inertia: bool) -> Vec<Grouping> {
             }
         }
     }
-    group(&columns)
+    let mut moved_by: Vec<u64> = Vec::with_capacity(p);
+    for i in 0..tree.links().len() {
+        let joints = tree.upstream(i).iter().fold(0, |all, j| all | 1 << j);
+        moved_by.extend([joints; STANDARD]);
+    }
+    moved_by.extend((moved_by.len()..p).map(|drive| 1 << (drive + n - p)));
+    group(&columns, &moved_by)
 }
 
-/// Orthogonalises columns in their order (twice, so that rounding does not add up).
-fn group(columns: &[Vec<f64>]) -> Vec<Grouping> {
+/// Orthogonalises columns in their order (twice, so that rounding does not add up). Bit j of `moved_by`
+/// says that a column can differ from zero in the rows of joint j: columns without a common joint, as
+/// of two arms, are orthogonal as they are.
+fn group(columns: &[Vec<f64>], moved_by: &[u64]) -> Vec<Grouping> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = columns.iter().map(|c| norm(c)).fold(0.0, f64::max);
-    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let mut basis: Vec<(Vec<f64>, u64)> = Vec::new();
     // R, column by column: coefficients of the kept columns in the orthonormal basis
     let mut triangle: Vec<Vec<f64>> = Vec::new();
     let mut found: Vec<Grouping> = Vec::new();
@@ -84,13 +92,19 @@ fn group(columns: &[Vec<f64>]) -> Vec<Grouping> {
         }
         let mut rest = column.clone();
         let mut along = vec![0.0; basis.len()];
+        // what is taken off has rows of its own
+        let mut joints = moved_by[index];
         for _ in 0..2 {
-            for (b, total) in basis.iter().zip(&mut along) {
+            for ((b, of), total) in basis.iter().zip(&mut along) {
+                if of & joints == 0 {
+                    continue;
+                }
                 let part: f64 = b.iter().zip(&rest).map(|(b, x)| b * x).sum();
                 *total += part;
                 for (x, b) in rest.iter_mut().zip(b) {
                     *x -= part * b;
                 }
+                joints |= of;
             }
         }
         let left = norm(&rest);
@@ -98,7 +112,7 @@ fn group(columns: &[Vec<f64>]) -> Vec<Grouping> {
             for x in &mut rest {
                 *x /= left;
             }
-            basis.push(rest);
+            basis.push((rest, joints));
             along.push(left);
             triangle.push(along);
             found.push(Grouping {

@@ -1,16 +1,17 @@
-//! The chain: links behind joints, where each joint sits, and which coordinate drives it.
+//! The tree: links behind joints, where each joint sits, and which coordinate drives it. A chain is
+//! a tree without branches.
 //!
 //! A joint's frame is given in the frame of the link before it; the link turns about (or slides
 //! along) the joint's axis, and its own frame is the joint's frame after that motion. A modified
 //! Denavit-Hartenberg row (Craig 1986) and a URDF joint are both of this form.
 
 use super::space::{Rotation, Vector, about, of_roll_pitch_yaw, product};
-use crate::robot::JointKind;
+use crate::robot::joint::JointKind;
 
-/// Most independent joints: what the recursion keeps on the stack.
-pub const MOST_JOINTS: usize = 8;
+/// Most independent joints: what a state keeps on the stack.
+pub const MOST_JOINTS: usize = 32;
 /// Most moving links.
-pub const MOST_LINKS: usize = 16;
+pub const MOST_LINKS: usize = 64;
 
 /// A term A sin(phase + sum k_j q_j) of a dependent coordinate.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,9 +79,9 @@ impl Link {
     }
 }
 
-/// Why a chain cannot be used.
+/// Why links make no tree that can be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ChainError {
+pub enum TreeError {
     #[error("the chain has no moving link; give at least one revolute or prismatic joint")]
     Empty,
     #[error("the chain has {links} moving links; at most {MOST_LINKS} are supported")]
@@ -103,88 +104,95 @@ pub enum ChainError {
     Idle { joint: usize },
     #[error("link `{link}` holds a number that is not finite")]
     NotFinite { link: String },
-    #[error(
-        "the regressor of {joints} joints and {parameters} base parameters has {entries} entries; \
-         at most {most} are supported"
-    )]
-    TooWide {
-        joints: usize,
-        parameters: usize,
-        entries: usize,
-        most: usize,
-    },
 }
 
 /// Moving links from the base outward, and gravity.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chain {
+pub struct Tree {
     links: Vec<Link>,
-    joints: usize,
+    /// Kind of each independent joint.
+    kinds: Vec<JointKind>,
     /// Acceleration of free fall in the base frame [m/s^2].
     gravity: Vector,
-    /// Per link, which independent joints move it, one bit each.
-    moved_by: Vec<u8>,
+    /// How the recursion passes each link.
+    steps: Vec<Step>,
+    /// States that must be kept at a time, and the most joints that move one link.
+    size: (usize, usize),
 }
 
-impl Chain {
-    /// A chain of links whose parents stand before them.
+/// One link in the recursion.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    /// Independent joints that move the link: those of the link before it, in its order, then its own.
+    pub upstream: Vec<usize>,
+    /// How many of them move the link before it too.
+    pub inherited: usize,
+    /// Place of the joint that drives the link itself in `upstream`; 0 where it follows.
+    pub driver: usize,
+    /// Where the link's state is kept while links behind it are to come.
+    pub slot: usize,
+    /// Where that of the link before it is.
+    pub parent_slot: Option<usize>,
+}
+
+impl Tree {
+    /// A tree of links whose parents stand before them, of `joints` independent joints.
     ///
     /// # Errors
-    /// [`ChainError`] names the link and what is wrong with it.
-    pub fn new(links: Vec<Link>, joints: usize, gravity: Vector) -> Result<Self, ChainError> {
+    /// [`TreeError`] names the link and what is wrong with it.
+    pub fn new(links: Vec<Link>, joints: usize, gravity: Vector) -> Result<Self, TreeError> {
         if links.is_empty() || joints == 0 {
-            return Err(ChainError::Empty);
+            return Err(TreeError::Empty);
         }
         if links.len() > MOST_LINKS {
-            return Err(ChainError::TooManyLinks { links: links.len() });
+            return Err(TreeError::TooManyLinks { links: links.len() });
         }
         if joints > MOST_JOINTS {
-            return Err(ChainError::TooManyJoints { joints });
+            return Err(TreeError::TooManyJoints { joints });
         }
-        let mut moved_by: Vec<u8> = Vec::with_capacity(links.len());
+        let mut steps: Vec<Step> = Vec::with_capacity(links.len());
+        let slots = slots(&links);
         for (i, link) in links.iter().enumerate() {
-            let name = || link.name.clone();
-            let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
-            let placed = link.rotation.iter().all(|r| finite(r)) && finite(&link.origin);
-            if !placed || !finite(&gravity) || !link.coordinate.is_finite() {
-                return Err(ChainError::NotFinite { link: name() });
-            }
-            let length = link.axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > 1e-9 || length.is_nan() {
-                return Err(ChainError::Axis {
-                    link: name(),
-                    axis: link.axis,
-                });
-            }
-            let before = match link.parent {
-                None => 0,
-                Some(parent) => *moved_by
-                    .get(parent)
-                    .ok_or_else(|| ChainError::Order { link: name() })?,
+            check(link, i, joints, &gravity)?;
+            let mut upstream = match link.parent {
+                None => Vec::new(),
+                Some(parent) => steps[parent].upstream.clone(),
             };
-            debug_assert!(moved_by.len() == i);
-            let mut own = 0;
+            let inherited = upstream.len();
             for joint in link.coordinate.drivers() {
-                if joint >= joints {
-                    return Err(ChainError::Joint {
-                        link: name(),
-                        joint,
-                        joints,
-                    });
+                if !upstream.contains(&joint) {
+                    upstream.push(joint);
                 }
-                own |= 1 << joint;
             }
-            moved_by.push(before | own);
+            let driver = match &link.coordinate {
+                Coordinate::Joint(j) => upstream.iter().position(|k| k == j).unwrap_or_default(),
+                Coordinate::Follows(_) => 0,
+            };
+            steps.push(Step {
+                upstream,
+                inherited,
+                driver,
+                slot: slots[i],
+                parent_slot: link.parent.map(|parent| slots[parent]),
+            });
         }
-        let all = moved_by.iter().fold(0, |all, m| all | m);
-        if let Some(joint) = (0..joints).find(|j| all & (1 << j) == 0) {
-            return Err(ChainError::Idle { joint });
+        let moves = |joint| steps.iter().any(|step| step.upstream.contains(&joint));
+        if let Some(joint) = (0..joints).find(|joint| !moves(*joint)) {
+            return Err(TreeError::Idle { joint });
         }
+        let kind = |joint| {
+            let own = links
+                .iter()
+                .find(|l| l.coordinate == Coordinate::Joint(joint));
+            own.map_or(JointKind::Revolute, |link| link.kind)
+        };
+        let most = |of: fn(&Step) -> usize| steps.iter().map(of).max().unwrap_or_default();
         Ok(Self {
+            size: (most(|s| s.slot) + 1, most(|s| s.upstream.len())),
+            kinds: (0..joints).map(kind).collect(),
             links,
-            joints,
             gravity,
-            moved_by,
+            steps,
         })
     }
 
@@ -195,7 +203,12 @@ impl Chain {
 
     /// Number n of independent joints.
     pub fn joints(&self) -> usize {
-        self.joints
+        self.kinds.len()
+    }
+
+    /// Kind of independent joint j: that of the link that it drives itself.
+    pub fn joint_kind(&self, j: usize) -> JointKind {
+        self.kinds[j]
     }
 
     /// Acceleration of free fall in the base frame [m/s^2].
@@ -203,11 +216,76 @@ impl Chain {
         self.gravity
     }
 
-    /// Whether independent joint j moves link i.
-    #[inline(always)]
-    pub(super) fn moves(&self, j: usize, i: usize) -> bool {
-        self.moved_by[i] & (1 << j) != 0
+    /// The same links where free fall is another \[m/s^2\].
+    pub fn in_gravity(&self, gravity: Vector) -> Self {
+        Self {
+            gravity,
+            ..self.clone()
+        }
     }
+
+    /// Independent joints that move link i.
+    pub fn upstream(&self, i: usize) -> &[usize] {
+        &self.steps[i].upstream
+    }
+
+    /// How the recursion passes link i.
+    #[inline(always)]
+    pub(super) fn step(&self, i: usize) -> &Step {
+        &self.steps[i]
+    }
+
+    /// States that must be kept at a time, and the most joints that move one link.
+    #[inline(always)]
+    pub(super) fn size(&self) -> (usize, usize) {
+        self.size
+    }
+}
+
+/// What is wrong with link i.
+fn check(link: &Link, i: usize, joints: usize, gravity: &Vector) -> Result<(), TreeError> {
+    let name = || link.name.clone();
+    let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+    let placed = link.rotation.iter().all(|r| finite(r)) && finite(&link.origin);
+    if !placed || !finite(gravity) || !link.coordinate.is_finite() {
+        return Err(TreeError::NotFinite { link: name() });
+    }
+    let length = link.axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if (length - 1.0).abs() > 1e-9 || length.is_nan() {
+        return Err(TreeError::Axis {
+            link: name(),
+            axis: link.axis,
+        });
+    }
+    if link.parent.is_some_and(|parent| parent >= i) {
+        return Err(TreeError::Order { link: name() });
+    }
+    match link.coordinate.drivers().into_iter().find(|j| *j >= joints) {
+        None => Ok(()),
+        Some(joint) => Err(TreeError::Joint {
+            link: name(),
+            joint,
+            joints,
+        }),
+    }
+}
+
+/// Where each link's state is kept: a place is free again behind the last link that hangs on it. A chain needs
+/// two places, however long it is.
+fn slots(links: &[Link]) -> Vec<usize> {
+    let mut last: Vec<usize> = (0..links.len()).collect();
+    for (i, link) in links.iter().enumerate() {
+        if let Some(last) = link.parent.and_then(|parent| last.get_mut(parent)) {
+            *last = i;
+        }
+    }
+    let mut slots: Vec<usize> = Vec::with_capacity(links.len());
+    for i in 0..links.len() {
+        let taken = |slot: &usize| (0..i).any(|k| slots[k] == *slot && last[k] >= i);
+        let free = (0..=i).find(|slot| !taken(slot));
+        slots.push(free.unwrap_or(i));
+    }
+    slots
 }
 
 impl Coordinate {
@@ -232,10 +310,10 @@ impl Coordinate {
         }
     }
 
-    /// Position, velocity and acceleration of the coordinate, and its derivative by each
-    /// independent joint.
+    /// Position, velocity and acceleration of the coordinate; its derivative by each independent
+    /// joint is added to `slope`.
     #[inline]
-    pub(super) fn motion(
+    pub fn motion(
         &self,
         q: &[f64],
         v: &[f64],

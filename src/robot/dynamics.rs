@@ -1,0 +1,77 @@
+//! M and C v + G of a robot with given parameters: what a simulation solves for accelerations.
+
+use super::cft::dynamics::{Coefficients, inertia_and_bias};
+use super::cft::{EXTENDED, PRINTED};
+use super::{Form, Robot};
+
+/// A robot with its inertial parameters, ready for many states.
+#[derive(Debug, Clone)]
+pub struct Dynamics {
+    robot: Robot,
+    theta: Vec<f64>,
+    /// The coefficients of the closed form, where there is one.
+    closed: Option<Coefficients>,
+}
+
+impl Robot {
+    /// The dynamics with inertial parameters in the order of [`Robot::parameters`].
+    pub fn dynamics(&self, theta: &[f64]) -> Dynamics {
+        Dynamics {
+            robot: self.clone(),
+            theta: theta.to_vec(),
+            closed: self.coefficients(theta),
+        }
+    }
+
+    /// The coefficients of the report's closed forms, of the robot that it is about.
+    pub(super) fn coefficients(&self, theta: &[f64]) -> Option<Coefficients> {
+        let Form::Report(_) = self.0.form else {
+            return None;
+        };
+        if let Ok(theta) = <&[f64; EXTENDED.len()]>::try_from(theta) {
+            return Some(Coefficients::from_theta22(theta));
+        }
+        let theta = <&[f64; PRINTED]>::try_from(theta).ok()?;
+        Some(Coefficients::from_theta12(theta))
+    }
+}
+
+impl Dynamics {
+    /// The robot.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// The inertial parameters.
+    pub fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// Writes M(q), n x n row-major, and C v + G at q and v. Where there is no closed form the columns of M
+    /// are torques of unit accelerations. Does not allocate.
+    ///
+    /// # Panics
+    /// Where q, v or `bias` does not hold n numbers or `mass` n^2: a mistake of the caller's code.
+    #[inline]
+    pub fn inertia_and_bias(&self, q: &[f64], v: &[f64], mass: &mut [f64], bias: &mut [f64]) {
+        let n = self.robot.joints();
+        if let Some(closed) = &self.closed {
+            let (m, b) = inertia_and_bias(super::four(q), super::four(v), closed);
+            mass.copy_from_slice(m.as_flattened());
+            bias.copy_from_slice(&b);
+            return;
+        }
+        let mut unit = [0.0; super::tree::MOST_JOINTS];
+        let mut tau = [0.0; super::tree::MOST_JOINTS];
+        let (unit, tau) = (&mut unit[..n], &mut tau[..n]);
+        self.robot.torque(&self.theta, q, v, unit, bias);
+        for k in 0..n {
+            unit[k] = 1.0;
+            self.robot.torque(&self.theta, q, v, unit, tau);
+            unit[k] = 0.0;
+            for (i, (tau, bias)) in tau.iter().zip(&*bias).enumerate() {
+                mass[i * n + k] = tau - bias;
+            }
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! From motors to joints: motors at the joints, gear trains that are coupled, or a linkage whose motors
+//! move coordinates of their own.
+//!
+//! Vectors of motors and of joints have one number each per joint. Where the motors are at the joints
+//! their coordinates are the joints' own, and one volt stands for one unit of torque.
+
+use super::cft::actuation::{self, ENCODER_SCALE, Limits, Setup};
+use super::cft::pantograph::{self, TURN_OFFSET};
+use super::cft::{COORDINATES, geometry};
+use super::error::RobotError;
+use super::joint::JointKind;
+use super::tree::Coupling;
+
+/// How the motors of a robot move its joints.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Transmission {
+    couplings: Vec<Coupling>,
+    /// The pantograph of the CFT robot, eq. (45)-(57), with its amplifiers.
+    pantograph: Option<Setup>,
+}
+
+impl Transmission {
+    /// A motor at each joint, some of them turned by other joints too.
+    pub(super) fn geared(couplings: Vec<Coupling>) -> Self {
+        Self {
+            couplings,
+            pantograph: None,
+        }
+    }
+
+    /// The motors of x_c1..x_c4, through the pantograph and Table 6.
+    pub(super) fn pantograph(setup: Setup) -> Self {
+        Self {
+            couplings: Vec::new(),
+            pantograph: Some(setup),
+        }
+    }
+
+    /// Coupled gear trains.
+    pub fn couplings(&self) -> &[Coupling] {
+        &self.couplings
+    }
+
+    /// Names of the motors' coordinates; `None` where the motors are at the joints.
+    pub fn coordinates(&self) -> Option<&'static [&'static str]> {
+        self.pantograph.map(|_| &COORDINATES[..])
+    }
+
+    /// Kind of the motors' coordinate i; `None` where the motors are at the joints.
+    pub fn coordinate_kind(&self, i: usize) -> Option<JointKind> {
+        self.pantograph.map(|_| match i {
+            2 => JointKind::Revolute,
+            _ => JointKind::Prismatic,
+        })
+    }
+
+    /// The joint that coordinate i is but for a constant, and this constant: coordinate = joint + constant.
+    pub fn joint_of(&self, i: usize) -> Option<(usize, f64)> {
+        match (self.pantograph, i) {
+            (None, _) => Some((i, 0.0)),
+            (Some(_), 2) => Some((1, TURN_OFFSET)),
+            (Some(_), 3) => Some((0, -geometry::DS)),
+            (Some(_), _) => None,
+        }
+    }
+
+    /// Names of the screws that move joints through the linkage, where friction and inertia sit that no
+    /// joint has for itself; empty where the motors are at the joints.
+    pub fn screws(&self) -> &'static [&'static str] {
+        match self.pantograph {
+            Some(_) => &["x_r", "y_r"],
+            None => &[],
+        }
+    }
+
+    /// Limits of the motors' coordinates (Table 5); `None` where only the robot's file knows them.
+    pub fn limits(&self) -> Option<Limits> {
+        self.pantograph.map(Setup::limits)
+    }
+
+    /// Full travel of joint i by Table 5 of the CFT robot's report: q1 by x_c4, q2 by x_c3, q4 and q5
+    /// as x_c1 and x_c2 leave them \[m or rad\]. Of other robots only their files know it.
+    pub fn full_travel(&self, i: usize) -> Option<f64> {
+        let spans = self.limits()?.spans();
+        [spans[3], spans[2], 2.2, 1.7].get(i).copied()
+    }
+
+    /// Motor force or torque per volt (Table 6); `None` where the amplifiers are not known.
+    pub fn gains(&self) -> Option<[f64; 4]> {
+        self.pantograph.map(Setup::gains)
+    }
+
+    /// The set-up of the amplifiers, where they are known.
+    pub fn setup(&self) -> Option<Setup> {
+        self.pantograph
+    }
+
+    /// Joint positions of the motors' positions.
+    ///
+    /// # Errors
+    /// [`RobotError::OutOfReach`].
+    #[inline]
+    pub fn joints(&self, x: &[f64], q: &mut [f64]) -> Result<(), RobotError> {
+        match self.pantograph {
+            None => q.copy_from_slice(x),
+            Some(_) => q.copy_from_slice(&pantograph::joints(four(x))?),
+        }
+        Ok(())
+    }
+
+    /// Joint velocities of the motors' velocities at the pose q.
+    ///
+    /// # Errors
+    /// [`RobotError::Singular`].
+    #[inline]
+    pub fn joint_velocities(&self, q: &[f64], xd: &[f64], v: &mut [f64]) -> Result<(), RobotError> {
+        match self.pantograph {
+            None => v.copy_from_slice(xd),
+            Some(_) => v.copy_from_slice(&pantograph::joint_velocities(four(q), four(xd))?),
+        }
+        Ok(())
+    }
+
+    /// Joint accelerations of the motors' accelerations at q and v.
+    ///
+    /// # Errors
+    /// [`RobotError::Singular`].
+    #[inline]
+    pub fn joint_accelerations(
+        &self,
+        q: &[f64],
+        v: &[f64],
+        xdd: &[f64],
+        a: &mut [f64],
+    ) -> Result<(), RobotError> {
+        match self.pantograph {
+            None => a.copy_from_slice(xdd),
+            Some(_) => {
+                let found = pantograph::joint_accelerations(four(q), four(v), four(xdd))?;
+                a.copy_from_slice(&found);
+            }
+        }
+        Ok(())
+    }
+
+    /// The motors' positions at a pose.
+    #[inline]
+    pub fn positions(&self, q: &[f64], x: &mut [f64]) {
+        match self.pantograph {
+            None => x.copy_from_slice(q),
+            Some(_) => x.copy_from_slice(&pantograph::cartesian(four(q))),
+        }
+    }
+
+    /// The motors' velocities.
+    #[inline]
+    pub fn velocities(&self, q: &[f64], v: &[f64], xd: &mut [f64]) {
+        match self.pantograph {
+            None => xd.copy_from_slice(v),
+            Some(_) => xd.copy_from_slice(&pantograph::cartesian_velocities(four(q), four(v))),
+        }
+    }
+
+    /// The motors' accelerations.
+    #[inline]
+    pub fn accelerations(&self, q: &[f64], v: &[f64], a: &[f64], xdd: &mut [f64]) {
+        match self.pantograph {
+            None => xdd.copy_from_slice(a),
+            Some(_) => {
+                let found = pantograph::cartesian_accelerations(four(q), four(v), four(a));
+                xdd.copy_from_slice(&found);
+            }
+        }
+    }
+
+    /// Joint torques \[N or N m\] of the amplifiers' volts at a pose (eq. (66)).
+    #[inline]
+    pub fn torques(&self, q: &[f64], volts: &[f64], tau: &mut [f64]) {
+        match self.pantograph {
+            None => tau.copy_from_slice(volts),
+            Some(setup) => tau.copy_from_slice(&setup.volts_to_torques(four(q), four(volts))),
+        }
+    }
+
+    /// Volts of joint torques \[N or N m\] at a pose.
+    ///
+    /// # Errors
+    /// [`RobotError::Singular`].
+    #[inline]
+    pub fn volts(&self, q: &[f64], tau: &[f64], volts: &mut [f64]) -> Result<(), RobotError> {
+        match self.pantograph {
+            None => volts.copy_from_slice(tau),
+            Some(setup) => volts.copy_from_slice(&setup.torques_to_volts(four(q), four(tau))?),
+        }
+        Ok(())
+    }
+
+    /// How far a pose is from one where the motors lose hold of a joint, 1 being farthest: sin q5 of the
+    /// CFT robot, 0 where links 4 and 5 are in line. `None` where there is no such pose.
+    #[inline]
+    pub fn clearance(&self, q: &[f64]) -> Option<f64> {
+        self.pantograph.map(|_| four(q)[3].sin())
+    }
+
+    /// Torques at pose `there` of the motor forces that give `tau` at pose `here`: held motor
+    /// forces turn into other joint torques as the arm moves (eq. (63)-(66)). Where motors act on
+    /// the joints directly, and at a singular pose, `tau` itself.
+    #[inline]
+    pub fn carry_torque(&self, here: &[f64], there: &[f64], tau: &[f64], out: &mut [f64]) {
+        out.copy_from_slice(tau);
+        if self.pantograph.is_some()
+            && let Ok(forces) = actuation::torques_to_forces(four(here), four(tau))
+        {
+            out.copy_from_slice(&actuation::forces_to_torques(four(there), &forces));
+        }
+    }
+
+    /// Steps of the motors' encoders \[m or rad\]; `None` where they are not known.
+    pub fn encoder_steps(&self) -> Option<&'static [f64]> {
+        self.pantograph.map(|_| &ENCODER_SCALE[..])
+    }
+
+    /// Rounds a pose as the encoders would whose grid is shifted by parts of a step per motor.
+    /// Leaves the pose as it is where the encoders are not known or the pose is out of reach.
+    pub fn round_at_encoders(&self, q: &mut [f64], shift: &[f64; 4]) {
+        if self.pantograph.is_some() {
+            let mut x = pantograph::cartesian(four(q));
+            for ((x, step), shift) in x.iter_mut().zip(ENCODER_SCALE).zip(shift) {
+                *x = ((*x / step + shift).round() - shift) * step;
+            }
+            if let Ok(rounded) = pantograph::joints(&x) {
+                q.copy_from_slice(&rounded);
+            }
+        }
+    }
+
+    /// Variance of a position measured at the motors, seen at joint i, from the encoders' steps
+    /// (resolution^2 / 12 each); pose-dependent on the CFT robot. `None` where the robot's
+    /// encoders are not known.
+    pub fn encoder_variance(&self, i: usize, q: &[f64]) -> Option<f64> {
+        self.pantograph?;
+        let steps = actuation::quantisation_variance();
+        let covariance = actuation::joint_covariance(four(q), &steps).ok()?;
+        Some(covariance[i][i])
+    }
+}
+
+#[inline(always)]
+fn four(x: &[f64]) -> &[f64; 4] {
+    x.try_into().expect("the pantograph moves four joints")
+}

@@ -1,0 +1,157 @@
+//! Torques of what a declared model leaves out: gravity along the base's x and y, a body at the tool,
+//! parameters that the declared structure drops.
+
+use std::sync::LazyLock;
+
+use super::cft::dynamics::Coefficients;
+use super::cft::links::{PseudoInertia, base_parameters};
+use super::cft::regressor::regressor22;
+use super::cft::{PRINTED, Structure, UNPRINTED};
+use super::standard::STANDARD;
+use super::tree::newton_euler::walk;
+use super::tree::{MOST_JOINTS, Tree};
+use super::{Form, Robot, four};
+
+/// Torques of a gravity of one along the base's x and along its y. Masses m_i at p_i have the potential
+/// -sum m_i (gx p_x + gy p_y); the first moments of the CFT robot's chain are those of its kinetic energy
+/// (eq. (60)), those of other links are their base parameters. First moments that are no parameter, as those
+/// about a vertical first axis, count as none.
+#[derive(Debug, Clone)]
+pub struct Tilt(Moments);
+
+#[derive(Debug, Clone)]
+enum Moments {
+    Unknown,
+    Report(Box<Coefficients>),
+    /// The tree in each of the two gravities, and standard parameters of its links.
+    Links(Box<[Tree; 2]>, Vec<[f64; STANDARD]>),
+}
+
+impl Robot {
+    /// What a base that stands askew adds, for inertial parameters `theta`.
+    pub fn tilt(&self, theta: &[f64]) -> Tilt {
+        Tilt(match &self.0.form {
+            Form::Inertia => Moments::Unknown,
+            Form::Report(_) => match self.coefficients(theta) {
+                Some(closed) => Moments::Report(Box::new(closed)),
+                None => Moments::Unknown,
+            },
+            Form::Recursion(_) => {
+                let along = |gravity| self.tree().in_gravity(gravity);
+                Moments::Links(
+                    Box::new([along([1.0, 0.0, 0.0]), along([0.0, 1.0, 0.0])]),
+                    self.link_parameters(theta),
+                )
+            }
+        })
+    }
+
+    /// Link that carries the tool: the last one.
+    pub fn tool_link(&self) -> usize {
+        self.tree().links().len() - 1
+    }
+
+    /// Whether the last link turns about the vertical alone, as the tool of the CFT robot and what a single
+    /// joint carries do: a body on it then has one moment of inertia that shows.
+    pub fn tool_stays_level(&self) -> bool {
+        !matches!(self.0.form, Form::Recursion(_))
+    }
+
+    /// Torque of joint `joint` by mass, first moments and moment of inertia about the vertical of a body on a
+    /// tool that stays level, in the frame of the last link. A single joint's link has no place: all that a
+    /// body adds to it is in the first number.
+    pub fn level_tool_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64]) -> [f64; 5] {
+        match &self.0.form {
+            Form::Inertia => [a[joint], 0.0, 0.0, 0.0, 0.0],
+            Form::Report(_) => {
+                let mut y = [[0.0; 22]; 4];
+                regressor22(four(q), four(v), four(a), &mut y);
+                BODIES.map(|body| y[joint].iter().zip(&body).map(|(y, b)| y * b).sum())
+            }
+            Form::Recursion(_) => {
+                let row = self.tool_row(joint, q, v, a);
+                [row[9], row[6], row[7], row[8], row[0] + row[3] + row[5]]
+            }
+        }
+    }
+
+    /// Torque of joint `joint` by the ten standard parameters of a body on the last link.
+    pub fn tool_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64]) -> [f64; STANDARD] {
+        let (last, mut out) = (self.tool_link(), [0.0; STANDARD]);
+        walk(self.tree(), q, v, a, |link, on, row| {
+            if link == last && on == joint {
+                out = *row;
+            }
+        });
+        out
+    }
+
+    /// Names of the base parameters of the full chain that the declared structure drops.
+    pub fn dropped_parameters(&self) -> &'static [&'static str] {
+        match self.0.form {
+            Form::Report(Structure::Printed12) => &UNPRINTED,
+            _ => &[],
+        }
+    }
+
+    /// Torque of joint `joint` by each of the dropped parameters.
+    pub fn dropped_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
+        if !self.dropped_parameters().is_empty() {
+            let mut y = [[0.0; 22]; 4];
+            regressor22(four(q), four(v), four(a), &mut y);
+            out.copy_from_slice(&y[joint][PRINTED..]);
+        }
+    }
+}
+
+impl Tilt {
+    /// Torque of joint `joint` at the pose q \[N or N m per m/s^2\].
+    pub fn torque(&self, joint: usize, q: &[f64]) -> [f64; 2] {
+        match &self.0 {
+            Moments::Unknown => [0.0; 2],
+            Moments::Report(chain) => of_report(chain, joint, four(q)),
+            Moments::Links(trees, bodies) => {
+                let still = [0.0; MOST_JOINTS];
+                trees.each_ref().map(|tree| {
+                    let mut torque = 0.0;
+                    walk(tree, q, &still, &still, |link, on, row| {
+                        if on == joint {
+                            let own = row.iter().zip(&bodies[link]);
+                            torque += own.map(|(y, x)| y * x).sum::<f64>();
+                        }
+                    });
+                    torque
+                })
+            }
+        }
+    }
+}
+
+fn of_report(chain: &Coefficients, joint: usize, q: &[f64; 4]) -> [f64; 2] {
+    let [a, b, cc, e] = chain.h;
+    let (s2, c2) = q[1].sin_cos();
+    let (s4, c4) = q[2].sin_cos();
+    let (sum_s, sum_c) = (q[2] + q[3]).sin_cos();
+    // slopes of the radial first moment
+    let by_psi = b * sum_c - e * sum_s;
+    let by_q4 = a * c4 - cc * s4 + by_psi;
+    let radial = chain.h0 + a * s4 + b * sum_s + cc * c4 + e * sum_c;
+    match joint {
+        0 => [0.0, -(chain.t1 + chain.mr)],
+        1 => [chain.o * s2 + radial * c2, radial * s2 - chain.o * c2],
+        2 => [by_q4 * s2, -by_q4 * c2],
+        _ => [by_psi * s2, -by_psi * c2],
+    }
+}
+
+/// Base parameters of a unit mass, unit first moments and a unit second moment along x in the frame of
+/// the CFT robot's last link.
+static BODIES: LazyLock<[[f64; 22]; 5]> = LazyLock::new(|| {
+    let place = [(3, 3), (0, 3), (1, 3), (2, 3), (0, 0)];
+    place.map(|(r, c)| {
+        let mut links = [PseudoInertia([[0.0; 4]; 4]); 8];
+        links[7].0[r][c] = 1.0;
+        links[7].0[c][r] = 1.0;
+        base_parameters(&links)
+    })
+});
