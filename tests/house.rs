@@ -56,10 +56,10 @@ const DOORS: &[(&str, &str)] = &[
     ("clap_mangen", "cli/man.rs"),
     ("indicatif", "cli/context.rs"),
     ("ctrlc", "cli/mod.rs"),
-    ("csv", "log/csv.rs"),
+    ("csv", "log/text/csv.rs"),
     // one to read, one to write
-    ("mcap", "log/recording/mcap.rs|output/mcap.rs"),
-    ("rusqlite", "log/recording/bag.rs"),
+    ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
+    ("rusqlite", "log/recording/format/bag.rs"),
     ("flate2", "log/content.rs|output/log.rs"),
     ("zstd", "log/content.rs|output/log.rs"),
     ("resvg", "report/figure/png.rs"),

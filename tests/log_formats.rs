@@ -121,7 +121,7 @@ fn raw_channels_of_the_cft_robot_come_out_as_joint_positions_and_torques() {
     log.commit().unwrap();
     let (block, reader) = read(&path, &robot.layout());
     assert_eq!(reader.layout().channels, Channels::Actuator);
-    assert!(robot.torque_held(reader.layout().channels));
+    assert!(robot.zero_order_hold(reader.layout().channels));
     for (index, row) in rows.iter().enumerate() {
         let q = pantograph::joints(&[row[0], row[1], row[2], row[3]]).unwrap();
         let tau = Setup::Tuedacs.volts_to_torques(&q, &[row[4], row[5], row[6], row[7]]);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use cft_ident::config::RobotFile;
-use cft_ident::log::{Block, Instant, Reader, Table, TableBlock};
+use cft_ident::log::{Block, Instant, RawBlock, RawReader, Reader};
 use cft_ident::output::LogWriter;
 use proptest::prelude::*;
 use serde_json::Value;
@@ -34,9 +34,9 @@ impl Log {
 
     fn read(path: &Path) -> Self {
         let spec = path.to_string_lossy().parse().unwrap();
-        let mut table = Table::open(&spec, None).unwrap();
+        let mut table = RawReader::open(&spec, None).unwrap();
         table.set_time(0, 1.0);
-        let mut block = TableBlock::default();
+        let mut block = RawBlock::default();
         let mut rows = Vec::new();
         while table.read(&mut block).unwrap() {
             for (k, t) in block.t.iter().enumerate() {

@@ -1,21 +1,21 @@
-//! Which columns of a table are which channels: by the robot file, or by their names.
+//! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
 use super::machine::Machine;
 use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
-use crate::log::{self, Channels, Layout, Table};
+use crate::log::{self, Channels, Layout, RawReader};
 
 /// Channels by their names alone.
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn guessed(table: &Table) -> Result<(Plan, Option<Fault>), CliError> {
-    let (time, seconds) = time_column(table)?;
-    let names = table.names();
+pub(super) fn guessed(log: &RawReader) -> Result<(Plan, Option<Fault>), CliError> {
+    let (time, seconds) = time_column(log)?;
+    let names = log.names();
     let mut channels = Vec::new();
     for column in 0..names.len() {
         if column != time {
-            channels.push(other(table, column));
+            channels.push(other(log, column));
         }
     }
     let plan = Plan {
@@ -29,8 +29,8 @@ pub(super) fn guessed(table: &Table) -> Result<(Plan, Option<Fault>), CliError> 
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn time_column(table: &Table) -> Result<(usize, f64), CliError> {
-    let names = table.names();
+pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
+    let names = log.names();
     let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
         CliError::input(format!(
             "no column is a time; the header has {}",
@@ -40,36 +40,36 @@ pub(super) fn time_column(table: &Table) -> Result<(usize, f64), CliError> {
     })?;
     // `time [ms]`, or `time_ms`
     let suffix = || names[time].rsplit_once('_').map(|(_, unit)| unit);
-    Ok((time, seconds(table.unit(time).or_else(suffix))))
+    Ok((time, seconds(log.unit(time).or_else(suffix))))
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
 /// reading the log.
-pub(super) fn of_robot(table: &Table, machine: &Machine) -> (Plan, Option<Fault>) {
-    let (layout, refused) = table.layout();
-    let names = table.names();
-    let time = table.find(&layout.time);
+pub(super) fn of_robot(log: &RawReader, machine: &Machine) -> (Plan, Option<Fault>) {
+    let layout = log.layout();
+    let names = log.names();
+    let time = log.find(&layout.time);
     let time = time.or_else(|| names.iter().position(|name| is_time(name)));
     let mut known: Vec<Option<Planned>> = vec![None; names.len()];
-    place(table, machine, &layout, &mut known);
+    place(log, machine, layout, &mut known);
     if let Some(other) = &layout.otherwise {
         // A log may hold both sides of the gears.
-        place(table, machine, other, &mut known);
+        place(log, machine, other, &mut known);
     }
     let columns = known.into_iter().enumerate();
     let channels = columns
         .filter(|(column, _)| Some(*column) != time)
-        .map(|(column, planned)| planned.unwrap_or_else(|| other(table, column)))
+        .map(|(column, planned)| planned.unwrap_or_else(|| other(log, column)))
         .collect();
     let plan = Plan {
         time: time.map(|time| (time, layout.time.factor)),
         channels,
     };
-    (plan, refused.map(refusal))
+    (plan, log.refused().map(|error| refusal(error.to_string())))
 }
 
 /// Finds the channels of a layout among the columns that are not known yet.
-fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<Planned>]) {
+fn place(log: &RawReader, machine: &Machine, layout: &Layout, known: &mut [Option<Planned>]) {
     let raw = layout.channels == Channels::Actuator;
     let kinds = [
         (&layout.positions, Role::Position),
@@ -78,10 +78,7 @@ fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<
     ];
     for (channels, role) in kinds {
         for (j, channel) in channels.iter().enumerate() {
-            let Some(column) = table
-                .find(channel)
-                .filter(|column| known[*column].is_none())
-            else {
+            let Some(column) = log.find(channel).filter(|column| known[*column].is_none()) else {
                 continue;
             };
             let joint = &layout.joints[j];
@@ -96,7 +93,7 @@ fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<
                 Role::Torque => machine.file.torque_unit(j).to_owned(),
                 _ => position.to_owned(),
             };
-            let name = &table.names()[column];
+            let name = &log.names()[column];
             let mut seen = Channel::new(name, role, Some(joint), Some(&unit));
             (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
             known[column] = Some(Planned {
@@ -110,9 +107,9 @@ fn place(table: &Table, machine: &Machine, layout: &Layout, known: &mut [Option<
 }
 
 /// A column that no robot file names.
-fn other(table: &Table, column: usize) -> Planned {
-    let mut channel = Channel::guessed(&table.names()[column]);
-    channel.unit = table.unit(column).map(str::to_owned);
+fn other(log: &RawReader, column: usize) -> Planned {
+    let mut channel = Channel::guessed(&log.names()[column]);
+    channel.unit = log.unit(column).map(str::to_owned);
     Planned {
         column,
         factor: 1.0,

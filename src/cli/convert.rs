@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::machine::Machine;
 use super::{CliError, Context, Outcome, arguments, columns};
-use crate::log::{Block, Instant, LogSpec, Provenance, Reader, Table, TableBlock, escape};
+use crate::log::{Block, Instant, LogSpec, Provenance, RawBlock, RawReader, Reader, escape};
 use crate::number;
 use crate::output::{LogForm, LogWriter};
 use crate::report::json::Document;
@@ -120,50 +120,45 @@ fn as_it_stands(
     warnings: &mut Vec<String>,
     context: &Context,
 ) -> Result<Provenance, CliError> {
-    let mut table = Table::open(spec, None)?;
+    let mut log = RawReader::open(spec, None)?;
     let name = escape(&spec.name());
-    let (time, seconds) = match table.is_recording() {
+    let (time, seconds) = match log.is_recording() {
         true => (0, 1.0),
-        false => columns::time_column(&table)?,
+        false => columns::time_column(&log)?,
     };
-    table.set_time(time, seconds);
-    let others: Vec<usize> = (0..table.names().len()).filter(|k| *k != time).collect();
-    let named = others.iter().map(|column| table.names()[*column].clone());
+    log.set_time(time, seconds);
+    let others: Vec<usize> = (0..log.names().len()).filter(|k| *k != time).collect();
+    let named = others.iter().map(|column| log.names()[*column].clone());
     target.begin(spec, std::iter::once("t".to_owned()).chain(named).collect())?;
-    let mut block = TableBlock::default();
+    let mut block = RawBlock::default();
     let mut first = true;
-    while table.read(&mut block)? {
+    while log.read(&mut block)? {
         context.check()?;
-        let origin = table.origin();
+        let origin = log.origin();
         for (k, t) in block.t.iter().enumerate() {
             let values = others.iter().map(|column| block.columns[*column][k]);
             target.row(spec, origin, first, *t, values)?;
             first = false;
         }
     }
-    if table.malformed() > 0 {
+    if log.malformed() > 0 {
         return Err(CliError::input(format!(
             "{name}: {} rows have more or fewer fields than the header names",
-            table.malformed()
+            log.malformed()
         ))
         .hint("complete or delete these rows; write decimal points, not commas"));
     }
-    warnings.extend(
-        table
-            .warnings()
-            .iter()
-            .map(|text| format!("{name}: {text}")),
-    );
+    warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
     for column in others {
-        let words = table.words(column);
+        let words = log.words(column);
         if words > 0 {
             warnings.push(format!(
                 "{name}: {words} fields of `{}` are words and are left out: only numbers are kept",
-                escape(&table.names()[column])
+                escape(&log.names()[column])
             ));
         }
     }
-    Ok(table.provenance()?)
+    Ok(log.provenance()?)
 }
 
 /// Converts the channels of a robot.

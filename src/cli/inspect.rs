@@ -8,7 +8,7 @@ use super::machine::{Machine, run_error};
 use super::{CliError, Context, Exit, Outcome, columns};
 use crate::config::ModelFile;
 use crate::inspect::{Comparison, Fault, Findings, Kind, Severity, look};
-use crate::log::{LogSpec, Provenance, Table, escape};
+use crate::log::{LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::number;
 use crate::report::json::Document;
@@ -80,17 +80,16 @@ fn inspect(
 ) -> Result<(Inspected, Provenance), CliError> {
     let machine = known.map(|known| &known.machine);
     let layout = machine.map(|machine| machine.file.layout());
-    let mut table = Table::open(spec, layout.as_ref())?;
+    let mut log = RawReader::open(spec, layout.as_ref())?;
     let (plan, refused) = match machine {
-        Some(machine) => columns::of_robot(&table, machine),
-        None => columns::guessed(&table)?,
+        Some(machine) => columns::of_robot(&log, machine),
+        None => columns::guessed(&log)?,
     };
-    let found = look(&mut table, &plan, &|| context.interrupted())?;
+    let found = look(&mut log, &plan, &|| context.interrupted())?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
     findings.faults.splice(0..0, refused);
     warnings.extend(
-        table
-            .warnings()
+        log.warnings()
             .iter()
             .map(|text| format!("{}: {text}", escape(&spec.name()))),
     );
@@ -116,7 +115,7 @@ fn inspect(
         }
     }
     let name = spec.name();
-    Ok((Inspected { name, findings }, table.provenance()?))
+    Ok((Inspected { name, findings }, log.provenance()?))
 }
 
 /// What one log holds and what is wrong with it, by the robot file.
@@ -128,9 +127,9 @@ pub(super) fn findings(
     machine: &Machine,
     context: &Context,
 ) -> Result<Findings, CliError> {
-    let mut table = Table::open(spec, Some(&machine.file.layout()))?;
-    let (plan, refused) = columns::of_robot(&table, machine);
-    let found = look(&mut table, &plan, &|| context.interrupted())?;
+    let mut log = RawReader::open(spec, Some(&machine.file.layout()))?;
+    let (plan, refused) = columns::of_robot(&log, machine);
+    let found = look(&mut log, &plan, &|| context.interrupted())?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
     findings.faults.splice(0..0, refused);
     Ok(findings)

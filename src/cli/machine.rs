@@ -227,7 +227,7 @@ impl Machine {
         context: &'a Context,
     ) -> Result<(Open<'a>, bool), CliError> {
         let open = self.open_as(spec, &self.file.layout(), context)?;
-        let held = self.file.torque_held(open.reader.layout().channels);
+        let held = self.file.zero_order_hold(open.reader.layout().channels);
         Ok((open, held))
     }
 

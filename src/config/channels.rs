@@ -42,9 +42,9 @@ impl RobotFile {
     /// Whether a logged torque (or volt) acts from its own row to the next.
     ///
     /// The volts of the CFT robot do unless the file says otherwise.
-    pub fn torque_held(&self, channels: Channels) -> bool {
+    pub fn zero_order_hold(&self, channels: Channels) -> bool {
         self.log
-            .torque_held
+            .zero_order_hold
             .unwrap_or(channels == Channels::Actuator)
     }
 
@@ -207,7 +207,7 @@ impl RobotFile {
                 StampKind::Publish => Stamp::Publish,
             },
             joints,
-            torque_held: self.torque_held(channels),
+            zero_order_hold: self.zero_order_hold(channels),
             torque_delay_s: self.log.torque_delay_s.unwrap_or(0.0),
         }
     }

@@ -294,8 +294,8 @@ pub struct LogSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_is: Option<TorqueIs>,
     /// The logged torque (or volt) was held from its own sample to the next.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque_held: Option<bool>,
+    #[serde(rename = "torque_held", skip_serializing_if = "Option::is_none")]
+    pub zero_order_hold: Option<bool>,
     /// Rows of the matrix R of coupled gears, p = R q, where the log is of the motors' side:
     /// q = R^-1 p + offset, tau = R' c.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

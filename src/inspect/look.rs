@@ -1,10 +1,10 @@
-//! Shows a log, as it stands in its file, to the judge.
+//! Shows a log, as it stands in its files, to the judge.
 
 use super::channel::Channel;
 use super::fault::{Fault, Kind, Severity};
 use super::findings::Findings;
 use super::judge::{Depth, Judge};
-use crate::log::{LogError, Table, TableBlock};
+use crate::log::{LogError, RawBlock, RawReader};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,17 +33,17 @@ pub struct Plan {
 /// # Errors
 /// A file that can no longer be read.
 pub fn look(
-    table: &mut Table,
+    log: &mut RawReader,
     plan: &Plan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Findings>, LogError> {
     if let Some((column, seconds)) = plan.time {
-        table.set_time(column, seconds);
+        log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
     let mut judge = Judge::new(channels.collect(), Depth::Whole);
-    let mut block = TableBlock::default();
-    while table.read(&mut block)? {
+    let mut block = RawBlock::default();
+    while log.read(&mut block)? {
         if stop() {
             return Ok(None);
         }
@@ -62,8 +62,8 @@ pub fn look(
         judge.take(&block.t, &columns);
     }
     let mut findings = judge.finish();
-    if table.malformed() > 0 {
-        let rows = table.malformed();
+    if log.malformed() > 0 {
+        let rows = log.malformed();
         findings.faults.insert(
             0,
             Fault {
@@ -96,7 +96,7 @@ pub fn look(
             },
         );
     }
-    for effect in table.breaks() {
+    for effect in log.breaks() {
         findings.faults.insert(
             0,
             Fault {

@@ -13,9 +13,9 @@ pub(super) struct Column {
 }
 
 /// The columns of one log that are read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Columns {
-    pub(super) time: Column,
+    pub(super) time: Option<Column>,
     pub(super) positions: Vec<Column>,
     pub(super) torques: Vec<Column>,
     /// Empty where the log lacks a velocity.
@@ -30,14 +30,6 @@ pub(super) struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// Whether any position or torque of the layout is there.
-    fn has_any(&self, layout: &Layout) -> bool {
-        let channels = layout.positions.iter().chain(&layout.torques);
-        channels
-            .into_iter()
-            .any(|c| self.indices(c).next().is_some())
-    }
-
     /// Finds every channel of the layout.
     pub(super) fn columns(&self, layout: &Layout) -> Result<Columns, LogError> {
         let each = |channels: &[Channel], what: &str| -> Result<Vec<Column>, LogError> {
@@ -50,46 +42,22 @@ impl Header<'_> {
         let positions = each(&layout.positions, "position")?;
         let torques = each(&layout.torques, "torque")?;
         // A velocity is optional unless the robot file names its column.
-        let wanted = |c: &Channel| c.key.is_some() || self.indices(c).next().is_some();
+        let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
         let velocities = if layout.velocities.iter().all(wanted) {
             each(&layout.velocities, "velocity")?
         } else {
             Vec::new()
         };
         Ok(Columns {
-            time,
+            time: Some(time),
             positions,
             torques,
             velocities,
         })
     }
 
-    /// The first column that a channel may be.
-    pub(super) fn first(&self, channel: &Channel) -> Option<usize> {
-        self.indices(channel).next()
-    }
-
-    /// The layout to use: the other one where the header has channels of that alone.
-    pub(super) fn choose(&self, layout: &Layout) -> Layout {
-        match &layout.otherwise {
-            Some(other) if !self.has_any(layout) && self.has_any(other) => (**other).clone(),
-            _ => layout.clone(),
-        }
-    }
-
-    fn indices<'h>(&'h self, channel: &'h Channel) -> impl Iterator<Item = usize> + 'h {
-        let number = column_number(&channel.column);
-        let names = self.names.iter().enumerate();
-        names
-            .filter(move |(index, name)| match number {
-                Some(number) => *index == number,
-                None => **name == channel.column || name_and_unit(name).0 == channel.column,
-            })
-            .map(|(index, _)| index)
-    }
-
     fn find(&self, channel: &Channel, purpose: &str) -> Result<Column, LogError> {
-        let mut indices = self.indices(channel);
+        let mut indices = positions_of(self.names, channel);
         let Some(index) = indices.next() else {
             return Err(self.missing(channel, purpose));
         };
@@ -151,6 +119,33 @@ impl Header<'_> {
                 "set the unit of this column to \"{found}\" in the [log] section of the robot file, or correct the header"
             ),
         })
+    }
+}
+
+/// Places of the columns that a channel may be.
+fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<Item = usize> + 'n {
+    let number = column_number(&channel.column);
+    let is = move |(index, name): &(usize, &String)| match number {
+        Some(number) => *index == number,
+        None => **name == channel.column || name_and_unit(name).0 == channel.column,
+    };
+    names.iter().enumerate().filter(is).map(|(index, _)| index)
+}
+
+/// The first column that a channel may be.
+pub(super) fn position_of(names: &[String], channel: &Channel) -> Option<usize> {
+    positions_of(names, channel).next()
+}
+
+/// The layout to use: the other one where the columns have channels of that alone.
+pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
+    let has_any = |layout: &Layout| {
+        let mut channels = layout.positions.iter().chain(&layout.torques);
+        channels.any(|channel| position_of(names, channel).is_some())
+    };
+    match &layout.otherwise {
+        Some(other) if !has_any(layout) && has_any(other) => (**other).clone(),
+        _ => layout.clone(),
     }
 }
 
@@ -222,7 +217,7 @@ mod tests {
         let columns = header(&names)
             .columns(&Layout::joint_columns(&["q1"]))
             .unwrap();
-        assert_eq!(columns.time.index, 3);
+        assert_eq!(columns.time.unwrap().index, 3);
         assert_eq!(columns.positions[0].index, 2);
         assert_eq!(columns.torques[0].index, 0);
         assert!(columns.velocities.is_empty());

@@ -9,14 +9,6 @@ use super::{LogError, source};
 /// Bytes that are looked at.
 pub(super) const HEAD: usize = 1 << 16;
 
-/// What a log is, once it is decompressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Text,
-    Mcap,
-    Sqlite,
-}
-
 /// How a file is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Compression {
@@ -30,7 +22,6 @@ pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
 
 /// An open log of any kind.
 pub(super) struct Content {
-    pub(super) kind: Kind,
     pub(super) compression: Compression,
     /// Length of the file as it lies on the disk [bytes].
     pub(super) size: u64,
@@ -69,15 +60,7 @@ impl Content {
             }
             rest = Box::new(Failing(error.kind(), error.to_string()));
         }
-        let kind = if head.starts_with(b"\x89MCAP") {
-            Kind::Mcap
-        } else if head.starts_with(b"SQLite format 3\0") {
-            Kind::Sqlite
-        } else {
-            Kind::Text
-        };
         Ok(Self {
-            kind,
             compression,
             size,
             head,

@@ -118,7 +118,7 @@ pub struct Messages {
     /// Names of the joints in messages, in joint order.
     pub joints: Vec<String>,
     /// A torque of its own topic holds until its next message; else it is interpolated.
-    pub torque_held: bool,
+    pub zero_order_hold: bool,
     /// Time by which the torques of an own topic lag behind the positions [s]; it is taken off.
     pub torque_delay_s: f64,
 }

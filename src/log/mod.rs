@@ -10,20 +10,17 @@
 mod block;
 mod columns;
 mod content;
-mod csv;
 mod error;
-mod head;
 mod layout;
 mod names;
-mod number;
+mod pass;
+mod raw;
 mod reader;
 mod recording;
-mod row;
-mod sheet;
+mod rows;
 mod source;
 mod spec;
 mod stale;
-mod table;
 mod text;
 mod time;
 
@@ -31,11 +28,11 @@ pub use block::Block;
 pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
 pub use names::{escape, escape_whole, nearest};
+pub use raw::{RawBlock, RawReader};
 pub use reader::Reader;
 pub use recording::{CdrReader, DefinitionError, Delay, DelayEstimate, Malformed, Value};
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
-pub use table::{Table, TableBlock};
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;

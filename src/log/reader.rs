@@ -1,30 +1,19 @@
 //! Reads one log block by block, in SI units, inside its span, with its time checked.
 
-use std::path::PathBuf;
-
 use super::layout::Layout;
-use super::row::{LogRows, Stamped};
+use super::pass::Pass;
+use super::rows::Strictness;
 use super::source::{self, Provenance};
 use super::stale::{Stale, Verdict};
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 
-/// A log that is being read.
+/// A log that is being read, and refused where anything is wrong with it.
 #[derive(Debug)]
 pub struct Reader {
-    spec: LogSpec,
-    files: Vec<PathBuf>,
-    rows: LogRows,
-    layout: Layout,
-    /// The instant from which times are counted; known from the first row.
-    origin: Option<Instant>,
-    /// Times of the span [s], half open; set at the first row.
-    span: Option<(f64, f64)>,
+    pass: Pass,
     /// Times of the first and the last row of the file so far [s].
     seen: Option<(f64, f64)>,
-    /// Times of the first and the last row handed out [s].
-    used: Option<(f64, f64)>,
-    samples: u64,
     finished: bool,
     activity: Vec<Activity>,
     stale: Stale,
@@ -48,22 +37,14 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        let files = spec.files()?;
-        let (rows, layout) = LogRows::open(&files, layout)?;
-        let joints = layout.positions.len();
+        let pass = Pass::open(spec, layout, Strictness::Refuse)?;
+        let (joints, torques) = (pass.layout.positions.len(), pass.layout.torques.len());
         Ok(Self {
-            spec: spec.clone(),
-            files,
-            activity: vec![Activity::default(); layout.torques.len().min(joints)],
-            rows,
-            stale: Stale::new(joints),
-            layout,
-            origin: None,
-            span: None,
+            pass,
             seen: None,
-            used: None,
-            samples: 0,
             finished: false,
+            activity: vec![Activity::default(); torques.min(joints)],
+            stale: Stale::new(joints),
             duplicates: 0,
             pending: Block::default(),
         })
@@ -71,22 +52,22 @@ impl Reader {
 
     /// The layout that the log turned out to have.
     pub fn layout(&self) -> &Layout {
-        &self.layout
+        &self.pass.layout
     }
 
     /// Whether the blocks hold logged velocities.
     pub fn has_velocities(&self) -> bool {
-        self.rows.has_velocities()
+        self.pass.rows.has_velocities()
     }
 
     /// Rows handed out so far.
     pub fn samples(&self) -> u64 {
-        self.samples
+        self.pass.samples
     }
 
     /// Time from the first to the last row handed out so far [s].
     pub fn duration_s(&self) -> f64 {
-        self.used.map_or(0.0, |(first, last)| last - first)
+        self.pass.duration_s()
     }
 
     /// The instant from which the times of the blocks are counted, once the first row is read.
@@ -94,7 +75,7 @@ impl Reader {
     /// Zero unless the log's own times are so far from it (epoch and ISO stamps) that f64 seconds
     /// would lose digits; then the log's first stamp.
     pub fn origin(&self) -> Instant {
-        self.origin.unwrap_or_default()
+        self.pass.origin()
     }
 
     /// Fills the block with the next rows; false, and an empty block, at the end.
@@ -106,17 +87,14 @@ impl Reader {
         block.clear();
         std::mem::swap(block, &mut self.pending);
         while !self.finished && block.len() < Block::ROWS {
-            let Some(stamp) = self.rows.next()? else {
+            let Some(t) = self.pass.next()? else {
                 self.finish(block)?;
                 break;
             };
-            let Some(t) = self.time(stamp)? else {
+            if !self.is_later(t)? {
                 continue;
-            };
-            let (from, to) = match self.span {
-                Some(span) => span,
-                None => self.place_span(t)?,
-            };
+            }
+            let (from, to) = self.pass.span(t)?;
             if t < from {
                 continue;
             }
@@ -130,14 +108,16 @@ impl Reader {
             // What follows decides about the rows at the end.
             self.pending.split_from(block, self.stale.undecided());
         }
-        self.count(block);
+        if let (Some(first), Some(last)) = (block.t.first(), block.t.last()) {
+            self.pass.count(block.len(), *first, *last);
+        }
         Ok(!block.is_empty())
     }
 
     /// What was left out, dropped or chosen so far, one sentence each; call it after the last block.
     pub fn warnings(&self) -> Vec<String> {
-        let name = super::escape(&self.spec.name());
-        let mut found = self.rows.warnings();
+        let name = super::escape(&self.pass.spec.name());
+        let mut found = self.pass.rows.warnings();
         if self.duplicates > 0 {
             found.push(format!(
                 "{} messages are the message before once more, time included, and are left out",
@@ -159,48 +139,37 @@ impl Reader {
     /// # Errors
     /// A file that can no longer be read.
     pub fn provenance(&self) -> Result<Provenance, LogError> {
-        Ok(Provenance {
-            name: self.spec.name(),
-            span: self.spec.span.label(),
-            sha256: source::sha256_of(&self.files)?,
-            samples: self.samples,
-            duration_s: self.duration_s(),
-        })
+        self.pass.provenance()
     }
 
-    /// Time of the current row [s], later than the row before; `None` for a row that is there twice.
+    /// Whether the current row is later than the one before it; false for one that is there twice.
     #[inline]
-    fn time(&mut self, stamp: Stamped) -> Result<Option<f64>, LogError> {
-        let t = seconds(stamp, &mut self.origin);
-        let Some((first, before)) = self.seen else {
-            self.seen = Some((t, t));
-            return Ok(Some(t));
-        };
-        if t <= before {
-            return self.out_of_order(before, t);
+    fn is_later(&mut self, t: f64) -> Result<bool, LogError> {
+        match self.seen {
+            Some((_, before)) if t <= before => self.out_of_order(before, t),
+            seen => {
+                self.seen = Some((seen.map_or(t, |(first, _)| first), t));
+                Ok(true)
+            }
         }
-        self.seen = Some((first, t));
-        Ok(Some(t))
     }
 
     #[cold]
-    fn out_of_order(&mut self, before: f64, t: f64) -> Result<Option<f64>, LogError> {
-        let repeats = t == before && self.rows.repeats();
+    fn out_of_order(&mut self, before: f64, t: f64) -> Result<bool, LogError> {
+        let rows = &self.pass.rows;
+        let remedy = rows.clock_remedy(before - self.seen.map_or(0.0, |seen| seen.0));
+        let repeats = t == before && rows.repeats();
         // Nobody can delete messages from a recording by hand.
-        if repeats && matches!(self.rows, LogRows::Messages(_)) {
+        if repeats && remedy.is_some() {
             self.duplicates += 1;
-            return Ok(None);
+            return Ok(false);
         }
-        let at = self.rows.place();
-        let remedy = |text: String| match &self.rows {
-            LogRows::Messages(rows) => rows.clock_remedy(before - self.seen.map_or(0.0, |s| s.0)),
-            LogRows::Text(_) => text,
-        };
+        let at = rows.place();
         Err(if t < before {
-            let remedy = remedy(
+            let remedy = remedy.unwrap_or_else(|| {
                 "sort the rows by time, or split the file where a second recording begins"
-                    .to_owned(),
-            );
+                    .to_owned()
+            });
             LogError::TimeBackwards {
                 at,
                 before,
@@ -210,59 +179,32 @@ impl Reader {
         } else if repeats {
             LogError::DuplicateRow { at, t }
         } else {
-            let column = super::escape(&self.layout.time.column);
-            let remedy = remedy(format!(
-                "check the clock of the recorder or the time column `{column}`"
-            ));
+            let remedy = remedy.unwrap_or_else(|| {
+                let column = super::escape(&self.pass.layout.time.column);
+                format!("check the clock of the recorder or the time column `{column}`")
+            });
             LogError::TimeStandsStill { at, t, remedy }
         })
-    }
-
-    /// Turns the span into times, once the first row is known.
-    fn place_span(&mut self, first: f64) -> Result<(f64, f64), LogError> {
-        let span = match self.spec.span {
-            Span::Whole => (f64::NEG_INFINITY, f64::INFINITY),
-            Span::Seconds { from, to } => (first + from, first + to),
-            Span::Percent { from, to } => {
-                let last = self.last_time()?;
-                let at = |percent: f64| first + (last - first) * percent / 100.0;
-                let end = if to >= 100.0 { f64::INFINITY } else { at(to) };
-                (at(from), end)
-            }
-        };
-        self.span = Some(span);
-        Ok(span)
-    }
-
-    /// Time of the log's last row [s]: one pass in which only times are looked at.
-    fn last_time(&self) -> Result<f64, LogError> {
-        let mut origin = self.origin;
-        let (mut rows, _) = LogRows::open(&self.files, &self.layout)?;
-        let mut last = f64::NEG_INFINITY;
-        while let Some(stamp) = rows.next()? {
-            last = seconds(stamp, &mut origin);
-        }
-        Ok(last)
     }
 
     /// Appends the current row to the block, and drops rows before it that turn out to be stale.
     fn take(&mut self, t: f64, block: &mut Block) -> Result<(), LogError> {
         if block.is_empty() {
-            block.line0 = self.rows.number();
+            block.line0 = self.pass.rows.number();
         }
         block.t.push(t);
         let (at_q, at_tau, at_dq) = (block.q.len(), block.tau.len(), block.dq.len());
-        self.rows.append(block)?;
+        self.pass.rows.append(block)?;
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
         for ((activity, q), tau) in self.activity.iter_mut().zip(&*q).zip(&*tau) {
             activity.driven |= *tau != 0.0;
             activity.moved |= *activity.first_position.get_or_insert(*q) != *q;
         }
-        if let Some(conversion) = &self.layout.conversion
+        if let Some(conversion) = &self.pass.layout.conversion
             && !conversion.apply(q, tau, &mut block.dq[at_dq..])
         {
             return Err(LogError::NoPose {
-                at: self.rows.place(),
+                at: self.pass.rows.place(),
                 positions: format!("{q:?}"),
             });
         }
@@ -275,24 +217,16 @@ impl Reader {
         Ok(())
     }
 
-    /// Counts the rows that are handed out.
-    fn count(&mut self, block: &Block) {
-        if let (Some(first), Some(last)) = (block.t.first(), block.t.last()) {
-            self.used = Some((self.used.map_or(*first, |(first, _)| first), *last));
-            self.samples += block.len() as u64;
-        }
-    }
-
     /// Judges what can be judged only at the end.
     fn finish(&mut self, block: &Block) -> Result<(), LogError> {
         self.finished = true;
-        let file = || source::shown_all(&self.files);
-        let rows = self.samples + block.len() as u64;
+        let file = || source::shown_all(&self.pass.files);
+        let rows = self.pass.samples + block.len() as u64;
         if rows < 2 {
-            return Err(match (self.spec.span, self.seen) {
+            return Err(match (self.pass.spec.span, self.seen) {
                 (Span::Percent { .. } | Span::Seconds { .. }, Some((first, last))) => {
                     LogError::EmptySpan {
-                        spec: super::escape_whole(&self.spec.to_string()),
+                        spec: super::escape_whole(&self.pass.spec.to_string()),
                         rows,
                         duration_s: last - first,
                     }
@@ -305,25 +239,10 @@ impl Reader {
             None => Ok(()),
             Some(joint) => Err(LogError::ZeroTorque {
                 file: file(),
-                column: super::escape(&self.layout.torques[joint].column),
-                joint: super::escape(&self.layout.joints[joint]),
+                column: super::escape(&self.pass.layout.torques[joint].column),
+                joint: super::escape(&self.pass.layout.joints[joint]),
                 rows,
             }),
-        }
-    }
-}
-
-/// Seconds of a row's time, counted from the first one where that is far from zero.
-#[inline]
-pub(super) fn seconds(stamp: Stamped, origin: &mut Option<Instant>) -> f64 {
-    match stamp {
-        Stamped::Seconds(seconds) => seconds,
-        Stamped::Exact(instant) => {
-            let origin = *origin.get_or_insert(match instant.is_far() {
-                true => instant,
-                false => Instant::default(),
-            });
-            instant.since(origin)
         }
     }
 }

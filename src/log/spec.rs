@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use super::LogError;
 use super::names::escape_whole;
+use super::recording::FORMATS;
 use super::source::{failed, file_name, shown};
 
 /// The part of a log that is used.
@@ -151,7 +152,7 @@ impl LogSpec {
 /// Recordings in the folder of a rosbag2 recording, which may be split: `bag_0.mcap`, `bag_1.mcap`.
 fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
     let entries = std::fs::read_dir(folder).map_err(|error| failed(folder, error))?;
-    let mut found: Vec<(bool, PathBuf)> = Vec::new();
+    let mut found: Vec<(&str, PathBuf)> = Vec::new();
     for entry in entries {
         let path = entry.map_err(|error| failed(folder, error))?.path();
         let name = file_name(&path).to_lowercase();
@@ -159,14 +160,13 @@ fn recordings_in(folder: &Path) -> Result<Vec<PathBuf>, LogError> {
             .iter()
             .find_map(|end| name.strip_suffix(end))
             .unwrap_or(&name);
-        if plain.ends_with(".mcap") || plain.ends_with(".db3") {
-            found.push((plain.ends_with(".mcap"), path));
-        }
+        let format = FORMATS.iter().find(|format| plain.ends_with(format.ending));
+        found.extend(format.map(|format| (format.ending, path)));
     }
     found.sort_by_cached_key(|(_, path)| natural(&file_name(path)));
     let problem = match found.first() {
         None => "holds no .mcap or .db3 file",
-        Some((mcap, _)) if found.iter().any(|(other, _)| other != mcap) => {
+        Some((first, _)) if found.iter().any(|(other, _)| other != first) => {
             "holds both .mcap and .db3 files"
         }
         Some(_) => return Ok(found.into_iter().map(|(_, path)| path).collect()),

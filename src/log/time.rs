@@ -155,6 +155,42 @@ impl Instant {
     }
 }
 
+/// Time of a row, before it is counted from anywhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Stamped {
+    /// Seconds as the log counts them.
+    Seconds(f64),
+    /// An exact instant, counted from the first one where it is far from zero.
+    Exact(Instant),
+}
+
+impl Stamped {
+    /// Of a row without a time.
+    pub(super) const NONE: Self = Self::Seconds(f64::NAN);
+
+    /// Seconds, counted from the first time where that is far from zero.
+    #[inline]
+    pub(super) fn seconds(self, origin: &mut Option<Instant>) -> f64 {
+        match self {
+            Self::Seconds(seconds) => seconds,
+            Self::Exact(instant) => {
+                let origin = *origin.get_or_insert(match instant.is_far() {
+                    true => instant,
+                    false => Instant::default(),
+                });
+                instant.since(origin)
+            }
+        }
+    }
+
+    pub(super) fn instant(self) -> Instant {
+        match self {
+            Self::Exact(instant) => instant,
+            Self::Seconds(seconds) => Instant::default().plus(seconds),
+        }
+    }
+}
+
 /// Seconds, with as many decimals as the instant has.
 impl fmt::Display for Instant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

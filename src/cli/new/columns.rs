@@ -2,7 +2,7 @@
 
 use crate::cli::{CliError, Context, columns};
 use crate::inspect::{self, Role};
-use crate::log::{LogSpec, Provenance, Table, escape, nearest};
+use crate::log::{LogSpec, Provenance, RawReader, escape, nearest};
 use crate::robot::JointKind;
 
 /// A column of a log.
@@ -30,7 +30,7 @@ pub(super) struct Seen {
 
 /// Looks at a log, to its end.
 pub(super) fn look(spec: &LogSpec, context: &Context) -> Result<Seen, CliError> {
-    let mut table = Table::open(spec, None)?;
+    let mut table = RawReader::open(spec, None)?;
     let (plan, _) = columns::guessed(&table)?;
     let bar = context.progress("looking at the log", None);
     let findings = look_at(&mut table, &plan, context)?;
@@ -71,7 +71,7 @@ pub(super) fn look(spec: &LogSpec, context: &Context) -> Result<Seen, CliError> 
 }
 
 fn look_at(
-    table: &mut Table,
+    table: &mut RawReader,
     plan: &inspect::Plan,
     context: &Context,
 ) -> Result<inspect::Findings, CliError> {

@@ -25,7 +25,7 @@ pub struct Delay {
 
 /// An estimated delay of the torques behind the positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct DelayEstimate {
     /// Delay [s], positive where torques lag.
     pub delay_s: f64,
     /// Its standard deviation [s].
@@ -58,7 +58,7 @@ impl Delay {
             None => format!(
                 "the delay between {positions} and {torques} cannot be told from the motion ({removed})"
             ),
-            Some(Estimate { delay_s, std_s }) => format!(
+            Some(DelayEstimate { delay_s, std_s }) => format!(
                 "{torques} lags behind {positions} by {:.1} ms (standard deviation {:.1} ms), estimated from the motion; {removed}",
                 delay_s * 1e3,
                 std_s * 1e3
@@ -67,7 +67,7 @@ impl Delay {
     }
 
     /// Estimates the delay; `None` where the motion explains too little of the torques.
-    pub fn estimate(&self) -> Option<Estimate> {
+    pub fn estimate(&self) -> Option<DelayEstimate> {
         let rows = self.t.len();
         if rows < 8 * TRIALS {
             return None;
@@ -115,7 +115,7 @@ impl Delay {
         // Smoothing makes neighbours within its width say the same.
         let independent = rows as f64 / (2 * half + 1) as f64;
         let std = (2.0 * middle / (curvature * independent)).sqrt();
-        Some(Estimate {
+        Some(DelayEstimate {
             delay_s: steps * dt,
             std_s: std * dt,
         })

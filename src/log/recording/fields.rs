@@ -2,16 +2,15 @@
 
 use std::ops::Range;
 
-use super::container::Head;
+use super::message::MessageHead;
 use super::path::Path;
 use super::value::Value;
 use crate::log::layout::{Channel, Layout, Stamp, column_number};
-use crate::log::row::Stamped;
-use crate::log::time::{FAR_S, Instant};
+use crate::log::time::{FAR_S, Instant, Stamped};
 
 /// The fields of one robot in messages, each with the paths that it may have.
 #[derive(Debug, Clone)]
-pub(super) struct Fields {
+pub(super) struct RobotFields {
     pub(super) paths: Vec<Vec<Path>>,
     pub(super) positions: Range<usize>,
     pub(super) torques: Range<usize>,
@@ -33,7 +32,7 @@ pub(super) enum TimeSource {
     Publish,
 }
 
-impl Fields {
+impl RobotFields {
     pub(super) fn new(layout: &Layout) -> Self {
         let mut paths: Vec<Vec<Path>> = Vec::new();
         let mut add = |channels: &[Channel], field: &str| -> Range<usize> {
@@ -107,7 +106,7 @@ impl Fields {
     pub(super) fn stamp(
         &self,
         values: &[Value],
-        head: &Head,
+        head: &MessageHead,
         source: TimeSource,
     ) -> Option<Stamped> {
         match source {

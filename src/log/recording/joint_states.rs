@@ -6,13 +6,14 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use super::container::{Head, Recording, Wanted};
-use super::decode::{Decoder, Schema};
+use super::encoding::reader_of;
+use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::parts::Recording;
 use super::path::Path;
 use super::value::Value;
 use crate::log::names::{escape, list};
-use crate::log::row::Stamped;
-use crate::log::time::Instant;
+use crate::log::rows::Rows;
+use crate::log::time::{Instant, Stamped};
 use crate::log::{LogError, source};
 
 /// Messages that are looked at for topics and their names.
@@ -34,10 +35,10 @@ const TIMES: &str = "/t";
 const ARRAYS: [(&str, &str); 3] = [("position", "q"), ("effort", "tau"), ("velocity", "dq")];
 
 /// One topic and the columns that it fills.
-struct Source {
+struct StateTopic {
     topic: String,
     schema: Schema,
-    decoder: Decoder,
+    reader: Box<dyn MessageReader>,
     values: Vec<Value>,
     /// Place of its first column.
     first: usize,
@@ -45,10 +46,10 @@ struct Source {
 }
 
 /// What a topic was found to hold.
-struct Found {
+struct FoundTopic {
     topic: String,
     schema: Schema,
-    probe: Decoder,
+    probe: Box<dyn MessageReader>,
     names: Vec<String>,
     arrays: [bool; 3],
     stamped: bool,
@@ -56,7 +57,7 @@ struct Found {
 }
 
 #[derive(Debug, Clone, Default)]
-struct Row {
+struct StateRow {
     key: i128,
     /// The time where it is no whole nanosecond.
     exact: Option<f64>,
@@ -68,12 +69,12 @@ struct Row {
 /// The rows of a recording.
 pub(in crate::log) struct JointStates {
     recording: Recording,
-    sources: Vec<Source>,
-    times: Option<(Schema, Decoder)>,
+    sources: Vec<StateTopic>,
+    times: Option<(Schema, Box<dyn MessageReader>)>,
     columns: Vec<String>,
-    row: Row,
+    row: StateRow,
     /// The row that begins with the message after this row.
-    ahead: Row,
+    ahead: StateRow,
     /// A time that waits for its row: when it was recorded, and what it is.
     exact: Option<(u64, f64)>,
     other_topics: Vec<String>,
@@ -128,14 +129,14 @@ impl JointStates {
                     columns.push(column(&one, letter, name, &main));
                 }
             }
-            let Ok(decoder) = Decoder::new(&one.schema, &fields) else {
+            let Ok(reader) = reader_of(&one.schema, &fields) else {
                 continue;
             };
-            sources.push(Source {
+            sources.push(StateTopic {
                 values: vec![Value::Absent; fields.len()],
                 topic: one.topic,
                 schema: one.schema,
-                decoder,
+                reader,
                 first,
                 stamped: one.stamped,
             });
@@ -146,8 +147,8 @@ impl JointStates {
         }
         let mut states = Self {
             recording: Recording::open(paths, Wanted { names })?,
-            row: Row::new(columns.len(), sources.len()),
-            ahead: Row::new(columns.len(), sources.len()),
+            row: StateRow::new(columns.len(), sources.len()),
+            ahead: StateRow::new(columns.len(), sources.len()),
             sources,
             times,
             columns,
@@ -160,74 +161,6 @@ impl JointStates {
         Ok(states)
     }
 
-    /// Names of the columns, the time's first.
-    pub(in crate::log) fn columns(&self) -> &[String] {
-        &self.columns
-    }
-
-    /// Goes on to the next row; false at the end.
-    pub(in crate::log) fn next(&mut self) -> Result<bool, LogError> {
-        std::mem::swap(&mut self.row, &mut self.ahead);
-        if !self.row.full {
-            // It is at the end for good.
-            self.ahead.clear();
-            return Ok(false);
-        }
-        self.begin()?;
-        self.incomplete += u64::from(self.row.sources.contains(&false));
-        Ok(true)
-    }
-
-    /// Time of the current row.
-    pub(in crate::log) fn stamp(&self) -> Stamped {
-        match self.row.exact {
-            Some(seconds) => Stamped::Seconds(seconds),
-            None => Stamped::Exact(Instant::from_ns(self.row.key)),
-        }
-    }
-
-    /// The number in a column of the current row; NaN where the messages had none.
-    pub(in crate::log) fn number(&self, column: usize) -> f64 {
-        self.row.values.get(column).copied().unwrap_or(f64::NAN)
-    }
-
-    /// What was left out, once the last row is read.
-    pub(in crate::log) fn warnings(&self) -> Vec<String> {
-        let mut out: Vec<String> = self.breaks();
-        if !self.other_topics.is_empty() {
-            let topics = list(self.other_topics.iter().map(String::as_str));
-            out.push(format!("{topics} hold no JointState and are left out"));
-        }
-        if self.unreadable > 0 {
-            out.push(format!(
-                "{} messages cannot be decoded and are left out",
-                self.unreadable
-            ));
-        }
-        if self.incomplete > 0 && self.sources.len() > 1 {
-            out.push(format!(
-                "{} rows have no message of one of the topics at their time, and no numbers there",
-                self.incomplete
-            ));
-        }
-        out
-    }
-
-    /// Where files break off, once that is known.
-    pub(in crate::log) fn breaks(&self) -> Vec<String> {
-        let broken = self.recording.broken.iter();
-        broken
-            .map(|(path, broken)| {
-                format!(
-                    "{} breaks off {} ({}): everything before is used",
-                    escape(&source::file_name(path)),
-                    broken.place,
-                    escape(&broken.reason)
-                )
-            })
-            .collect()
-    }
-
     /// Reads messages into `row`, or the row ahead of it, until that has begun.
     fn begin(&mut self) -> Result<(), LogError> {
         self.ahead.clear();
@@ -236,24 +169,24 @@ impl JointStates {
                 return Ok(());
             };
             let (head, topic) = (message.head, message.topic);
-            if let Some((schema, decoder)) = &mut self.times
+            if let Some((schema, reader)) = &mut self.times
                 && topic.name == TIMES
                 && *topic.schema == *schema
             {
                 let mut value = [Value::Absent];
-                let read = decoder.read(message.data, &mut value);
+                let read = reader.read(message.data, &mut value);
                 if let (Ok(()), Some(t)) = (read, value[0].number()) {
                     self.exact = Some((head.log_ns, t));
                 }
                 continue;
             }
-            let is = |s: &Source| s.topic == topic.name && s.schema == *topic.schema;
+            let is = |s: &StateTopic| s.topic == topic.name && s.schema == *topic.schema;
             let Some(at) = self.sources.iter().position(is) else {
                 self.unreadable += 1;
                 continue;
             };
             let one = &mut self.sources[at];
-            if one.decoder.read(message.data, &mut one.values).is_err() {
+            if one.reader.read(message.data, &mut one.values).is_err() {
                 self.unreadable += 1;
                 continue;
             }
@@ -281,9 +214,69 @@ impl JointStates {
     }
 }
 
-impl Source {
+impl Rows for JointStates {
+    fn names(&self) -> &[String] {
+        &self.columns
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        std::mem::swap(&mut self.row, &mut self.ahead);
+        if !self.row.full {
+            // It is at the end for good.
+            self.ahead.clear();
+            return Ok(None);
+        }
+        self.begin()?;
+        self.incomplete += u64::from(self.row.sources.contains(&false));
+        Ok(Some(match self.row.exact {
+            Some(seconds) => Stamped::Seconds(seconds),
+            None => Stamped::Exact(Instant::from_ns(self.row.key)),
+        }))
+    }
+
+    fn logged(&self, column: usize) -> Option<f64> {
+        self.row.values.get(column).copied()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out: Vec<String> = self.breaks();
+        if !self.other_topics.is_empty() {
+            let topics = list(self.other_topics.iter().map(String::as_str));
+            out.push(format!("{topics} hold no JointState and are left out"));
+        }
+        if self.unreadable > 0 {
+            out.push(format!(
+                "{} messages cannot be decoded and are left out",
+                self.unreadable
+            ));
+        }
+        if self.incomplete > 0 && self.sources.len() > 1 {
+            out.push(format!(
+                "{} rows have no message of one of the topics at their time, and no numbers there",
+                self.incomplete
+            ));
+        }
+        out
+    }
+
+    fn breaks(&self) -> Vec<String> {
+        let broken = self.recording.broken.iter();
+        broken
+            .map(|(path, broken)| {
+                format!(
+                    "{} breaks off {} ({}): everything before is used",
+                    escape(&source::file_name(path)),
+                    broken.place,
+                    escape(&broken.reason)
+                )
+            })
+            .collect()
+    }
+}
+
+impl StateTopic {
     /// Instant of a message [ns].
-    fn key(&self, head: &Head) -> i128 {
+    fn key(&self, head: &MessageHead) -> i128 {
         let part = |index: usize| self.values.get(index).and_then(|v| v.integer());
         match (self.stamped, part(0), part(1)) {
             (true, Some(s), Some(ns)) => s * 1_000_000_000 + ns,
@@ -292,7 +285,7 @@ impl Source {
     }
 }
 
-impl Row {
+impl StateRow {
     fn new(columns: usize, sources: usize) -> Self {
         Self {
             values: vec![f64::NAN; columns],
@@ -310,16 +303,16 @@ impl Row {
 }
 
 /// The topic whose columns have no name of a topic before them.
-fn main_topic(found: &[Found]) -> String {
-    let last = |one: &&Found| one.topic.rsplit('/').next() == Some(JOINTS);
-    let both = |one: &&Found| one.arrays[0] && one.arrays[1];
+fn main_topic(found: &[FoundTopic]) -> String {
+    let last = |one: &&FoundTopic| one.topic.rsplit('/').next() == Some(JOINTS);
+    let both = |one: &&FoundTopic| one.arrays[0] && one.arrays[1];
     let named = found.iter().find(last);
     let best = named.or_else(|| found.iter().find(both)).or(found.first());
     best.map(|one| one.topic.clone()).unwrap_or_default()
 }
 
 /// Name of the column with one array's element.
-fn column(of: &Found, letter: &str, name: &str, main: &str) -> String {
+fn column(of: &FoundTopic, letter: &str, name: &str, main: &str) -> String {
     if of.topic == main && of.topic.trim_matches('/') != COLUMNS {
         return format!("{letter}_{name}");
     }
@@ -332,12 +325,16 @@ fn column(of: &Found, letter: &str, name: &str, main: &str) -> String {
     }
 }
 
-type Survey = (Vec<Found>, Vec<String>, Option<(Schema, Decoder)>);
+type Survey = (
+    Vec<FoundTopic>,
+    Vec<String>,
+    Option<(Schema, Box<dyn MessageReader>)>,
+);
 
 /// Looks at the beginning of a recording.
 fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
     let mut recording = Recording::open(paths, Wanted::default())?;
-    let mut found: Vec<Found> = Vec::new();
+    let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
     let mut messages = 0;
     while messages < LOOKED_AT
@@ -351,10 +348,10 @@ fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         let at = match known {
             Some(at) => at,
             None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
-                let Ok(probe) = Decoder::new(schema, &probes()) else {
+                let Ok(probe) = reader_of(schema, &probes()) else {
                     continue;
                 };
-                found.push(Found {
+                found.push(FoundTopic {
                     topic: topic.clone(),
                     schema: schema.clone(),
                     probe,
@@ -367,8 +364,8 @@ fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
             }
             None => {
                 if topic == TIMES && schema.name.ends_with("Float64") && times.is_none() {
-                    let decoder = Decoder::new(schema, &[vec![Path::parse("data")]]);
-                    times = decoder.ok().map(|decoder| (schema.clone(), decoder));
+                    let reader = reader_of(schema, &[vec![Path::parse("data")]]);
+                    times = reader.ok().map(|reader| (schema.clone(), reader));
                 }
                 continue;
             }
@@ -402,7 +399,7 @@ fn probes() -> Vec<Vec<Path>> {
     fields
 }
 
-impl Found {
+impl FoundTopic {
     fn look(&mut self, data: &[u8]) {
         if self.looked_at >= OF_TOPIC {
             return;

@@ -9,8 +9,7 @@ use std::path::PathBuf;
 
 use super::delay::Delay;
 use crate::log::layout::Messages;
-use crate::log::row::Stamped;
-use crate::log::time::Instant;
+use crate::log::time::{Instant, Stamped};
 
 /// Rows that wait for their torque at most.
 const WAITING: usize = 1 << 14;
@@ -49,19 +48,11 @@ impl Default for Sample {
     }
 }
 
-impl Sample {
-    fn instant(&self) -> Instant {
-        match self.stamp {
-            Stamped::Exact(instant) => instant,
-            Stamped::Seconds(seconds) => Instant::default().plus(seconds),
-        }
-    }
-}
-
 /// Rows and torques on their way to each other.
 #[derive(Debug)]
 pub(super) struct Pairing {
-    held: bool,
+    /// Torques hold from message to message.
+    zero_order_hold: bool,
     delay_s: f64,
     waiting: VecDeque<Sample>,
     torques: VecDeque<(Instant, Vec<f64>)>,
@@ -83,7 +74,7 @@ pub(super) struct Pairing {
 impl Pairing {
     pub(super) fn new(messages: &Messages) -> Self {
         Self {
-            held: messages.torque_held,
+            zero_order_hold: messages.zero_order_hold,
             delay_s: messages.torque_delay_s,
             waiting: VecDeque::new(),
             torques: VecDeque::new(),
@@ -126,7 +117,7 @@ impl Pairing {
 
     /// Torques, on their own clock.
     pub(super) fn add_torques(&mut self, sample: &mut Sample) {
-        let t = sample.instant().plus(-self.delay_s);
+        let t = sample.stamp.instant().plus(-self.delay_s);
         if let Some((before, _)) = self.torques.back() {
             if t <= *before {
                 self.disordered += 1;
@@ -148,7 +139,7 @@ impl Pairing {
     /// Pairs every waiting row that has torques at or after its time.
     fn pair(&mut self) {
         while let (Some(row), Some((last, _))) = (self.waiting.front(), self.torques.back()) {
-            let t = row.instant();
+            let t = row.stamp.instant();
             if t > *last {
                 return;
             }
@@ -192,7 +183,7 @@ impl Pairing {
         to.clear();
         let share = t.since(*before_t) / step;
         let pairs = before_tau.iter().zip(after_tau);
-        to.extend(pairs.map(|(before, after)| match self.held {
+        to.extend(pairs.map(|(before, after)| match self.zero_order_hold {
             true => *before,
             false => before + share * (after - before),
         }));
@@ -211,7 +202,7 @@ impl Pairing {
 
     /// What the user should know, topics named.
     pub(super) fn warnings(&self, positions: &str, torques: &str) -> Vec<String> {
-        let how = match self.held {
+        let how = match self.zero_order_hold {
             true => "held from message to message",
             false => "interpolated linearly",
         };

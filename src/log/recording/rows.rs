@@ -2,17 +2,19 @@
 
 use std::fmt;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::container::{Recording, Wanted};
-use super::decode::{Decoder, Schema};
-use super::fields::{Fields, TimeSource};
+use super::encoding::reader_of;
+use super::fields::{RobotFields, TimeSource};
+use super::message::{MessageReader, Schema, Wanted};
 use super::pairing::{Pairing, Sample};
+use super::parts::{Message, Recording};
 use super::survey::{self, Choice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
-use crate::log::row::Stamped;
+use crate::log::rows::Rows;
+use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
 
 /// The rows of a recording.
@@ -23,28 +25,29 @@ pub(in crate::log) struct MessageRows {
     row: Sample,
     previous: Sample,
     messages: u64,
-    notes: Vec<String>,
+    /// Names of the columns: of the time, and of what the samples hold.
+    names: Vec<String>,
 }
 
 /// How messages become samples.
 struct Reading {
     layout: Layout,
-    fields: Fields,
+    fields: RobotFields,
     choice: Choice,
-    decoders: Vec<(Arc<Schema>, Result<Decoder, String>)>,
+    readers: Vec<(Arc<Schema>, Result<Box<dyn MessageReader>, String>)>,
     values: Vec<Value>,
     /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
-    incomplete: Count,
-    unreadable: Count,
+    incomplete: LeftOut,
+    unreadable: LeftOut,
 }
 
 #[derive(Default)]
-struct Count {
+struct LeftOut {
     count: u64,
     first: String,
 }
 
-impl Count {
+impl LeftOut {
     fn add(&mut self, reason: impl FnOnce() -> String) {
         if self.count == 0 {
             self.first = reason();
@@ -63,7 +66,7 @@ impl fmt::Debug for MessageRows {
 
 /// What a message holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum Holds {
     Whole,
     Positions,
     Torques,
@@ -78,72 +81,37 @@ impl MessageRows {
         let (choice, layout) = survey::choose(paths, layout)?;
         let mut names = vec![choice.topic.clone()];
         names.extend(choice.torque_topic.clone());
-        let fields = Fields::new(&layout);
+        let fields = RobotFields::new(&layout);
         let pairing = choice
             .torque_topic
             .is_some()
             .then(|| Pairing::new(&layout.messages));
+        let velocities = match choice.velocities {
+            true => &layout.velocities[..],
+            false => &[],
+        };
+        let channels = (layout.positions.iter())
+            .chain(&layout.torques)
+            .chain(velocities);
+        let channels = channels.map(|channel| channel.column.clone());
         let rows = Self {
+            names: std::iter::once("t".to_owned()).chain(channels).collect(),
             recording: Recording::open(paths, Wanted { names })?,
             pairing,
             row: Sample::default(),
             previous: Sample::default(),
             messages: 0,
-            notes: choice.notes.clone(),
             reading: Reading {
                 values: vec![Value::Absent; fields.paths.len()],
                 layout: layout.clone(),
                 fields,
                 choice,
-                decoders: Vec::new(),
-                incomplete: Count::default(),
-                unreadable: Count::default(),
+                readers: Vec::new(),
+                incomplete: LeftOut::default(),
+                unreadable: LeftOut::default(),
             },
         };
         Ok((rows, layout))
-    }
-
-    /// Goes on to the next row; its time, or `None` at the end.
-    pub(in crate::log) fn next(&mut self) -> Result<Option<Stamped>, LogError> {
-        std::mem::swap(&mut self.row, &mut self.previous);
-        loop {
-            if let Some(pairing) = &mut self.pairing
-                && pairing.take(&mut self.row)
-            {
-                return Ok(Some(self.row.stamp));
-            }
-            let Some(message) = self.recording.next()? else {
-                return Ok(None);
-            };
-            self.messages += 1;
-            let Some(part) = self.reading.read(
-                message.path,
-                &message.topic.name,
-                &message.topic.schema,
-                message.head,
-                message.data,
-                &mut self.row,
-            )?
-            else {
-                continue;
-            };
-            match (&mut self.pairing, part) {
-                (None, _) | (_, Part::Whole) => return Ok(Some(self.row.stamp)),
-                (Some(pairing), Part::Positions) => pairing.add_positions(&mut self.row),
-                (Some(pairing), Part::Torques) => pairing.add_torques(&mut self.row),
-            }
-        }
-    }
-
-    /// Appends positions, torques and velocities of the current row to the block.
-    pub(in crate::log) fn append(&self, block: &mut Block) -> Result<(), LogError> {
-        let layout = &self.reading.layout;
-        self.append_part(&layout.positions, &self.row.q, &mut block.q)?;
-        self.append_part(&layout.torques, &self.row.tau, &mut block.tau)?;
-        if self.has_velocities() {
-            self.append_part(&layout.velocities, &self.row.dq, &mut block.dq)?;
-        }
-        Ok(())
     }
 
     fn append_part(
@@ -166,20 +134,57 @@ impl MessageRows {
         }
         Ok(())
     }
+}
 
-    pub(in crate::log) fn has_velocities(&self) -> bool {
+impl Rows for MessageRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        std::mem::swap(&mut self.row, &mut self.previous);
+        loop {
+            if let Some(pairing) = &mut self.pairing
+                && pairing.take(&mut self.row)
+            {
+                return Ok(Some(self.row.stamp));
+            }
+            let Some(message) = self.recording.next()? else {
+                return Ok(None);
+            };
+            self.messages += 1;
+            let Some(part) = self.reading.read(&message, &mut self.row) else {
+                continue;
+            };
+            match (&mut self.pairing, part) {
+                (None, _) | (_, Holds::Whole) => return Ok(Some(self.row.stamp)),
+                (Some(pairing), Holds::Positions) => pairing.add_positions(&mut self.row),
+                (Some(pairing), Holds::Torques) => pairing.add_torques(&mut self.row),
+            }
+        }
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let layout = &self.reading.layout;
+        self.append_part(&layout.positions, &self.row.q, &mut block.q)?;
+        self.append_part(&layout.torques, &self.row.tau, &mut block.tau)?;
+        if self.has_velocities() {
+            self.append_part(&layout.velocities, &self.row.dq, &mut block.dq)?;
+        }
+        Ok(())
+    }
+
+    fn has_velocities(&self) -> bool {
         self.reading.choice.velocities
     }
 
-    /// Whether the current row equals the one before it.
-    pub(in crate::log) fn repeats(&self) -> bool {
+    fn repeats(&self) -> bool {
         let (a, b) = (&self.row, &self.previous);
         a.stamp == b.stamp && a.q == b.q && a.tau == b.tau && a.dq == b.dq
     }
 
-    /// File, topic and message of the current row.
     #[cold]
-    pub(in crate::log) fn place(&self) -> String {
+    fn place(&self) -> String {
         format!(
             "{}: message {} ({})",
             self.row.file,
@@ -188,31 +193,27 @@ impl MessageRows {
         )
     }
 
-    /// What to do about a time that is not later than the one before, `t` being that of the row.
     #[cold]
-    pub(in crate::log) fn clock_remedy(&self, t: f64) -> String {
+    fn clock_remedy(&self, t: f64) -> Option<String> {
         let part = format!("use the part before it: FILE@0..{t}s");
-        match self.reading.choice.time {
+        Some(match self.reading.choice.time {
             TimeSource::Log => part,
             _ => format!(
                 "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
             ),
-        }
+        })
     }
 
-    /// Number of the message in its file.
-    pub(in crate::log) fn number(&self) -> u64 {
+    fn number(&self) -> u64 {
         self.row.number
     }
 
-    /// A number of the current row as logged, not scaled: positions, then torques, then velocities.
-    pub(in crate::log) fn logged(&self, index: usize) -> f64 {
+    fn logged(&self, column: usize) -> Option<f64> {
         let mut numbers = (self.row.q.iter()).chain(&self.row.tau).chain(&self.row.dq);
-        numbers.nth(index).copied().unwrap_or(f64::NAN)
+        numbers.nth(column.checked_sub(1)?).copied()
     }
 
-    /// Where files break off, once that is known.
-    pub(in crate::log) fn breaks(&self) -> Vec<String> {
+    fn breaks(&self) -> Vec<String> {
         let broken = self.recording.broken.iter();
         broken
             .map(|(path, broken)| {
@@ -227,9 +228,8 @@ impl MessageRows {
             .collect()
     }
 
-    /// What was left out or chosen on the way.
-    pub(in crate::log) fn warnings(&self) -> Vec<String> {
-        let mut out = self.notes.clone();
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.reading.choice.notes.clone();
         let reading = &self.reading;
         out.extend(self.breaks());
         let topic = escape(&reading.choice.topic);
@@ -254,50 +254,49 @@ impl MessageRows {
 
 impl Reading {
     /// Reads one message into a sample; `None` where it is left out.
-    fn read(
-        &mut self,
-        path: &Path,
-        topic: &str,
-        schema: &Arc<Schema>,
-        head: super::container::Head,
-        data: &[u8],
-        sample: &mut Sample,
-    ) -> Result<Option<Part>, LogError> {
+    fn read(&mut self, message: &Message<'_>, sample: &mut Sample) -> Option<Holds> {
+        let Message {
+            path,
+            topic,
+            head,
+            data,
+        } = message;
+        let (schema, topic) = (&topic.schema, &topic.name);
         let place = || format!("message {} of {}", head.number, escape(topic));
-        let known = self.decoders.iter().position(|(s, _)| s == schema);
+        let known = self.readers.iter().position(|(s, _)| s == schema);
         let index = known.unwrap_or_else(|| {
-            let decoder = Decoder::new(schema, &self.fields.paths);
-            self.decoders.push((schema.clone(), decoder));
-            self.decoders.len() - 1
+            let reader = reader_of(schema, &self.fields.paths);
+            self.readers.push((schema.clone(), reader));
+            self.readers.len() - 1
         });
-        let read = match &mut self.decoders[index].1 {
-            Ok(decoder) => decoder.read(data, &mut self.values),
+        let read = match &mut self.readers[index].1 {
+            Ok(reader) => reader.read(data, &mut self.values),
             Err(reason) => Err(reason.clone()),
         };
         if let Err(reason) = read {
             self.unreadable
                 .add(|| format!("{}: {}", place(), escape(&reason)));
-            return Ok(None);
+            return None;
         }
         let (fields, values) = (&self.fields, &self.values);
-        let Some(stamp) = fields.stamp(values, &head, self.choice.time) else {
+        let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
             self.incomplete.add(|| format!("{}: no time", place()));
-            return Ok(None);
+            return None;
         };
         let part = match &self.choice.torque_topic {
-            None => Part::Whole,
-            Some(torques) if torques == topic => Part::Torques,
-            Some(_) => Part::Positions,
+            None => Holds::Whole,
+            Some(torques) if torques == topic => Holds::Torques,
+            Some(_) => Holds::Positions,
         };
         let none = || 0..0;
         let (q, tau, dq): (Range<usize>, Range<usize>, Range<usize>) = match part {
-            Part::Whole => (
+            Holds::Whole => (
                 fields.positions.clone(),
                 fields.torques.clone(),
                 fields.velocities.clone(),
             ),
-            Part::Positions => (fields.positions.clone(), none(), fields.velocities.clone()),
-            Part::Torques => (none(), fields.torques.clone(), none()),
+            Holds::Positions => (fields.positions.clone(), none(), fields.velocities.clone()),
+            Holds::Torques => (none(), fields.torques.clone(), none()),
         };
         let dq = if self.choice.velocities { dq } else { none() };
         let parts = [
@@ -314,17 +313,17 @@ impl Reading {
                         let path = path.map_or("", |path| path.text());
                         format!("{} has no `{}`", place(), escape(path))
                     });
-                    return Ok(None);
+                    return None;
                 };
                 to.push(number);
             }
         }
         sample.stamp = stamp;
         sample.number = head.number;
-        if sample.path != path {
-            sample.path = path.to_owned();
+        if sample.path != *path {
+            sample.path = (*path).to_owned();
             sample.file = source::shown(path);
         }
-        Ok(Some(part))
+        Some(part)
     }
 }

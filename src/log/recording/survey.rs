@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::container::{Recording, Wanted};
-use super::decode::Decoder;
-use super::fields::{Fields, TimeSource};
+use super::encoding::reader_of;
+use super::fields::{RobotFields, TimeSource};
+use super::message::{MessageReader, Wanted};
+use super::parts::Recording;
 use super::value::Value;
 use crate::log::layout::Layout;
 use crate::log::names::{escape, list, nearest};
@@ -33,7 +34,7 @@ pub(super) struct Choice {
 struct Candidate {
     name: String,
     kind: String,
-    decoder: Result<Decoder, String>,
+    reader: Result<Box<dyn MessageReader>, String>,
     tries: u32,
     positions: bool,
     torques: bool,
@@ -43,37 +44,38 @@ struct Candidate {
     velocities: bool,
     header: bool,
     time: bool,
-    /// Fields that no message held so far.
+    /// RobotFields that no message held so far.
     missing: Vec<bool>,
     names: Vec<String>,
 }
 
 impl Candidate {
     /// Looks at one message; whether it shows anything new.
-    fn look(&mut self, data: &[u8], fields: &Fields, values: &mut [Value]) -> bool {
+    fn look(&mut self, data: &[u8], fields: &RobotFields, values: &mut [Value]) -> bool {
         let before = self.shown();
         self.tries += 1;
-        let Ok(decoder) = &mut self.decoder else {
+        let Ok(reader) = &mut self.reader else {
             return false;
         };
-        if let Err(reason) = decoder.read(data, values) {
+        if let Err(reason) = reader.read(data, values) {
             if self.tries >= TRIES && self.names.is_empty() {
-                self.decoder = Err(format!("its messages cannot be read: {reason}"));
+                self.reader = Err(format!("its messages cannot be read: {reason}"));
             }
             return false;
         }
         if self.names.is_empty() {
-            self.names = decoder.names(data);
+            self.names = reader.names(data);
         }
         for (missing, value) in self.missing.iter_mut().zip(&*values) {
             *missing &= *value == Value::Absent;
         }
         // A robot without positions (or torques) to read finds them everywhere.
-        let all = |range| Fields::all(values, range) || range.is_empty();
+        let all = |range| RobotFields::all(values, range) || range.is_empty();
         let (q, tau) = (all(&fields.positions), all(&fields.torques));
         if q {
             let first = !self.positions;
-            self.velocities = (self.velocities || first) && Fields::all(values, &fields.velocities);
+            self.velocities =
+                (self.velocities || first) && RobotFields::all(values, &fields.velocities);
         }
         self.positions |= q && !fields.positions.is_empty();
         self.torques |= tau && !fields.torques.is_empty();
@@ -95,11 +97,11 @@ impl Candidate {
 /// # Errors
 /// No topic with the robot's channels, or several; a file that cannot be read.
 pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layout), LogError> {
-    let fields = Fields::new(layout);
+    let fields = RobotFields::new(layout);
     let found = survey(paths, layout, &fields)?;
     let chosen = pick(&found, layout, &fields);
     if let (Err(_), Some(other)) = (&chosen, &layout.otherwise) {
-        let other_fields = Fields::new(other);
+        let other_fields = RobotFields::new(other);
         let others = survey(paths, other, &other_fields)?;
         if let Ok(choice) = pick(&others, other, &other_fields) {
             return Ok((choice, (**other).clone()));
@@ -116,7 +118,11 @@ pub(super) fn choose(paths: &[PathBuf], layout: &Layout) -> Result<(Choice, Layo
 }
 
 /// Looks at the messages of every topic until the channels are found and no other topic has them.
-fn survey(paths: &[PathBuf], layout: &Layout, fields: &Fields) -> Result<Vec<Candidate>, LogError> {
+fn survey(
+    paths: &[PathBuf],
+    layout: &Layout,
+    fields: &RobotFields,
+) -> Result<Vec<Candidate>, LogError> {
     let mut recording = Recording::open(paths, Wanted::default())?;
     let mut found: Vec<Candidate> = Vec::new();
     let mut values = vec![Value::Absent; fields.paths.len()];
@@ -128,7 +134,7 @@ fn survey(paths: &[PathBuf], layout: &Layout, fields: &Fields) -> Result<Vec<Can
                 found.push(Candidate {
                     name: message.topic.name.clone(),
                     kind: message.topic.schema.name.clone(),
-                    decoder: Decoder::new(&message.topic.schema, &fields.paths),
+                    reader: reader_of(&message.topic.schema, &fields.paths),
                     tries: 0,
                     positions: false,
                     torques: false,
@@ -182,7 +188,11 @@ fn survey(paths: &[PathBuf], layout: &Layout, fields: &Fields) -> Result<Vec<Can
 }
 
 /// Chooses among the topics; else what is wrong and what to do.
-fn pick(found: &[Candidate], layout: &Layout, fields: &Fields) -> Result<Choice, (String, String)> {
+fn pick(
+    found: &[Candidate],
+    layout: &Layout,
+    fields: &RobotFields,
+) -> Result<Choice, (String, String)> {
     let asked = &layout.messages;
     let one = |holds: &dyn Fn(&Candidate) -> bool, key: &str, what: &str| {
         let mut holding = found.iter().filter(|c| holds(c));
@@ -233,7 +243,7 @@ fn pick(found: &[Candidate], layout: &Layout, fields: &Fields) -> Result<Choice,
     let all = |holds: &dyn Fn(&Candidate) -> bool| holds(first) && second.is_none_or(holds);
     let any = |holds: &dyn Fn(&Candidate) -> bool| holds(first) || second.is_some_and(holds);
     let mut notes = Vec::new();
-    let time = match Fields::asked(asked.stamp) {
+    let time = match RobotFields::asked(asked.stamp) {
         Some(TimeSource::Header) if !all(&|c| c.header) => {
             return Err((
                 format!(
@@ -268,7 +278,7 @@ fn pick(found: &[Candidate], layout: &Layout, fields: &Fields) -> Result<Choice,
 fn missing(
     found: &[Candidate],
     layout: &Layout,
-    fields: &Fields,
+    fields: &RobotFields,
     positions: Option<&Candidate>,
 ) -> (String, String) {
     let asked = &layout.messages;
@@ -300,14 +310,14 @@ fn missing(
     let best = found
         .iter()
         .filter(|c| wanted.as_ref().is_none_or(|name| *name == c.name))
-        .max_by_key(|c| (c.decoder.is_ok(), count(c), c.kind.contains("JointState")));
+        .max_by_key(|c| (c.reader.is_ok(), count(c), c.kind.contains("JointState")));
     let Some(best) = best else {
         return (
             "no topic holds the robot's channels".to_owned(),
             String::new(),
         );
     };
-    if let Err(reason) = &best.decoder {
+    if let Err(reason) = &best.reader {
         return (
             format!(
                 "messages of {} ({}) cannot be read: {}",

@@ -4,17 +4,40 @@
 //! that is asked for.
 
 use super::cursor::{Cursor, Encoding, Malformed, Span};
-use super::msg::{Definition, DefinitionError, Field, Kind};
-use super::path::Path;
-use super::plan::{By, Node, Plan, Slot};
-use super::value::Value;
+use super::msg::{Definition, DefinitionError, ElementType, Field};
+use super::plan::{By, Node, Slot, Walkthrough};
+use crate::log::recording::message::{MessageReader, Schema};
+use crate::log::recording::path::Path;
+use crate::log::recording::value::Value;
+
+/// Messages in CDR, and in the packed form of ROS 1, by their `.msg` definitions.
+pub(super) fn open(
+    schema: &Schema,
+    fields: &[Vec<Path>],
+) -> Option<Result<Box<dyn MessageReader>, String>> {
+    let encoding = match (schema.encoding.as_str(), schema.language.as_str()) {
+        ("cdr", "ros2msg" | "") => Encoding::Cdr,
+        ("ros1", "ros1msg" | "") => Encoding::Ros1,
+        _ => return None,
+    };
+    let reader = || -> Result<Box<dyn MessageReader>, String> {
+        let text = std::str::from_utf8(&schema.text)
+            .map_err(|_| "its definition is no text".to_owned())?;
+        if text.contains("\nIDL:") || text.starts_with("IDL:") {
+            return Err("its definition is IDL, which is not read".to_owned());
+        }
+        let definition = Definition::parse(&schema.name, text).map_err(|e| e.to_string())?;
+        Ok(Box::new(CdrReader::new(&definition, encoding, fields).0))
+    };
+    Some(reader())
+}
 
 /// Reads the numbers of some fields out of the messages of one type.
 #[derive(Debug, Clone)]
 pub struct CdrReader {
     messages: Vec<Vec<Field>>,
     encoding: Encoding,
-    plan: Plan,
+    plan: Walkthrough,
     /// Place and number of the elements of each array that is asked for.
     arrays: Vec<Option<Span>>,
     /// Places of the texts in each list of names.
@@ -50,12 +73,8 @@ impl CdrReader {
 
     /// Plans the reading of `fields`: for each the paths it may have, the first that leads to a
     /// number is taken. Says for each whether one does.
-    pub(crate) fn new(
-        definition: &Definition,
-        encoding: Encoding,
-        fields: &[Vec<Path>],
-    ) -> (Self, Vec<bool>) {
-        let mut plan = Plan::default();
+    fn new(definition: &Definition, encoding: Encoding, fields: &[Vec<Path>]) -> (Self, Vec<bool>) {
+        let mut plan = Walkthrough::default();
         let mut found = Vec::with_capacity(fields.len());
         for (output, paths) in fields.iter().enumerate() {
             let mut steps = paths.iter().map(|path| &path.steps);
@@ -76,7 +95,7 @@ impl CdrReader {
     ///
     /// # Errors
     /// [`Malformed`]: the bytes are no message of this type.
-    pub(crate) fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), Malformed> {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), Malformed> {
         out.fill(Value::Absent);
         if out.len() != self.outputs {
             return Ok(());
@@ -118,7 +137,7 @@ impl CdrReader {
     }
 
     /// Names in the lists of the message that was read last, for messages to the user.
-    pub(crate) fn names(&self, data: &[u8]) -> Vec<String> {
+    fn names(&self, data: &[u8]) -> Vec<String> {
         let body = match self.encoding {
             Encoding::Cdr => data.get(4..).unwrap_or_default(),
             Encoding::Ros1 => data,
@@ -128,6 +147,16 @@ impl CdrReader {
             .filter_map(|span| body.get(span.start..span.start + span.count))
             .map(|bytes| String::from_utf8_lossy(bytes).into_owned())
             .collect()
+    }
+}
+
+impl MessageReader for CdrReader {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.read(data, out).map_err(|error| error.to_string())
+    }
+
+    fn names(&self, data: &[u8]) -> Vec<String> {
+        self.names(data)
     }
 }
 
@@ -181,7 +210,7 @@ impl Walk<'_> {
     ) -> Result<(), Malformed> {
         let count = cursor.count(field.count)?;
         match field.kind {
-            Kind::Primitive(kind) => {
+            ElementType::Primitive(kind) => {
                 let span = cursor.primitives(count, kind)?;
                 match slot {
                     Some(Slot::Number(outputs)) => {
@@ -194,7 +223,7 @@ impl Walk<'_> {
                     _ => {}
                 }
             }
-            Kind::String => {
+            ElementType::String => {
                 for _ in 0..count {
                     let text = cursor.text()?;
                     if let Some(Slot::List(list)) = slot {
@@ -202,14 +231,14 @@ impl Walk<'_> {
                     }
                 }
             }
-            Kind::WideString => {
+            ElementType::WideString => {
                 for _ in 0..count {
                     let length = cursor.length()?;
                     let bytes = length.checked_mul(2).ok_or_else(|| cursor.short())?;
                     cursor.pass(bytes)?;
                 }
             }
-            Kind::Message(message) => {
+            ElementType::Message(message) => {
                 let mut elements = match slot {
                     Some(Slot::Elements(elements)) => elements.as_slice(),
                     _ => &[],

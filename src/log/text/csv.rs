@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use csv::ByteRecord;
 
-use super::content::{Bytes, Content};
-use super::head;
-use super::layout::Layout;
-use super::time::Instant;
-use super::{LogError, escape, number, source};
+use super::{head, number};
+use crate::log::content::{Bytes, Content};
+use crate::log::layout::Layout;
+use crate::log::rows::Strictness;
+use crate::log::time::Instant;
+use crate::log::{LogError, escape, source};
 
 /// Bytes that one row may take.
 const LONGEST_ROW: usize = 1 << 20;
@@ -48,9 +49,9 @@ impl Read for Guard {
     }
 }
 
-/// The rows of a text log.
+/// A text log: its records one by one.
 #[derive(Debug)]
-pub(super) struct Rows {
+pub(super) struct TextFile {
     path: PathBuf,
     reader: csv::Reader<Guard>,
     record: ByteRecord,
@@ -62,11 +63,18 @@ pub(super) struct Rows {
     decimal_comma: bool,
     /// The record is a row that was not handed out yet.
     ahead: bool,
+    strictness: Strictness,
+    malformed: u64,
 }
 
-impl Rows {
+impl TextFile {
     /// Reads the header of a text log.
-    pub(super) fn new(path: &Path, content: Content, layout: &Layout) -> Result<Self, LogError> {
+    pub(super) fn open(
+        path: &Path,
+        content: Content,
+        layout: &Layout,
+        strictness: Strictness,
+    ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
         let found = head::look_at(path, begin, layout.delimiter, layout.by_number())?;
@@ -90,6 +98,8 @@ impl Rows {
             runs: found.spaces.then(Vec::new),
             decimal_comma: found.delimiter != b',',
             ahead: found.headerless,
+            strictness,
+            malformed: 0,
         };
         if let Some((names, _)) = found.header_in_comment {
             let parts = head::split(&names, found.delimiter, found.spaces);
@@ -132,8 +142,13 @@ impl Rows {
             if !self.advance()? {
                 return Ok(false);
             }
-            if self.fields() == self.header.len() || self.width_is_right()? {
+            if self.fields() == self.header.len() || self.is_row() {
                 return Ok(true);
+            }
+            match self.strictness {
+                _ if self.is_blank() => {}
+                Strictness::Record => self.malformed += 1,
+                Strictness::Refuse => return Err(self.wrong_width()),
             }
         }
     }
@@ -172,17 +187,19 @@ impl Rows {
         }
     }
 
-    /// Whether a row that has another width than the header is one; false for a line of blanks.
+    /// Whether a row that has another width than the header is one: more fields, all of them blank.
     #[cold]
-    fn width_is_right(&self) -> Result<bool, LogError> {
-        if self.is_blank() {
-            return Ok(false);
-        }
+    fn is_row(&self) -> bool {
         let (found, expected) = (self.fields(), self.header.len());
-        if found > expected && (expected..found).all(|index| self.is_blank_field(index)) {
-            return Ok(true);
-        }
-        Err(LogError::Fields {
+        found > expected
+            && !self.is_blank()
+            && (expected..found).all(|index| self.is_blank_field(index))
+    }
+
+    #[cold]
+    fn wrong_width(&self) -> LogError {
+        let (found, expected) = (self.fields(), self.header.len());
+        LogError::Fields {
             file: self.file(),
             line: self.line(),
             found,
@@ -192,14 +209,15 @@ impl Rows {
             } else {
                 "the line is cut off or a field is missing: complete or delete it"
             },
-        })
+        }
     }
 
     fn is_blank(&self) -> bool {
         (0..self.fields()).all(|index| self.is_blank_field(index))
     }
 
-    fn is_blank_field(&self, index: usize) -> bool {
+    /// Whether a field of the current row is empty; false where there is none.
+    pub(super) fn is_blank_field(&self, index: usize) -> bool {
         self.field(index)
             .is_some_and(|field| field.trim_ascii().is_empty())
     }
@@ -220,28 +238,15 @@ impl Rows {
         }
     }
 
-    /// `factor` x the number in a column of the current row + `offset`, finite.
+    /// The number in a column of the current row, NaN and infinities included.
     #[inline]
-    pub(super) fn scaled(&self, column: usize, factor: f64, offset: f64) -> Result<f64, LogError> {
-        match self.field(column).and_then(number::parse) {
-            Some(value) if (value * factor + offset).is_finite() => Ok(value * factor + offset),
-            _ => Err(self.no_number(column)),
-        }
+    pub(super) fn number(&self, column: usize) -> Option<f64> {
+        self.field(column).and_then(number::parse)
     }
 
-    /// The number in a column of the current row, NaN and infinities included; NaN for an empty
-    /// field, `None` for words.
-    #[inline]
-    pub(super) fn lenient(&self, column: usize) -> Option<f64> {
-        let field = self.field(column).unwrap_or_default();
-        match number::parse(field) {
-            None if field.trim_ascii().is_empty() => Some(f64::NAN),
-            number => number,
-        }
-    }
-
+    /// Why a column of the current row holds no number that can be used.
     #[cold]
-    fn no_number(&self, column: usize) -> LogError {
+    pub(super) fn no_number(&self, column: usize) -> LogError {
         let field = self.field(column).unwrap_or_default();
         let text = String::from_utf8_lossy(field);
         let text = text.trim();
@@ -275,11 +280,9 @@ impl Rows {
     }
 
     /// The instant in a column of the current row: a date, or a number in units of 10^`power` s.
-    pub(super) fn instant(&self, column: usize, power: i32) -> Result<Instant, LogError> {
-        let field = self.field(column).unwrap_or_default();
-        Instant::parse_decimal(field, power)
-            .or_else(|| Instant::parse_iso(field))
-            .ok_or_else(|| self.no_number(column))
+    pub(super) fn instant(&self, column: usize, power: i32) -> Option<Instant> {
+        let field = self.field(column)?;
+        Instant::parse_decimal(field, power).or_else(|| Instant::parse_iso(field))
     }
 
     /// Whether a column of the current row holds a date.
@@ -291,6 +294,11 @@ impl Rows {
     /// Whether the current row equals the one before it, byte for byte.
     pub(super) fn repeats(&self) -> bool {
         self.record == self.previous
+    }
+
+    /// Rows that were passed over because of their width.
+    pub(super) fn malformed(&self) -> u64 {
+        self.malformed
     }
 
     /// The file for a message.

@@ -1,11 +1,11 @@
 //! Which numbers are taken from the messages of one type: field paths resolved against its definition.
 
-use super::msg::{Count, Field, Kind, Primitive};
-use super::path::Step;
+use super::msg::{Count, ElementType, Field, Primitive};
+use crate::log::recording::path::Step;
 
 /// What is taken from a message, and where it goes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Plan {
+pub(super) struct Walkthrough {
     pub(super) root: Node,
     pub(super) picks: Vec<Pick>,
     /// Type of the elements of each array that is remembered.
@@ -73,7 +73,7 @@ enum End {
     Named(Vec<Hop>, String, Primitive),
 }
 
-impl Plan {
+impl Walkthrough {
     /// Adds the number at the end of a path to the plan; false where the path leads to none.
     pub(super) fn add(&mut self, messages: &[Vec<Field>], steps: &[Step], output: usize) -> bool {
         match route(messages, steps) {
@@ -147,12 +147,12 @@ fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
             Some(Step::Index(index)) => Some(*index),
             Some(Step::Field(digits)) => Some(digits.parse().ok()?),
             Some(Step::Named { list, value }) => {
-                let Kind::Primitive(kind) = field.kind else {
+                let ElementType::Primitive(kind) = field.kind else {
                     return None;
                 };
                 let list = outer.iter().rev().find_map(|(message, depth)| {
                     let (index, field) = find_field(&messages[*message], list)?;
-                    let texts = field.kind == Kind::String && field.count != Count::One;
+                    let texts = field.kind == ElementType::String && field.count != Count::One;
                     texts.then(|| [&hops[..*depth], &[Hop::Field(index)]].concat())
                 })?;
                 return steps.next().is_none().then(|| Route {
@@ -162,15 +162,15 @@ fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
             }
         };
         match field.kind {
-            Kind::String | Kind::WideString => return None,
-            Kind::Primitive(kind) => {
+            ElementType::String | ElementType::WideString => return None,
+            ElementType::Primitive(kind) => {
                 let end = match number {
                     None => End::Number,
                     Some(number) => End::Element(number, kind),
                 };
                 return steps.next().is_none().then_some(Route { hops, end });
             }
-            Kind::Message(message) => {
+            ElementType::Message(message) => {
                 hops.extend(number.map(Hop::Element));
                 inside = message;
                 outer.push((message, hops.len()));

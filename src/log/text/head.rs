@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::content::HEAD;
-use super::layout::Delimiter;
-use super::time::Instant;
-use super::{LogError, number, source};
+use super::number;
+use crate::log::content::HEAD;
+use crate::log::layout::Delimiter;
+use crate::log::time::Instant;
+use crate::log::{LogError, source};
 
 /// What the head of a file tells.
 pub(super) struct Head {

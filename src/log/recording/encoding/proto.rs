@@ -4,16 +4,46 @@
 //! leads to, and nothing is allocated. Of a field that stands there twice the last one counts.
 
 use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
-use super::path::{Path, Step};
-use super::value::Value;
 use super::wire::{Broken, Fields, Item, fixed, varint};
+use crate::log::recording::message::{MessageReader, Schema};
+use crate::log::recording::path::{Path, Step};
+use crate::log::recording::value::Value;
 
 /// Steps that a path may have.
 const LONGEST: usize = 16;
 
+/// Messages in protobuf, by the descriptor set that is their schema.
+pub(super) fn open(
+    schema: &Schema,
+    fields: &[Vec<Path>],
+) -> Option<Result<Box<dyn MessageReader>, String>> {
+    if (&*schema.encoding, &*schema.language) != ("protobuf", "protobuf") {
+        return None;
+    }
+    let reader = ProtoReader::new(&schema.name, &schema.text);
+    let fields = fields.to_vec();
+    Some(reader.map(|reader| Box::new(FieldReader { reader, fields }) as Box<_>))
+}
+
+/// Reads some fields of messages of one type.
+struct FieldReader {
+    reader: ProtoReader,
+    fields: Vec<Vec<Path>>,
+}
+
+impl MessageReader for FieldReader {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.reader.read(data, &self.fields, out)
+    }
+
+    fn names(&self, _: &[u8]) -> Vec<String> {
+        self.reader.names()
+    }
+}
+
 /// Reads messages of one type.
 #[derive(Debug, Clone)]
-pub(crate) struct ProtoReader {
+pub(super) struct ProtoReader {
     types: Types,
 }
 
@@ -32,7 +62,7 @@ impl ProtoReader {
     ///
     /// # Errors
     /// What is wrong with the set, or that it lacks the type.
-    pub(crate) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
+    pub(super) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
         let types = Types::parse(name, set)?;
         Ok(Self { types })
     }
@@ -41,7 +71,7 @@ impl ProtoReader {
     ///
     /// # Errors
     /// Bytes that are no message.
-    pub(crate) fn read(
+    pub(super) fn read(
         &self,
         data: &[u8],
         fields: &[Vec<Path>],
@@ -64,7 +94,7 @@ impl ProtoReader {
     }
 
     /// Names of the type's fields, for messages to the user.
-    pub(crate) fn names(&self) -> Vec<String> {
+    pub(super) fn names(&self) -> Vec<String> {
         let fields = self.types.messages.get(self.types.root);
         let fields = fields.map_or(&[][..], |root| &root.fields);
         fields.iter().map(|field| field.name.clone()).collect()

@@ -13,9 +13,8 @@ use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::TempDir;
 
-use super::container::{Break, Head, Topic, Wanted};
-use super::decode::Schema;
 use crate::log::content::{Compression, Content};
+use crate::log::recording::message::{Break, MessageFile, MessageHead, Schema, Topic, Wanted};
 use crate::log::{LogError, escape_whole, source};
 
 /// Messages that are asked of the database at once, and their bytes at which a page ends earlier.
@@ -31,7 +30,7 @@ const COPY: &str = "copy.db3";
 const LARGEST_RATIO: u64 = 256;
 
 /// A rosbag2 database that is being read.
-pub(super) struct BagFile {
+struct BagFile {
     connection: Connection,
     /// Folder of the copy that is read instead of the file, removed when reading ends.
     _copy: Option<TempDir>,
@@ -55,8 +54,17 @@ struct Stored {
     data: Vec<u8>,
 }
 
+/// Opens a database, to read the wanted topics.
+pub(super) fn open(
+    path: &Path,
+    content: Content,
+    wanted: &Wanted,
+) -> Result<Box<dyn MessageFile>, LogError> {
+    Ok(Box::new(BagFile::open(path, content, wanted)?))
+}
+
 impl BagFile {
-    pub(super) fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
+    fn open(path: &Path, content: Content, wanted: &Wanted) -> Result<Self, LogError> {
         let refuse = |reason: String| LogError::Database {
             file: source::shown(path),
             reason: escape_whole(&reason.replace('\n', " ")),
@@ -126,42 +134,6 @@ impl BagFile {
         })
     }
 
-    pub(super) fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    /// Where and why the database breaks off, once it has.
-    pub(super) fn broken(&self) -> Option<&Break> {
-        self.broken.as_ref()
-    }
-
-    /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
-    pub(super) fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<Head>, LogError> {
-        if self.page.is_empty() && !self.ended {
-            // What is read of a page that breaks off is used.
-            if let Err(error) = self.turn() {
-                self.ended = true;
-                self.broken = Some(Break {
-                    reason: error.to_string(),
-                    place: format!("after {} of its messages", self.messages),
-                });
-            }
-            self.page.reverse();
-        }
-        let Some(message) = self.page.pop() else {
-            return Ok(None);
-        };
-        self.messages += 1;
-        *data = message.data;
-        let ns = u64::try_from(message.ns).unwrap_or_default();
-        Ok(Some(Head {
-            topic: message.topic,
-            log_ns: ns,
-            publish_ns: ns,
-            number: self.messages,
-        }))
-    }
-
     /// Reads the next page.
     fn turn(&mut self) -> Result<(), rusqlite::Error> {
         let sql = format!(
@@ -192,6 +164,42 @@ impl BagFile {
             }
         }
         Ok(())
+    }
+}
+
+impl MessageFile for BagFile {
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+
+    fn broken(&self) -> Option<&Break> {
+        self.broken.as_ref()
+    }
+
+    fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError> {
+        if self.page.is_empty() && !self.ended {
+            // What is read of a page that breaks off is used.
+            if let Err(error) = self.turn() {
+                self.ended = true;
+                self.broken = Some(Break {
+                    reason: error.to_string(),
+                    place: format!("after {} of its messages", self.messages),
+                });
+            }
+            self.page.reverse();
+        }
+        let Some(message) = self.page.pop() else {
+            return Ok(None);
+        };
+        self.messages += 1;
+        *data = message.data;
+        let ns = u64::try_from(message.ns).unwrap_or_default();
+        Ok(Some(MessageHead {
+            topic: message.topic,
+            log_ns: ns,
+            publish_ns: ns,
+            number: self.messages,
+        }))
     }
 }
 

@@ -6,7 +6,7 @@
 use thiserror::Error;
 
 use super::msg::{Count, Primitive};
-use super::value::Value;
+use crate::log::recording::value::Value;
 
 /// What is wrong with the bytes of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -33,7 +33,7 @@ pub enum Malformed {
 
 /// How numbers and texts are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Encoding {
+pub(super) enum Encoding {
     /// CDR with its four bytes of header, as ROS 2 writes it.
     Cdr,
     /// Packed little-endian numbers without padding, as ROS 1 writes them.

@@ -46,7 +46,7 @@ pub enum DefinitionError {
 
 /// A type of fixed size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Primitive {
+pub(super) enum Primitive {
     Bool,
     I8,
     U8,
@@ -62,7 +62,7 @@ pub(crate) enum Primitive {
 
 impl Primitive {
     /// Size, and alignment, in bytes.
-    pub(crate) const fn size(self) -> usize {
+    pub(super) const fn size(self) -> usize {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -92,7 +92,7 @@ impl Primitive {
 
 /// Type of one element of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(super) enum ElementType {
     Primitive(Primitive),
     String,
     /// Text of two-byte characters.
@@ -103,7 +103,7 @@ pub(crate) enum Kind {
 
 /// How many elements a field has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Count {
+pub(super) enum Count {
     One,
     Fixed(usize),
     Sequence,
@@ -111,16 +111,16 @@ pub(crate) enum Count {
 
 /// A field of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Field {
-    pub(crate) name: String,
-    pub(crate) kind: Kind,
-    pub(crate) count: Count,
+pub(super) struct Field {
+    pub(super) name: String,
+    pub(super) kind: ElementType,
+    pub(super) count: Count,
 }
 
 /// A message type with every type that it needs; the first one is the message itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Definition {
-    pub(crate) messages: Vec<Vec<Field>>,
+pub(super) struct Definition {
+    pub(super) messages: Vec<Vec<Field>>,
 }
 
 /// Definitions that recordings may leave out: some recorders store type names alone.
@@ -166,7 +166,7 @@ impl Definition {
     ///
     /// # Errors
     /// [`DefinitionError`]: a line that is none, a type that is not defined, an endless nesting.
-    pub(crate) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
+    pub(super) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         if text.len() > LONGEST {
             return Err(DefinitionError::Long { bytes: text.len() });
         }
@@ -299,10 +299,10 @@ fn resolve(
     let mut fields = Vec::new();
     for field in sections.get(name).map(Vec::as_slice).unwrap_or_default() {
         let kind = match field.of {
-            "string" => Kind::String,
-            "wstring" => Kind::WideString,
+            "string" => ElementType::String,
+            "wstring" => ElementType::WideString,
             other => match Primitive::named(other) {
-                Some(primitive) => Kind::Primitive(primitive),
+                Some(primitive) => ElementType::Primitive(primitive),
                 None => {
                     let full = full_name(other, name, sections).ok_or_else(|| {
                         DefinitionError::Undefined {
@@ -311,7 +311,7 @@ fn resolve(
                         }
                     })?;
                     let inner = resolve(&full, root, sections, numbers, messages, depth + 1)?;
-                    Kind::Message(inner)
+                    ElementType::Message(inner)
                 }
             },
         };
@@ -325,7 +325,7 @@ fn resolve(
         // In CDR a message without fields still takes one byte.
         fields.push(Field {
             name: String::new(),
-            kind: Kind::Primitive(Primitive::U8),
+            kind: ElementType::Primitive(Primitive::U8),
             count: Count::One,
         });
     }
@@ -380,12 +380,12 @@ mod tests {
         assert_eq!(
             kinds,
             [
-                ("count", Kind::Primitive(Primitive::I32), Count::One),
-                ("label", Kind::String, Count::One),
-                ("v", Kind::Primitive(Primitive::F32), Count::Fixed(3)),
-                ("w", Kind::Primitive(Primitive::F64), Count::Sequence),
-                ("list", Kind::Message(1), Count::Sequence),
-                ("wide", Kind::WideString, Count::One),
+                ("count", ElementType::Primitive(Primitive::I32), Count::One),
+                ("label", ElementType::String, Count::One),
+                ("v", ElementType::Primitive(Primitive::F32), Count::Fixed(3)),
+                ("w", ElementType::Primitive(Primitive::F64), Count::Sequence),
+                ("list", ElementType::Message(1), Count::Sequence),
+                ("wide", ElementType::WideString, Count::One),
             ]
         );
     }

@@ -2,18 +2,36 @@
 
 use serde_json::Value as Json;
 
-use super::path::{Path, Step};
-use super::value::Value;
+use crate::log::recording::message::{MessageReader, Schema};
+use crate::log::recording::path::{Path, Step};
+use crate::log::recording::value::Value;
+
+/// Reads some fields of JSON messages.
+struct JsonReader {
+    fields: Vec<Vec<Path>>,
+}
+
+/// Messages in JSON, whatever their schema.
+pub(super) fn open(
+    schema: &Schema,
+    fields: &[Vec<Path>],
+) -> Option<Result<Box<dyn MessageReader>, String>> {
+    let fields = fields.to_vec();
+    (schema.encoding == "json").then(|| Ok(Box::new(JsonReader { fields }) as Box<_>))
+}
+
+impl MessageReader for JsonReader {
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        read(data, &self.fields, out).map_err(|error| error.to_string())
+    }
+
+    fn names(&self, data: &[u8]) -> Vec<String> {
+        names(data)
+    }
+}
 
 /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-///
-/// # Errors
-/// What the JSON reader says of bytes that are no JSON document.
-pub(crate) fn read(
-    data: &[u8],
-    fields: &[Vec<Path>],
-    out: &mut [Value],
-) -> Result<(), serde_json::Error> {
+fn read(data: &[u8], fields: &[Vec<Path>], out: &mut [Value]) -> Result<(), serde_json::Error> {
     let root: Json = serde_json::from_slice(data)?;
     for (paths, out) in fields.iter().zip(out) {
         let numbers = paths.iter().filter_map(|path| find(&root, &path.steps));
@@ -72,7 +90,7 @@ fn find<'j>(root: &'j Json, steps: &[Step]) -> Option<&'j Json> {
 }
 
 /// Names under which a message lists its parts, for messages to the user.
-pub(crate) fn names(data: &[u8]) -> Vec<String> {
+fn names(data: &[u8]) -> Vec<String> {
     let Ok(Json::Object(fields)) = serde_json::from_slice::<Json>(data) else {
         return Vec::new();
     };

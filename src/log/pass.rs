@@ -1,0 +1,165 @@
+//! The one way through a log, strict or not: its rows inside its span, each with its time.
+
+use std::path::PathBuf;
+
+use super::columns::choose;
+use super::content::Content;
+use super::layout::Layout;
+use super::recording::{JointStates, MessageRows, format_of};
+use super::rows::{Rows, Strictness};
+use super::source::{self, Provenance};
+use super::text::TextRows;
+use super::time::Instant;
+use super::{LogError, LogSpec, Span};
+
+/// A log that is being gone through.
+#[derive(Debug)]
+pub(super) struct Pass {
+    pub(super) spec: LogSpec,
+    pub(super) files: Vec<PathBuf>,
+    strictness: Strictness,
+    pub(super) rows: Box<dyn Rows>,
+    /// The layout that the log turned out to have.
+    pub(super) layout: Layout,
+    /// What keeps a strict reader from it.
+    pub(super) refused: Option<LogError>,
+    /// Column of the time and seconds per unit of it, where it was said.
+    time: Option<(usize, f64)>,
+    /// The instant from which times are counted; known from the first row.
+    origin: Option<Instant>,
+    /// Times of the span [s], half open; set at the first row that has a time.
+    span: Option<(f64, f64)>,
+    /// Times of the first and the last row handed out [s].
+    used: Option<(f64, f64)>,
+    /// Rows handed out.
+    pub(super) samples: u64,
+}
+
+impl Pass {
+    /// Opens a log of any format and finds its channels.
+    pub(super) fn open(
+        spec: &LogSpec,
+        layout: &Layout,
+        strictness: Strictness,
+    ) -> Result<Self, LogError> {
+        let files = spec.files()?;
+        let (rows, layout, refused) = open(&files, layout, strictness)?;
+        Ok(Self {
+            spec: spec.clone(),
+            files,
+            strictness,
+            rows,
+            layout,
+            refused,
+            time: None,
+            origin: None,
+            span: None,
+            used: None,
+            samples: 0,
+        })
+    }
+
+    /// Says which column is the time, and how many seconds its unit has.
+    pub(super) fn set_time(&mut self, column: usize, seconds: f64) {
+        self.time = Some((column, seconds));
+        self.rows.set_time(column, seconds);
+    }
+
+    /// The instant from which times are counted, once a row is read: zero, unless they lie so far
+    /// from it that f64 seconds would lose digits; then the log's first stamp.
+    pub(super) fn origin(&self) -> Instant {
+        self.origin.unwrap_or_default()
+    }
+
+    /// Goes on to the next row; its time [s], NaN where it has none, or `None` at the end.
+    #[inline]
+    pub(super) fn next(&mut self) -> Result<Option<f64>, LogError> {
+        let stamp = self.rows.next()?;
+        Ok(stamp.map(|stamp| stamp.seconds(&mut self.origin)))
+    }
+
+    /// Times of the span [s], half open, once the first row's is known.
+    #[inline]
+    pub(super) fn span(&mut self, first: f64) -> Result<(f64, f64), LogError> {
+        if let Some(span) = self.span {
+            return Ok(span);
+        }
+        let span = match self.spec.span {
+            Span::Whole => (f64::NEG_INFINITY, f64::INFINITY),
+            Span::Seconds { from, to } => (first + from, first + to),
+            Span::Percent { from, to } => {
+                let last = self.last_time()?.unwrap_or(first);
+                let at = |percent: f64| first + (last - first) * percent / 100.0;
+                let end = if to >= 100.0 { f64::INFINITY } else { at(to) };
+                (at(from), end)
+            }
+        };
+        self.span = Some(span);
+        Ok(span)
+    }
+
+    /// Time of the log's last row [s]: one more pass, in which only times are looked at.
+    fn last_time(&self) -> Result<Option<f64>, LogError> {
+        let (mut rows, ..) = open(&self.files, &self.layout, self.strictness)?;
+        if let Some((column, seconds)) = self.time {
+            rows.set_time(column, seconds);
+        }
+        let (mut origin, mut last) = (self.origin, None);
+        while let Some(stamp) = rows.next()? {
+            let t = stamp.seconds(&mut origin);
+            last = if t.is_nan() { last } else { Some(t) };
+        }
+        Ok(last)
+    }
+
+    /// Counts rows that are handed out, by the times of the first and the last of them.
+    pub(super) fn count(&mut self, rows: usize, first: f64, last: f64) {
+        self.used = Some((self.used.map_or(first, |(first, _)| first), last));
+        self.samples += rows as u64;
+    }
+
+    /// Time from the first to the last row handed out so far [s].
+    pub(super) fn duration_s(&self) -> f64 {
+        self.used.map_or(0.0, |(first, last)| last - first)
+    }
+
+    /// Name, span, checksum, rows and duration of what was handed out.
+    pub(super) fn provenance(&self) -> Result<Provenance, LogError> {
+        Ok(Provenance {
+            name: self.spec.name(),
+            span: self.spec.span.label(),
+            sha256: source::sha256_of(&self.files)?,
+            samples: self.samples,
+            duration_s: self.duration_s(),
+        })
+    }
+}
+
+/// Rows of a log, the layout that it turns out to have, and what keeps a strict reader from it.
+type Opened = (Box<dyn Rows>, Layout, Option<LogError>);
+
+fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
+    if let [path] = files {
+        let content = Content::open(path)?;
+        if format_of(content.head()).is_none() {
+            let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;
+            return Ok((Box::new(rows), layout, refused));
+        }
+    }
+    let mut refused = None;
+    // Without a robot there are no channels to look for.
+    if !layout.joints.is_empty() {
+        match (MessageRows::open(files, layout), strictness) {
+            (Ok((rows, layout)), _) => return Ok((Box::new(rows), layout, None)),
+            (Err(error), Strictness::Refuse) => return Err(error),
+            (Err(error), Strictness::Record) => refused = Some(error),
+        }
+    }
+    match JointStates::open(files) {
+        Ok(states) => {
+            let layout = choose(states.names(), layout);
+            Ok((Box::new(states), layout, refused))
+        }
+        Err(error) => Err(refused.unwrap_or(error)),
+    }
+}

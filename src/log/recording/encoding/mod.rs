@@ -1,0 +1,41 @@
+//! The encodings of messages that are read. A new one is a file of its own and its lines here: its
+//! module, and its place in the list.
+
+mod cdr;
+mod cursor;
+mod descriptor;
+mod json;
+mod msg;
+mod plan;
+mod proto;
+mod wire;
+
+pub use cdr::CdrReader;
+pub use cursor::Malformed;
+pub use msg::DefinitionError;
+
+use super::message::{MessageReader, Schema};
+use super::path::Path;
+
+/// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another
+/// encoding, else why its messages cannot be read.
+type Open = fn(&Schema, &[Vec<Path>]) -> Option<Result<Box<dyn MessageReader>, String>>;
+
+const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
+
+/// Makes a reader for `fields` of messages: for each the paths that it may have.
+///
+/// # Errors
+/// Why messages of this schema cannot be read, for the user.
+pub(super) fn reader_of(
+    schema: &Schema,
+    fields: &[Vec<Path>],
+) -> Result<Box<dyn MessageReader>, String> {
+    let opened = ENCODINGS.iter().find_map(|open| open(schema, fields));
+    opened.unwrap_or_else(|| {
+        let (encoding, language) = (&schema.encoding, &schema.language);
+        Err(format!(
+            "its encoding `{encoding}` with a `{language}` definition is not read"
+        ))
+    })
+}

@@ -1,0 +1,41 @@
+//! The formats of recordings. A new one is a file of its own and its lines here: its module, and its
+//! place in the list.
+
+mod bag;
+mod mcap;
+mod record;
+
+use std::path::Path;
+
+use super::message::{MessageFile, Wanted};
+use crate::log::LogError;
+use crate::log::content::Content;
+
+/// A format of recordings.
+pub(in crate::log) struct Format {
+    /// First bytes of a file.
+    magic: &'static [u8],
+    /// End of a file's name, compression aside.
+    pub(in crate::log) ending: &'static str,
+    /// Opens a file, to read the wanted topics.
+    pub(super) open: fn(&Path, Content, &Wanted) -> Result<Box<dyn MessageFile>, LogError>,
+}
+
+/// The formats that are read.
+pub(in crate::log) const FORMATS: [Format; 2] = [
+    Format {
+        magic: b"\x89MCAP",
+        ending: ".mcap",
+        open: mcap::open,
+    },
+    Format {
+        magic: b"SQLite format 3\0",
+        ending: ".db3",
+        open: bag::open,
+    },
+];
+
+/// The format of a file by its first bytes; `None` for a text log.
+pub(in crate::log) fn format_of(head: &[u8]) -> Option<&'static Format> {
+    FORMATS.iter().find(|format| head.starts_with(format.magic))
+}

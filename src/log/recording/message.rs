@@ -1,0 +1,87 @@
+//! What recordings are made of: messages on topics, and what they are written in.
+
+use std::sync::Arc;
+
+use super::value::Value;
+use crate::log::LogError;
+
+/// How the messages of a topic are written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Schema {
+    /// Type, e.g. `sensor_msgs/msg/JointState`.
+    pub(super) name: String,
+    /// Language of the definition: `ros2msg`, `protobuf`, `jsonschema`, ...
+    pub(super) language: String,
+    /// The definition.
+    pub(super) text: Vec<u8>,
+    /// Encoding of the messages: `cdr`, `json`, `protobuf`, ...
+    pub(super) encoding: String,
+}
+
+/// A topic of a file.
+#[derive(Debug, Clone)]
+pub(super) struct Topic {
+    pub(super) name: String,
+    pub(super) schema: Arc<Schema>,
+}
+
+/// Which topics are read.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wanted {
+    /// Their names; empty for all.
+    pub(super) names: Vec<String>,
+}
+
+impl Wanted {
+    pub(super) fn includes(&self, topic: &str) -> bool {
+        self.names.is_empty() || self.names.iter().any(|name| name == topic)
+    }
+}
+
+/// A message without its bytes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MessageHead {
+    /// Index of its topic in the file.
+    pub(super) topic: usize,
+    /// When it was recorded [ns].
+    pub(super) log_ns: u64,
+    /// When it was published [ns].
+    pub(super) publish_ns: u64,
+    /// Which message of the file it is, from 1.
+    pub(super) number: u64,
+}
+
+/// Where and why a file ends before its end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Break {
+    pub(super) reason: String,
+    /// How much of it was read, as it stands after "breaks off".
+    pub(super) place: String,
+}
+
+/// A file of messages, read from front to back: what each format does.
+pub(super) trait MessageFile: Send {
+    /// The topics declared so far.
+    fn topics(&self) -> &[Topic];
+
+    /// The next message of a wanted topic, its bytes in `data`; `None` at the end.
+    ///
+    /// # Errors
+    /// A disk that cannot be read; a part whose checksum is wrong.
+    fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<MessageHead>, LogError>;
+
+    /// Where and why the file breaks off, once it has.
+    fn broken(&self) -> Option<&Break>;
+}
+
+/// Reads the fields that it was made for out of the messages of one topic: what each encoding does.
+pub(super) trait MessageReader: Send {
+    /// Reads the fields of one message.
+    ///
+    /// # Errors
+    /// What is wrong with the message, for the user.
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String>;
+
+    /// Names that the message which was read last lists: those of its joints, or of its fields.
+    fn names(&self, data: &[u8]) -> Vec<String>;
+}

@@ -1,0 +1,82 @@
+//! What every log is made of, whatever the format of its files: rows, one after the other.
+
+use std::fmt::Debug;
+
+use super::time::Stamped;
+use super::{Block, LogError};
+
+/// What becomes of a row, a field or a channel that cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Strictness {
+    /// The log is refused, with the line.
+    Refuse,
+    /// It is recorded as a fault of the log, and reading goes on.
+    Record,
+}
+
+/// The rows of one log.
+pub(super) trait Rows: Debug + Send {
+    /// Names of the columns.
+    fn names(&self) -> &[String];
+
+    /// Goes on to the next row; its time, or `None` at the end.
+    fn next(&mut self) -> Result<Option<Stamped>, LogError>;
+
+    /// The number in a column of the current row as logged, NaN where there is none; `None` for
+    /// words.
+    fn logged(&self, column: usize) -> Option<f64>;
+
+    /// Appends the channels of the current row to the block, in SI units.
+    fn append(&self, _: &mut Block) -> Result<(), LogError> {
+        Ok(())
+    }
+
+    /// Whether velocities are among the channels.
+    fn has_velocities(&self) -> bool {
+        false
+    }
+
+    /// Says which column is the time, and how many seconds its unit has, where rows carry none.
+    fn set_time(&mut self, _column: usize, _seconds: f64) {}
+
+    /// Whether rows carry their own times, as those of recordings do.
+    fn is_recording(&self) -> bool {
+        true
+    }
+
+    /// Whether the current row equals the one before it in all that the log holds of it.
+    fn repeats(&self) -> bool {
+        false
+    }
+
+    /// Line or message number of the current row, from 1.
+    fn number(&self) -> u64 {
+        0
+    }
+
+    /// Where the current row stands, for a message.
+    fn place(&self) -> String {
+        String::new()
+    }
+
+    /// What to do about a row that is not later than the one before, `t` seconds into the log, where
+    /// nobody can mend rows by hand.
+    fn clock_remedy(&self, _t: f64) -> Option<String> {
+        None
+    }
+
+    /// Rows that were passed over because they have more or fewer fields than the header.
+    fn malformed(&self) -> u64 {
+        0
+    }
+
+    /// What was left out or chosen on the way, once the last row is read.
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Where files break off, once the last row is read.
+    fn breaks(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
