@@ -34,7 +34,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "report",
         &[
-            "log", "verdict", "number", "friction", "inertia", "validate",
+            "log", "verdict", "number", "config", "motion", "friction", "inertia", "validate",
+            "inspect", "excite",
         ],
     ),
     (

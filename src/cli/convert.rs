@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::machine::Machine;
 use super::{CliError, Context, Outcome, arguments, columns};
@@ -35,6 +36,19 @@ pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml: write its joint channels
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: Option<String>,
+}
+
+/// A log that was converted.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Converted {
+    /// Names of the columns, the time first.
+    columns: Vec<String>,
+    /// Rows.
+    samples: u64,
+    /// Durations of the logs together \[s\].
+    duration_s: f64,
+    /// Name of the log that was written.
+    file: Option<String>,
 }
 
 /// The log that is being written.
@@ -247,12 +261,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     let duration: f64 = provenance.iter().map(|p| p.duration_s).sum();
-    let result = json!({
-        "columns": target.columns,
-        "samples": target.rows,
-        "duration_s": duration,
-        "file": args.output.file_name().map(|name| name.to_string_lossy()),
-    });
+    let name = args.output.file_name();
+    let result = Converted {
+        columns: target.columns,
+        samples: target.rows,
+        duration_s: duration,
+        file: name.map(|name| name.to_string_lossy().into_owned()),
+    };
     let document = Document::new("convert", &provenance, &warnings, &result)?;
     if let Some(writer) = target.writer {
         writer.commit()?;
@@ -260,8 +275,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     Ok(Outcome {
         text: format!(
             "{} rows of {} columns, {} s\nwritten: {}\n",
-            target.rows,
-            target.columns.len(),
+            result.samples,
+            result.columns.len(),
             number::significant(duration, 5),
             args.output.display()
         ),

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::outputs::write_text;
 use super::{CliError, Context, Outcome, arguments, files};
@@ -47,6 +48,24 @@ pub struct Args {
     /// Leave out the [[effect]] tables of the model; the files say so
     #[arg(long)]
     pub without_effects: bool,
+}
+
+/// A model that was written for other programs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Exported {
+    joints: Vec<String>,
+    files: Vec<Written>,
+    /// Effects that the files do not hold.
+    left_out: Vec<String>,
+}
+
+/// A file that was written.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Written {
+    /// Its name.
+    file: String,
+    /// What it is.
+    what: String,
 }
 
 /// A file's name without folder and ending.
@@ -142,18 +161,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     for (path, what, _) in &texts {
         table.row([path.display().to_string().as_str(), what]);
     }
-    let written: Vec<_> = texts
-        .iter()
-        .map(|(path, what, _)| json!({"file": name(path), "what": what}))
-        .collect();
-    let result = json!({
-        "joints": program.joints,
-        "files": written,
-        "left_out": left_out,
-    });
     let warnings: Vec<String> = match left_out.is_empty() {
         true => Vec::new(),
         false => vec![format!("left out: {}", left_out.join(", "))],
+    };
+    let written = texts.iter().map(|(path, what, _)| Written {
+        file: name(path),
+        what: (*what).to_owned(),
+    });
+    let result = Exported {
+        joints: program.joints.clone(),
+        files: written.collect(),
+        left_out,
     };
     Ok(Outcome {
         text: table.to_string(),

@@ -11,7 +11,7 @@ use super::pages::{self, Look};
 use super::refined::{held_for_pictures, refined};
 use super::{
     CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
-    lsq, simulate, validate,
+    lsq, validate,
 };
 use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
@@ -370,5 +370,5 @@ fn comparison(model: &ModelFile, truth: &TruthFile) -> Value {
             }))
         })
         .collect();
-    json!({ "parameters": rows, "effects": simulate::effects(truth) })
+    json!({ "parameters": rows, "effects": truth.effects })
 }

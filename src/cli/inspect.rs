@@ -2,18 +2,14 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-
 use super::machine::{Machine, run_error};
 use super::{CliError, Context, Exit, Outcome, columns};
 use crate::config::ModelFile;
-use crate::inspect::{Comparison, Fault, Findings, Kind, Severity, look};
+use crate::inspect::{Comparison, Fault, Findings, Inspection, Kind, look};
 use crate::log::{LogSpec, Provenance, RawReader, escape};
 use crate::motion;
-use crate::number;
 use crate::report::json::Document;
-use crate::report::table;
-use crate::report::table::Align;
+use crate::report::stages;
 use crate::robot::model::Model;
 
 const EXAMPLE: &str = "\
@@ -65,19 +61,13 @@ impl Known {
     }
 }
 
-/// One log as it was found.
-struct Inspected {
-    name: String,
-    findings: Findings,
-}
-
 /// Looks at one log.
 fn inspect(
     spec: &LogSpec,
     known: Option<&Known>,
     context: &Context,
     warnings: &mut Vec<String>,
-) -> Result<(Inspected, Provenance), CliError> {
+) -> Result<(Findings, Provenance), CliError> {
     let machine = known.map(|known| &known.machine);
     let layout = machine.map(|machine| machine.file.layout());
     let mut log = RawReader::open(spec, layout.as_ref())?;
@@ -114,8 +104,7 @@ fn inspect(
             )),
         }
     }
-    let name = spec.name();
-    Ok((Inspected { name, findings }, log.provenance()?))
+    Ok((findings, log.provenance()?))
 }
 
 /// What one log holds and what is wrong with it, by the robot file.
@@ -198,198 +187,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     for spec in &args.logs {
-        let (log, input) = inspect(spec, known.as_ref(), context, &mut warnings)?;
-        logs.push(log);
+        let (findings, input) = inspect(spec, known.as_ref(), context, &mut warnings)?;
+        logs.push((spec.name(), findings));
         provenance.push(input);
         bar.advance(1);
     }
     drop(bar);
     context.check()?;
+    let result = Inspection::of(&logs);
     Ok(Outcome {
-        text: logs.iter().map(text).collect(),
-        document: Document::new("inspect", &provenance, &warnings, &document(&logs))?,
+        text: stages::inspect::inspect(&logs).text(),
+        document: Document::new("inspect", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })
-}
-
-/// The fields of one log stand at the top; of several, in `logs`, with the lists together at the
-/// top, each entry with its log's name.
-fn document(logs: &[Inspected]) -> Value {
-    let mut fields = serde_json::Map::new();
-    if let [log] = logs {
-        if let Value::Object(own) = json!(log.findings) {
-            fields = own;
-        }
-        return Value::Object(fields);
-    }
-    let mut each = Vec::new();
-    let lists = ["channels", "gaps", "joints", "faults"];
-    let mut all = lists.map(|_| Vec::new());
-    for log in logs {
-        let mut own = json!(log.findings);
-        own["log"] = log.name.clone().into();
-        for (list, all) in lists.iter().zip(&mut all) {
-            for entry in own[*list].as_array().into_iter().flatten() {
-                let mut entry = entry.clone();
-                entry["log"] = log.name.clone().into();
-                all.push(entry);
-            }
-        }
-        each.push(own);
-    }
-    let rates = logs.iter().filter_map(|log| log.findings.rate_hz);
-    let jitters = logs.iter().filter_map(|log| log.findings.jitter);
-    fields.insert("rate_hz".into(), json!(rates.reduce(f64::min)));
-    fields.insert("jitter".into(), json!(jitters.reduce(f64::max)));
-    for (list, all) in lists.iter().zip(all) {
-        fields.insert((*list).to_owned(), all.into());
-    }
-    fields.insert("logs".into(), each.into());
-    Value::Object(fields)
-}
-
-fn text(log: &Inspected) -> String {
-    let found = &log.findings;
-    let mut out = format!(
-        "{}: {} rows in {} s",
-        escape(&log.name),
-        found.rows,
-        number::significant(found.duration_s, 5)
-    );
-    if let (Some(rate), Some(jitter)) = (found.rate_hz, found.jitter) {
-        out += &format!(
-            ", {} Hz, jitter {}, {} gap(s)",
-            number::significant(rate, 5),
-            number::percent(jitter),
-            found.gaps.len()
-        );
-    }
-    out = table::hanging("", &out, 2) + "\n";
-    out += &channels(found).to_string();
-    if !found.joints.is_empty() {
-        out += &format!("\n{}", joints(found));
-    }
-    out += &faults(found);
-    out + "\n"
-}
-
-fn channels(found: &Findings) -> table::Table {
-    let mut table = table::Table::new(&[
-        ("channel", Align::Left),
-        ("from", Align::Decimal),
-        ("to", Align::Decimal),
-        ("unit", Align::Left),
-        ("step", Align::Decimal),
-        ("limits", Align::Left),
-    ]);
-    for channel in &found.channels {
-        let limits = channel.limits.map(|[low, high]| {
-            format!(
-                "{}..{}",
-                number::significant(low, 4),
-                number::significant(high, 4)
-            )
-        });
-        let absent = f64::NAN;
-        table.row([
-            escape(&channel.name),
-            number::significant(channel.min.unwrap_or(absent), 5),
-            number::significant(channel.max.unwrap_or(absent), 5),
-            channel.unit.clone().unwrap_or_default(),
-            channel
-                .step
-                .map(|step| number::significant(step, 3))
-                .unwrap_or_default(),
-            limits.unwrap_or_default(),
-        ]);
-    }
-    table
-}
-
-fn joints(found: &Findings) -> table::Table {
-    let mut columns = vec![
-        ("joint", Align::Left),
-        ("moves", Align::Left),
-        ("travel", Align::Decimal),
-        ("speed", Align::Decimal),
-        ("acc.", Align::Decimal),
-        ("reversals", Align::Right),
-        ("moving", Align::Decimal),
-        ("condition", Align::Decimal),
-    ];
-    let known = found.joints.iter().any(|joint| joint.unit.is_some());
-    if known {
-        columns.push(("unit", Align::Left));
-    }
-    let unit = match known {
-        true => "unit",
-        false => "unit of the log",
-    };
-    let mut table = table::Table::new(&columns).caption(&format!(
-        "motion: travel [{unit}], greatest speed [{unit}/s] and acceleration [{unit}/s^2]"
-    ));
-    for joint in &found.joints {
-        table.row([
-            escape(&joint.joint),
-            if joint.moves { "yes" } else { "no" }.to_owned(),
-            number::significant(joint.travel, 3),
-            number::significant(joint.speed_max, 3),
-            number::significant(joint.acceleration_max, 3),
-            joint.reversals.to_string(),
-            number::percent(joint.moving_share),
-            joint
-                .condition
-                .map(|condition| number::significant(condition, 3))
-                .unwrap_or_default(),
-            // Left off where there is no column for it.
-            joint.unit.clone().unwrap_or_default(),
-        ]);
-    }
-    table
-}
-
-fn faults(found: &Findings) -> String {
-    if found.faults.is_empty() {
-        return "\nno faults found\n".to_owned();
-    }
-    let count = |severity| found.of(severity).count();
-    let mut out = format!(
-        "\n{} error(s), {} warning(s), {} note(s)\n",
-        count(Severity::Error),
-        count(Severity::Warning),
-        count(Severity::Info)
-    );
-    // One channel at several times, or several channels with the same words.
-    let alike = |a: &Fault, b: &Fault| {
-        (a.kind, a.severity, &a.remedy) == (b.kind, b.severity, &b.remedy)
-            && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span()))
-    };
-    let mut told: Vec<&Fault> = Vec::new();
-    for fault in &found.faults {
-        if told.iter().any(|earlier| alike(earlier, fault)) {
-            continue;
-        }
-        let all: Vec<&Fault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
-        told.push(fault);
-        let distinct = |texts: Vec<String>| {
-            let mut out: Vec<String> = Vec::new();
-            for text in texts {
-                if !out.contains(&text) {
-                    out.push(text);
-                }
-            }
-            out.join(", ")
-        };
-        let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
-        let channels = distinct(channels.map(escape).collect());
-        let spans = distinct(all.iter().map(|fault| fault.span()).collect());
-        let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
-        out += &format!(
-            "\n{}{}{}",
-            table::paragraph(&format!("{}: {spans} s", head.trim_end()), 0),
-            table::paragraph(&fault.effect, 4),
-            table::paragraph(&format!("-> {}", fault.remedy), 4)
-        );
-    }
-    out
 }

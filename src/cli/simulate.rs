@@ -2,20 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::context::Context;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::{arguments, files};
 use crate::config::RobotFile;
+use crate::config::model_file::Parameter;
 use crate::log::{Block, LogSpec, Provenance, Reader};
 use crate::number;
 use crate::output::{LogWriter, write_whole};
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
+use crate::simulate::effects::EffectValue;
 use crate::simulate::{
-    self, EffectSpec, Ending, InitialConditions, Motion, Order, SimulatedLog, TruthFile,
+    self, EffectSpec, Ending, InitialConditions, LimitEvent, Motion, Order, SimulatedLog,
 };
 
 const EXAMPLE: &str = "\
@@ -142,7 +145,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
     let names = (file_name(&args.output), file_name(&truth_path));
     let duration = duration(&robot, &simulated);
-    let result = document(&simulated, args.seed, duration, &names);
+    let result = Simulated::of(&simulated, args.seed, duration, &names);
     Ok(Outcome {
         text: render(&robot, &simulated, duration, &names.0),
         document: Document::new("simulate", &inputs, &warnings(&simulated), &result)?,
@@ -256,48 +259,65 @@ fn duration(robot: &RobotFile, simulated: &SimulatedLog) -> f64 {
     }
 }
 
-/// The effects of a truth; the joint is null for what concerns all joints.
-pub(super) fn effects(truth: &TruthFile) -> Vec<Value> {
-    let list = truth.effects.iter();
-    list.map(|effect| {
-        json!({
-            "effect": effect.effect, "family": effect.family, "joint": effect.joint,
-            "parameters": effect.parameters,
-        })
-    })
-    .collect()
+/// A simulated log in numbers.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Simulated<'a> {
+    /// Effects that the plant has beyond the model, or faults of its log.
+    effects: &'a [EffectValue],
+    /// The true parameters.
+    parameters: &'a [Parameter],
+    /// Seed of everything that chance decided.
+    seed: u64,
+    /// Rows of the log.
+    samples: usize,
+    /// Time from the first to the last row \[s\].
+    duration_s: f64,
+    ending: Ending,
+    limits_reached: &'a [LimitEvent],
+    saturated: Vec<Saturation<'a>>,
+    files: Files<'a>,
 }
 
-fn document(
-    simulated: &SimulatedLog,
-    seed: u64,
-    duration_s: f64,
-    (log, truth): &(String, String),
-) -> Value {
-    let limits = simulated.limits.iter().map(|event| {
-        json!({
-            "coordinate": event.coordinate, "t": event.t, "value": event.value,
-            "lower": event.lower, "upper": event.upper,
-        })
-    });
-    let saturated = simulated
-        .saturated
-        .iter()
-        .map(|(name, share)| json!({"coordinate": name, "share": share}));
-    json!({
-        "effects": effects(&simulated.truth),
-        "parameters": simulated.truth.parameters,
-        "seed": seed,
-        "samples": simulated.rows().len(),
-        "duration_s": duration_s,
-        "ending": match simulated.ending {
-            Ending::Completed => "completed",
-            Ending::StoppedAtLimit => "stopped-at-limit",
-        },
-        "limits_reached": limits.collect::<Vec<Value>>(),
-        "saturated": saturated.collect::<Vec<Value>>(),
-        "files": {"log": log, "truth": truth},
-    })
+/// How often an amplifier saturates.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Saturation<'a> {
+    coordinate: &'a str,
+    /// Share of the rows.
+    share: f64,
+}
+
+/// Names of what was written.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Files<'a> {
+    log: &'a str,
+    truth: &'a str,
+}
+
+impl<'a> Simulated<'a> {
+    fn of(
+        log: &'a SimulatedLog,
+        seed: u64,
+        duration_s: f64,
+        (name, truth): &'a (String, String),
+    ) -> Self {
+        let saturated = log.saturated.iter();
+        Simulated {
+            effects: &log.truth.effects,
+            parameters: &log.truth.parameters,
+            seed,
+            samples: log.rows().len(),
+            duration_s,
+            ending: log.ending,
+            limits_reached: &log.limits,
+            saturated: saturated
+                .map(|(coordinate, share)| Saturation {
+                    coordinate,
+                    share: *share,
+                })
+                .collect(),
+            files: Files { log: name, truth },
+        }
+    }
 }
 
 pub(super) fn warnings(simulated: &SimulatedLog) -> Vec<String> {

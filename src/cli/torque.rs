@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
-use super::lsq::processing;
 use super::machine::{Machine, run_error, summary_warnings};
 use super::refined::refined;
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
 use crate::log::LogSpec;
-use crate::motion::{self, FilterSettings};
+use crate::motion::{self, FilterSettings, Summary};
 use crate::number;
 use crate::output::LogWriter;
 use crate::report::json::Document;
@@ -33,6 +33,27 @@ pub struct Args {
     /// Log to write
     #[arg(short, long, value_name = "OUT.csv|.mcap", value_parser = arguments::log_file)]
     pub output: PathBuf,
+}
+
+/// The torque along a motion.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Along {
+    joints: Vec<JointAlong>,
+    /// Rows that were written.
+    samples: u64,
+    processing: Summary,
+}
+
+/// The torque of one joint.
+#[derive(Debug, Serialize, JsonSchema)]
+struct JointAlong {
+    joint: String,
+    /// "N" or "Nm".
+    unit: String,
+    /// Root mean square \[unit\].
+    rms: f64,
+    /// Largest modulus \[unit\].
+    peak: f64,
 }
 
 /// Runs the command.
@@ -155,13 +176,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             &number::significant(peak[j], 4),
             unit,
         ]);
-        found.push(json!({"joint": joint, "unit": unit, "rms": rms, "peak": peak[j]}));
+        found.push(JointAlong {
+            joint: joint.clone(),
+            unit: unit.to_owned(),
+            rms,
+            peak: peak[j],
+        });
     }
-    let result = json!({
-        "joints": found,
-        "samples": summary.rows,
-        "processing": processing(&summary),
-    });
+    let result = Along {
+        joints: found,
+        samples: summary.rows,
+        processing: summary,
+    };
     let document = Document::new("torque", &provenance, &warnings, &result)?;
     out.commit()?;
     Ok(Outcome {

@@ -2,6 +2,7 @@
 //! direction, the pair that it confounds.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::ExciteError;
@@ -22,14 +23,14 @@ const NOTHING_OF_SQUARES: f64 = 1e-13;
 const PART: f64 = 1e-3;
 
 /// Condition numbers of the unweighted stacked regressor; null where its rank is short.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Condition {
     pub raw: Option<f64>,
     pub normalised: Option<f64>,
 }
 
 /// An unknown as a log of the motion is expected to give it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Expected {
     pub name: String,
     pub unit: String,
@@ -42,14 +43,14 @@ pub struct Expected {
 }
 
 /// Part of an unknown in a direction; columns are scaled to norm 1.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Part {
     pub parameter: String,
     pub weight: f64,
 }
 
 /// The two unknowns whose expected errors are most alike.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Pair {
     pub first: String,
     pub second: String,
@@ -58,7 +59,7 @@ pub struct Pair {
 }
 
 /// What a motion tells.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Foresight {
     pub condition: Condition,
     pub rank: usize,

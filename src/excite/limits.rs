@@ -1,9 +1,10 @@
 //! What a motion must keep, all along: one channel per bounded quantity.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What is bounded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// Of a designed coordinate \[m or rad\].

@@ -8,6 +8,7 @@
 //! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
 //! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
 //! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
+//! | [`judgement`] | the result: what a log of the motion will tell, and the limits along it |
 
 pub mod blend;
 pub mod criterion;
@@ -15,6 +16,7 @@ pub mod foresee;
 mod from_files;
 pub mod given;
 pub mod information;
+pub mod judgement;
 pub mod ladder;
 mod lagrangian;
 pub mod limits;
@@ -32,6 +34,7 @@ mod variables;
 pub use criterion::Criterion;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::Given;
+pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
 pub use motion::Motion;
 pub use objective::{NoValue, Prior};
 pub use start::usual_torque;

@@ -1,9 +1,10 @@
 //! What the columns of a log are: told by the robot file, or guessed from their names.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What a channel holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// Position of a joint or motor.

@@ -2,6 +2,7 @@
 //! inertia, viscous friction, Coulomb friction and offset.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::histogram::Histogram;
@@ -16,7 +17,7 @@ const LONGEST: usize = 4096;
 const MOVING: f64 = 0.02;
 
 /// What one joint did.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct JointMotion {
     /// The joint.
     pub joint: String,

@@ -1,9 +1,10 @@
 //! A fault of a log: what it is, where it is, what it does to a fit, and what to do about it.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// How much a fault matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
     /// Worth knowing; a fit is not spoilt by it.
@@ -26,7 +27,7 @@ impl Severity {
 }
 
 /// What is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// The file breaks off, or the reader could not use all of it.
@@ -100,7 +101,7 @@ impl Kind {
 }
 
 /// One fault of a log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Fault {
     /// What is wrong.
     pub kind: Kind,

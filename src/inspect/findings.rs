@@ -1,13 +1,79 @@
 //! What is known of a log in the end.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::channel::Role;
 use super::excitation::JointMotion;
 use super::fault::{Fault, Severity};
 
+/// What logs hold: of one its findings; of several all of them, with their lists together.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Inspection {
+    One(Findings),
+    Several(Several),
+}
+
+/// Several logs as they were found.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Several {
+    /// The slowest [Hz].
+    pub rate_hz: Option<f64>,
+    /// The worst.
+    pub jitter: Option<f64>,
+    pub channels: Vec<OfLog<ChannelFacts>>,
+    pub gaps: Vec<OfLog<Gap>>,
+    pub joints: Vec<OfLog<JointMotion>>,
+    pub faults: Vec<OfLog<Fault>>,
+    pub logs: Vec<OfLog<Findings>>,
+}
+
+/// What belongs to one log of several.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct OfLog<T> {
+    #[serde(flatten)]
+    pub found: T,
+    /// Name of the log.
+    pub log: String,
+}
+
+impl Inspection {
+    /// The findings of logs, by their names.
+    pub fn of(logs: &[(String, Findings)]) -> Self {
+        if let [(_, only)] = logs {
+            return Inspection::One(only.clone());
+        }
+        let all = || logs.iter().map(|(_, findings)| findings);
+        Inspection::Several(Several {
+            rate_hz: all().filter_map(|f| f.rate_hz).reduce(f64::min),
+            jitter: all().filter_map(|f| f.jitter).reduce(f64::max),
+            channels: together(logs, |f| &f.channels),
+            gaps: together(logs, |f| &f.gaps),
+            joints: together(logs, |f| &f.joints),
+            faults: together(logs, |f| &f.faults),
+            logs: together(logs, std::slice::from_ref),
+        })
+    }
+}
+
+/// A list of every log in one, each entry with its log's name.
+fn together<T: Clone>(
+    logs: &[(String, Findings)],
+    list: impl Fn(&Findings) -> &[T],
+) -> Vec<OfLog<T>> {
+    let of = |(log, findings): &(String, Findings)| {
+        let entry = |found: &T| OfLog {
+            found: found.clone(),
+            log: log.clone(),
+        };
+        list(findings).iter().map(entry).collect::<Vec<_>>()
+    };
+    logs.iter().flat_map(of).collect()
+}
+
 /// A log as it was found.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
     /// Rows.
     pub rows: u64,
@@ -32,7 +98,7 @@ pub struct Findings {
 }
 
 /// A stretch without rows, counted from the log's first row.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Gap {
     /// Last row before it [s].
     pub from_s: f64,
@@ -41,7 +107,7 @@ pub struct Gap {
 }
 
 /// One channel in numbers.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelFacts {
     /// Name of the column.
     pub name: String,

@@ -35,7 +35,7 @@ mod windows;
 pub use channel::{Channel, Role, is_time};
 pub use excitation::JointMotion;
 pub use fault::{Fault, Kind, Severity};
-pub use findings::{ChannelFacts, Findings, Gap};
+pub use findings::{ChannelFacts, Findings, Gap, Inspection};
 pub use gate::{Cutter, Gate};
 pub use judge::{Depth, Judge};
 pub use look::{Plan, Planned, look};

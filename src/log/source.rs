@@ -21,6 +21,7 @@ pub struct Provenance {
     #[serde(default)]
     pub span: Option<String>,
     /// SHA-256 of the whole file, hexadecimal.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub sha256: String,
     /// Rows used; 0 for a file that is no log.
     #[serde(default)]

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -24,33 +25,41 @@ pub enum RunError<E> {
     Motion(#[from] MotionError),
 }
 
-/// What was done to a log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// What was done to a log. A document tells its filters.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Rows of the log.
+    #[serde(skip)]
     pub samples: u64,
     /// Rows handed to the sink.
+    #[serde(skip)]
     pub rows: u64,
     /// Sampling step (s).
+    #[serde(skip)]
     pub dt: f64,
     /// Time from the first to the last row of the log (s).
+    #[serde(skip)]
     pub duration_s: f64,
     /// Stretches without a gap that were used.
+    #[serde(skip)]
     pub segments: usize,
     /// Stretches too short to filter.
+    #[serde(skip)]
     pub skipped: Skipped,
     /// Samples interpolated because no row lay within 2 % of a step from their time.
+    #[serde(skip)]
     pub interpolated: u64,
     /// Cut-off of the parallel filter (Hz).
     pub cutoff_hz: f64,
     /// Every how many samples a row was kept.
     pub decimation: usize,
     /// Cut-off of the position filter (Hz); none where raw positions were differentiated.
+    #[serde(rename = "position_cutoff_hz")]
     pub q_cutoff_hz: Option<f64>,
 }
 
 /// Stretches of a log that were too short to filter.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Skipped {
     /// How many.
     pub segments: usize,

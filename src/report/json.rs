@@ -5,8 +5,10 @@
 //! has no other word for them. Nothing of the moment (clock, duration, threads, absolute path)
 //! belongs in it.
 
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use thiserror::Error;
 
 use crate::log::Provenance;
@@ -104,10 +106,51 @@ impl Document {
     }
 }
 
+/// The schema of a command's document around a result of type `T`: the fields that a script may rely on.
+/// A document may hold others.
+pub fn schema<T: JsonSchema>(command: &str) -> Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut generator = settings.into_generator();
+    let inputs = generator.subschema_for::<Vec<Provenance>>();
+    let mut found = Value::from(generator.into_root_schema_for::<T>());
+    found["title"] = format!("JSON document of `cft-ident {command}`").into();
+    let mut properties = Map::new();
+    let version = format!("cft-ident/{command}/1");
+    properties.insert("schema".into(), json!({ "const": version }));
+    properties.insert("version".into(), json!({"type": "string"}));
+    properties.insert("inputs".into(), inputs.into());
+    let texts = json!({"type": "array", "items": {"type": "string"}});
+    properties.insert("warnings".into(), texts);
+    let mut required: Vec<Value> = properties.keys().map(|name| json!(name)).collect();
+    if let Some(Value::Object(own)) = found.get_mut("properties").map(Value::take) {
+        properties.extend(own);
+    }
+    if let Some(Value::Array(own)) = found.get_mut("required").map(Value::take) {
+        required.extend(own);
+    }
+    found["properties"] = properties.into();
+    found["required"] = required.into();
+    with_null(&mut found);
+    found
+}
+
+/// A number that is not finite becomes null, so every number of a schema may be null.
+fn with_null(schema: &mut Value) {
+    match schema {
+        Value::Object(fields) => {
+            if fields.get("type").is_some_and(|kind| kind == "number") {
+                fields.insert("type".into(), json!(["number", "null"]));
+            }
+            fields.values_mut().for_each(with_null);
+        }
+        Value::Array(items) => items.iter_mut().for_each(with_null),
+        _ => {}
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     fn input() -> Provenance {
         Provenance {
@@ -156,6 +199,27 @@ mod tests {
         let back: Value = serde_json::from_str(&document.text()).unwrap();
         assert_eq!(back["value"], Value::Null);
         assert_eq!(back["list"], json!([null, 0.30000000000000004, null]));
+    }
+
+    #[test]
+    fn a_schema_has_the_envelope_and_the_fields_of_the_result() {
+        /// Any.
+        #[derive(Serialize, JsonSchema)]
+        struct Fitted {
+            /// Root mean square [N].
+            rmse: f64,
+            std: Option<f64>,
+            joints: Vec<String>,
+        }
+        let schema = schema::<Fitted>("lsq");
+        let required = [
+            "schema", "version", "inputs", "warnings", "rmse", "std", "joints",
+        ];
+        assert_eq!(schema["required"], json!(required));
+        assert_eq!(schema["properties"]["schema"]["const"], "cft-ident/lsq/1");
+        let rmse = &schema["properties"]["rmse"];
+        assert_eq!(rmse["type"], json!(["number", "null"]));
+        assert_eq!(rmse["description"], "Root mean square [N].");
     }
 
     #[test]

@@ -8,6 +8,8 @@ mod encode;
 pub mod figure;
 pub mod json;
 mod page;
+pub mod sections;
+pub mod stages;
 pub mod summary;
 pub mod table;
 mod text;

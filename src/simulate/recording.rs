@@ -1,5 +1,8 @@
 //! What a simulation gives: the log as a laboratory would have it, and beside it what was true.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::chance::Purpose;
 use super::effects::{Effects, Log};
 use super::integrate::Effort;
@@ -25,7 +28,7 @@ impl Status {
 }
 
 /// A limit that was reached.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LimitEvent {
     pub coordinate: String,
     /// Time of the first sample at which the coordinate was outside \[s\].
@@ -37,7 +40,8 @@ pub struct LimitEvent {
 }
 
 /// How the run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Ending {
     /// After the time that was asked for.
     Completed,

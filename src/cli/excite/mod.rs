@@ -3,12 +3,9 @@
 
 mod given;
 mod judge;
-mod page;
 mod samples;
 
 use std::path::{Path, PathBuf};
-
-use serde_json::json;
 
 use super::context::Context;
 use super::error::CliError;
@@ -22,13 +19,15 @@ use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
 use crate::excite::machine::Machine;
 use crate::excite::search::{Task, design};
 use crate::excite::{
-    Criterion, ExciteError, Given, Motion, Prior, foresee, machine, series_of, trajectory,
-    usual_torque,
+    Criterion, ExciteError, Given, Judgement, Judgements, LawForeseen, Motion, Prior, foresee,
+    machine, series_of, trajectory, usual_torque,
 };
-use crate::log::Provenance;
+use crate::log::{Provenance, escape};
 use crate::report::json::Document;
+use crate::report::sections::provenance;
+use crate::report::{Report, stages};
 
-use judge::{Friction, Judged, judge};
+use judge::{head, judged, refuse_broken};
 
 const EXAMPLE: &str = "\
 Example:
@@ -301,26 +300,19 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
                 .contains(&file.joint) =>
         {
             let task = ladder_task(bench, &file.joint);
-            Some(Friction {
+            Some(LawForeseen {
                 joint: file.joint.clone(),
-                expected: foresee_ladder(&bench.machine, &task, file)?,
-                usual: None,
+                parameters: foresee_ladder(&bench.machine, &task, file)?,
+                usual_relative_std: None,
             })
         }
         _ => None,
     };
-    let judged = judge(bench, &motion, &channels, None, friction)?;
-    let mut text = judged.text(bench, &given.name);
-    text += &extras(bench, &motion, &judged, names, &given.name)?;
-    let document = Document::new(
-        "excite",
-        &bench.inputs,
-        &judged.warnings,
-        &judged.json(bench),
-    )?;
+    let judged = judged(bench, &motion, &channels, None, friction)?;
+    let report = written(bench, &motion, &judged, names, &given.name)?;
     Ok(Outcome {
-        text,
-        document,
+        text: report.text(),
+        document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
         missed: judged.broken(),
     })
 }
@@ -354,30 +346,23 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
         args.seconds,
         seed,
     )?;
-    let friction = Friction {
+    let friction = LawForeseen {
         joint: joint.to_owned(),
-        expected: found.expected,
-        usual: Some(found.usual),
+        parameters: found.expected,
+        usual_relative_std: Some(found.usual),
     };
-    let mut judged = judge(
-        bench,
-        &motion,
-        &bench.machine.channels,
-        None,
-        Some(friction),
-    )?;
+    let channels = &bench.machine.channels;
+    let mut judged = judged(bench, &motion, channels, None, Some(friction))?;
     judged.evaluations = Some(found.evaluations);
-    judged.refuse_broken()?;
+    refuse_broken(&judged)?;
     let file = names.trajectory.clone().unwrap_or_default();
     let shown = file.display().to_string();
-    let mut text = judged.text(bench, &shown);
-    text += &extras(bench, &motion, &judged, names, &shown)?;
-    write_text(&file, &trajectory.to_toml(&judged.head(bench)))?;
-    text += &format!("written: {shown}\n");
-    let result = judged.json(bench);
+    let mut report = written(bench, &motion, &judged, names, &shown)?;
+    write_text(&file, &trajectory.to_toml(&head(&judged)))?;
+    report.terminal().line(&format!("written: {shown}"));
     Ok(Outcome {
-        text,
-        document: Document::new("excite", &bench.inputs, &judged.warnings, &result)?,
+        text: report.text(),
+        document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
         missed: Vec::new(),
     })
 }
@@ -395,7 +380,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         any = true;
     }
     let mut text = String::new();
-    let mut documents = Vec::new();
+    let mut all: Vec<Judgement> = Vec::new();
     let mut stopped = None;
     keep_what_there_is();
     for names in names {
@@ -443,9 +428,9 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
             blend,
         };
         let channels = bench.machine.channels.clone();
-        let mut judged = judge(bench, &motion, &channels, any.then_some(&given), None)?;
+        let mut judged = judged(bench, &motion, &channels, any.then_some(&given), None)?;
         judged.evaluations = Some(found.evaluations);
-        judged.refuse_broken()?;
+        refuse_broken(&judged)?;
         let file = names.trajectory.clone().unwrap_or_default();
         let shown = file.display().to_string();
         let Motion::Periodic { series, blend } = &motion else {
@@ -455,13 +440,13 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         fourier.start_s = Some(blend.start);
         fourier.blend_s = Some(blend.seconds);
         fourier.periods = blend.periods;
-        let toml = Trajectory::Fourier(fourier).to_toml(&judged.head(bench));
-        text += &judged.text(bench, &shown);
-        text += &extras(bench, &motion, &judged, names, &shown)?;
+        let toml = Trajectory::Fourier(fourier).to_toml(&head(&judged));
+        let mut report = written(bench, &motion, &judged, names, &shown)?;
         write_text(&file, &toml)?;
-        text += &format!("written: {shown}\n");
-        warnings.append(&mut judged.warnings);
-        documents.push(judged.json(bench));
+        report.terminal().line(&format!("written: {shown}"));
+        text += &report.text();
+        warnings.extend(judged.warnings.iter().cloned());
+        all.push(judged);
         let (information, rows) =
             foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
         given.add_motion(&information, rows);
@@ -474,11 +459,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     if let Some(file) = stopped {
         return Err(CliError::from_room(Exit::Interrupted, &Stopped { file }));
     }
-    // The last motion's fields, with all of them in a list where there are several.
-    let mut result = documents.last().cloned().unwrap_or_else(|| json!({}));
-    if documents.len() > 1 {
-        result["trajectories"] = documents.into();
-    }
+    let result = Judgements::of(all).ok_or_else(|| CliError::usage("no motion is asked for"))?;
     Ok(Outcome {
         text,
         document: Document::new("excite", &bench.inputs, &warnings, &result)?,
@@ -486,31 +467,42 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     })
 }
 
-/// Samples and picture, where they are asked for.
-fn extras(
+/// The report of a motion, after page, picture and samples were written where they are asked for;
+/// `shown` is the trajectory's path.
+fn written(
     bench: &Bench,
     motion: &Motion,
-    judged: &Judged,
+    judged: &Judgement,
     names: &Names,
-    title: &str,
-) -> Result<String, CliError> {
-    let mut text = String::new();
-    let title = Path::new(title).file_name().unwrap_or_default();
+    shown: &str,
+) -> Result<Report, CliError> {
+    let title = Path::new(shown).file_name().unwrap_or_default();
     let title = title.to_string_lossy();
+    let mut report = stages::excite::excite(judged, shown, &title);
+    let figure = |title: &str| stages::excite::figure(&bench.machine, motion, judged, title);
     if let Some(path) = &names.report {
-        write_text(path, &page::page(bench, motion, judged, &title))?;
-        text += &format!("written: {}\n", path.display());
+        let mut page = report.page();
+        stages::excite::course(&mut page, judged, &figure(&escape(&title)));
+        let (file, command) = (&bench.file, bench.context.command());
+        provenance::section(&mut page, file, &bench.inputs, &[], None, command);
+        write_text(path, &report.html())?;
+        report
+            .terminal()
+            .line(&format!("written: {}", path.display()));
     }
     if let Some(path) = &names.plot {
-        let figure = judge::figure(bench, motion, judged, &title);
-        write_picture(path, &figure.svg())?;
-        text += &format!("written: {}\n", path.display());
+        write_picture(path, &figure(&title).svg())?;
+        report
+            .terminal()
+            .line(&format!("written: {}", path.display()));
     }
     if let Some(path) = &names.samples {
         samples::write(bench, motion, path)?;
-        text += &format!("written: {}\n", path.display());
+        report
+            .terminal()
+            .line(&format!("written: {}", path.display()));
     }
-    Ok(text)
+    Ok(report)
 }
 
 /// 1/noise per joint where the criterion weighs rows, else ones.

@@ -1,5 +1,8 @@
 //! Which columns of a log are which joint, by the likeness of their names.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::cli::{CliError, Context, columns};
 use crate::inspect::{self, Role};
 use crate::log::{LogSpec, Provenance, RawReader, escape, nearest};
@@ -80,16 +83,24 @@ fn look_at(
 }
 
 /// One joint and its columns.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Joint {
+    #[serde(rename = "joint")]
     pub name: String,
+    #[serde(skip)]
     pub kind: JointKind,
+    /// Column of its position.
     pub position: Option<String>,
+    /// Column of its velocity.
     pub velocity: Option<String>,
+    /// Column of its torque.
     pub torque: Option<String>,
+    #[serde(skip)]
     pub position_unit: Option<String>,
+    #[serde(skip)]
     pub torque_unit: Option<String>,
     /// Width of what the position went through, in its own unit.
+    #[serde(skip)]
     pub span: f64,
 }
 

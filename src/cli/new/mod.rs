@@ -5,7 +5,8 @@ mod text;
 
 use std::path::{Component, Path, PathBuf};
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::outputs::write_text;
 use super::{CliError, Context, Outcome};
@@ -53,6 +54,21 @@ pub(super) enum Shape {
     Rows,
     /// One joint.
     Single(JointKind),
+}
+
+/// A robot file that was written.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Drafted {
+    /// Its name.
+    file: String,
+    /// What the robot is.
+    #[schemars(extend("enum" = ["single-joint", "serial"]))]
+    model: &'static str,
+    joints: Vec<columns::Joint>,
+    /// Rate of the log \[Hz\].
+    rate_hz: Option<f64>,
+    /// Cut-off of the parallel filter that was suggested \[Hz\].
+    cutoff_hz: Option<f64>,
 }
 
 /// Runs the command.
@@ -153,20 +169,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ),
         None => format!("next: cft-ident inspect LOG -r {}\n", target.display()),
     };
-    let joints: Vec<_> = mapping
-        .joints
-        .iter()
-        .map(|j| {
-            json!({"joint": j.name, "position": j.position, "velocity": j.velocity, "torque": j.torque})
-        })
-        .collect();
-    let result = json!({
-        "file": target.file_name().unwrap_or_default().to_string_lossy(),
-        "model": draft.model(),
-        "joints": joints,
-        "rate_hz": seen.as_ref().and_then(|s| s.rate_hz),
-        "cutoff_hz": draft.cutoff_hz(),
-    });
+    let result = Drafted {
+        file: target
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        model: draft.model(),
+        joints: mapping.joints.clone(),
+        rate_hz: seen.as_ref().and_then(|s| s.rate_hz),
+        cutoff_hz: draft.cutoff_hz(),
+    };
     Ok(Outcome {
         text: format!("{table}{next}"),
         document: Document::new("new", &provenance, &warnings, &result)?,

@@ -4,8 +4,9 @@ use super::super::compare::{Compared, apart_table, error_table, parameter_table}
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
-use super::{provenance, quality, torque};
+use super::{quality, torque};
 use crate::log::{LogSpec, Provenance, escape};
+use crate::report::sections::provenance;
 use crate::report::{Report, TraceStyle, Writer};
 
 /// What the page is made from.
@@ -71,7 +72,7 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
     }
     made_from.dedup();
     let file = &of.machine.file;
-    provenance::section(&mut out, file, read, &made_from, summary, context);
+    provenance::section(&mut out, file, read, &made_from, summary, context.command());
     Ok(report.html())
 }
 

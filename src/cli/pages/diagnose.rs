@@ -7,12 +7,13 @@ use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
-use super::{fit, friction, parameters, provenance, quality, residual, torque};
+use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::diagnose::{Candidate, Errors, Pair};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::figure::ResidualFigure;
+use crate::report::sections::provenance;
 use crate::report::{Report, TraceStyle, Writer};
 
 /// Candidates that are told.
@@ -113,7 +114,7 @@ pub fn diagnose(
         &inputs,
         made_from,
         summary,
-        context,
+        context.command(),
     );
     Ok(report.html())
 }
@@ -216,7 +217,7 @@ pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result
         &inputs,
         made_from,
         None,
-        context,
+        context.command(),
     );
     Ok(report.html())
 }

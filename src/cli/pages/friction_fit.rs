@@ -3,11 +3,12 @@
 use super::super::friction::{Identified, figure};
 use super::super::machine::Machine;
 use super::super::{CliError, Context};
-use super::{fit, parameters, provenance, quality};
+use super::{fit, parameters, quality};
 use crate::config::ModelFile;
 use crate::friction::passes::Ending;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
+use crate::report::sections::provenance;
 use crate::report::{Report, Writer};
 
 /// What the page is made from.
@@ -100,7 +101,14 @@ pub fn friction_fit(of: &FrictionFit, context: &Context) -> Result<String, CliEr
     quality::section(&mut page, machine, &logs, &of.found.warnings, context)?;
     let mut inputs = of.given.clone();
     inputs.extend(of.found.inputs.iter().cloned());
-    provenance::section(&mut page, &machine.file, &inputs, &[], None, context);
+    provenance::section(
+        &mut page,
+        &machine.file,
+        &inputs,
+        &[],
+        None,
+        context.command(),
+    );
     Ok(report.html())
 }
 

@@ -7,12 +7,13 @@ use super::super::validate::Validated;
 use super::super::{CliError, Context, friction, lsq};
 use super::look::Look;
 use super::torque::Drawn;
-use super::{diagnose, fit, parameters, provenance, quality, residual, torque, validate};
+use super::{diagnose, fit, parameters, quality, residual, torque, validate};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
+use crate::report::sections::provenance;
 use crate::report::{Report, Writer};
 
 /// What the page is made from.
@@ -127,7 +128,14 @@ pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<Str
     fit::section(&mut page, of.fitted, of.model());
     quality::section(&mut page, machine, &of.logs, of.warnings, context)?;
     let summary = Some(&of.fitted.summary);
-    provenance::section(&mut page, &machine.file, of.inputs, &[], summary, context);
+    provenance::section(
+        &mut page,
+        &machine.file,
+        of.inputs,
+        &[],
+        summary,
+        context.command(),
+    );
     page.details("campaign file", of.campaign.1);
     page.paragraph(&format!(
         "Noise of the torque that is left, by joint: {}.",

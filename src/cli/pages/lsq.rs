@@ -5,11 +5,12 @@ use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
-use super::{fit, friction, parameters, provenance, quality, residual, torque};
+use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
+use crate::report::sections::provenance;
 use crate::report::{Report, Writer};
 
 /// What the page is made from.
@@ -82,6 +83,13 @@ pub fn lsq(of: &Lsq, context: &Context) -> Result<String, CliError> {
     let mut inputs = of.given.clone();
     inputs.extend(of.found.inputs.iter().cloned());
     let summary = Some(&of.found.summary);
-    provenance::section(&mut page, &of.machine.file, &inputs, &[], summary, context);
+    provenance::section(
+        &mut page,
+        &of.machine.file,
+        &inputs,
+        &[],
+        summary,
+        context.command(),
+    );
     Ok(report.html())
 }

@@ -10,7 +10,6 @@ mod identify;
 mod look;
 mod lsq;
 mod parameters;
-pub mod provenance;
 mod quality;
 mod residual;
 mod torque;

@@ -5,11 +5,12 @@ use super::super::validate::Validated;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
-use super::{fit, friction, parameters, provenance, quality, residual, torque};
+use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::effect::Refined;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
+use crate::report::sections::provenance;
 use crate::report::{Report, Writer};
 use crate::validate::Validation;
 
@@ -194,7 +195,7 @@ pub fn validate(of: &Validate, context: &Context) -> Result<String, CliError> {
         &inputs,
         made_from,
         summary,
-        context,
+        context.command(),
     );
     Ok(report.html())
 }

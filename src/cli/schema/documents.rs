@@ -331,35 +331,6 @@ fn compare() -> Vec<(&'static str, Value)> {
     ]
 }
 
-fn inspect() -> Vec<(&'static str, Value)> {
-    let channel = object(&[
-        ("name", text()),
-        ("unit", maybe_text()),
-        ("min", number()),
-        ("max", number()),
-        ("rate_hz", number()),
-    ]);
-    let fault = object(&[
-        ("kind", text()),
-        ("severity", one_of(&["info", "warning", "error"])),
-        ("channel", maybe_text()),
-        ("from_s", number()),
-        ("to_s", number()),
-        ("effect", text()),
-        ("remedy", text()),
-    ]);
-    vec![
-        ("channels", list(channel)),
-        ("rate_hz", number()),
-        ("jitter", number()),
-        (
-            "gaps",
-            list(object(&[("from_s", number()), ("to_s", number())])),
-        ),
-        ("faults", list(fault)),
-    ]
-}
-
 /// Fields of a command's own result.
 fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
     let part = || json!({"type": ["object", "null"]});
@@ -369,7 +340,6 @@ fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
         Kind::Validate => ("validate", validate()),
         Kind::Diagnose => ("diagnose", diagnose()),
         Kind::Compare => ("compare", compare()),
-        Kind::Inspect => ("inspect", inspect()),
         Kind::Identify => (
             "identify",
             vec![
@@ -381,74 +351,7 @@ fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
                 ("files", json!({})),
             ],
         ),
-        Kind::Excite => (
-            "excite",
-            vec![
-                (
-                    "condition",
-                    object(&[("raw", number()), ("normalised", number())]),
-                ),
-                ("log_det", number()),
-                ("limits_used", json!({})),
-                ("weakest_direction", json!({})),
-                ("evaluations", count()),
-            ],
-        ),
-        Kind::Simulate => (
-            "simulate",
-            vec![
-                ("effects", json!({"type": "array"})),
-                ("parameters", json!({})),
-            ],
-        ),
-        Kind::Torque => {
-            let joint = object(&[
-                ("joint", text()),
-                ("unit", text()),
-                ("rms", number()),
-                ("peak", number()),
-            ]);
-            (
-                "torque",
-                vec![
-                    ("joints", list(joint)),
-                    ("samples", count()),
-                    ("processing", processing()),
-                ],
-            )
-        }
-        Kind::Export => (
-            "export",
-            vec![
-                ("joints", list(text())),
-                ("files", list(object(&[("file", text()), ("what", text())]))),
-                ("left_out", list(text())),
-            ],
-        ),
-        Kind::New => {
-            let joint = object(&[
-                ("joint", text()),
-                ("position", maybe_text()),
-                ("velocity", maybe_text()),
-                ("torque", maybe_text()),
-            ]);
-            (
-                "new",
-                vec![
-                    ("file", text()),
-                    ("model", one_of(&["single-joint", "serial"])),
-                    ("joints", list(joint)),
-                    ("rate_hz", number()),
-                    ("cutoff_hz", number()),
-                ],
-            )
-        }
-        Kind::Convert
-        | Kind::Robot
-        | Kind::Model
-        | Kind::Campaign
-        | Kind::Trajectory
-        | Kind::Truth => ("convert", Vec::new()),
+        _ => ("convert", Vec::new()),
     }
 }
 

@@ -3,11 +3,14 @@
 mod documents;
 
 use clap::ValueEnum;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
+use crate::cli::{convert, export, new, simulate, torque};
 use crate::config::schema::{campaign, model, robot, trajectory};
-use crate::report::json::Document;
+use crate::excite::Judgements;
+use crate::inspect::Inspection;
+use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
 
 const EXAMPLE: &str = "\
@@ -76,6 +79,13 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Campaign => campaign(),
         Kind::Trajectory => trajectory(),
         Kind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
+        Kind::Excite => json::schema::<Judgements>("excite"),
+        Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
+        Kind::Inspect => json::schema::<Inspection>("inspect"),
+        Kind::Torque => json::schema::<torque::Along>("torque"),
+        Kind::Convert => json::schema::<convert::Converted>("convert"),
+        Kind::Export => json::schema::<export::Exported>("export"),
+        Kind::New => json::schema::<new::Drafted>("new"),
         of_document => documents::schema(of_document),
     }
 }
@@ -88,7 +98,7 @@ pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
     let found = schema(args.kind);
     let text = format!("{found:#}\n");
     let name = args.kind.to_possible_value();
-    let result = json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
+    let result = serde_json::json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
     Ok(Outcome {
         document: Document::new("schema", &[], &[], &result)?,
         text,

@@ -23,8 +23,8 @@ pub struct EffectSpec {
 pub struct EffectValue {
     pub effect: String,
     pub family: String,
-    /// The joint or screw; absent for the robot as a whole.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The joint or screw; absent (null in JSON) for the robot as a whole.
+    #[serde(default)]
     pub joint: Option<String>,
     /// By key, in alphabetical order.
     pub parameters: BTreeMap<String, EffectParameter>,

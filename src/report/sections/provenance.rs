@@ -1,6 +1,5 @@
 //! Where a page came from, so that the run can be repeated.
 
-use super::super::Context;
 use crate::config::RobotFile;
 use crate::log::{Provenance, escape};
 use crate::motion::Summary;
@@ -36,7 +35,7 @@ pub fn section(
     inputs: &[Provenance],
     model_inputs: &[Provenance],
     summary: Option<&Summary>,
-    context: &Context,
+    command: &str,
 ) {
     page.heading("Where it came from");
     files(page, "inputs of this run", inputs);
@@ -56,7 +55,7 @@ pub fn section(
         "cft-ident {}, called as:",
         env!("CARGO_PKG_VERSION")
     ));
-    page.code(context.command());
+    page.code(command);
     if let Ok(text) = toml::to_string(robot) {
         page.details("robot file, with every setting of this run", &text);
     }

@@ -1,0 +1,3 @@
+//! What several reports say alike, section by section.
+
+pub mod provenance;

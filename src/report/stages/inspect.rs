@@ -1,0 +1,164 @@
+//! The report of `inspect`: what logs hold and what is wrong with them.
+
+use crate::inspect::{Fault, Findings, Severity};
+use crate::log::escape;
+use crate::number;
+use crate::report::table::{Align, Table};
+use crate::report::{Report, Writer};
+
+/// The findings of logs, by their names.
+pub fn inspect(logs: &[(String, Findings)]) -> Report {
+    let mut report = Report::new("Logs");
+    for (name, found) in logs {
+        let mut out = report.everywhere();
+        out.note("", &head(name, found), 2);
+        out.line("");
+        out.table(channels(found));
+        if !found.joints.is_empty() {
+            out.line("");
+            out.table(joints(found));
+        }
+        out.line("");
+        faults(&mut out, found);
+        out.line("");
+    }
+    report
+}
+
+fn head(name: &str, found: &Findings) -> String {
+    let mut head = format!(
+        "{}: {} rows in {} s",
+        escape(name),
+        found.rows,
+        number::significant(found.duration_s, 5)
+    );
+    if let (Some(rate), Some(jitter)) = (found.rate_hz, found.jitter) {
+        head += &format!(
+            ", {} Hz, jitter {}, {} gap(s)",
+            number::significant(rate, 5),
+            number::percent(jitter),
+            found.gaps.len()
+        );
+    }
+    head
+}
+
+fn channels(found: &Findings) -> Table {
+    let mut table = Table::new(&[
+        ("channel", Align::Left),
+        ("from", Align::Decimal),
+        ("to", Align::Decimal),
+        ("unit", Align::Left),
+        ("step", Align::Decimal),
+        ("limits", Align::Left),
+    ]);
+    for channel in &found.channels {
+        let limits = channel.limits.map(|[low, high]| {
+            format!(
+                "{}..{}",
+                number::significant(low, 4),
+                number::significant(high, 4)
+            )
+        });
+        let absent = f64::NAN;
+        table.row([
+            escape(&channel.name),
+            number::significant(channel.min.unwrap_or(absent), 5),
+            number::significant(channel.max.unwrap_or(absent), 5),
+            channel.unit.clone().unwrap_or_default(),
+            channel
+                .step
+                .map(|step| number::significant(step, 3))
+                .unwrap_or_default(),
+            limits.unwrap_or_default(),
+        ]);
+    }
+    table
+}
+
+fn joints(found: &Findings) -> Table {
+    let mut columns = vec![
+        ("joint", Align::Left),
+        ("moves", Align::Left),
+        ("travel", Align::Decimal),
+        ("speed", Align::Decimal),
+        ("acc.", Align::Decimal),
+        ("reversals", Align::Right),
+        ("moving", Align::Decimal),
+        ("condition", Align::Decimal),
+    ];
+    let known = found.joints.iter().any(|joint| joint.unit.is_some());
+    if known {
+        columns.push(("unit", Align::Left));
+    }
+    let unit = match known {
+        true => "unit",
+        false => "unit of the log",
+    };
+    let mut table = Table::new(&columns).caption(&format!(
+        "motion: travel [{unit}], greatest speed [{unit}/s] and acceleration [{unit}/s^2]"
+    ));
+    for joint in &found.joints {
+        table.row([
+            escape(&joint.joint),
+            if joint.moves { "yes" } else { "no" }.to_owned(),
+            number::significant(joint.travel, 3),
+            number::significant(joint.speed_max, 3),
+            number::significant(joint.acceleration_max, 3),
+            joint.reversals.to_string(),
+            number::percent(joint.moving_share),
+            joint
+                .condition
+                .map(|condition| number::significant(condition, 3))
+                .unwrap_or_default(),
+            // Left off where there is no column for it.
+            joint.unit.clone().unwrap_or_default(),
+        ]);
+    }
+    table
+}
+
+fn faults(out: &mut Writer, found: &Findings) {
+    if found.faults.is_empty() {
+        return out.line("no faults found");
+    }
+    let count = |severity| found.of(severity).count();
+    out.line(&format!(
+        "{} error(s), {} warning(s), {} note(s)",
+        count(Severity::Error),
+        count(Severity::Warning),
+        count(Severity::Info)
+    ));
+    // One channel at several times, or several channels with the same words.
+    let alike = |a: &Fault, b: &Fault| {
+        (a.kind, a.severity, &a.remedy) == (b.kind, b.severity, &b.remedy)
+            && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span()))
+    };
+    let mut told: Vec<&Fault> = Vec::new();
+    for fault in &found.faults {
+        if told.iter().any(|earlier| alike(earlier, fault)) {
+            continue;
+        }
+        let all: Vec<&Fault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
+        told.push(fault);
+        let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
+        let channels = distinct(channels.map(escape).collect());
+        let spans = distinct(all.iter().map(|fault| fault.span()).collect());
+        let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
+        out.line("");
+        out.note("", &format!("{}: {spans} s", head.trim_end()), 0);
+        out.note("    ", &fault.effect, 4);
+        out.note("    ", &format!("-> {}", fault.remedy), 4);
+    }
+}
+
+/// Each text once, in a line.
+fn distinct(texts: Vec<String>) -> String {
+    let mut out: Vec<String> = Vec::new();
+    for text in texts {
+        if !out.contains(&text) {
+            out.push(text);
+        }
+    }
+    out.join(", ")
+}

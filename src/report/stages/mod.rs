@@ -1,0 +1,5 @@
+//! The reports, one file per stage: the verdict comes first, in words and one table; what it stands on
+//! follows; where it came from ends the page.
+
+pub mod excite;
+pub mod inspect;
