@@ -3,6 +3,7 @@
 //! Measured and reconstructed torque run through the model's declared parallel filter alike; the
 //! errors of every filtered, decimated row and of every raw sample are summed as they pass.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::log::Block;
@@ -10,7 +11,7 @@ use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary};
 use crate::robot::model::Model;
 
 /// Errors of one joint.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct JointError {
     pub joint: String,
     /// "N" or "Nm".
@@ -30,7 +31,7 @@ pub struct JointError {
 }
 
 /// Errors over all joints.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Overall {
     /// Stacked norms over all joints; none where their units differ.
     pub relative_error: Option<f64>,

@@ -5,13 +5,14 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::effect::Refined;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// How much larger the second model's error is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
     /// Relative error of B less that of A, a fraction.
     pub difference: f64,

@@ -3,6 +3,7 @@
 //! A difference d = b - a of two independent estimates has the variance s_a^2 + s_b^2; what is told
 //! is d over the root of it. Estimates from the same logs are not independent: the caller says so.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::config::ModelFile;
@@ -10,7 +11,7 @@ use crate::config::model_file::Parameter;
 use crate::verdict::Verdict;
 
 /// One model's estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct ParameterEstimate {
     /// Value [unit of the pair].
     pub value: f64,
@@ -21,7 +22,7 @@ pub struct ParameterEstimate {
 }
 
 /// A parameter that both models have.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ParameterPair {
     /// Name; `effect.key` for a number of an effect.
     pub name: String,
@@ -43,7 +44,7 @@ pub struct ParameterPair {
 }
 
 /// Why a parameter has no partner.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
     /// The other model has none of this name.
@@ -55,7 +56,7 @@ pub enum Reason {
 }
 
 /// A parameter that one model has alone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Apart {
     pub name: String,
     pub joint: Option<String>,
@@ -66,7 +67,7 @@ pub struct Apart {
 }
 
 /// All parameters of two models.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct SideBySide {
     /// What both have, in the order of the first.
     pub parameters: Vec<ParameterPair>,

@@ -1,6 +1,7 @@
 //! The estimate of one joint: parameters with verdicts, curve, consistency.
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::excitation::{FrictionError, Speeds, speeds};
@@ -36,7 +37,7 @@ pub struct EstimatedValue {
 }
 
 /// One point of the friction curve.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct FrictionCurvePoint {
     /// Velocity [m/s or rad/s].
     pub v: f64,
@@ -47,7 +48,7 @@ pub struct FrictionCurvePoint {
 }
 
 /// A nuisance quantity.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Nuisance {
     pub name: String,
     pub value: f64,
@@ -60,7 +61,7 @@ pub struct Nuisance {
 /// The noise levels are estimated, so that single innovations have about their own variance under
 /// any model. What tells a wrong one is that its innovations are alike: so the mean is over windows
 /// of 50 samples, each the square of the window's summed normalised innovations over their number.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Nis {
     /// Mean over windows; 1 where the filter's covariance is true and the innovations are white.
     pub mean: f64,

@@ -44,7 +44,7 @@ const LIKELIER: f64 = 1.0;
 const MOST_STEPS: usize = 40;
 
 /// How a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ending {
     Converged,

@@ -4,13 +4,14 @@
 //! joints is subtracted. It is drawn over the filter's curve as a check that uses neither the
 //! filter nor the friction law.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::prepare::Prepared;
 use super::problem::FRICTION;
 
 /// Mean torque over one plateau, less the nuisance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Plateau {
     /// Mean velocity [m/s or rad/s].
     pub v: f64,

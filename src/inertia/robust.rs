@@ -8,6 +8,7 @@
 //! section 2.7). Each pass streams over the logs: medians come from histograms of fixed size.
 
 use nalgebra::DVector;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::accumulate::BlockFactors;
@@ -33,7 +34,7 @@ const RATIO: f64 = 1.01;
 const LOWEST: f64 = 1e-6;
 
 /// How a residual of u scales counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// All rows alike.
@@ -244,7 +245,7 @@ impl Weigher {
 const LEAST_SLOPE: f64 = 0.1;
 
 /// How an estimator that iterates ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// The last iteration moved nothing that matters.

@@ -2,6 +2,7 @@
 //! noise, with rank, condition numbers and a covariance that correlated residuals do not break.
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::accumulate::{BlockFactors, JointFactor};
@@ -10,7 +11,7 @@ use crate::math::rank;
 use crate::math::rfactor::RFactor;
 
 /// Which rows count how much.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weighting {
     /// Rows weighted by each joint's residual of an ordinary fit (two steps).
@@ -41,7 +42,7 @@ pub enum FitError {
 }
 
 /// Condition numbers of the unweighted stacked regressor.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct ConditionNumbers {
     /// Ratio of its extreme singular values as it stands; null where the rank is short.
     pub raw: Option<f64>,
@@ -50,7 +51,7 @@ pub struct ConditionNumbers {
 }
 
 /// A combination of unknowns that the data do not tell apart: coefficients of the scaled columns.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Confounded {
     /// Index of the unknown and its coefficient, largest first.
     pub terms: Vec<(usize, f64)>,

@@ -3,6 +3,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::diagnose::problem::plan::{Plan, Role};
@@ -11,7 +12,7 @@ use crate::effect::Refined;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Errors of one joint.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JointErrors {
     pub joint: String,
     pub unit: String,
@@ -26,7 +27,7 @@ pub struct JointErrors {
 }
 
 /// Errors over all joints.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct OverallErrors {
     /// Stacked norms; none where the joints' units differ.
     pub relative_error: Option<f64>,
@@ -37,7 +38,7 @@ pub struct OverallErrors {
 }
 
 /// Errors over the rows of one use.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Errors {
     pub joints: Vec<JointErrors>,
     pub overall: OverallErrors,
