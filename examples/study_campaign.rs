@@ -9,9 +9,9 @@ mod study;
 
 use std::path::Path;
 
-use cft_ident::cli::machine::narrowed;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
 use cft_ident::friction::passes::Ending;
+use cft_ident::identify::narrowed;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use cft_ident::inertia::solve::{Weighting, fit};

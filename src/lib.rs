@@ -48,4 +48,6 @@ pub mod output;
 
 pub mod compare;
 
+pub mod identify;
+
 pub mod cli;

@@ -32,6 +32,13 @@ const ROOMS: &[(&str, &[&str])] = &[
         &["robot", "config", "motion", "effect", "verdict"],
     ),
     (
+        "identify",
+        &[
+            "math", "verdict", "number", "robot", "log", "config", "motion", "effect", "friction",
+            "inertia", "diagnose", "validate", "inspect", "compare",
+        ],
+    ),
+    (
         "report",
         &[
             "log", "verdict", "number", "config", "motion", "friction", "inertia", "validate",
@@ -43,7 +50,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         &[
             "math", "verdict", "number", "robot", "log", "config", "output", "motion", "effect",
             "friction", "inertia", "diagnose", "validate", "inspect", "simulate", "excite",
-            "compare", "report", "export",
+            "compare", "identify", "report", "export",
         ],
     ),
 ];

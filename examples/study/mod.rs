@@ -6,12 +6,12 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use cft_ident::cli::machine::narrowed;
 use cft_ident::config::Trajectory;
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
 use cft_ident::friction::inputs::Inputs;
 use cft_ident::friction::motions::motions;
 use cft_ident::friction::prepare::{Prepared, SensorModel as Read, prepare};
+use cft_ident::identify::narrowed;
 use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;

@@ -1,7 +1,7 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
-use super::machine::Machine;
+use crate::identify::LoggedRobot;
 use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
 use crate::log::{self, Channels, Layout, RawReader};
 
@@ -45,7 +45,7 @@ pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
 /// reading the log.
-pub(super) fn of_robot(log: &RawReader, machine: &Machine) -> (Plan, Option<Fault>) {
+pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (Plan, Option<Fault>) {
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
@@ -69,7 +69,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &Machine) -> (Plan, Option<Faul
 }
 
 /// Finds the channels of a layout among the columns that are not known yet.
-fn place(log: &RawReader, machine: &Machine, layout: &Layout, known: &mut [Option<Planned>]) {
+fn place(log: &RawReader, machine: &LoggedRobot, layout: &Layout, known: &mut [Option<Planned>]) {
     let raw = layout.channels == Channels::Actuator;
     let kinds = [
         (&layout.positions, Role::Position),
@@ -142,7 +142,7 @@ fn seconds(unit: Option<&str>) -> f64 {
 
 /// Limits of a channel, and whether a number at the limit is what was applied.
 fn limits(
-    machine: &Machine,
+    machine: &LoggedRobot,
     (j, joint): (usize, &str),
     role: Role,
     raw: bool,

@@ -4,13 +4,14 @@
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
+use crate::identify::{self, Control};
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]
@@ -20,6 +21,7 @@ pub struct Context {
     bars: bool,
     interrupted: Arc<AtomicBool>,
     command: String,
+    control: Control,
 }
 
 impl Context {
@@ -29,12 +31,22 @@ impl Context {
     /// stop.
     pub fn new(quiet: bool, json: Option<&Path>, interrupted: Arc<AtomicBool>) -> Self {
         let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        let bars = !quiet && std::io::stderr().is_terminal() && !dumb;
+        let flag = Arc::clone(&interrupted);
+        let running = Mutex::new(Vec::new());
+        let control = Control::default()
+            .stopped_by(move || flag.load(Ordering::Relaxed))
+            .told_to(move |progress| {
+                let mut running = running.lock().unwrap_or_else(PoisonError::into_inner);
+                show(progress, &mut running, bars, quiet);
+            });
         Context {
             quiet,
             json: json.map(Path::to_path_buf),
-            bars: !quiet && std::io::stderr().is_terminal() && !dumb,
+            bars,
             interrupted,
             command: String::new(),
+            control,
         }
     }
 
@@ -53,6 +65,11 @@ impl Context {
     /// Whether the user has asked to stop; long loops look at it between blocks.
     pub fn interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
+    }
+
+    /// The same, and the progress bars, for a stage of [`identify`].
+    pub fn control(&self) -> &Control {
+        &self.control
     }
 
     /// The flag behind [`Context::interrupted`], for a room that takes one.
@@ -83,14 +100,50 @@ impl Context {
 
     /// A line on standard error for the person who waits; `-q` silences it.
     pub fn note(&self, text: &str) {
-        if !self.quiet {
-            tell(&mut std::io::stderr(), &indented(text));
-        }
+        note(text, self.quiet);
     }
 
     /// A progress bar over `total` steps (a spinner for `None`), removed when it is dropped.
     pub fn progress(&self, label: &str, total: Option<u64>) -> Progress {
-        let target = if self.bars {
+        Progress::new(label, total, self.bars)
+    }
+}
+
+/// A line on standard error, unless that is to be quiet.
+fn note(text: &str, quiet: bool) {
+    if !quiet {
+        tell(&mut std::io::stderr(), &indented(text));
+    }
+}
+
+/// Shows the progress of a stage; the bar that began last is the one that moves.
+fn show(progress: identify::Progress, running: &mut Vec<Progress>, bars: bool, quiet: bool) {
+    match progress {
+        identify::Progress::Begin(work, steps) => running.push(Progress::new(work, steps, bars)),
+        identify::Progress::End => drop(running.pop()),
+        identify::Progress::Note(text) => note(text, quiet),
+        identify::Progress::Advance(steps) => {
+            if let Some(bar) = running.last() {
+                bar.advance(steps);
+            }
+        }
+        identify::Progress::Doing(what) => {
+            if let Some(bar) = running.last() {
+                bar.label(what);
+            }
+        }
+    }
+}
+
+/// A running bar; its methods may be called from any thread.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    fn new(label: &str, total: Option<u64>, drawn: bool) -> Self {
+        let target = if drawn {
             ProgressDrawTarget::stderr_with_hz(10)
         } else {
             ProgressDrawTarget::hidden()
@@ -106,15 +159,7 @@ impl Context {
         bar.set_message(label.to_owned());
         Progress { bar }
     }
-}
 
-/// A running bar; its methods may be called from any thread.
-#[derive(Debug)]
-pub struct Progress {
-    bar: ProgressBar,
-}
-
-impl Progress {
     /// `steps` more are done.
     pub fn advance(&self, steps: u64) {
         self.bar.inc(steps);

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::machine::Machine;
 use super::{CliError, Context, Outcome, arguments, columns};
+use crate::identify::LoggedRobot;
 use crate::log::{Block, Instant, LogSpec, Provenance, RawBlock, RawReader, Reader, escape};
 use crate::number;
 use crate::output::{LogForm, LogWriter};
@@ -178,7 +178,7 @@ fn as_it_stands(
 /// Converts the channels of a robot.
 fn of_robot(
     spec: &LogSpec,
-    machine: &Machine,
+    machine: &LoggedRobot,
     target: &mut Target<'_>,
     warnings: &mut Vec<String>,
     context: &Context,
@@ -217,7 +217,7 @@ fn of_robot(
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<_> = args.logs.iter().map(|log| log.path.as_path()).collect();
     context.check_outputs(&inputs, &[args.output.as_path()])?;
-    let machine = args.robot.as_deref().map(Machine::load).transpose()?;
+    let machine = args.robot.as_deref().map(LoggedRobot::load).transpose()?;
     let mut target = Target {
         path: &args.output,
         writer: None,

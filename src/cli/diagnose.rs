@@ -7,16 +7,14 @@ use serde_json::{Value, json};
 use super::diagnose_fault::{self as fault, DataFault};
 use super::diagnose_prior::{information, moved_alone, open};
 use super::diagnose_text::text;
-use super::friction::new_model;
 use super::lsq::processing;
-use super::machine::Machine;
-use super::refined::{Held, hold, in_file, refined};
 use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
 use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
 };
 use crate::effect::{Refined, Told};
+use crate::identify::{InMemory, Log, LoggedRobot, in_file, new_model, read_whole, refined};
 use crate::log::LogSpec;
 use crate::motion::Parallel;
 use crate::number;
@@ -74,7 +72,7 @@ pub enum Found {
 /// Result of the stage.
 pub struct Diagnosed {
     pub diagnosis: Diagnosis,
-    pub held: Held,
+    pub held: InMemory,
     /// Names of the logs, in order.
     pub logs: Vec<String>,
     /// The model as it was given.
@@ -92,7 +90,7 @@ pub struct Logs<'a> {
 
 /// Diagnoses a model on logs.
 pub fn diagnose(
-    machine: &Machine,
+    machine: &LoggedRobot,
     file: &ModelFile,
     name: &str,
     logs: &Logs,
@@ -101,7 +99,7 @@ pub fn diagnose(
 ) -> Result<Found, CliError> {
     let given = refined(file, name)?;
     for spec in logs.train {
-        if let Some(fault) = machine.fault(spec, context)? {
+        if let Some(fault) = machine.fault(&spec.into(), context.control())? {
             return Ok(Found::DataFault(DataFault {
                 kind: fault.kind.word().to_owned(),
                 channel: fault.channel,
@@ -120,7 +118,8 @@ pub fn diagnose(
         .iter()
         .flat_map(|(logs, role)| logs.iter().map(|_| *role))
         .collect();
-    let mut held = hold(machine, &specs, context)?;
+    let read: Vec<Log> = specs.iter().map(|spec| Log::from(*spec)).collect();
+    let mut held = read_whole(machine, &read, context.control())?;
     let settings = machine.settings();
     let parallel = Parallel::design(&settings, held.summary.dt)
         .map_err(|e| CliError::input(format!("{name}: {e}")))?;
@@ -186,7 +185,7 @@ pub fn diagnose(
 }
 
 /// Parameters of an accepted effect with their standard deviations.
-pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told> {
+pub fn told(machine: &LoggedRobot, diagnosis: &Diagnosis, effect: usize) -> Vec<Told> {
     let added = &diagnosis.model.effects[effect];
     let joint = added.place.joint().unwrap_or(0);
     let covariance = diagnosis.covariance_of(effect);
@@ -198,7 +197,7 @@ pub fn told(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> Vec<Told
 }
 
 /// The same in words: `order = 14.0 +- 0.1 1/m, ..`.
-pub fn in_words(machine: &Machine, diagnosis: &Diagnosis, effect: usize) -> String {
+pub fn in_words(machine: &LoggedRobot, diagnosis: &Diagnosis, effect: usize) -> String {
     let words = told(machine, diagnosis, effect).into_iter().map(|t| {
         let value = match t.std {
             Some(std) if std > 0.0 => number::plus_minus(t.value, std),
@@ -224,7 +223,7 @@ pub fn verdict(diagnosis: &Diagnosis) -> &'static str {
 }
 
 /// The refined model as a file.
-pub fn into_model(machine: &Machine, file: &ModelFile, found: &Diagnosed) -> ModelFile {
+pub fn into_model(machine: &LoggedRobot, file: &ModelFile, found: &Diagnosed) -> ModelFile {
     let diagnosis = &found.diagnosis;
     let mut model = new_model(machine, "diagnose", &found.held.inputs);
     model.parameters.clone_from(&file.parameters);
@@ -309,7 +308,7 @@ fn errors_json(errors: &Errors) -> Value {
     json!({"joints": errors.joints, "overall": errors.overall})
 }
 
-fn candidate_json(machine: &Machine, c: &Candidate) -> Value {
+fn candidate_json(machine: &LoggedRobot, c: &Candidate) -> Value {
     json!({
         "effect": c.effect.kind.name,
         "joint": c.effect.place.name(&machine.robot),
@@ -325,7 +324,7 @@ fn candidate_json(machine: &Machine, c: &Candidate) -> Value {
 }
 
 /// The JSON fields of the command.
-pub fn json(machine: &Machine, found: &Diagnosed) -> Value {
+pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
     let d = &found.diagnosis;
     let robot = &machine.robot;
     let steps: Vec<Value> = d
@@ -433,7 +432,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model)?;
     let (name, file) = (given.name, given.value);
-    let machine = Machine::new(&name, file.robot.clone());
+    let machine = LoggedRobot::new(&name, file.robot.clone());
     let logs = Logs {
         train: &args.logs,
         veto: &args.veto,

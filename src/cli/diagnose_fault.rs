@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::machine::Machine;
 use crate::diagnose::Suspicion;
+use crate::identify::LoggedRobot;
 
 /// A fault of the data.
 #[derive(Debug, Clone)]
@@ -15,7 +15,7 @@ pub struct DataFault {
 }
 
 /// A torque channel that the model knows otherwise, as a fault.
-pub fn wrong_channel(machine: &Machine, found: Suspicion) -> DataFault {
+pub fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
     let names = machine.robot.joint_names();
     let (joint, effect, remedy) = match found {
         Suspicion::Turned { joint } => (

@@ -2,17 +2,17 @@
 
 use nalgebra::DMatrix;
 
-use super::machine::Machine;
 use crate::config::ModelFile;
 use crate::diagnose::{LogRole, Open};
 use crate::effect::{Refined, held_joints};
+use crate::identify::LoggedRobot;
 use crate::motion::Stretch;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
 /// Which parameters the fit may move: all but those that the friction stage left open.
-pub fn open(machine: &Machine, file: &ModelFile, given: &Refined) -> Open {
+pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &Refined) -> Open {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()

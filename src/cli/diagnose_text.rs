@@ -1,10 +1,10 @@
 //! What `diagnose` tells a person: the effects, their numbers, what is left, and the errors before and after.
 
 use super::diagnose::{Diagnosed, in_words, verdict};
-use super::machine::Machine;
 use super::typed;
 use crate::diagnose::{Candidate, Diagnosis, Errors, Pair};
 use crate::effect::Added;
+use crate::identify::LoggedRobot;
 use crate::number;
 use crate::report::table::{Align, Table, hanging};
 
@@ -12,7 +12,7 @@ use crate::report::table::{Align, Table, hanging};
 const MARGIN: &str = "     ";
 
 /// The tables for a person.
-pub fn text(machine: &Machine, found: &Diagnosed, name: &str) -> String {
+pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
     let d = &found.diagnosis;
     let robot = &machine.robot;
     let mut out = match verdict(d) {
@@ -138,7 +138,7 @@ const NAMED: usize = 3;
 
 /// Why what was found may stand in for something else, and what else is no chance; nothing where only noise
 /// is left.
-pub fn doubts(machine: &Machine, found: &Diagnosed) -> Vec<String> {
+pub fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
     let robot = &machine.robot;
     let open: Vec<String> = d

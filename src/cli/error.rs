@@ -10,6 +10,7 @@ use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
 use crate::config::ConfigError;
+use crate::identify::{ErrorKind, IdentifyError};
 use crate::log::LogError;
 use crate::output::OutputError;
 use crate::report::json::JsonError;
@@ -115,6 +116,22 @@ impl From<LogError> for CliError {
 impl From<ConfigError> for CliError {
     fn from(error: ConfigError) -> Self {
         Self::from_room(Exit::BadInput, &error)
+    }
+}
+
+impl From<IdentifyError> for CliError {
+    fn from(error: IdentifyError) -> Self {
+        let exit = match error.kind() {
+            ErrorKind::Usage => Exit::Usage,
+            ErrorKind::Input => Exit::BadInput,
+            ErrorKind::Undetermined => Exit::Undetermined,
+            ErrorKind::Interrupted => return Self::interrupted(),
+        };
+        let told = Self::from_room(exit, &error);
+        match error.remedy() {
+            Some(remedy) => told.hint(remedy),
+            None => told,
+        }
     }
 }
 

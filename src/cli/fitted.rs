@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::lsq::{Identified, Unknown};
-use super::machine::Machine;
+use super::{estimate, feasible};
+use crate::identify::{IdentifiedDynamics, LoggedRobot, Unknown};
 use crate::motion::Summary;
 use crate::number;
 use crate::report::summary;
@@ -11,7 +11,7 @@ use crate::report::table::{hanging, unbroken};
 use crate::verdict::{IDENTIFIED, Verdict, WEAK};
 
 /// The JSON fields of the command.
-pub fn json(machine: &Machine, found: &Identified) -> Value {
+pub fn json(machine: &LoggedRobot, found: &IdentifiedDynamics) -> Value {
     let fit = &found.fit;
     let parameters: Vec<Value> = found
         .unknowns
@@ -52,14 +52,14 @@ pub fn json(machine: &Machine, found: &Identified) -> Value {
         .collect();
     json!({
         "parameters": parameters,
-        "essential": { "count": found.essential_count(), "joints": essential },
-        "feasible": found.physical.as_ref().map(|p| p.json(machine)),
+        "essential": { "count": essential_count(found), "joints": essential },
+        "feasible": found.physical.as_ref().map(|p| feasible::json(p, machine)),
         "condition": fit.condition,
         "rank": fit.rank,
         "samples": fit.rows * machine.robot.joints() as u64,
         "effective_samples": fit.effective_rows * machine.robot.joints() as f64,
         "joints": joints,
-        "estimator": found.account.json(machine),
+        "estimator": estimate::json(&found.account, machine),
         "processing": processing(&found.summary),
     })
 }
@@ -74,7 +74,7 @@ pub fn processing(summary: &Summary) -> Value {
 }
 
 /// The tables for a person.
-pub fn text(machine: &Machine, found: &Identified) -> String {
+pub fn text(machine: &LoggedRobot, found: &IdentifiedDynamics) -> String {
     let rows: Vec<summary::Parameter> = found
         .unknowns
         .iter()
@@ -103,13 +103,13 @@ pub fn text(machine: &Machine, found: &Identified) -> String {
         quality(machine, found)
     );
     if let Some(physical) = &found.physical {
-        out += &physical.text(machine);
+        out += &feasible::text(physical, machine);
     }
     out
 }
 
 /// What the short names of base parameters stand for; nothing where they are names already.
-fn groupings(found: &Identified) -> String {
+fn groupings(found: &IdentifiedDynamics) -> String {
     let grouped = found.unknowns.iter().filter_map(|u| {
         let grouping = u.grouping.as_ref()?;
         (*grouping != u.name).then(|| hanging("  ", grouping, 4))
@@ -124,16 +124,14 @@ fn groupings(found: &Identified) -> String {
     }
 }
 
-impl Identified {
-    /// Number of essential unknowns.
-    fn essential_count(&self) -> usize {
-        self.essential.essential.iter().filter(|e| **e).count()
-    }
+/// Number of essential unknowns.
+fn essential_count(found: &IdentifiedDynamics) -> usize {
+    found.essential.essential.iter().filter(|e| **e).count()
 }
 
 /// What rank and verdicts say together, where a parameter is called not identifiable: that no torque
 /// tells of it, or that what tells of it drowns in the noise.
-fn open_directions(found: &Identified) -> String {
+fn open_directions(found: &IdentifiedDynamics) -> String {
     let unknowns = &found.unknowns;
     let named = |u: &&Unknown| u.verdict == Verdict::NotIdentifiable;
     let all = unknowns.iter().filter(named).count();
@@ -158,7 +156,7 @@ fn open_directions(found: &Identified) -> String {
 }
 
 /// Condition, rank, independent rows and residual of the fit, and what is essential.
-pub fn quality(machine: &Machine, found: &Identified) -> String {
+pub fn quality(machine: &LoggedRobot, found: &IdentifiedDynamics) -> String {
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
     let told = format!(
@@ -185,7 +183,7 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
         .collect();
     let told = format!("residual of the fit: {}", errors.join(", "));
     out += &hanging("", &told, 2);
-    out += &found.account.text(machine);
+    out += &estimate::text(&found.account, machine);
     let alone: Vec<String> = machine
         .robot
         .joint_names()
@@ -195,7 +193,7 @@ pub fn quality(machine: &Machine, found: &Identified) -> String {
         .collect();
     let told = format!(
         "{} of {} parameters are essential; residual with them alone: {}",
-        found.essential_count(),
+        essential_count(found),
         found.unknowns.len(),
         alone.join(", ")
     );

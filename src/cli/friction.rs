@@ -1,22 +1,15 @@
 //! `cft-ident friction`: the friction of single joints from one-joint logs.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::machine::Machine;
-use super::{CliError, Context, Outcome, arguments, files, outputs, pages};
-use crate::config::ModelFile;
-use crate::config::identified::{friction_meaning, friction_unit};
-use crate::config::model_file::{ModelProvenance, Parameter};
-use crate::friction::estimate::{JointEstimate, Nis, Options, curve_std, estimate};
-use crate::friction::excitation::{FrictionError, moving_joint};
-use crate::friction::inputs::Inputs;
-use crate::friction::passes::{Ending, GivenNoise};
-use crate::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
-use crate::log::{LogSpec, Provenance, did_you_mean};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pages};
+use crate::config::identified::friction_unit;
+use crate::friction::estimate::curve_std;
+use crate::friction::passes::Ending;
+use crate::identify::{self, FrictionSettings, IdentifiedFriction, LoggedRobot, new_model};
+use crate::log::LogSpec;
 use crate::number;
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::report::json::Document;
@@ -62,255 +55,8 @@ pub struct Args {
     pub seed: u64,
 }
 
-/// Friction of every joint that the logs move.
-pub struct Identified {
-    /// Joint index and estimate, in joint order.
-    pub joints: Vec<(usize, JointEstimate)>,
-    pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
-}
-
-/// Estimates the friction from one-joint logs; several logs of one joint are used together.
-pub fn identify(
-    machine: &Machine,
-    logs: &[LogSpec],
-    joint: Option<&str>,
-    context: &Context,
-) -> Result<Identified, CliError> {
-    let names = machine.robot.joint_names();
-    let named = match joint {
-        None => None,
-        Some(name) => Some(names.iter().position(|n| n == name).ok_or_else(|| {
-            let known = names.join(", ");
-            let near = did_you_mean(name, &known);
-            CliError::usage(format!("the robot has no joint `{name}`"))
-                .hint(format!("{near}its joints are {known}"))
-        })?),
-    };
-    let bar = context.progress("reading logs", None);
-    let ranges = machine.ranges();
-    let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
-    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    for spec in logs {
-        let log = machine.motions(spec, context)?;
-        inputs.push(log.provenance);
-        warnings.extend(log.warnings);
-        let moving = match named {
-            Some(j) => j,
-            None => moving_joint(names, &log.motions, &ranges)
-                .map_err(|e| CliError::undetermined(format!("{}: {e}", spec.name())))?,
-        };
-        let group = groups.entry(moving).or_default();
-        group.held |= log.held;
-        group.motions.extend(log.motions);
-        group.narrower.extend(log.narrower);
-        group.logs.push(spec.name());
-    }
-    drop(bar);
-    let bar = context.progress("friction filter", Some(groups.len() as u64));
-    let parameter_names: Vec<String> = machine
-        .robot
-        .parameters()
-        .iter()
-        .map(|p| p.name.to_string())
-        .collect();
-    // joints do not know of one another: they run in parallel, and are collected in joint order
-    let found: Vec<Result<(usize, JointEstimate), CliError>> = groups
-        .into_par_iter()
-        .map(|(j, group)| {
-            context.check()?;
-            let estimate = one_joint(machine, j, &group, &parameter_names)?;
-            bar.advance(1);
-            Ok((j, estimate))
-        })
-        .collect();
-    let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
-    context.check()?;
-    let of_joints = joints.iter();
-    warnings.extend(of_joints.flat_map(|(j, e)| joint_warnings(&names[*j], e)));
-    Ok(Identified {
-        joints,
-        inputs,
-        warnings,
-    })
-}
-
-/// Logs of one joint.
-#[derive(Default)]
-struct Group {
-    motions: Vec<SmoothedMotion>,
-    narrower: Vec<SmoothedMotion>,
-    held: bool,
-    logs: Vec<String>,
-}
-
-fn one_joint(
-    machine: &Machine,
-    j: usize,
-    group: &Group,
-    parameter_names: &[String],
-) -> Result<JointEstimate, CliError> {
-    let name = &machine.robot.joint_names()[j];
-    let place = group.logs.join(", ");
-    let undetermined = |e: FrictionError| CliError::undetermined(format!("{place}: {e}"));
-    let noise = machine.file.noise.joint.get(name);
-    let given = noise.and_then(|n| n.position_resolution);
-    let resolution = given.unwrap_or_else(|| resolution(&group.motions, machine.robot.joints(), j));
-    let variance = |q: &[f64]| -> f64 {
-        let known = match given {
-            Some(_) => None,
-            None => machine.robot.transmission().encoder_variance(j, q),
-        };
-        known.unwrap_or(resolution * resolution / 12.0)
-    };
-    let sensors = SensorModel {
-        variance: &variance,
-        zero_order_hold: group.held,
-    };
-    let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
-        undetermined(FrictionError::StandsStill {
-            joint: name.clone(),
-        })
-    })?;
-    let options = Options {
-        start: start_of(machine, name),
-        noise: GivenNoise {
-            torque: noise.and_then(|n| n.torque_std),
-            position_factor: None,
-        },
-        ..Options::default()
-    };
-    let inputs = Inputs {
-        robot: &machine.robot,
-        joint: j,
-        motions: &group.motions,
-        narrower: &group.narrower,
-        sensors: &sensors,
-    };
-    estimate(name, parameter_names, &prepared, Some(&inputs), &options).map_err(undetermined)
-}
-
-/// The user's starting values, where all five are given.
-fn start_of(machine: &Machine, joint: &str) -> Option<DoubleTanh> {
-    let s = machine.file.friction.joint.get(joint)?;
-    Some(DoubleTanh {
-        viscous: s.viscous?,
-        coulomb_1: s.coulomb_1?,
-        coulomb_2: s.coulomb_2?,
-        slope_1: s.slope_1?,
-        slope_2: s.slope_2?,
-    })
-}
-
-/// What a reader of the estimate should know.
-fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
-    let mut out = Vec::new();
-    if e.ending != Ending::Converged {
-        out.push(format!(
-            "{joint}: the search ended without converging ({:?})",
-            e.ending
-        ));
-    }
-    let Nis {
-        mean,
-        lower_95,
-        upper_95,
-        ..
-    } = e.nis;
-    if mean > upper_95 {
-        out.push(format!(
-            "{joint}: mean NIS {mean:.2} is above its bounds {lower_95:.2}..{upper_95:.2}: the innovations are alike for many samples, so something acts that the model lacks"
-        ));
-    } else if mean < lower_95 {
-        out.push(format!(
-            "{joint}: mean NIS {mean:.2} is below its bounds {lower_95:.2}..{upper_95:.2}: innovations cancel over many samples, as where positions are finer than the encoder's step^2/12 or were filtered before they were logged"
-        ));
-    }
-    if e.widening > 1.5 {
-        out.push(format!(
-            "{joint}: the innovations are coloured, so the model lacks something; the standard deviations hold a factor {:.1} for it",
-            e.widening.sqrt()
-        ));
-    }
-    for (k, value) in e.values.iter().enumerate() {
-        match value.verdict {
-            Verdict::LowerBound => out.push(format!(
-                "{joint}: {} is only known to be above {} (95 %): these data do not pass slowly enough through zero speed to bound it from above",
-                DoubleTanh::NAMES[k],
-                number::significant(value.value, 3)
-            )),
-            Verdict::NotIdentifiable => out.push(format!(
-                "{joint}: these data cannot determine {}; log slower reversals and more speeds",
-                DoubleTanh::NAMES[k]
-            )),
-            Verdict::Identified | Verdict::Weak => {}
-        }
-    }
-    out
-}
-
-/// The parameters of one joint as a model file holds them. A slope with a bound keeps the value of
-/// highest likelihood, which the torque is computed with; its meaning names the bound.
-pub fn file_parameters(machine: &Machine, j: usize, e: &JointEstimate) -> Vec<Parameter> {
-    let joint = &machine.robot.joint_names()[j];
-    let torque_unit = machine.file.torque_unit(j);
-    let law = e.law.parameters();
-    (0..5)
-        .map(|k| {
-            let name = DoubleTanh::NAMES[k];
-            let v = &e.values[k];
-            let mut meaning = friction_meaning(name).to_owned();
-            if v.verdict == Verdict::LowerBound {
-                meaning += &format!("; only known to be above {:e} (95 %)", v.value);
-            }
-            Parameter {
-                name: name.to_owned(),
-                theta: machine.robot.friction_theta(j, k),
-                joint: Some(joint.clone()),
-                value: law[k],
-                std: (v.std.is_finite()).then_some(v.std),
-                unit: friction_unit(&machine.robot, j, name, torque_unit),
-                meaning,
-                verdict: Some(v.verdict),
-            }
-        })
-        .collect()
-}
-
-/// Writes the estimates into a model, in place of what it has of these joints.
-pub fn into_model(machine: &Machine, found: &Identified, model: &mut ModelFile) {
-    for (j, e) in &found.joints {
-        let joint = &machine.robot.joint_names()[*j];
-        model.replace_joint(joint, file_parameters(machine, *j, e));
-        let keys: Vec<String> = DoubleTanh::NAMES
-            .iter()
-            .map(|n| format!("{n}:{joint}"))
-            .collect();
-        model.replace_covariance(&keys, &|a, b| e.covariance[a][b]);
-    }
-}
-
-/// An empty model of the robot.
-pub fn new_model(machine: &Machine, command: &str, inputs: &[Provenance]) -> ModelFile {
-    ModelFile {
-        robot: machine.file.clone(),
-        parameters: Vec::new(),
-        covariance: None,
-        residual_std: BTreeMap::new(),
-        effects: Vec::new(),
-        links: Vec::new(),
-        drive_inertia: BTreeMap::new(),
-        provenance: ModelProvenance {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            command: command.to_owned(),
-            seed: None,
-            inputs: inputs.to_vec(),
-        },
-    }
-}
-
 /// The JSON fields of the command.
-pub fn json(machine: &Machine, found: &Identified) -> Value {
+pub fn json(machine: &LoggedRobot, found: &IdentifiedFriction) -> Value {
     let joints: Vec<Value> = found
         .joints
         .iter()
@@ -353,7 +99,7 @@ pub fn json(machine: &Machine, found: &Identified) -> Value {
 }
 
 /// The tables for a person.
-pub fn text(machine: &Machine, found: &Identified) -> String {
+pub fn text(machine: &LoggedRobot, found: &IdentifiedFriction) -> String {
     let mut out = String::new();
     for (j, e) in &found.joints {
         let joint = &machine.robot.joint_names()[*j];
@@ -410,7 +156,7 @@ fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
 }
 
 /// The friction curves with their bands and the plateau map.
-pub fn figure(machine: &Machine, found: &Identified) -> FrictionFigure {
+pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigure {
     let panels = found
         .joints
         .iter()
@@ -457,7 +203,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
-    let machine = Machine::new(&args.robot, robot.value);
+    let machine = LoggedRobot::new(&args.robot, robot.value);
     let mut given = vec![robot.provenance];
     let old = match &args.model {
         None => None,
@@ -467,7 +213,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             Some(model.value)
         }
     };
-    let found = identify(&machine, &args.logs, args.joint.as_deref(), context)?;
+    let settings = FrictionSettings {
+        joint: args.joint.clone(),
+    };
+    let logs = logs_of(&args.logs);
+    let found = identify::friction(&machine, &logs, &settings, context.control())?;
     let mut model = new_model(&machine, "friction", &found.inputs);
     if let Some(old) = old {
         model.parameters = old.parameters;
@@ -475,7 +225,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         model.residual_std = old.residual_std;
         model.effects = old.effects;
     }
-    into_model(&machine, &found, &mut model);
+    found.write_into(&machine, &mut model);
     let document = Document::new(
         "friction",
         &found.inputs,

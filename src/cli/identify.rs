@@ -5,17 +5,14 @@ use std::str::FromStr;
 
 use serde_json::{Value, json};
 
-use super::estimate::Estimator;
-use super::machine::Machine;
-use super::pages::{self, Look};
-use super::refined::{held_for_pictures, refined};
+use super::pages::{self, Look, held_for_pictures};
 use super::{
     CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
-    lsq, validate,
+    logs_of, lsq, validate,
 };
-use crate::config::campaign::EstimatorKind;
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
+use crate::identify::{self, FrictionSettings, LoggedRobot, LsqSettings, new_model, refined};
 use crate::log::{LogSpec, Provenance};
 use crate::output::write_whole;
 use crate::report::json::Document;
@@ -115,15 +112,8 @@ fn execute(
     context: &Context,
     mut warnings: Vec<String>,
 ) -> Result<Outcome, CliError> {
-    let estimator = match campaign.settings.estimator {
-        EstimatorKind::Wls => Estimator::Wls,
-        EstimatorKind::Ols => Estimator::Ols,
-        EstimatorKind::Irls => Estimator::Irls,
-        EstimatorKind::Oe => Estimator::Oe,
-        EstimatorKind::Iv => Estimator::Iv,
-    };
     let robot = resolve(base, &campaign.robot);
-    let machine = Machine::load(&robot.to_string_lossy())?;
+    let machine = LoggedRobot::load(&robot.to_string_lossy())?;
     let roles = &campaign.logs;
     let mut files: Vec<String> = Vec::new();
     let mut inputs: Vec<Provenance> = Vec::new();
@@ -133,14 +123,19 @@ fn execute(
     let one_joint = logs(base, &roles.friction)?;
     let found = match one_joint.as_slice() {
         [] => None,
-        some => Some(friction::identify(&machine, some, None, context)?),
+        some => Some(identify::friction(
+            &machine,
+            &logs_of(some),
+            &FrictionSettings::default(),
+            context.control(),
+        )?),
     };
     let mut friction_json = Value::Null;
     let known = match &found {
         None => None,
         Some(found) => {
-            let mut model = friction::new_model(&machine, "identify", &found.inputs);
-            friction::into_model(&machine, found, &mut model);
+            let mut model = new_model(&machine, "identify", &found.inputs);
+            found.write_into(&machine, &mut model);
             write(folder, "friction.toml", &model.to_toml()?, &mut files)?;
             let figure = friction::figure(&machine, found).svg();
             write(folder, "friction.svg", &figure, &mut files)?;
@@ -152,15 +147,14 @@ fn execute(
     };
 
     // inertias
-    let fitted = lsq::identify(
-        &machine,
-        &logs(base, &roles.identification)?,
-        known.as_ref().map(|model| ("friction.toml", model)),
-        estimator,
-        campaign.settings.feasible,
-        context,
-    )?;
-    let model = lsq::into_model(&machine, &fitted, known.as_ref());
+    let settings = LsqSettings {
+        estimator: campaign.settings.estimator,
+        consistent: campaign.settings.feasible,
+        friction: known.as_ref().map(|model| ("friction.toml", model)),
+    };
+    let together = logs_of(&logs(base, &roles.identification)?);
+    let fitted = identify::lsq(&machine, &together, &settings, context.control())?;
+    let model = fitted.model(&machine, known.as_ref());
     write(folder, "model.toml", &model.to_toml()?, &mut files)?;
     warnings.extend(fitted.warnings.iter().cloned());
     inputs.extend(fitted.inputs.iter().cloned());
@@ -173,7 +167,13 @@ fn execute(
     let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
     let numbers = refined(&model, "model.toml")?;
     if !unseen.is_empty() {
-        let found = validate::reconstruct(&machine, &numbers, &unseen, context, &mut |_, _| {})?;
+        let found = identify::validate(
+            &machine,
+            &numbers,
+            &logs_of(&unseen),
+            context.control(),
+            &mut |_, _| {},
+        )?;
         let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
         let title = names.join(", ");
         let figure = validate::figure(&machine, &found.validation, &title).svg();
@@ -242,9 +242,7 @@ fn execute(
         Some(truth) => comparison(refined_model.as_ref().unwrap_or(&model), truth),
     };
     let held = match diagnosed {
-        None if !unseen.is_empty() => {
-            held_for_pictures(&machine, &unseen.iter().collect::<Vec<_>>(), context)?
-        }
+        None if !unseen.is_empty() => held_for_pictures(&machine, &logs_of(&unseen), context)?,
         _ => None,
     };
     let look = held.as_ref().map(|held| {

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::machine::{Machine, run_error};
 use super::{CliError, Context, Exit, Outcome, columns};
 use crate::config::ModelFile;
+use crate::identify::{IdentifyError, LoggedRobot};
 use crate::inspect::{Comparison, Fault, Findings, Inspection, Kind, look};
 use crate::log::{LogSpec, Provenance, RawReader, escape};
 use crate::motion;
@@ -38,7 +38,7 @@ pub struct Args {
 
 /// A robot as it was identified.
 struct Known {
-    machine: Machine,
+    machine: LoggedRobot,
     model: Option<Model>,
 }
 
@@ -48,12 +48,12 @@ impl Known {
             let name = path.display().to_string();
             let file = ModelFile::load(path)?;
             let model = Some(file.model(&name)?);
-            let machine = Machine::new(&name, file.robot.clone());
+            let machine = LoggedRobot::new(&name, file.robot.clone());
             return Ok(Some(Self { machine, model }));
         }
         let load = |robot: &str| {
             Ok(Self {
-                machine: Machine::load(robot)?,
+                machine: LoggedRobot::load(robot)?,
                 model: None,
             })
         };
@@ -113,7 +113,7 @@ fn inspect(
 /// A log that cannot be read at all, and interruption.
 pub(super) fn findings(
     spec: &LogSpec,
-    machine: &Machine,
+    machine: &LoggedRobot,
     context: &Context,
 ) -> Result<Findings, CliError> {
     let mut log = RawReader::open(spec, Some(&machine.file.layout()))?;
@@ -126,7 +126,7 @@ pub(super) fn findings(
 
 /// Compares the torques of a log with those that a model gives, joints turned and exchanged.
 fn compare(
-    machine: &Machine,
+    machine: &LoggedRobot,
     model: &Model,
     spec: &LogSpec,
     context: &Context,
@@ -135,7 +135,7 @@ fn compare(
     let n = joints.len();
     let mut comparison = Comparison::new(n);
     let changes = comparison.changes().to_vec();
-    let mut log = machine.open(spec, context)?;
+    let mut log = machine.open(&spec.into(), context.control())?;
     let summary = motion::run(
         &mut |block| log.read(block),
         n,
@@ -163,7 +163,7 @@ fn compare(
         },
         &mut |row| comparison.add(row.segment, row.t, row.filtered),
     )
-    .map_err(|error| run_error(spec, error))?;
+    .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
     let (rows, duration_s) = (summary.samples, summary.duration_s);
     let order = comparison.fault(joints, rows, duration_s);
     // With joints in the wrong order there is no delay to speak of.

@@ -34,12 +34,9 @@ mod exit;
 mod feasible;
 mod files;
 mod fitted;
-pub mod machine;
 mod outcome;
 mod outputs;
 mod pages;
-pub mod reference;
-mod refined;
 mod typed;
 
 use std::ffi::OsString;
@@ -51,6 +48,8 @@ use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 
+use crate::identify::Log;
+use crate::log::LogSpec;
 use crate::output;
 use crate::report::table::{WIDTH, folded};
 
@@ -59,6 +58,11 @@ pub use context::{Context, Progress};
 pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;
+
+/// Files as logs of the library.
+fn logs_of(specs: &[LogSpec]) -> Vec<Log> {
+    specs.iter().map(Log::from).collect()
+}
 
 const EXAMPLES: &str = "\
 The help of each command ends with examples. Their files are those that
@@ -265,7 +269,7 @@ mod tests {
         assert_eq!(args.joint.as_deref(), Some("q4"));
         let args: super::lsq::Args =
             parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
-        assert_eq!(args.estimator, super::estimate::Estimator::Ols);
+        assert_eq!(args.estimator, crate::config::campaign::EstimatorKind::Ols);
         assert_eq!(args.logs[0].span.label().as_deref(), Some("0..70%"));
         let args: super::validate::Args =
             parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::machine::{Machine, run_error, summary_warnings};
-use super::refined::refined;
 use super::{CliError, Context, Outcome, arguments};
 use crate::config::ModelFile;
+use crate::identify::{IdentifyError, Log, LoggedRobot, refined, summary_warnings};
 use crate::log::LogSpec;
 use crate::motion::{self, FilterSettings, Summary};
 use crate::number;
@@ -67,7 +66,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = ModelFile::load(&args.model)?;
     let refined = refined(&file, &name)?;
     let model = &refined.model;
-    let machine = Machine::new(&name, file.robot.clone());
+    let machine = LoggedRobot::new(&name, file.robot.clone());
     let joints = machine.robot.joint_names();
     let n = joints.len();
     let p = model.parameters();
@@ -90,7 +89,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ..machine.settings()
     };
     let bar = context.progress("torque", None);
-    let mut log = machine.open_positions(&args.log, context)?;
+    let mut log = machine.open_positions(&Log::from(&args.log), context.control())?;
     out.set_origin(log.origin());
     let mut failed = None;
     let mut peak = vec![0.0f64; n];
@@ -130,11 +129,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             },
             &mut |row| emit(row.t, row.raw),
         )
-        .map_err(|e| run_error(&args.log, e))?
+        .map_err(|e| IdentifyError::of_run(&args.log.name(), e))?
     } else {
         // effects remember: they need a stretch from its begin
-        let (found, summary) =
-            motion::stretches(0, n, &settings, &mut read).map_err(|e| run_error(&args.log, e))?;
+        let (found, summary) = motion::stretches(0, n, &settings, &mut read)
+            .map_err(|e| IdentifyError::of_run(&args.log.name(), e))?;
         let mut values = vec![0.0; 2 * n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for stretch in &found {
@@ -156,7 +155,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     let mut warnings = log.warnings();
-    warnings.extend(summary_warnings(&args.log, &summary));
+    warnings.extend(summary_warnings(&args.log.name(), &summary));
     let provenance = [log.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let mut table = Table::new(&[

@@ -5,19 +5,17 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::lsq::processing;
-use super::machine::{Machine, run_error, summary_warnings};
-use super::pages::{self, Look};
-use super::refined::{held_for_pictures, hold, refined};
-use super::{CliError, Context, Outcome, arguments, files, outputs};
-use crate::effect::Refined;
-use crate::log::{Instant, LogSpec, Provenance};
+use super::pages::{self, Look, held_for_pictures};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs};
+use crate::identify::{self, LoggedRobot, refined};
+use crate::log::LogSpec;
 use crate::number;
 use crate::output::LogWriter;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
 use crate::report::summary;
 use crate::report::table::{hanging, unbroken};
-use crate::validate::{Reconstructed, Reconstruction, Validation};
+use crate::validate::{Reconstructed, Validation};
 
 const EXAMPLE: &str = "\
 Example:
@@ -50,68 +48,8 @@ pub struct Args {
     pub report: Option<PathBuf>,
 }
 
-/// Result of the stage.
-pub struct Validated {
-    pub validation: Validation,
-    pub inputs: Vec<Provenance>,
-    pub warnings: Vec<String>,
-}
-
-/// Reconstructs the torque of logs; `row` gets every raw sample, and the instant from which its time
-/// is counted.
-pub fn reconstruct(
-    machine: &Machine,
-    refined: &Refined,
-    logs: &[LogSpec],
-    context: &Context,
-    row: &mut dyn FnMut(&Reconstructed, Instant),
-) -> Result<Validated, CliError> {
-    let bar = context.progress("reconstruction", Some(logs.len() as u64));
-    let mut all = Reconstruction::new(&refined.model);
-    let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
-    let settings = machine.settings();
-    let mut segments = 0;
-    for spec in logs {
-        if refined.effects.is_empty() {
-            let mut log = machine.open(spec, context)?;
-            let origin = log.origin();
-            let summary = all
-                .add(&settings, &mut |block| log.read(block), &mut |r| {
-                    row(r, origin)
-                })
-                .map_err(|e| run_error(spec, e))?;
-            warnings.extend(log.warnings());
-            warnings.extend(summary_warnings(spec, &summary));
-            inputs.push(log.provenance()?);
-            last = Some(summary);
-        } else {
-            // effects remember: they need a stretch from its begin
-            let held = hold(machine, &[spec], context)?;
-            for stretch in &held.stretches {
-                let hat = refined.reconstruct(stretch);
-                let mut told = |r: &Reconstructed| row(r, held.origin);
-                all.add_stretch(&settings, segments, stretch, &hat, &mut told)
-                    .map_err(|e| CliError::input(format!("{}: {e}", spec.name())))?;
-                segments += 1;
-            }
-            warnings.extend(held.warnings);
-            inputs.extend(held.inputs);
-            last = Some(held.summary);
-        }
-        bar.advance(1);
-    }
-    let Some(summary) = last else {
-        return Err(CliError::usage("no log is given"));
-    };
-    Ok(Validated {
-        validation: all.finish(summary),
-        inputs,
-        warnings,
-    })
-}
-
 /// The JSON fields of the command.
-pub fn json(machine: &Machine, validation: &Validation) -> Value {
+pub fn json(machine: &LoggedRobot, validation: &Validation) -> Value {
     let joints: Vec<Value> = validation
         .joints
         .iter()
@@ -130,7 +68,7 @@ pub fn json(machine: &Machine, validation: &Validation) -> Value {
 }
 
 /// The table for a person.
-pub fn text(machine: &Machine, validation: &Validation, caption: &str) -> String {
+pub fn text(machine: &LoggedRobot, validation: &Validation, caption: &str) -> String {
     let rows: Vec<summary::TorqueError> = validation
         .joints
         .iter()
@@ -169,7 +107,7 @@ pub fn text(machine: &Machine, validation: &Validation, caption: &str) -> String
 }
 
 /// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
-pub fn figure(machine: &Machine, validation: &Validation, title: &str) -> TorqueFigure {
+pub fn figure(machine: &LoggedRobot, validation: &Validation, title: &str) -> TorqueFigure {
     let traces = &validation.traces;
     let n = validation.joints.len();
     let joints = validation
@@ -258,7 +196,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let given = files::model(&args.model)?;
     let (name, file) = (given.name, given.value);
     let model = refined(&file, &name)?;
-    let machine = Machine::new(&name, file.robot.clone());
+    let machine = LoggedRobot::new(&name, file.robot.clone());
     let mut residual = match &args.output {
         None => None,
         Some(path) => Some(LogWriter::create(
@@ -267,14 +205,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         )?),
     };
     let mut failed = None;
-    let found = reconstruct(&machine, &model, &args.logs, context, &mut |r, origin| {
-        if let Some(file) = &mut residual
-            && failed.is_none()
-        {
-            file.set_origin(origin);
-            failed = file.row(residual_row(r)).err();
-        }
-    })?;
+    let logs = logs_of(&args.logs);
+    let found = identify::validate(
+        &machine,
+        &model,
+        &logs,
+        context.control(),
+        &mut |r, origin| {
+            if let Some(file) = &mut residual
+                && failed.is_none()
+            {
+                file.set_origin(origin);
+                failed = file.row(residual_row(r)).err();
+            }
+        },
+    )?;
     if let Some(error) = failed {
         return Err(error.into());
     }
@@ -299,7 +244,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let page = match &args.report {
         None => None,
         Some(path) => {
-            let logs: Vec<&LogSpec> = args.logs.iter().collect();
             let held = held_for_pictures(&machine, &logs, context)?;
             let held = held.as_ref();
             let look = held

@@ -45,6 +45,19 @@ pub enum EstimatorKind {
     Oe,
 }
 
+impl EstimatorKind {
+    /// As files and the command line spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            EstimatorKind::Wls => "wls",
+            EstimatorKind::Ols => "ols",
+            EstimatorKind::Irls => "irls",
+            EstimatorKind::Iv => "iv",
+            EstimatorKind::Oe => "oe",
+        }
+    }
+}
+
 /// `[settings]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -117,6 +117,20 @@ pub enum LogError {
         /// Time from the first to the last row that was seen [s].
         duration_s: f64,
     },
+    /// Arrays whose sizes do not belong together.
+    #[error("{log}: {channel} holds {values} values for {rows} rows; {remedy}")]
+    Shape {
+        /// Name of the log.
+        log: String,
+        /// What the values are.
+        channel: &'static str,
+        /// Number of values.
+        values: usize,
+        /// Number of times.
+        rows: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// A column that the robot needs.
     #[error("{file}:{line}: column `{column}` ({purpose}) is missing; {remedy}")]
     MissingColumn {

@@ -5,8 +5,9 @@
 //! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
 //!
 //! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are told
-//! apart by their first bytes.
+//! apart by their first bytes; logs in memory, as [`Arrays`], are read alike.
 
+mod arrays;
 mod block;
 mod columns;
 mod content;
@@ -24,6 +25,7 @@ mod stale;
 mod text;
 mod time;
 
+pub use arrays::Arrays;
 pub use block::Block;
 pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};

@@ -45,18 +45,28 @@ impl Pass {
         let files = spec.files()?;
         let (rows, layout, refused) = open(&files, layout, strictness)?;
         Ok(Self {
-            spec: spec.clone(),
             files,
             strictness,
+            refused,
+            ..Self::of_rows(spec.clone(), rows, layout)
+        })
+    }
+
+    /// Goes through rows that are there already.
+    pub(super) fn of_rows(spec: LogSpec, rows: Box<dyn Rows>, layout: Layout) -> Self {
+        Self {
+            spec,
+            files: Vec::new(),
+            strictness: Strictness::Refuse,
             rows,
             layout,
-            refused,
+            refused: None,
             time: None,
             origin: None,
             span: None,
             used: None,
             samples: 0,
-        })
+        }
     }
 
     /// Says which column is the time, and how many seconds its unit has.
@@ -128,7 +138,10 @@ impl Pass {
         Ok(Provenance {
             name: self.spec.name(),
             span: self.spec.span.label(),
-            sha256: source::sha256_of(&self.files)?,
+            sha256: match self.rows.sha256() {
+                Some(known) => known.to_owned(),
+                None => source::sha256_of(&self.files)?,
+            },
             samples: self.samples,
             duration_s: self.duration_s(),
         })

@@ -1,5 +1,8 @@
 //! Reads one log block by block, in SI units, inside its span, with its time checked.
 
+use std::sync::Arc;
+
+use super::arrays::{ArrayRows, Arrays};
 use super::layout::Layout;
 use super::pass::Pass;
 use super::rows::Strictness;
@@ -37,9 +40,22 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        let pass = Pass::open(spec, layout, Strictness::Refuse)?;
+        Pass::open(spec, layout, Strictness::Refuse).map(Self::new)
+    }
+
+    /// Reads a log that is in memory; `layout` names its joints and says whether torques are read.
+    ///
+    /// # Errors
+    /// Another number of channels than the layout has.
+    pub fn of_arrays(arrays: &Arc<Arrays>, layout: Layout) -> Result<Self, LogError> {
+        let rows = Box::new(ArrayRows::open(arrays, &layout)?);
+        let spec = LogSpec::whole(arrays.name());
+        Ok(Self::new(Pass::of_rows(spec, rows, layout)))
+    }
+
+    fn new(pass: Pass) -> Self {
         let (joints, torques) = (pass.layout.positions.len(), pass.layout.torques.len());
-        Ok(Self {
+        Self {
             pass,
             seen: None,
             finished: false,
@@ -47,7 +63,7 @@ impl Reader {
             stale: Stale::new(joints),
             duplicates: 0,
             pending: Block::default(),
-        })
+        }
     }
 
     /// The layout that the log turned out to have.
@@ -220,7 +236,10 @@ impl Reader {
     /// Judges what can be judged only at the end.
     fn finish(&mut self, block: &Block) -> Result<(), LogError> {
         self.finished = true;
-        let file = || source::shown_all(&self.pass.files);
+        let file = || match self.pass.files.as_slice() {
+            [] => super::escape(&self.pass.spec.name()),
+            files => source::shown_all(files),
+        };
         let rows = self.pass.samples + block.len() as u64;
         if rows < 2 {
             return Err(match (self.pass.spec.span, self.seen) {

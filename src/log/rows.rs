@@ -75,6 +75,11 @@ pub(super) trait Rows: Debug + Send {
         Vec::new()
     }
 
+    /// SHA-256 of what holds the rows, where that is no file.
+    fn sha256(&self) -> Option<&str> {
+        None
+    }
+
     /// Where files break off, once the last row is read.
     fn breaks(&self) -> Vec<String> {
         Vec::new()

@@ -45,10 +45,12 @@ impl Provenance {
 
     /// An input that is no file of the user: a configuration that comes with the tool.
     pub fn of_text(name: &str, text: &str) -> Self {
+        let mut checksum = Checksum::default();
+        checksum.update(text.as_bytes());
         Self {
             name: name.to_owned(),
             span: None,
-            sha256: hexadecimal(&Sha256::digest(text.as_bytes())),
+            sha256: checksum.hexadecimal(),
             samples: 0,
             duration_s: 0.0,
         }
@@ -116,24 +118,36 @@ pub fn sha256(path: &Path) -> Result<String, LogError> {
 
 /// SHA-256 of whole files one after the other, hexadecimal.
 pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
-    let mut hasher = Sha256::new();
+    let mut checksum = Checksum::default();
     let mut buffer = vec![0; 1 << 16];
     for path in paths {
         let mut file = open(path)?;
         loop {
             match file.read(&mut buffer) {
                 Ok(0) => break,
-                Ok(count) => hasher.update(&buffer[..count]),
+                Ok(count) => checksum.update(&buffer[..count]),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(failed(path, error)),
             }
         }
     }
-    Ok(hexadecimal(&hasher.finalize()))
+    Ok(checksum.hexadecimal())
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+/// SHA-256 of what it is given piece by piece.
+#[derive(Default)]
+pub(super) struct Checksum(Sha256);
+
+impl Checksum {
+    pub(super) fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// As hexadecimal digits.
+    pub(super) fn hexadecimal(self) -> String {
+        let digest = self.0.finalize();
+        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
 }
 
 #[cfg(test)]

@@ -10,13 +10,12 @@ use serde_json::{Value, json};
 
 use super::files::Given;
 use super::lsq::processing;
-use super::machine::Machine;
 use super::pages::{self, Look, curve, speeds};
-use super::refined::{Held, hold, refined, refined_or_friction};
-use super::{CliError, Context, Outcome, arguments, files, outputs};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs};
 use crate::compare::{self, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::Refined;
+use crate::identify::{InMemory, LoggedRobot, read_whole, refined, refined_or_friction};
 use crate::log::{LogSpec, escape};
 use crate::motion::Parallel;
 use crate::number;
@@ -65,14 +64,14 @@ pub struct Side {
 
 /// Both models on the same logs.
 pub struct Tried {
-    pub held: Held,
+    pub held: InMemory,
     pub validations: [Validation; 2],
     pub differences: ErrorDifferences,
 }
 
 /// Result of the comparison.
 pub struct Compared {
-    pub machine: Machine,
+    pub machine: LoggedRobot,
     pub sides: [Side; 2],
     pub table: SideBySide,
     pub curves: Vec<Curves>,
@@ -170,7 +169,7 @@ pub fn compare(
     let sides = [side(a, !logs.is_empty())?, side(b, !logs.is_empty())?];
     one_robot(sides.each_ref())?;
     let first = &sides[0].given;
-    let machine = Machine::new(&first.name, first.value.robot.clone());
+    let machine = LoggedRobot::new(&first.name, first.value.robot.clone());
     let mut warnings = cautions(sides.each_ref(), !logs.is_empty());
     let tried = match logs {
         [] => None,
@@ -190,13 +189,12 @@ pub fn compare(
 }
 
 fn on_logs(
-    machine: &Machine,
+    machine: &LoggedRobot,
     sides: &[Side; 2],
     logs: &[LogSpec],
     context: &Context,
 ) -> Result<Tried, CliError> {
-    let specs: Vec<&LogSpec> = logs.iter().collect();
-    let held = hold(machine, &specs, context)?;
+    let held = read_whole(machine, &logs_of(logs), context.control())?;
     let settings = machine.settings();
     let named = |error| CliError::input(format!("{}: {error}", machine.name));
     let validation = |side: &Side| {
@@ -221,7 +219,7 @@ fn on_logs(
 }
 
 /// Friction of the joints where a model has some.
-fn curves(machine: &Machine, sides: &[Side; 2], tried: Option<&Tried>) -> Vec<Curves> {
+fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Vec<Curves> {
     let robot = &machine.robot;
     let joints = robot.joint_names().iter().enumerate();
     joints

@@ -1,8 +1,8 @@
 //! The tables of `compare`.
 
 use super::{Compared, LETTERS, Tried};
-use crate::cli::machine::Machine;
 use crate::compare::{Apart, Difference, ParameterEstimate, Reason};
+use crate::identify::LoggedRobot;
 use crate::number;
 use crate::report::table::{Align, Table, paragraph};
 
@@ -78,7 +78,7 @@ pub fn apart_table(of: &Compared, side: usize) -> Option<Table> {
 }
 
 /// Errors of both on the same logs.
-pub fn error_table(tried: &Tried, machine: &Machine, logs: &str) -> Table {
+pub fn error_table(tried: &Tried, machine: &LoggedRobot, logs: &str) -> Table {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("A", Align::Decimal),

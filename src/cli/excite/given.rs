@@ -5,10 +5,10 @@ use std::path::Path;
 use super::Bench;
 use crate::cli::error::CliError;
 use crate::cli::files;
-use crate::cli::machine::{Machine as Logs, run_error, summary_warnings};
 use crate::config::RobotFile;
 use crate::excite::machine::Machine;
 use crate::excite::{Given, Motion, foresee};
+use crate::identify::{IdentifyError, Log, LoggedRobot, summary_warnings};
 use crate::inertia::accumulate;
 use crate::log::LogSpec;
 
@@ -55,16 +55,16 @@ pub(super) fn add(
     let spec: LogSpec = name
         .parse()
         .map_err(|error| CliError::usage(format!("--with {name}: {error}")))?;
-    let logs = Logs::new(name, bench.file.clone());
-    let mut log = logs.open_positions(&spec, bench.context)?;
+    let logs = LoggedRobot::new(name, bench.file.clone());
+    let mut log = logs.open_positions(&Log::from(&spec), bench.context.control())?;
     let (sums, summary) = accumulate(
         &logs.robot,
         &bench.machine.columns,
         &logs.settings(),
         &mut |block| log.read(block),
     )
-    .map_err(|error| run_error(&spec, error))?;
-    warnings.extend(summary_warnings(&spec, &summary));
+    .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
+    warnings.extend(summary_warnings(&spec.name(), &summary));
     bench.inputs.push(log.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())

@@ -3,13 +3,13 @@
 use super::super::diagnose::{Diagnosed, in_words, into_model, verdict};
 use super::super::diagnose_fault::DataFault;
 use super::super::diagnose_text::{doubts, nothing_missing};
-use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::diagnose::{Candidate, Errors, Pair};
+use crate::identify::LoggedRobot;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::figure::ResidualFigure;
@@ -21,7 +21,7 @@ const MOST: usize = 20;
 
 /// What the page is made from.
 pub struct Diagnose<'a> {
-    pub machine: &'a Machine,
+    pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     /// The model file.
     pub given: Provenance,
@@ -30,19 +30,19 @@ pub struct Diagnose<'a> {
 }
 
 /// The residual before and after, over the logs that were fitted.
-pub fn figure(machine: &Machine, found: &Diagnosed) -> Result<ResidualFigure, CliError> {
+pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure, CliError> {
     let look = look(machine, found)?;
     let fitted = found.diagnosis.fitted_logs;
     let after = &found.diagnosis.model;
     residual::figure(&look, &|log| log < fitted, &found.given, Some(after))
 }
 
-fn look<'a>(machine: &'a Machine, found: &'a Diagnosed) -> Result<Look<'a>, CliError> {
+fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, CliError> {
     Look::new(machine, &found.held, found.logs.iter().cloned())
 }
 
 /// The verdict in words, and whether nothing calls for attention.
-pub fn words(machine: &Machine, found: &Diagnosed) -> (String, bool) {
+pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let d = &found.diagnosis;
     let titles: Vec<String> = d
         .steps
@@ -125,7 +125,7 @@ pub fn diagnose(
 /// Stretches that are too short for the filter.
 pub fn sections(
     page: &mut Writer,
-    machine: &Machine,
+    machine: &LoggedRobot,
     found: &Diagnosed,
     figure: &str,
 ) -> Result<(), CliError> {
@@ -161,7 +161,7 @@ pub fn sections(
     Ok(())
 }
 
-fn candidates(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
+fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
     let all = found.diagnosis.candidates.iter();
     let mut rest: Vec<_> = all.filter(|c| c.score.is_some()).collect();
@@ -223,7 +223,7 @@ pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result
 }
 
 /// Errors of every joint before and after, on the logs that were fitted and on those that were not.
-pub fn errors(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
+pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
     let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
     let rows: Vec<Vec<String>> = machine
@@ -271,7 +271,7 @@ pub fn errors(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
     );
 }
 
-fn steps(page: &mut Writer, machine: &Machine, found: &Diagnosed) {
+fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
     let mut rows = Vec::new();
     for step in &d.steps {

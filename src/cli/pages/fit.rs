@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::super::lsq;
 use crate::config::ModelFile;
+use crate::identify::IdentifiedDynamics;
 use crate::number;
 use crate::report::Writer;
 
@@ -13,7 +13,7 @@ const ALIKE: f64 = 0.9;
 const MOST: usize = 8;
 
 /// The section of a fit.
-pub fn section(page: &mut Writer, found: &lsq::Identified, model: &ModelFile) {
+pub fn section(page: &mut Writer, found: &IdentifiedDynamics, model: &ModelFile) {
     page.heading("Condition and weakest directions");
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
@@ -45,7 +45,7 @@ pub fn section(page: &mut Writer, found: &lsq::Identified, model: &ModelFile) {
 }
 
 /// The combination of scaled columns with the largest variance.
-fn weakest(page: &mut Writer, found: &lsq::Identified) {
+fn weakest(page: &mut Writer, found: &IdentifiedDynamics) {
     let fit = &found.fit;
     let n = found.unknowns.len();
     let norm = |i: usize| fit.column_rms.column(i).norm();

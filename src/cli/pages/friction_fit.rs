@@ -1,11 +1,11 @@
 //! The page of `friction`.
 
-use super::super::friction::{Identified, figure};
-use super::super::machine::Machine;
+use super::super::friction::figure;
 use super::super::{CliError, Context};
 use super::{fit, parameters, quality};
 use crate::config::ModelFile;
 use crate::friction::passes::Ending;
+use crate::identify::{IdentifiedFriction, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::sections::provenance;
@@ -13,8 +13,8 @@ use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct FrictionFit<'a> {
-    pub machine: &'a Machine,
-    pub found: &'a Identified,
+    pub machine: &'a LoggedRobot,
+    pub found: &'a IdentifiedFriction,
     /// The model that was written.
     pub file: &'a ModelFile,
     pub logs: &'a [LogSpec],

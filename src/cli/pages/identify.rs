@@ -2,15 +2,14 @@
 
 use super::super::diagnose::Diagnosed;
 use super::super::diagnose_fault::DataFault;
-use super::super::machine::Machine;
-use super::super::validate::Validated;
-use super::super::{CliError, Context, friction, lsq};
+use super::super::{CliError, Context, friction};
 use super::look::Look;
 use super::torque::Drawn;
 use super::{diagnose, fit, parameters, quality, residual, torque, validate};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::effect::Refined;
+use crate::identify::{IdentifiedDynamics, IdentifiedFriction, LoggedRobot, Validated};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::sections::provenance;
@@ -18,11 +17,11 @@ use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct Identify<'a> {
-    pub machine: &'a Machine,
+    pub machine: &'a LoggedRobot,
     /// Name of the campaign, and its file.
     pub campaign: (&'a str, &'a str),
-    pub friction: Option<&'a friction::Identified>,
-    pub fitted: &'a lsq::Identified,
+    pub friction: Option<&'a IdentifiedFriction>,
+    pub fitted: &'a IdentifiedDynamics,
     /// The model as it was declared, and with the effects that were found.
     pub declared: &'a ModelFile,
     pub refined: Option<&'a ModelFile>,

@@ -1,15 +1,32 @@
 //! Logs held in memory beside the models that are looked at on them.
 
-use super::super::refined::Held;
-use super::super::{CliError, machine::Machine};
+use super::super::{CliError, Context};
 use crate::diagnose::{JointEvidence, evidence};
 use crate::effect::Refined;
+use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
 use crate::log::escape;
 use crate::motion::{Parallel, Stretch};
 
+/// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
+/// is no reason to lose the report.
+///
+/// # Errors
+/// Those of [`identify::read_whole`].
+pub fn held_for_pictures(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    context: &Context,
+) -> Result<Option<InMemory>, CliError> {
+    match identify::read_whole(machine, logs, context.control()) {
+        Ok(held) => Ok(Some(held)),
+        Err(IdentifyError::TooManySamples { .. } | IdentifyError::SampledUnlike { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
 /// Logs with the processing of a model.
 pub struct Look<'a> {
-    pub machine: &'a Machine,
+    pub machine: &'a LoggedRobot,
     pub stretches: &'a [Stretch],
     /// Names of the logs, by the index that their stretches carry.
     pub names: Vec<String>,
@@ -23,8 +40,8 @@ impl<'a> Look<'a> {
     /// # Errors
     /// Settings that the sampling rate does not carry.
     pub fn new(
-        machine: &'a Machine,
-        held: &'a Held,
+        machine: &'a LoggedRobot,
+        held: &'a InMemory,
         logs: impl Iterator<Item = String>,
     ) -> Result<Self, CliError> {
         let settings = machine.settings();

@@ -1,13 +1,12 @@
 //! The page of `lsq`.
 
-use super::super::lsq::Identified;
-use super::super::machine::Machine;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::effect::Refined;
+use crate::identify::{IdentifiedDynamics, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::sections::provenance;
@@ -15,8 +14,8 @@ use crate::report::{Report, Writer};
 
 /// What the page is made from.
 pub struct Lsq<'a> {
-    pub machine: &'a Machine,
-    pub found: &'a Identified,
+    pub machine: &'a LoggedRobot,
+    pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
     pub file: &'a ModelFile,
     pub model: &'a Refined,
@@ -28,7 +27,7 @@ pub struct Lsq<'a> {
 }
 
 /// The residual of the fit, joint by joint.
-pub fn residuals(page: &mut Writer, machine: &Machine, found: &Identified) {
+pub fn residuals(page: &mut Writer, machine: &LoggedRobot, found: &IdentifiedDynamics) {
     let joints = machine.robot.joint_names().iter().enumerate();
     let rows: Vec<Vec<String>> = joints
         .map(|(j, joint)| {

@@ -20,6 +20,6 @@ pub(super) use diagnose::{Diagnose, data_fault, diagnose, figure as diagnose_fig
 pub(super) use friction::{curve, speeds};
 pub(super) use friction_fit::{FrictionFit, friction_fit};
 pub(super) use identify::{Identify, identify};
-pub(super) use look::Look;
+pub(super) use look::{Look, held_for_pictures};
 pub(super) use lsq::{Lsq, lsq};
 pub(super) use validate::{Validate, validate};

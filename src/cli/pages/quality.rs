@@ -1,7 +1,7 @@
 //! What the logs hold and what is wrong with them.
 
-use super::super::machine::Machine;
 use super::super::{CliError, Context, Exit, inspect};
+use crate::identify::LoggedRobot;
 use crate::inspect::Severity;
 use crate::log::{LogSpec, escape};
 use crate::number;
@@ -16,7 +16,7 @@ const MOST: usize = 30;
 /// Interruption.
 pub fn section(
     page: &mut Writer,
-    machine: &Machine,
+    machine: &LoggedRobot,
     logs: &[&LogSpec],
     warnings: &[String],
     context: &Context,

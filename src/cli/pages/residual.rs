@@ -1,10 +1,10 @@
 //! What the residual depends on: over position, velocity, load and time, and its spectra.
 
 use super::super::CliError;
-use super::super::machine::Machine;
 use super::look::Look;
 use crate::diagnose::JointEvidence;
 use crate::effect::Refined;
+use crate::identify::LoggedRobot;
 use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 
@@ -44,7 +44,7 @@ pub fn figure(
 }
 
 fn panels(
-    machine: &Machine,
+    machine: &LoggedRobot,
     j: usize,
     before: &JointEvidence,
     after: Option<&JointEvidence>,

@@ -1,9 +1,9 @@
 //! Measured and reconstructed torque over time, and how far they are apart.
 
 use super::super::CliError;
-use super::super::machine::Machine;
 use super::look::Look;
 use crate::effect::Refined;
+use crate::identify::LoggedRobot;
 use crate::motion::Stretch;
 use crate::number;
 use crate::report::figure::{JointTorque, TorqueFigure};
@@ -78,7 +78,7 @@ fn sampled(look: &Look, stretch: &Stretch) -> Vec<f64> {
 
 /// Torques of one log, stretch after stretch.
 struct Series<'a> {
-    machine: &'a Machine,
+    machine: &'a LoggedRobot,
     models: &'a [Drawn<'a>],
     t: Vec<f64>,
     breaks: Vec<usize>,
@@ -153,7 +153,7 @@ impl<'a> Series<'a> {
 }
 
 /// The still picture of a trace, by the last of its models.
-pub fn still(machine: &Machine, trace: &Trace, title: &str) -> TorqueFigure {
+pub fn still(machine: &LoggedRobot, trace: &Trace, title: &str) -> TorqueFigure {
     let whole = |values: &[f64]| -> Vec<f64> {
         let mut out = Vec::with_capacity(values.len() + trace.breaks.len());
         for (k, v) in values.iter().enumerate() {

@@ -1,13 +1,12 @@
 //! The page of `validate`.
 
-use super::super::machine::Machine;
-use super::super::validate::Validated;
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::effect::Refined;
+use crate::identify::{LoggedRobot, Validated};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::sections::provenance;
@@ -16,7 +15,7 @@ use crate::validate::Validation;
 
 /// What the page is made from.
 pub struct Validate<'a> {
-    pub machine: &'a Machine,
+    pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
     pub model: &'a Refined,
     pub logs: &'a [LogSpec],
@@ -73,7 +72,7 @@ pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (Strin
 }
 
 /// The errors of every joint.
-pub fn errors(page: &mut Writer, machine: &Machine, validation: &Validation, caption: &str) {
+pub fn errors(page: &mut Writer, machine: &LoggedRobot, validation: &Validation, caption: &str) {
     let rows: Vec<Vec<String>> = validation
         .joints
         .iter()

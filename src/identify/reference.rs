@@ -1,10 +1,10 @@
 //! The references of a log beside its positions, row by row.
 
-use super::machine::ReadError;
+use super::error::ReadError;
 use crate::log::{Block, Reader};
 
 /// A second reading of a log, of the positions that the controller was asked for.
-pub struct Reference {
+pub struct LoggedReference {
     reader: Reader,
     block: Block,
     row: usize,
@@ -13,9 +13,9 @@ pub struct Reference {
     wide: Block,
 }
 
-impl Reference {
+impl LoggedReference {
     pub fn new(reader: Reader) -> Self {
-        Reference {
+        LoggedReference {
             reader,
             block: Block::default(),
             row: 0,

@@ -1,0 +1,163 @@
+//! Why a stage ends without a result.
+
+use crate::config::ConfigError;
+use crate::diagnose::DiagnoseError;
+use crate::effect::EffectError;
+use crate::friction::excitation::FrictionError;
+use crate::inertia::solve::FitError;
+use crate::inspect::Fault;
+use crate::log::{LogError, did_you_mean, escape};
+use crate::motion::{MotionError, RunError};
+
+/// What an error is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// FilterSettings that contradict each other or the robot.
+    Usage,
+    /// A log, robot or model that cannot be used.
+    Input,
+    /// The data determine nothing that was asked.
+    Undetermined,
+    /// The stage was asked to stop.
+    Interrupted,
+}
+
+/// An error of a stage. Its text reads `what is wrong; what to do`.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error("interrupted")]
+    Interrupted,
+    #[error("no log is given")]
+    NoLog,
+    /// A fault of the data for which a fit refuses a log; its remedy is told apart.
+    #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
+    Refused { log: String, fault: Box<Fault> },
+    /// The motion of a log, or the processing that a robot file asks for.
+    #[error("{of}: {error}")]
+    Motion { of: String, error: MotionError },
+    #[error(
+        "{log}: more than {most} rows; the friction filter passes over a one-joint log many times and holds it in memory; give a span of it, such as FILE@0..600s: minutes are enough for friction"
+    )]
+    TooManyRows { log: String, most: usize },
+    #[error(
+        "{log}: {samples} samples are more than the {most} that are held in memory; choose spans of the logs, as in LOG@0..20%"
+    )]
+    TooManySamples {
+        log: String,
+        samples: usize,
+        most: usize,
+    },
+    #[error(
+        "{log}: sampled at {dt:.6} s, the log before it at {before:.6} s; logs of one run are sampled alike; work on them one by one"
+    )]
+    SampledUnlike { log: String, dt: f64, before: f64 },
+    #[error(
+        "the robot has no joint `{joint}`; {}its joints are {known}", did_you_mean(.joint, .known)
+    )]
+    NoJoint { joint: String, known: String },
+    #[error("{logs}: {error}")]
+    Friction { logs: String, error: FrictionError },
+    #[error(
+        "{estimator} is linear, and the double-tanh law of friction is not; take `--estimator oe`, which refines the law with the inertias; or give the friction with -m, or set `law = \"viscous-coulomb\"`"
+    )]
+    LawIsNotLinear { estimator: &'static str },
+    #[error(
+        "these data determine none of the parameters; excite every joint with more speed and acceleration"
+    )]
+    NothingDetermined,
+    #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
+    Effect { model: String, error: EffectError },
+    #[error(transparent)]
+    Diagnose(DiagnoseError),
+    #[error(
+        "{first} and {second} are models of different robots: the joints are {ours} in the first and {theirs} in the second; give two models that were identified on one robot"
+    )]
+    OtherRobot {
+        first: String,
+        second: String,
+        ours: String,
+        theirs: String,
+    },
+}
+
+/// What was meant by a name that is not known.
+fn near(error: &EffectError) -> String {
+    match error {
+        EffectError::Unknown { name, known } => did_you_mean(name, known),
+        EffectError::Joint { joint, known, .. } => did_you_mean(joint, known),
+        _ => String::new(),
+    }
+}
+
+impl IdentifyError {
+    /// What it is about.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Interrupted => ErrorKind::Interrupted,
+            Self::NoLog | Self::NoJoint { .. } | Self::LawIsNotLinear { .. } => ErrorKind::Usage,
+            Self::Fit(FitError::TooFewRows { .. } | FitError::NothingExcited)
+            | Self::Friction { .. }
+            | Self::NothingDetermined => ErrorKind::Undetermined,
+            Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
+            Self::Diagnose(_) => ErrorKind::Undetermined,
+            Self::Log(_)
+            | Self::Config(_)
+            | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
+            | Self::Refused { .. }
+            | Self::Motion { .. }
+            | Self::TooManyRows { .. }
+            | Self::TooManySamples { .. }
+            | Self::SampledUnlike { .. }
+            | Self::Effect { .. }
+            | Self::OtherRobot { .. } => ErrorKind::Input,
+        }
+    }
+
+    /// What to do, where the text does not say it.
+    pub fn remedy(&self) -> Option<&str> {
+        match self {
+            Self::Refused { fault, .. } => Some(&fault.remedy),
+            _ => None,
+        }
+    }
+
+    /// The motion of a log.
+    pub(super) fn motion(of: &str, error: MotionError) -> Self {
+        Self::Motion {
+            of: of.to_owned(),
+            error,
+        }
+    }
+
+    /// What ended a run through a log.
+    pub fn of_run(log: &str, error: RunError<ReadError>) -> Self {
+        match error {
+            RunError::Source(error) => error.into(),
+            RunError::Motion(error) => Self::motion(log, error),
+        }
+    }
+}
+
+/// What stops the reading of a log.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl From<ReadError> for IdentifyError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Log(error) => Self::Log(error),
+            ReadError::Interrupted => Self::Interrupted,
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! The estimators of `lsq` on logs that are read once per pass.
+
+use nalgebra::DVector;
+
+use super::error::IdentifyError;
+use super::logged_robot::narrowed;
+use super::passes::Passes;
+use crate::config::campaign::EstimatorKind;
+use crate::inertia::accumulate::BlockFactors;
+use crate::inertia::add_processing;
+use crate::inertia::closed_loop::Gains;
+use crate::inertia::columns::RegressorColumns;
+use crate::inertia::encoder::{GRIDS, add_scatter};
+use crate::inertia::feasible::nearest;
+use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
+use crate::inertia::refine::{self, RefinedFit};
+use crate::inertia::robust::{self, Robust, Status, Weigher};
+use crate::inertia::solve::{self, Fit, FitError, fit};
+use crate::motion::FilterSettings;
+
+/// What an estimator says of its own work.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Account {
+    pub estimator: EstimatorKind,
+    /// The estimator that was asked for cannot do without the refinement of the friction law.
+    pub law_refined: bool,
+    pub status: Status,
+    /// Passes over the logs; 1 for least squares.
+    pub iterations: usize,
+    /// Per joint: scale of the residual [N or Nm] and share of rows of less than half weight.
+    pub down_weighted: Option<Vec<(f64, f64)>>,
+    /// Relative residual per joint before a refinement.
+    pub before: Option<Vec<f64>>,
+    /// The loop that was simulated.
+    pub simulated: Option<Simulated>,
+}
+
+/// The loop by which instruments were simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    pub gains: Gains,
+    pub reference: ReferenceSource,
+    /// Share of the steps at which the simulation failed a joint.
+    pub indefinite: f64,
+}
+
+impl Account {
+    fn of(estimator: EstimatorKind) -> Self {
+        Account {
+            estimator,
+            law_refined: false,
+            status: Status::Converged,
+            iterations: 1,
+            down_weighted: None,
+            before: None,
+            simulated: None,
+        }
+    }
+}
+
+/// A fit, the columns that its unknowns belong to, and how it came about.
+pub struct Estimated {
+    pub columns: RegressorColumns,
+    pub fit: Fit,
+    pub basis: Basis,
+    pub account: Account,
+}
+
+/// The rows that the fit is about, reduced.
+pub struct Basis {
+    pub sums: BlockFactors,
+    /// What their solution lacks to the fit's parameters: a law that they are linear about.
+    pub shift: DVector<f64>,
+}
+
+/// What turns other readings of the logs into a fit of the same kind.
+enum Solver {
+    Linear(solve::Weighting),
+    Robust(Box<Weigher>),
+    Refined(Box<RefinedFit>),
+    /// The fit, and the parameters that were simulated.
+    Instrumental(Box<(Fit, DVector<f64>)>),
+}
+
+impl Solver {
+    /// Columns of the rows.
+    fn columns<'a>(&'a self, linear: &'a RegressorColumns) -> &'a RegressorColumns {
+        match self {
+            Solver::Refined(refined) => &refined.columns,
+            _ => linear,
+        }
+    }
+
+    fn weigher(&self) -> Option<Weigher> {
+        match self {
+            Solver::Robust(weigher) => Some(weigher.afresh()),
+            _ => None,
+        }
+    }
+
+    fn solve(&self, sums: BlockFactors, weigher: Option<&Weigher>) -> Result<Fit, FitError> {
+        match self {
+            Solver::Refined(refined) => refined.solve(sums),
+            Solver::Robust(own) => weigher.unwrap_or(own).solve(&sums),
+            Solver::Linear(estimator) => fit(&sums, *estimator),
+            // rows without instruments: what moves the plain fit moves this one
+            Solver::Instrumental(_) => fit(&sums, solve::Weighting::Wls),
+        }
+    }
+}
+
+/// What an estimator ends with, before its uncertainty is widened: the fit, the rows that it is about,
+/// and what turns other readings into a fit of the same kind.
+type Found = (Fit, BlockFactors, Solver);
+
+/// Fits the unknowns of `columns`. With `law`, viscous and Coulomb terms only begin the law of
+/// (18), which is then refined.
+///
+/// # Errors
+/// Every [`IdentifyError`] of logs that are read, and of a fit.
+pub fn estimate(
+    passes: &mut Passes,
+    columns: RegressorColumns,
+    estimator: EstimatorKind,
+    law: bool,
+) -> Result<Estimated, IdentifyError> {
+    let settings = passes.machine.settings();
+    let mut account = Account::of(estimator);
+    let told = &mut account;
+    let (mut fit, sums, solver) = match estimator {
+        EstimatorKind::Oe => refined(passes, &settings, &columns, law, told)?,
+        EstimatorKind::Wls if law => refined(passes, &settings, &columns, law, told)?,
+        EstimatorKind::Irls => robust_regression(passes, &settings, &columns, told)?,
+        EstimatorKind::Iv => instrumental(passes, &settings, &columns, told)?,
+        EstimatorKind::Ols => linear(passes, &settings, &columns, solve::Weighting::Ols)?,
+        EstimatorKind::Wls => linear(passes, &settings, &columns, solve::Weighting::Wls)?,
+    };
+    widen(passes, &settings, &columns, &solver, &mut fit)?;
+    let (columns, shift) = match &solver {
+        Solver::Refined(refined) => (refined.columns.with_free_friction(), refined.shift()),
+        _ => (columns, DVector::zeros(fit.theta.len())),
+    };
+    Ok(Estimated {
+        columns,
+        fit,
+        basis: Basis { sums, shift },
+        account,
+    })
+}
+
+/// Linear least squares, rows weighted or alike.
+fn linear(
+    passes: &mut Passes,
+    settings: &FilterSettings,
+    columns: &RegressorColumns,
+    estimator: solve::Weighting,
+) -> Result<Found, IdentifyError> {
+    let sums = passes.read(settings, columns, None)?;
+    let found = fit(&sums, estimator)?;
+    Ok((found, sums.in_one_block(), Solver::Linear(estimator)))
+}
+
+/// The slopes of the friction law with all else.
+fn refined(
+    passes: &mut Passes,
+    settings: &FilterSettings,
+    columns: &RegressorColumns,
+    law: bool,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    passes.work.doing("friction law");
+    let mut pass = |columns: &RegressorColumns| passes.read(settings, columns, None);
+    let start = match law {
+        true => refine::begin(columns, &mut pass)?,
+        false => columns.clone(),
+    };
+    let refined = refine::refine(start, &mut pass)?;
+    account.law_refined = refined.columns.known.iter().any(Option::is_some);
+    account.status = refined.status;
+    account.iterations = refined.iterations;
+    account.before = Some(refined.before.clone());
+    let sums = refined.factors.in_one_block();
+    Ok((
+        refined.fit.clone(),
+        sums,
+        Solver::Refined(Box::new(refined)),
+    ))
+}
+
+/// Rows with large residuals count less.
+fn robust_regression(
+    passes: &mut Passes,
+    settings: &FilterSettings,
+    columns: &RegressorColumns,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    passes.work.doing("robust regression");
+    let Robust {
+        fit,
+        factors: sums,
+        weigher,
+        status,
+        iterations,
+        scale,
+        down_weighted,
+    } = robust::irls(&mut |weigher| passes.read(settings, columns, weigher))?;
+    account.status = status;
+    account.iterations = iterations;
+    account.down_weighted = Some(scale.into_iter().zip(down_weighted).collect());
+    Ok((fit, sums.in_one_block(), Solver::Robust(Box::new(weigher))))
+}
+
+/// The regressor along simulated positions as instruments.
+fn instrumental(
+    passes: &mut Passes,
+    settings: &FilterSettings,
+    columns: &RegressorColumns,
+    account: &mut Account,
+) -> Result<Found, IdentifyError> {
+    passes.work.doing("instrumental variables");
+    let sums = passes.read(settings, columns, None)?;
+    let plain = fit(&sums, solve::Weighting::Wls)?;
+    let map = passes.machine.robot.standard_map();
+    let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
+    let effective = plain.effective_rows / plain.rows as f64;
+    let mut simulate_by = plain.theta.clone();
+    let Instrumental {
+        fit,
+        status,
+        iterations,
+    } = instruments::iterate(columns, &plain, &mut |theta| {
+        simulate_by = nearest(&map, &whole, effective, theta)?;
+        let (sums, simulated) = passes.read_instruments(settings, columns, &simulate_by)?;
+        account.simulated = Some(simulated);
+        Ok::<_, IdentifyError>(sums)
+    })?;
+    account.status = status;
+    account.iterations = iterations;
+    let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));
+    Ok((fit, sums.in_one_block(), solver))
+}
+
+/// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move.
+fn widen(
+    passes: &mut Passes,
+    settings: &FilterSettings,
+    columns: &RegressorColumns,
+    solver: &Solver,
+    fit: &mut Fit,
+) -> Result<(), IdentifyError> {
+    passes.work.doing("uncertainty");
+    let read = solver.columns(columns);
+    let dt = passes.summary.as_ref().map_or(1e-3, |s| s.dt);
+    let narrow = narrowed(settings, 1.0 / dt);
+    let mut weigher = solver.weigher();
+    let again = match solver {
+        Solver::Instrumental(found) => {
+            let (found, simulated) = &**found;
+            let (sums, _) = passes.read_instruments(&narrow, read, simulated)?;
+            instruments::again(read, found, &sums)?
+        }
+        _ => {
+            let sums = passes.read(&narrow, read, weigher.as_mut())?;
+            solver.solve(sums, weigher.as_ref())?
+        }
+    };
+    add_processing(fit, &again);
+    if passes
+        .machine
+        .robot
+        .transmission()
+        .encoder_steps()
+        .is_some()
+    {
+        let mut shifted = Vec::new();
+        for grid in 0..GRIDS {
+            let mut weigher = solver.weigher();
+            if let Some(sums) = passes.read_shifted(settings, read, grid, weigher.as_mut())? {
+                shifted.push(solver.solve(sums, weigher.as_ref())?);
+            }
+        }
+        add_scatter(fit, &shifted);
+    }
+    Ok(())
+}

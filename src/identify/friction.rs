@@ -1,0 +1,284 @@
+//! The friction of single joints from one-joint logs, by the Kalman filter.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::one_joint::{self, OneJointLog};
+use crate::config::ModelFile;
+use crate::config::identified::{friction_meaning, friction_unit};
+use crate::config::model_file::Parameter;
+use crate::friction::estimate::{JointEstimate, Nis, Options, estimate};
+use crate::friction::excitation::{FrictionError, moving_joint};
+use crate::friction::inputs::Inputs;
+use crate::friction::passes::{Ending, GivenNoise};
+use crate::friction::prepare::{SensorModel, SmoothedMotion, prepare, resolution};
+use crate::log::Provenance;
+use crate::number;
+use crate::robot::friction::DoubleTanh;
+use crate::verdict::Verdict;
+
+/// How friction is estimated.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FrictionSettings {
+    /// The joint that the logs move; found from the data where absent.
+    pub joint: Option<String>,
+}
+
+/// Friction of every joint that the logs move.
+pub struct IdentifiedFriction {
+    /// Joint index and estimate, in joint order.
+    pub joints: Vec<(usize, JointEstimate)>,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Estimates the friction from one-joint logs; several logs of one joint are used together.
+///
+/// # Errors
+/// Logs that cannot be used, and logs that do not move one joint through zero speed.
+pub fn friction(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    settings: &FrictionSettings,
+    control: &Control,
+) -> Result<IdentifiedFriction, IdentifyError> {
+    let names = machine.robot.joint_names();
+    let (groups, inputs, mut warnings) = by_joint(machine, logs, settings, control)?;
+    let work = control.begin("friction filter", Some(groups.len() as u64));
+    let parameters = machine.robot.parameters().iter();
+    let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();
+    // joints do not know of one another: they run in parallel, and are collected in joint order
+    let found: Vec<Result<(usize, JointEstimate), IdentifyError>> = groups
+        .into_par_iter()
+        .map(|(j, group)| {
+            control.check()?;
+            let estimate = one_joint(machine, j, &group, &parameter_names)?;
+            work.advance(1);
+            Ok((j, estimate))
+        })
+        .collect();
+    let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
+    control.check()?;
+    let of_joints = joints.iter();
+    warnings.extend(of_joints.flat_map(|(j, e)| joint_warnings(&names[*j], e)));
+    Ok(IdentifiedFriction {
+        joints,
+        inputs,
+        warnings,
+    })
+}
+
+/// Logs by the joint that they move, with their inputs and warnings.
+type Grouped = (BTreeMap<usize, Group>, Vec<Provenance>, Vec<String>);
+
+fn by_joint(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    settings: &FrictionSettings,
+    control: &Control,
+) -> Result<Grouped, IdentifyError> {
+    let names = machine.robot.joint_names();
+    let place = |name: &String| {
+        let found = names.iter().position(|n| n == name);
+        found.ok_or_else(|| IdentifyError::NoJoint {
+            joint: name.clone(),
+            known: names.join(", "),
+        })
+    };
+    let named = settings.joint.as_ref().map(place).transpose()?;
+    let _work = control.begin("reading logs", None);
+    let ranges = machine.ranges();
+    let mut groups: BTreeMap<usize, Group> = BTreeMap::new();
+    let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
+    for log in logs {
+        let OneJointLog {
+            motions,
+            narrower,
+            held,
+            provenance,
+            warnings: found,
+        } = one_joint::read(machine, log, control)?;
+        inputs.push(provenance);
+        warnings.extend(found);
+        let moving = match named {
+            Some(j) => j,
+            None => {
+                moving_joint(names, &motions, &ranges).map_err(|error| IdentifyError::Friction {
+                    logs: log.name(),
+                    error,
+                })?
+            }
+        };
+        let group = groups.entry(moving).or_default();
+        group.held |= held;
+        group.motions.extend(motions);
+        group.narrower.extend(narrower);
+        group.logs.push(log.name());
+    }
+    Ok((groups, inputs, warnings))
+}
+
+/// Logs of one joint.
+#[derive(Default)]
+struct Group {
+    motions: Vec<SmoothedMotion>,
+    narrower: Vec<SmoothedMotion>,
+    held: bool,
+    logs: Vec<String>,
+}
+
+fn one_joint(
+    machine: &LoggedRobot,
+    j: usize,
+    group: &Group,
+    parameter_names: &[String],
+) -> Result<JointEstimate, IdentifyError> {
+    let name = &machine.robot.joint_names()[j];
+    let place = group.logs.join(", ");
+    let undetermined = |error: FrictionError| IdentifyError::Friction {
+        logs: place.clone(),
+        error,
+    };
+    let noise = machine.file.noise.joint.get(name);
+    let given = noise.and_then(|n| n.position_resolution);
+    let resolution = given.unwrap_or_else(|| resolution(&group.motions, machine.robot.joints(), j));
+    let variance = |q: &[f64]| -> f64 {
+        let known = match given {
+            Some(_) => None,
+            None => machine.robot.transmission().encoder_variance(j, q),
+        };
+        known.unwrap_or(resolution * resolution / 12.0)
+    };
+    let sensors = SensorModel {
+        variance: &variance,
+        zero_order_hold: group.held,
+    };
+    let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
+        undetermined(FrictionError::StandsStill {
+            joint: name.clone(),
+        })
+    })?;
+    let options = Options {
+        start: start_of(machine, name),
+        noise: GivenNoise {
+            torque: noise.and_then(|n| n.torque_std),
+            position_factor: None,
+        },
+        ..Options::default()
+    };
+    let inputs = Inputs {
+        robot: &machine.robot,
+        joint: j,
+        motions: &group.motions,
+        narrower: &group.narrower,
+        sensors: &sensors,
+    };
+    estimate(name, parameter_names, &prepared, Some(&inputs), &options).map_err(undetermined)
+}
+
+/// The user's starting values, where all five are given.
+fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
+    let s = machine.file.friction.joint.get(joint)?;
+    Some(DoubleTanh {
+        viscous: s.viscous?,
+        coulomb_1: s.coulomb_1?,
+        coulomb_2: s.coulomb_2?,
+        slope_1: s.slope_1?,
+        slope_2: s.slope_2?,
+    })
+}
+
+/// What a reader of the estimate should know.
+fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
+    let mut out = Vec::new();
+    if e.ending != Ending::Converged {
+        out.push(format!(
+            "{joint}: the search ended without converging ({:?})",
+            e.ending
+        ));
+    }
+    let Nis {
+        mean,
+        lower_95,
+        upper_95,
+        ..
+    } = e.nis;
+    if mean > upper_95 {
+        out.push(format!(
+            "{joint}: mean NIS {mean:.2} is above its bounds {lower_95:.2}..{upper_95:.2}: the innovations are alike for many samples, so something acts that the model lacks"
+        ));
+    } else if mean < lower_95 {
+        out.push(format!(
+            "{joint}: mean NIS {mean:.2} is below its bounds {lower_95:.2}..{upper_95:.2}: innovations cancel over many samples, as where positions are finer than the encoder's step^2/12 or were filtered before they were logged"
+        ));
+    }
+    if e.widening > 1.5 {
+        out.push(format!(
+            "{joint}: the innovations are coloured, so the model lacks something; the standard deviations hold a factor {:.1} for it",
+            e.widening.sqrt()
+        ));
+    }
+    for (k, value) in e.values.iter().enumerate() {
+        match value.verdict {
+            Verdict::LowerBound => out.push(format!(
+                "{joint}: {} is only known to be above {} (95 %): these data do not pass slowly enough through zero speed to bound it from above",
+                DoubleTanh::NAMES[k],
+                number::significant(value.value, 3)
+            )),
+            Verdict::NotIdentifiable => out.push(format!(
+                "{joint}: these data cannot determine {}; log slower reversals and more speeds",
+                DoubleTanh::NAMES[k]
+            )),
+            Verdict::Identified | Verdict::Weak => {}
+        }
+    }
+    out
+}
+
+/// The parameters of one joint as a model file holds them. A slope with a bound keeps the value of
+/// highest likelihood, which the torque is computed with; its meaning names the bound.
+fn file_parameters(machine: &LoggedRobot, j: usize, e: &JointEstimate) -> Vec<Parameter> {
+    let joint = &machine.robot.joint_names()[j];
+    let torque_unit = machine.file.torque_unit(j);
+    let law = e.law.parameters();
+    (0..5)
+        .map(|k| {
+            let name = DoubleTanh::NAMES[k];
+            let v = &e.values[k];
+            let mut meaning = friction_meaning(name).to_owned();
+            if v.verdict == Verdict::LowerBound {
+                meaning += &format!("; only known to be above {:e} (95 %)", v.value);
+            }
+            Parameter {
+                name: name.to_owned(),
+                theta: machine.robot.friction_theta(j, k),
+                joint: Some(joint.clone()),
+                value: law[k],
+                std: (v.std.is_finite()).then_some(v.std),
+                unit: friction_unit(&machine.robot, j, name, torque_unit),
+                meaning,
+                verdict: Some(v.verdict),
+            }
+        })
+        .collect()
+}
+
+impl IdentifiedFriction {
+    /// Writes the estimates into a model, in place of what it has of these joints.
+    pub fn write_into(&self, machine: &LoggedRobot, model: &mut ModelFile) {
+        for (j, e) in &self.joints {
+            let joint = &machine.robot.joint_names()[*j];
+            model.replace_joint(joint, file_parameters(machine, *j, e));
+            let keys: Vec<String> = DoubleTanh::NAMES
+                .iter()
+                .map(|n| format!("{n}:{joint}"))
+                .collect();
+            model.replace_covariance(&keys, &|a, b| e.covariance[a][b]);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Logs read whole, as stretches in memory: for what looks at them many times.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::open_log::summary_warnings;
+use crate::log::{Instant, Provenance};
+use crate::motion::{Stretch, Summary, stretches};
+
+/// Most samples that are held in memory, over all logs: 2 GB for a robot of seven joints.
+const MOST_SAMPLES: usize = 9_000_000;
+
+/// Logs in memory, as stretches at full rate.
+pub struct InMemory {
+    pub stretches: Vec<Stretch>,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+    pub summary: Summary,
+    /// Instant from which the times of the first log are counted.
+    pub origin: Instant,
+    /// Torques are means of two rows: they are held from row to row.
+    pub averaged: bool,
+}
+
+/// Reads logs whole, smoothed as the model declares.
+///
+/// # Errors
+/// A log that cannot be read, logs sampled unlike, or more samples than memory is meant to hold.
+pub fn read_whole(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<InMemory, IdentifyError> {
+    let n = machine.robot.joints();
+    let settings = machine.settings();
+    let work = control.begin("reading", Some(logs.len() as u64));
+    let (mut all, mut inputs, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    let mut last: Option<Summary> = None;
+    let mut origin = None;
+    let mut samples = 0;
+    let mut averaged = false;
+    for (index, log) in logs.iter().enumerate() {
+        let name = log.name();
+        let mut open = machine.open(log, control)?;
+        origin = origin.or_else(|| Some(open.origin()));
+        averaged |= open.is_centred();
+        let (found, summary) = stretches(index, n, &settings, &mut |block| open.read(block))
+            .map_err(|e| IdentifyError::of_run(&name, e))?;
+        samples += found.iter().map(Stretch::len).sum::<usize>();
+        if samples > MOST_SAMPLES {
+            return Err(IdentifyError::TooManySamples {
+                log: name,
+                samples,
+                most: MOST_SAMPLES,
+            });
+        }
+        if let Some(before) = &last
+            && (before.dt / summary.dt - 1.0).abs() > 0.02
+        {
+            return Err(IdentifyError::SampledUnlike {
+                log: name,
+                dt: summary.dt,
+                before: before.dt,
+            });
+        }
+        warnings.extend(open.warnings());
+        warnings.extend(summary_warnings(&name, &summary));
+        inputs.push(open.provenance()?);
+        all.extend(found);
+        last = Some(summary);
+        work.advance(1);
+    }
+    let (Some(summary), Some(origin)) = (last, origin) else {
+        return Err(IdentifyError::NoLog);
+    };
+    Ok(InMemory {
+        stretches: all,
+        inputs,
+        warnings,
+        summary,
+        origin,
+        averaged,
+    })
+}

@@ -1,0 +1,232 @@
+//! A robot as its file describes it: its dynamics, and how its logs are read and processed.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::open_log::OpenLog;
+use super::reference::LoggedReference;
+use crate::config::RobotFile;
+use crate::config::robot_file::{DifferencesKind, FilterKind};
+use crate::friction::estimate::NARROWER;
+use crate::inspect::{Fault, Gate};
+use crate::log::{Layout, LogError, Reader, escape};
+use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
+use crate::robot::{JointKind, Robot};
+
+/// The same processing with a narrower position filter.
+pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
+    let plain = (6.0 * settings.cutoff_hz).min(0.4 * rate_hz);
+    FilterSettings {
+        q_cutoff_hz: Some(NARROWER * settings.q_cutoff_hz.unwrap_or(plain)),
+        ..settings.clone()
+    }
+}
+
+/// A robot as its file describes it.
+#[derive(Debug, Clone)]
+pub struct LoggedRobot {
+    /// Name of the file, for messages.
+    pub name: String,
+    pub file: RobotFile,
+    pub robot: Robot,
+    /// What the first look at each log found: a log is opened several times.
+    gates: Arc<Mutex<BTreeMap<String, Arc<Gate>>>>,
+}
+
+impl LoggedRobot {
+    /// Reads a robot file, or one that comes with the tool, such as `configs/cft.toml`.
+    ///
+    /// # Errors
+    /// A file that cannot be read or used.
+    pub fn load(path: &str) -> Result<Self, IdentifyError> {
+        Ok(Self::new(path, RobotFile::load(Path::new(path))?))
+    }
+
+    /// The robot of a file that is read already.
+    pub fn new(name: &str, file: RobotFile) -> Self {
+        let robot = file.robot();
+        LoggedRobot {
+            name: name.to_owned(),
+            file,
+            robot,
+            gates: Arc::default(),
+        }
+    }
+
+    /// Looks at a log before it is used, once.
+    fn gate(
+        &self,
+        log: &Log,
+        layout: &Layout,
+        control: &Control,
+    ) -> Result<Arc<Gate>, IdentifyError> {
+        let key = format!("{} {}", layout.torques.len(), log.key());
+        let known = || self.gates.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(gate) = known().get(&key) {
+            return Ok(Arc::clone(gate));
+        }
+        let gate = Arc::new(self.look(log, layout, control)?);
+        if let Some(fault) = gate.refusal() {
+            return Err(IdentifyError::Refused {
+                log: escape(&log.name()),
+                fault: Box::new(fault.clone()),
+            });
+        }
+        known().insert(key, Arc::clone(&gate));
+        Ok(gate)
+    }
+
+    /// The fault for which a fit refuses a log, where it has one.
+    ///
+    /// # Errors
+    /// A log that cannot be read, and interruption.
+    pub fn fault(&self, log: &Log, control: &Control) -> Result<Option<Fault>, IdentifyError> {
+        let gate = self.look(log, &self.file.layout(), control)?;
+        Ok(gate.refusal().cloned())
+    }
+
+    fn look(&self, log: &Log, layout: &Layout, control: &Control) -> Result<Gate, IdentifyError> {
+        let mut reader = self.reader(log, &layout.clone().as_logged())?;
+        let gate = Gate::look(&mut reader, &|| control.stopped())?;
+        gate.ok_or(IdentifyError::Interrupted)
+    }
+
+    fn reader(&self, log: &Log, layout: &Layout) -> Result<Reader, LogError> {
+        log.reader(layout, self.robot.joint_names())
+    }
+
+    /// Opens a log of this layout.
+    fn open_as<'a>(
+        &self,
+        log: &Log,
+        layout: &Layout,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        let gate = self.gate(log, layout, control)?;
+        Ok(OpenLog {
+            reader: self.reader(log, layout)?,
+            control,
+            centre: None,
+            name: escape(&log.name()),
+            cutter: gate.cutter(self.settings().gap_factor),
+            gate,
+        })
+    }
+
+    /// Opens a log, its torques as logged, and says whether they are held from row to row.
+    pub(super) fn open_raw<'a>(
+        &self,
+        log: &Log,
+        control: &'a Control,
+    ) -> Result<(OpenLog<'a>, bool), IdentifyError> {
+        let open = self.open_as(log, &self.file.layout(), control)?;
+        let held = self.file.zero_order_hold(open.reader.layout().channels);
+        Ok((open, held))
+    }
+
+    /// Opens a log for its positions alone: it needs no torque channels.
+    ///
+    /// # Errors
+    /// A log that cannot be read or is refused, and interruption.
+    pub fn open_positions<'a>(
+        &self,
+        log: &Log,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        self.open_as(log, &self.file.layout().without_torques(), control)
+    }
+
+    /// The references of a log, where the robot file names one for every joint.
+    pub(super) fn open_reference(
+        &self,
+        log: &Log,
+    ) -> Result<Option<LoggedReference>, IdentifyError> {
+        let plain = || self.file.layout().without_torques();
+        let opened = match log {
+            Log::File(_) => self
+                .file
+                .reference_layout()
+                .map(|layout| (log.clone(), layout)),
+            Log::Arrays(arrays) => arrays
+                .references()
+                .map(|references| (Log::Arrays(Arc::clone(references)), plain())),
+        };
+        let Some((log, layout)) = opened else {
+            return Ok(None);
+        };
+        Ok(Some(LoggedReference::new(self.reader(&log, &layout)?)))
+    }
+
+    /// Opens a log with every torque at the time and pose of its row.
+    ///
+    /// # Errors
+    /// A log that cannot be read or is refused, and interruption.
+    pub fn open<'a>(
+        &'a self,
+        log: &Log,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        let (mut open, held) = self.open_raw(log, control)?;
+        open.centre = held.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
+        Ok(open)
+    }
+
+    /// Processing of logs for least squares and validation.
+    pub fn settings(&self) -> FilterSettings {
+        let f = &self.file.filter;
+        let plain = FilterSettings::default();
+        let order = f.order.map(|o| o as usize);
+        FilterSettings {
+            cutoff_hz: f.cutoff_hz.unwrap_or(plain.cutoff_hz),
+            filter: match f.kind {
+                Some(FilterKind::ChebyshevDecimate) => ParallelFilter::Chebyshev {
+                    order: order.unwrap_or(8),
+                    ripple_db: f.ripple_db.unwrap_or(0.05),
+                },
+                Some(FilterKind::Butterworth) | None => ParallelFilter::Butterworth {
+                    order: order.unwrap_or(4),
+                },
+            },
+            decimation: f.decimation.map(|d| d as usize),
+            q_cutoff_hz: f.position_cutoff_hz,
+            q_order: f.position_order.map_or(plain.q_order, |o| o as usize),
+            differences: match f.differences {
+                Some(DifferencesKind::Central) => Differences::Central,
+                Some(DifferencesKind::HighOrder) | None => Differences::HighOrder,
+            },
+            // held torques are brought to their rows' time as the log is read
+            torque: TorqueTiming::Sampled,
+            gap_factor: f.gap_factor.unwrap_or(plain.gap_factor),
+            q_trim_s: f.position_trim_s,
+            trim_s: f.trim_s,
+        }
+    }
+
+    /// Travel of a joint by its machine, else by the file's limits; a turn, or a metre, where neither
+    /// has one.
+    fn range(&self, j: usize, name: &str) -> f64 {
+        if let Some(range) = self.robot.transmission().full_travel(j) {
+            return range;
+        }
+        let limits = self.file.limits.get(name).and_then(|l| l.position);
+        match (limits, self.robot.joint_kind(j)) {
+            (Some([low, high]), _) => high - low,
+            (None, JointKind::Revolute) => std::f64::consts::TAU,
+            (None, JointKind::Prismatic) => 1.0,
+        }
+    }
+
+    /// Full travel of each joint, by which motions of metres and radians are compared.
+    pub fn ranges(&self) -> Vec<f64> {
+        if self.robot.joints() == 1 {
+            return vec![f64::MIN_POSITIVE];
+        }
+        let names = self.robot.joint_names().iter().enumerate();
+        let range = |(j, name): (usize, &String)| self.range(j, name);
+        names.map(range).collect()
+    }
+}

@@ -1,0 +1,262 @@
+//! The inertial parameters by linear least squares, and friction with them where it is not known.
+
+use super::consistent::{ConsistentLinks, consistent};
+use super::control::Control;
+use super::error::IdentifyError;
+use super::estimate::{Account, Estimated, estimate};
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::new_model;
+use super::passes::Passes;
+use super::unknowns::{Unknown, columns, unknowns};
+use crate::config::ModelFile;
+use crate::config::campaign::EstimatorKind;
+use crate::config::model_file::Parameter;
+use crate::config::robot_file::FrictionLawKind;
+use crate::inertia::columns::RegressorColumns;
+use crate::inertia::essential::{Essential, essential};
+use crate::inertia::instruments::ReferenceSource;
+use crate::inertia::robust::Status;
+use crate::inertia::solve::{Confounded, Fit, factor, residual_of, weights_of};
+use crate::log::Provenance;
+use crate::motion::Summary;
+use crate::number;
+use crate::robot::friction::DoubleTanh;
+use crate::verdict::Verdict;
+
+/// How the inertial parameters are fitted.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LsqSettings<'a> {
+    /// How parameters are estimated from the rows.
+    pub estimator: EstimatorKind,
+    /// Only physically consistent parameters.
+    pub consistent: bool,
+    /// The model that holds the friction of every joint, and its name for messages; without one,
+    /// friction is fitted together with the inertias.
+    pub friction: Option<(&'a str, &'a ModelFile)>,
+}
+
+/// What `lsq` found.
+pub struct IdentifiedDynamics {
+    pub columns: RegressorColumns,
+    pub fit: Fit,
+    /// What the estimator did.
+    pub account: Account,
+    /// Physically consistent links, where they were asked for.
+    pub physical: Option<ConsistentLinks>,
+    /// Which unknowns the data are really about.
+    pub essential: Essential,
+    /// Relative residual per joint with those alone.
+    pub essential_error: Vec<f64>,
+    pub unknowns: Vec<Unknown>,
+    pub summary: Summary,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Fits the inertial parameters.
+///
+/// # Errors
+/// Logs that cannot be used, settings that contradict the robot file, and data that determine none
+/// of the parameters.
+pub fn lsq(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    settings: &LsqSettings,
+    control: &Control,
+) -> Result<IdentifiedDynamics, IdentifyError> {
+    let LsqSettings {
+        estimator,
+        friction,
+        ..
+    } = *settings;
+    let law = friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh;
+    if law && !matches!(estimator, EstimatorKind::Wls | EstimatorKind::Oe) {
+        return Err(IdentifyError::LawIsNotLinear {
+            estimator: estimator.name(),
+        });
+    }
+    let mut passes = Passes::new(machine, logs, control);
+    let linear = columns(machine, friction)?;
+    let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    let (essential, essential_error) = essentials(&estimated)?;
+    let physical = match settings.consistent {
+        true => Some(consistent(machine, &mut estimated)?),
+        false => None,
+    };
+    let Estimated {
+        columns,
+        fit,
+        account,
+        ..
+    } = estimated;
+    let mut warnings: Vec<String> = physical
+        .iter()
+        .flat_map(ConsistentLinks::warnings)
+        .collect();
+    if friction.is_none() {
+        warnings.push(with_friction(law).to_owned());
+    }
+    warnings.extend(account.warnings());
+    warnings.append(&mut passes.warnings);
+    let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
+    let inputs = std::mem::take(&mut passes.inputs);
+    let unknowns = unknowns(machine, &columns, &fit);
+    warnings.extend(confounded(&fit, &unknowns));
+    if unknowns
+        .iter()
+        .all(|u| u.verdict == Verdict::NotIdentifiable)
+    {
+        return Err(IdentifyError::NothingDetermined);
+    }
+    Ok(IdentifiedDynamics {
+        columns,
+        fit,
+        account,
+        physical,
+        essential,
+        essential_error,
+        unknowns,
+        summary,
+        inputs,
+        warnings,
+    })
+}
+
+fn with_friction(law: bool) -> &'static str {
+    match law {
+        true => {
+            "friction is fitted together with the inertias, for there are no one-joint logs of it: linear columns first, then the law of (18) by refinement"
+        }
+        false => {
+            "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it"
+        }
+    }
+}
+
+impl Account {
+    /// What did not come as it should, as warnings.
+    fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if self.estimator == EstimatorKind::Oe && !self.law_refined {
+            out.push("no parameter of this model is nonlinear: oe gives what wls gives".to_owned());
+        }
+        if let Some(simulated) = &self.simulated {
+            if simulated.reference == ReferenceSource::Smoothed {
+                out.push("iv: no log channel is named as the reference, so the measured position, smoothed to half the cut-off, stands for it; a part of its noise stays in the instruments. Name the channel: `reference = \"COLUMN\"` in [log.joint.NAME]".to_owned());
+            }
+            if simulated.indefinite > 0.0 {
+                out.push(format!(
+                    "iv: at {} of the simulated steps the motion could not be computed or went astray, and joints were moved by themselves or put back; instruments are poorer for it",
+                    number::percent(simulated.indefinite)
+                ));
+            }
+        }
+        if self.status == Status::IterationLimit {
+            out.push(format!(
+                "{} did not settle in {} passes over the logs; its last result stands",
+                self.estimator.name(),
+                self.iterations
+            ));
+        }
+        out
+    }
+}
+
+/// What the data do not tell apart, as warnings.
+fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
+    let sentence = |c: &Confounded| {
+        let most = || c.terms.iter().take(6);
+        let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].name.as_str()).collect();
+        let words: Vec<String> = most()
+            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].name))
+            .collect();
+        format!(
+            "these data cannot tell apart what {} share: their combination {} (columns scaled to norm 1) changes nothing",
+            names.join(", "),
+            words.join(" ")
+        )
+    };
+    fit.confounded.iter().map(sentence).collect()
+}
+
+/// The essential unknowns, and the relative residual of each joint with those alone.
+fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {
+    let (fit, basis) = (&estimated.fit, &estimated.basis);
+    let weights = weights_of(
+        &basis.sums,
+        &residual_of(&basis.sums, &(&fit.theta - &basis.shift))?,
+    );
+    let factor = factor(&basis.sums, &weights)?;
+    // targets without the laws that the rows are linear about: a parameter is absent at 0
+    let mut whole = factor.clone();
+    let u = factor.ncols() - 1;
+    let target = factor.column(u) + factor.columns(0, u) * &basis.shift;
+    whole.set_column(u, &target);
+    let rows = (fit.rows * basis.sums.columns.joints as u64) as f64;
+    let found = essential(&whole, rows, fit.effective_rows / fit.rows as f64)?;
+    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let whole = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let alone = residual_of(&basis.sums, &(&found.theta - &basis.shift))?;
+    let growth = alone
+        .iter()
+        .zip(&whole)
+        .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
+    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e);
+    Ok((found, error.collect()))
+}
+
+impl IdentifiedDynamics {
+    /// The model: friction as it was known, and what was fitted, with their joint covariance.
+    pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
+        let mut model = new_model(machine, "lsq", &self.inputs);
+        model.parameters = self.unknowns.iter().map(Unknown::parameter).collect();
+        let robot = &machine.robot;
+        let u = self.unknowns.len();
+        let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
+        let mut joint_of = Vec::new();
+        if let Some(friction) = friction {
+            let known = &self.columns.known;
+            let names = robot.joint_names().iter().enumerate();
+            // where it was refined it is among what was fitted
+            for (j, joint) in names.filter(|(j, _)| known[*j].is_some()) {
+                for (k, name) in DoubleTanh::NAMES.iter().enumerate() {
+                    if let Some(p) = friction.find(name, Some(joint)) {
+                        keys.push(p.key());
+                        joint_of.push((j, k));
+                        model.parameters.push(p.clone());
+                    }
+                }
+            }
+            model.effects = friction.effects.clone();
+        }
+        let fit = &self.fit;
+        let known = |j: usize, a: usize, b: usize| {
+            self.columns.known[j]
+                .as_ref()
+                .map_or(0.0, |k| k.covariance[a][b])
+        };
+        // cov(theta, theta_f) = S Sigma_f, with S = d theta / d theta_f
+        let cross = |i: usize, (j, k): (usize, usize)| -> f64 {
+            fit.friction_sensitivity[j]
+                .as_ref()
+                .map_or(0.0, |s| (0..5).map(|m| s[(i, m)] * known(j, m, k)).sum())
+        };
+        model.replace_covariance(&keys, &|a, b| match (a < u, b < u) {
+            (true, true) => fit.covariance[(a, b)],
+            (true, false) => cross(a, joint_of[b - u]),
+            (false, true) => cross(b, joint_of[a - u]),
+            (false, false) => {
+                let ((ja, ka), (jb, kb)) = (joint_of[a - u], joint_of[b - u]);
+                if ja == jb { known(ja, ka, kb) } else { 0.0 }
+            }
+        });
+        for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
+            model.residual_std.insert(joint.clone(), *std);
+        }
+        if let Some(physical) = &self.physical {
+            physical.write_into(machine, &mut model);
+        }
+        model
+    }
+}

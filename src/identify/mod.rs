@@ -1,0 +1,42 @@
+//! The stages of an identification as functions of a robot and its logs.
+//!
+//! A [`LoggedRobot`] is a robot file with all that it says of logs, a [`Log`] a file or arrays in
+//! memory, a [`Control`] the callbacks for progress and cancellation. Each stage returns its result as
+//! plain data, with warnings as sentences; it reads logs and writes nothing.
+//!
+//! | stage | from | to |
+//! |---|---|---|
+//! | [`friction`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
+//! | [`lsq`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
+//! | [`validate`] | logs that were not used, a model | [`Validated`]: torque errors |
+
+mod consistent;
+mod control;
+mod error;
+mod estimate;
+mod friction;
+mod in_memory;
+mod log;
+mod logged_robot;
+mod lsq;
+mod model;
+mod one_joint;
+mod open_log;
+mod passes;
+mod reference;
+mod unknowns;
+mod validate;
+
+pub use consistent::ConsistentLinks;
+pub use control::{Control, Progress};
+pub use error::{ErrorKind, IdentifyError, ReadError};
+pub use estimate::{Account, Simulated};
+pub use friction::{FrictionSettings, IdentifiedFriction, friction};
+pub use in_memory::{InMemory, read_whole};
+pub use log::Log;
+pub use logged_robot::{LoggedRobot, narrowed};
+pub use lsq::{IdentifiedDynamics, LsqSettings, lsq};
+pub use model::{in_file, new_model, refined, refined_or_friction};
+pub use open_log::{OpenLog, summary_warnings};
+pub use unknowns::Unknown;
+pub use validate::{Validated, validate};

@@ -1,0 +1,114 @@
+//! A log that is being read for a fit: rows that are marked bad left out, torques at their rows' time.
+
+use std::sync::Arc;
+
+use super::control::Control;
+use super::error::{IdentifyError, ReadError};
+use crate::inspect::{Cutter, Gate};
+use crate::log::{Block, Instant, Provenance, Reader};
+use crate::motion::{Summary, ZeroOrderHold};
+use crate::robot::Robot;
+
+/// A log that is being read.
+pub struct OpenLog<'a> {
+    pub(super) reader: Reader,
+    pub(super) control: &'a Control,
+    /// Brings held motor forces to the rows' own time and pose.
+    pub(super) centre: Option<(&'a Robot, ZeroOrderHold)>,
+    pub(super) name: String,
+    pub(super) gate: Arc<Gate>,
+    pub(super) cutter: Cutter,
+}
+
+impl OpenLog<'_> {
+    /// The next block, without the rows that are marked bad; false at the end.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
+        loop {
+            if self.control.stopped() {
+                return Err(ReadError::Interrupted);
+            }
+            let more = self.reader.read(block)?;
+            if let Some((robot, held)) = &mut self.centre {
+                held.centre(robot, block);
+            }
+            if block.tau.is_empty() {
+                // a log without torques moves with none
+                block.tau.resize(block.q.len(), 0.0);
+            }
+            self.cutter.cut(block);
+            if !more || !block.is_empty() {
+                return Ok(more);
+            }
+        }
+    }
+
+    /// The instant from which the times of the blocks are counted.
+    pub fn origin(&self) -> Instant {
+        self.gate.origin()
+    }
+
+    /// What was left out, dropped or chosen, once the last block is read.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut out = self.reader.warnings();
+        let found = self.gate.warnings().into_iter();
+        out.extend(found.map(|text| format!("{}: {text}", self.name)));
+        let removed = self.cutter.removed();
+        if removed > 0 {
+            out.push(format!(
+                "{}: {removed} of {} rows are left out in all, those next to bad ones included; `cft-ident inspect` tells more",
+                self.name,
+                self.reader.samples()
+            ));
+        }
+        out
+    }
+
+    /// Whether torques are held from row to row and so are means of two rows here.
+    pub fn is_centred(&self) -> bool {
+        self.centre.is_some()
+    }
+
+    /// Name, span, checksum and size of what was read.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    pub fn provenance(&self) -> Result<Provenance, IdentifyError> {
+        Ok(self.reader.provenance()?)
+    }
+}
+
+/// Warnings about what the processing left out of a log.
+pub fn summary_warnings(name: &str, summary: &Summary) -> Vec<String> {
+    let mut out = Vec::new();
+    if summary.skipped.segments > 0 {
+        let spans: Vec<String> = summary
+            .skipped
+            .spans_s
+            .iter()
+            .take(3)
+            .map(|[a, b]| format!("{a:.3}..{b:.3} s"))
+            .collect();
+        out.push(format!(
+            "{name}: {} stretch(es) between gaps are too short to filter and are left out ({} samples; {})",
+            summary.skipped.segments,
+            summary.skipped.samples,
+            spans.join(", ")
+        ));
+    }
+    if summary.segments > 1 {
+        out.push(format!(
+            "{name}: gaps part it into {} stretches; nothing is differentiated across them",
+            summary.segments
+        ));
+    }
+    if summary.interpolated > 0 {
+        out.push(format!(
+            "{name}: the clock is uneven, {} of {} samples were interpolated onto an even one",
+            summary.interpolated, summary.samples
+        ));
+    }
+    out
+}

@@ -1,0 +1,160 @@
+//! Readings of the same logs, one after the other, each reduced to what a fit needs.
+
+use nalgebra::DVector;
+
+use super::control::{Control, Work};
+use super::error::IdentifyError;
+use super::estimate::Simulated;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::open_log::summary_warnings;
+use crate::inertia::accumulate::BlockFactors;
+use crate::inertia::accumulate_weighted;
+use crate::inertia::columns::RegressorColumns;
+use crate::inertia::encoder::accumulate_shifted;
+use crate::inertia::instruments::{self, ReferenceSource};
+use crate::inertia::robust::Weigher;
+use crate::log::{Block, Provenance};
+use crate::motion::{FilterSettings, Summary};
+
+/// Readings of the same logs, one after the other.
+pub struct Passes<'a> {
+    pub(super) machine: &'a LoggedRobot,
+    logs: &'a [Log],
+    control: &'a Control,
+    pub(super) work: Work,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+    /// Of the first log, by the first reading.
+    pub summary: Option<Summary>,
+}
+
+impl<'a> Passes<'a> {
+    pub fn new(machine: &'a LoggedRobot, logs: &'a [Log], control: &'a Control) -> Self {
+        Passes {
+            machine,
+            logs,
+            control,
+            work: control.begin("least squares", None),
+            inputs: Vec::new(),
+            warnings: Vec::new(),
+            summary: None,
+        }
+    }
+
+    pub(super) fn read(
+        &mut self,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
+        mut weigher: Option<&mut Weigher>,
+    ) -> Result<BlockFactors, IdentifyError> {
+        let first = self.summary.is_none();
+        let mut total: Option<BlockFactors> = None;
+        for log in self.logs {
+            let mut open = self.machine.open(log, self.control)?;
+            let (sums, summary) = accumulate_weighted(
+                &self.machine.robot,
+                columns,
+                weigher.as_deref_mut(),
+                settings,
+                &mut |block| open.read(block),
+            )
+            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            if first {
+                self.warnings.extend(open.warnings());
+                self.warnings
+                    .extend(summary_warnings(&log.name(), &summary));
+                self.inputs.push(open.provenance()?);
+                self.summary.get_or_insert(summary);
+            }
+            match &mut total {
+                None => total = Some(sums),
+                Some(total) => total.merge(sums),
+            }
+            self.work.advance(1);
+        }
+        total.ok_or(IdentifyError::NoLog)
+    }
+
+    /// Rows with instruments from the loop under `theta`.
+    pub(super) fn read_instruments(
+        &mut self,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
+        theta: &DVector<f64>,
+    ) -> Result<(BlockFactors, Simulated), IdentifyError> {
+        let step = self.summary.as_ref().map_or(1e-3, |s| s.dt);
+        let mut total: Option<(BlockFactors, Simulated)> = None;
+        for log in self.logs {
+            let mut open = self.machine.open(log, self.control)?;
+            let mut logged = self.machine.open_reference(log)?;
+            let reference = match logged {
+                Some(_) => ReferenceSource::Logged,
+                None => ReferenceSource::Smoothed,
+            };
+            let mut source = |block: &mut Block| {
+                let more = open.read(block)?;
+                if let Some(logged) = &mut logged {
+                    logged.widen(block)?;
+                }
+                Ok(more)
+            };
+            let robot = &self.machine.robot;
+            let read = instruments::accumulate(
+                robot,
+                columns,
+                theta,
+                reference,
+                settings,
+                step,
+                &mut source,
+            )
+            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            match &mut total {
+                None => {
+                    let simulated = Simulated {
+                        gains: read.gains,
+                        reference,
+                        indefinite: read.indefinite,
+                    };
+                    total = Some((read.factors, simulated));
+                }
+                Some((sums, simulated)) => {
+                    sums.merge(read.factors);
+                    simulated.indefinite = simulated.indefinite.max(read.indefinite);
+                }
+            }
+            self.work.advance(1);
+        }
+        total.ok_or(IdentifyError::NoLog)
+    }
+
+    /// Positions rounded anew on a shifted grid of the encoders.
+    pub(super) fn read_shifted(
+        &mut self,
+        settings: &FilterSettings,
+        columns: &RegressorColumns,
+        grid: u32,
+        mut weigher: Option<&mut Weigher>,
+    ) -> Result<Option<BlockFactors>, IdentifyError> {
+        let mut total: Option<BlockFactors> = None;
+        for log in self.logs {
+            let mut open = self.machine.open(log, self.control)?;
+            let sums = accumulate_shifted(
+                &self.machine.robot,
+                columns,
+                weigher.as_deref_mut(),
+                settings,
+                grid,
+                &mut |block| open.read(block),
+            )
+            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            match (&mut total, sums) {
+                (Some(total), Some(sums)) => total.merge(sums),
+                (none, sums) => *none = sums,
+            }
+            self.work.advance(1);
+        }
+        Ok(total)
+    }
+}

@@ -1,0 +1,72 @@
+//! The torque of logs that were not used, reconstructed by a model.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::in_memory::read_whole;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::open_log::summary_warnings;
+use crate::effect::Refined;
+use crate::log::{Instant, Provenance};
+use crate::validate::{Reconstructed, Reconstruction, Validation};
+
+/// What `validate` found.
+pub struct Validated {
+    pub validation: Validation,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Reconstructs the torque of logs; `row` gets every raw sample, and the instant from which its time
+/// is counted.
+///
+/// # Errors
+/// Logs that cannot be used.
+pub fn validate(
+    machine: &LoggedRobot,
+    refined: &Refined,
+    logs: &[Log],
+    control: &Control,
+    row: &mut dyn FnMut(&Reconstructed, Instant),
+) -> Result<Validated, IdentifyError> {
+    let work = control.begin("reconstruction", Some(logs.len() as u64));
+    let mut all = Reconstruction::new(&refined.model);
+    let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
+    let settings = machine.settings();
+    let mut segments = 0;
+    for log in logs {
+        if refined.effects.is_empty() {
+            let mut open = machine.open(log, control)?;
+            let origin = open.origin();
+            let summary = all
+                .add(&settings, &mut |block| open.read(block), &mut |r| {
+                    row(r, origin)
+                })
+                .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            warnings.extend(open.warnings());
+            warnings.extend(summary_warnings(&log.name(), &summary));
+            inputs.push(open.provenance()?);
+            last = Some(summary);
+        } else {
+            // effects remember: they need a stretch from its begin
+            let whole = read_whole(machine, std::slice::from_ref(log), control)?;
+            for stretch in &whole.stretches {
+                let hat = refined.reconstruct(stretch);
+                let mut told = |r: &Reconstructed| row(r, whole.origin);
+                all.add_stretch(&settings, segments, stretch, &hat, &mut told)
+                    .map_err(|e| IdentifyError::motion(&log.name(), e))?;
+                segments += 1;
+            }
+            warnings.extend(whole.warnings);
+            inputs.extend(whole.inputs);
+            last = Some(whole.summary);
+        }
+        work.advance(1);
+    }
+    let summary = last.ok_or(IdentifyError::NoLog)?;
+    Ok(Validated {
+        validation: all.finish(summary),
+        inputs,
+        warnings,
+    })
+}
