@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use cft_ident::diagnose::{Candidate, Case, Diagnosis, Limits, LogRole, Open, Prior, diagnose};
-use cft_ident::effect::{Added, Refined};
+use cft_ident::effect::{self, Added, AugmentedModel};
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::solve::{Weighting, fit};
@@ -59,7 +59,7 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
         deviations: aloud,
         ..Limits::default()
     };
-    let run = |given: Refined, limits: Limits, without: Vec<String>| {
+    let run = |given: AugmentedModel, limits: Limits, without: Vec<String>| {
         let case = campaign.case(&lab, given, limits, without);
         diagnose(
             &case,
@@ -230,15 +230,11 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
     let step = &result.steps[s];
     let effect = &result.model.effects[step.effect];
     let place = effect.place.name(robot).unwrap_or_default();
-    let alike: Vec<&str> = step
-        .alternatives
-        .iter()
-        .map(|c| c.effect.kind.name)
-        .collect();
+    let alike: Vec<&str> = step.alternatives.iter().map(|c| c.effect.name()).collect();
     let covariance = result.covariance_of(step.effect);
-    let told = effect.told(robot, "", Some(&covariance));
+    let told = effect.numbers(robot, "", Some(&covariance));
     let of = |t: &&Truth| {
-        t.spec.name == effect.kind.name && t.spec.joint.clone().unwrap_or_default() == place
+        t.spec.name == effect.name() && t.spec.joint.clone().unwrap_or_default() == place
     };
     let truth = put.iter().find(of);
     let known = told.iter().filter_map(|told| {
@@ -251,7 +247,7 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
         known.iter().map(|(key, of)| (key, of[which])).collect()
     };
     json!({
-        "effect": effect.kind.name,
+        "effect": effect.name(),
         "family": effect.family().name(),
         "place": place,
         "alternatives": alike,
@@ -265,7 +261,7 @@ fn step(robot: &Robot, result: &Diagnosis, s: usize, put: &[Truth]) -> Value {
 /// The effects of a model with their standard deviations, and the error that it was fitted to.
 fn numbers(robot: &Robot, what: &str, result: &Diagnosis) {
     for (i, effect) in result.model.effects.iter().enumerate() {
-        let told = effect.told(robot, "", Some(&result.covariance_of(i)));
+        let told = effect.numbers(robot, "", Some(&result.covariance_of(i)));
         let told = told.iter().map(|t| match t.std {
             Some(std) => format!("{} {:.6} +- {:.6}", t.key, t.value, std),
             None => format!("{} {:.6}", t.key, t.value),
@@ -406,11 +402,11 @@ impl Lab {
             }
         }
         let place = (!place.is_empty()).then_some(place);
-        Added::of_keys(&self.robot, kind.name, place, &values).ok()
+        effect::read(&self.robot, kind.name, place, &values).ok()
     }
 
     fn of_columns(&self, plain: &Model, added: &Added, clean: &Stretch) -> f64 {
-        let model = |effects| Refined {
+        let model = |effects| AugmentedModel {
             model: plain.clone(),
             effects,
         };
@@ -466,7 +462,7 @@ fn arm(index: usize, log: &Block) -> Vec<Stretch> {
 
 /// The logs of a campaign and the declared model, as a lab has them.
 pub struct Campaign {
-    pub declared: Refined,
+    pub declared: AugmentedModel,
     pub prior: Prior,
     pub stretches: Vec<Stretch>,
     pub roles: Vec<LogRole>,
@@ -512,7 +508,7 @@ impl Campaign {
         let training = lab.run(truth, before, motion(seed), 10 * seed + 5);
         let sums = accumulate(robot, &columns, &processing(), &mut source(&training));
         let fitted = fit(&sums.expect("a log").0, Weighting::Wls).expect("a fit");
-        let declared = Refined::plain(Model {
+        let declared = AugmentedModel::plain(Model {
             robot: robot.clone(),
             theta: fitted.theta.iter().copied().collect(),
             friction: known
@@ -563,7 +559,7 @@ impl Campaign {
         }
     }
 
-    fn case(&self, lab: &Lab, given: Refined, limits: Limits, without: Vec<String>) -> Case {
+    fn case(&self, lab: &Lab, given: AugmentedModel, limits: Limits, without: Vec<String>) -> Case {
         let joints = lab.robot.joints();
         Case {
             prior: self.prior.clone(),

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use cft_ident::diagnose::{LogRole, Prior};
-use cft_ident::effect::Refined;
+use cft_ident::effect::AugmentedModel;
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{Own, RegressorColumns};
 use cft_ident::inertia::solve::{Weighting, fit};
@@ -127,7 +127,7 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
         &mut crate::study::source(&training),
     );
     let fitted = fit(&sums.expect("a log").0, Weighting::Wls).expect("a fit");
-    let declared = Refined::plain(model(
+    let declared = AugmentedModel::plain(model(
         &robot,
         [fitted.theta[0], fitted.theta[1], fitted.theta[2]],
     ));

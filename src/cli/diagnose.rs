@@ -13,7 +13,7 @@ use crate::config::ModelFile;
 use crate::diagnose::{
     self, Candidate, Case, DiagnoseError, Diagnosis, Errors, Limits, LogRole, Prior, Unknown,
 };
-use crate::effect::{Refined, Told};
+use crate::effect::{AugmentedModel, EffectNumber};
 use crate::identify::{InMemory, Log, LoggedRobot, in_file, new_model, read_whole, refined};
 use crate::log::LogSpec;
 use crate::motion::Parallel;
@@ -76,7 +76,7 @@ pub struct Diagnosed {
     /// Names of the logs, in order.
     pub logs: Vec<String>,
     /// The model as it was given.
-    pub given: Refined,
+    pub given: AugmentedModel,
     pub parallel: Parallel,
     pub cutoff_hz: f64,
 }
@@ -185,11 +185,11 @@ pub fn diagnose(
 }
 
 /// Parameters of an accepted effect with their standard deviations.
-pub fn told(machine: &LoggedRobot, diagnosis: &Diagnosis, effect: usize) -> Vec<Told> {
+pub fn told(machine: &LoggedRobot, diagnosis: &Diagnosis, effect: usize) -> Vec<EffectNumber> {
     let added = &diagnosis.model.effects[effect];
     let joint = added.place.joint().unwrap_or(0);
     let covariance = diagnosis.covariance_of(effect);
-    added.told(
+    added.numbers(
         &machine.robot,
         machine.file.torque_unit(joint),
         Some(&covariance),
@@ -310,7 +310,7 @@ fn errors_json(errors: &Errors) -> Value {
 
 fn candidate_json(machine: &LoggedRobot, c: &Candidate) -> Value {
     json!({
-        "effect": c.effect.kind.name,
+        "effect": c.effect.name(),
         "joint": c.effect.place.name(&machine.robot),
         "family": c.effect.family().name(),
         "score": c.score.as_ref().map(|s| s.cv_gain),
@@ -337,10 +337,10 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
                 .map(|t| (t.key, json!({"value": t.value, "std": t.std, "unit": t.unit})))
                 .collect();
             let alternatives: Vec<&str> =
-                step.alternatives.iter().map(|c| c.effect.kind.name).collect();
+                step.alternatives.iter().map(|c| c.effect.name()).collect();
             let score = step.candidate.score.as_ref();
             json!({
-                "effect": effect.kind.name,
+                "effect": effect.name(),
                 "family": effect.family().name(),
                 "joint": effect.place.name(robot),
                 "parameters": parameters,
@@ -349,7 +349,7 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
                 "separate_command": (!alternatives.is_empty())
                     .then(|| super::separate::command(effect, robot))
                     .flatten(),
-                "separate_by": if alternatives.is_empty() { Value::Null } else { effect.kind.separate_by.into() },
+                "separate_by": if alternatives.is_empty() { Value::Null } else { effect.law.entry.separate_by.into() },
                 "unique_share": score.map(|s| s.unique_share),
                 "delta_bic": score.map(|s| s.delta_bic),
                 "cv_gain": score.map(|s| s.cv_gain),
@@ -395,8 +395,8 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
         .iter()
         .map(|e| {
             json!({
-                "effect": "disturbance",
-                "family": "event",
+                "effect": crate::effect::disturbance::ENTRY.name,
+                "family": crate::effect::disturbance::ENTRY.family().name(),
                 "joint": robot.joint_names()[e.joint],
                 "log": found.logs[e.log],
                 "from_s": e.from_s,

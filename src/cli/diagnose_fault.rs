@@ -36,7 +36,7 @@ pub fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
         ),
     };
     DataFault {
-        kind: "wrong-sign-or-order".to_owned(),
+        kind: crate::effect::wrong_sign_or_order::ENTRY.name.to_owned(),
         channel: Some(names[joint].clone()),
         effect,
         remedy: remedy.to_owned(),

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::config::ModelFile;
 use crate::diagnose::{LogRole, Open};
-use crate::effect::{Refined, held_joints};
+use crate::effect::{AugmentedModel, stationary_joints};
 use crate::identify::LoggedRobot;
 use crate::motion::Stretch;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -12,7 +12,7 @@ use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
 /// Which parameters the fit may move: all but those that the friction stage left open.
-pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &Refined) -> Open {
+pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> Open {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()
@@ -52,12 +52,12 @@ pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &Refined) -> Open {
 }
 
 /// Joints that move in a log in which all others are held.
-pub fn moved_alone(given: &Refined, stretches: &[Stretch], roles: &[LogRole]) -> Vec<bool> {
+pub fn moved_alone(given: &AugmentedModel, stretches: &[Stretch], roles: &[LogRole]) -> Vec<bool> {
     let robot = &given.model.robot;
     let fitted = stretches.iter().filter(|s| roles[s.log] == LogRole::Train);
     let fitted: Vec<Stretch> = fitted.cloned().collect();
     let mut alone = vec![false; robot.joints()];
-    for held in held_joints(robot, &fitted) {
+    for held in stationary_joints(robot, &fitted) {
         let mut moving = (0..held.len()).filter(|j| !held[*j]);
         if let (Some(j), None, true) = (moving.next(), moving.next(), held.len() > 1) {
             alone[j] = true;
@@ -75,7 +75,7 @@ const FRICTION_DOUBT: f64 = 3.0;
 /// what the friction stage made of it would count twice, and without the effect that is looked for.
 pub fn information(
     file: &ModelFile,
-    given: &Refined,
+    given: &AugmentedModel,
     open: &Open,
     keep: bool,
     alone: &[bool],

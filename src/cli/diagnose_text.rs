@@ -69,7 +69,7 @@ pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
             let told = format!(
                 "these data do not separate it from {}; {} would",
                 names.join(", "),
-                effect.kind.separate_by
+                effect.law.entry.separate_by
             );
             out += &hanging(MARGIN, &told, 7);
             if let Some(command) = super::separate::command(effect, robot) {

@@ -1,40 +1,14 @@
 //! The experiment that separates an effect from its like, as a command to type: the motion is simulated
 //! with the model, and `--reference` runs the same one on the robot.
 
-use crate::effect::{Added, Place};
+use crate::effect::{Added, Ladder, Place};
 use crate::robot::Robot;
-
-/// Longest ladder over a joint's range that a person waits for \[s\].
-const LADDER_S: u32 = 60;
-/// Long enough for friction to warm up \[s\].
-const WARM_S: u32 = 600;
-
-/// A tenth of the range.
-const NARROW: &str = " --travel 0.1";
 
 /// A motion of one joint or motor alone, both ways at ten speeds over its range, where such a motion
 /// separates the effect; none where it takes a payload, a standstill or other sensors.
 pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
-    let ladder = [
-        "torque-offset",
-        "asymmetric-friction",
-        "stribeck",
-        "nonlinear-viscous",
-        "position-friction",
-        "ripple",
-        "spring",
-        "counterbalance",
-        "actuator-friction",
-        "rotor-inertia",
-        "coupling",
-    ];
-    let (seconds, travel) = match effect.kind.name {
-        "warm-up" => (WARM_S, ""),
-        // beside logs over the whole range: a gap keeps its width, a loop shrinks with the amplitude
-        "backlash" | "presliding" => (LADDER_S, NARROW),
-        name if ladder.contains(&name) => (LADDER_S, ""),
-        _ => return None,
-    };
+    let Ladder { seconds, travel } = effect.law.entry.ladder?;
+    let travel = travel.map_or(String::new(), |share| format!(" --travel {share}"));
     let moves = match effect.place {
         // the other joint alone
         Place::Pair { of, .. } | Place::Geared { other: of, .. } => {
@@ -55,19 +29,19 @@ pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::kind;
+    use crate::effect::law;
     use crate::robot::cft::{Setup, Structure};
 
     #[test]
     fn a_screw_is_moved_by_its_motor_and_a_coupling_by_the_other_joint() {
         let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
         let told = |name: &str, place: Place| {
-            let kind = kind(name).unwrap();
+            let law = law(&robot, name).unwrap();
             let effect = Added {
-                kind,
+                law,
                 place,
-                shape: vec![0.0; kind.shape.len()],
-                linear: vec![0.0; kind.linear.len()],
+                shape: vec![0.0; law.shape.len()],
+                linear: vec![0.0; law.linear.len()],
             };
             command(&effect, &robot)
         };

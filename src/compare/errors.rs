@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// How much larger the second model's error is.
@@ -58,7 +58,7 @@ type PieceSquares = [f64; 3];
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn differences(
-    models: [&Refined; 2],
+    models: [&AugmentedModel; 2],
     stretches: &[Stretch],
     parallel: &Parallel,
 ) -> Result<ErrorDifferences, MotionError> {

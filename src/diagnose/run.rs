@@ -17,14 +17,14 @@ use super::selection::accept::{Candidate, Limits};
 use super::uncertainty::covariance::covariance;
 use super::unexplained::errors::{Counted, Errors, errors};
 use super::unexplained::{Left, NEGLIGIBLE, STRUCTURED, left, noise, part_left};
-use crate::effect::{Added, Cover, Refined, Torques, held_joints};
+use crate::effect::{Added, AugmentedModel, Cover, Torques, stationary_joints};
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::model::JointFriction;
 
 /// What a diagnosis works on.
 pub struct Case {
     /// The declared model as it was given.
-    pub given: Refined,
+    pub given: AugmentedModel,
     pub prior: Prior,
     pub open: Open,
     pub stretches: Vec<Stretch>,
@@ -83,7 +83,7 @@ pub struct Pair {
 /// The outcome.
 pub struct Diagnosis {
     /// The refined model.
-    pub model: Refined,
+    pub model: AugmentedModel,
     /// Unknowns of the final fit and their covariance.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
@@ -124,7 +124,7 @@ pub fn diagnose(
     let robot = &case.given.model.robot;
     let fitted = fitted_stretches(case);
     plan.held = held(case, &fitted);
-    plan.rest = held_joints(robot, &case.stretches);
+    plan.rest = stationary_joints(robot, &case.stretches);
     let cover = Cover::of(robot, &fitted, case.cutoff_hz);
     let unknowns = super::problem::unknowns::Unknowns::of(&case.given, &case.open, &cover).len();
     if plan.fitted_rows() < 10 * unknowns || plan.folds < 3 {
@@ -236,7 +236,7 @@ pub fn diagnose(
         ));
         let mut alternatives: Vec<Candidate> = Vec::new();
         for i in others {
-            let same = |c: &Candidate| c.effect.kind.name == found[i].effect.kind.name;
+            let same = |c: &Candidate| c.effect.name() == found[i].effect.name();
             // what moves other joints explains another residual
             let places = [found[i].effect.place, found[chosen].effect.place];
             if !(0..robot.joints()).any(|j| places.iter().all(|p| p.touches(j))) {
@@ -284,7 +284,7 @@ pub fn diagnose(
     // everything is decided: the holdout may be looked at
     let plan = &ground.plan;
     let wanted = |role: Role| role == Role::Holdout;
-    let measured = |model: &Refined, wanted: &dyn Fn(Role) -> bool, counted: Counted| {
+    let measured = |model: &AugmentedModel, wanted: &dyn Fn(Role) -> bool, counted: Counted| {
         errors(
             model,
             &case.units,
@@ -294,8 +294,9 @@ pub fn diagnose(
             (wanted, counted),
         )
     };
-    let measure =
-        |model: &Refined, wanted: &dyn Fn(Role) -> bool| measured(model, wanted, Counted::All);
+    let measure = |model: &AugmentedModel, wanted: &dyn Fn(Role) -> bool| {
+        measured(model, wanted, Counted::All)
+    };
     let mut means = Vec::with_capacity(models.len());
     for model in &models {
         means.push(measure(model, &wanted)?.map(|e| e.overall.mean_relative_error));
@@ -305,7 +306,7 @@ pub fn diagnose(
             step.holdout = Some([*before, *after]);
         }
     }
-    let pair_of = |model: &Refined, counted: Counted| -> Result<Pair, DiagnoseError> {
+    let pair_of = |model: &AugmentedModel, counted: Counted| -> Result<Pair, DiagnoseError> {
         let train = measured(model, &Role::fitted, counted)?
             .ok_or(DiagnoseError::TooFewRows { rows: 0, unknowns })?;
         Ok(Pair {
@@ -313,7 +314,7 @@ pub fn diagnose(
             holdout: measured(model, &wanted, counted)?,
         })
     };
-    let pair = |model: &Refined| pair_of(model, Counted::All);
+    let pair = |model: &AugmentedModel| pair_of(model, Counted::All);
     let before = pair(&case.given)?;
     let refitted = pair(&models[0])?.train;
     let after = pair(&at.model)?;
@@ -373,8 +374,8 @@ fn held(case: &Case, fitted: &[Stretch]) -> Vec<Vec<bool>> {
     let robot = &case.given.model.robot;
     let veto = |s: &&Stretch| case.roles[s.log] == LogRole::Veto;
     let vetoing: Vec<Stretch> = case.stretches.iter().filter(veto).cloned().collect();
-    let mut of_fitted = held_joints(robot, fitted).into_iter();
-    let mut of_vetoing = held_joints(robot, &vetoing).into_iter();
+    let mut of_fitted = stationary_joints(robot, fitted).into_iter();
+    let mut of_vetoing = stationary_joints(robot, &vetoing).into_iter();
     let of = |s: &Stretch| match case.roles[s.log] {
         LogRole::Train => of_fitted.next(),
         LogRole::Veto => of_vetoing.next(),
@@ -400,7 +401,7 @@ fn fitted_torques<'a>(case: &Case, all: &'a [Torques]) -> impl Iterator<Item = &
 
 /// Raw residuals along stretches, `[stretch][joint][sample]`.
 fn residuals<'a>(
-    model: &Refined,
+    model: &AugmentedModel,
     stretches: &[Stretch],
     torques: impl Iterator<Item = &'a Torques>,
 ) -> Vec<Vec<Vec<f64>>> {

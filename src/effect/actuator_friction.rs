@@ -1,22 +1,31 @@
 //! `actuator-friction`: friction in the actuator coordinates, tau = J' F(J v). On the CFT robot it
 //! sits in the screws x_r and y_r, where the seals and nuts are, and couples q4 and q5.
 
-use super::{Family, Key, Kind, Place, Role, Unit};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::place::{Place, Places};
+use super::unit::Unit;
 use crate::robot::cft::pantograph::reference_jacobian;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "actuator-friction",
-    family: Family::Velocity,
-    role: Role::Columns,
-    shape: &[Key::new("slope", Unit::Text("s/m"))],
-    linear: &[
-        Key::new("viscous", Unit::Text("N s/m")),
-        Key::new("coulomb", Unit::Text("N")),
+    families: &[Family::Velocity, Family::Cross],
+    keys: &[
+        Key::size("viscous", Unit::Fixed("N s/m")),
+        Key::size("coulomb", Unit::Fixed("N")),
+        Key::shape("slope", Unit::Fixed("s/m")),
     ],
-    places: |robot, _| {
-        let screws = 0..robot.transmission().screws().len();
-        screws.map(Place::Actuator).collect()
-    },
+    places: Places::Actuators,
+    search: Search::Refined,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "move one actuator alone, both ways at several speeds, at three poses of the other",
+    formula: "J_a' (viscous v_a + coulomb tanh(slope v_a)), v_a = J_a v",
+    source: "seals and nuts of the screws that move two joints",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["slope"],
     starts: |cover, _| {
         if cover.joints.iter().all(|j| j.reversals < 2) {
             return Err("fewer than two reversals".into());
@@ -24,19 +33,22 @@ pub const KIND: Kind = Kind {
         Ok([50.0, 200.0, 1000.0].map(|w| vec![w]).to_vec())
     },
     limits: |_, _| vec![[10.0, 1e5]],
-    columns: |scene, place, shape, joint, out| {
-        let Place::Actuator(r) = place else { return };
-        let s = scene.stretch;
-        let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        let [viscous, coulomb] = out else { return };
-        for (k, (viscous, coulomb)) in viscous.iter_mut().zip(coulomb).enumerate() {
-            s.at(k, &mut q, &mut v, &mut a);
-            let jacobian = reference_jacobian(&q);
-            let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
-            let share = jacobian[r][joint - 2];
-            *viscous = share * speed;
-            *coulomb = share * (shape[0] * speed).tanh();
-        }
-    },
-    separate_by: "move one actuator alone, both ways at several speeds, at three poses of the other",
+    ..Law::linear(
+        &ENTRY,
+        &["viscous", "coulomb"],
+        |scene, place, shape, joint, out| {
+            let Place::Actuator(r) = place else { return };
+            let s = scene.stretch;
+            let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            let [viscous, coulomb] = out else { return };
+            for (k, (viscous, coulomb)) in viscous.iter_mut().zip(coulomb).enumerate() {
+                s.at(k, &mut q, &mut v, &mut a);
+                let jacobian = reference_jacobian(&q);
+                let speed = jacobian[r][0] * v[2] + jacobian[r][1] * v[3];
+                let share = jacobian[r][joint - 2];
+                *viscous = share * speed;
+                *coulomb = share * (shape[0] * speed).tanh();
+            }
+        },
+    )
 };

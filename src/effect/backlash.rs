@@ -1,15 +1,29 @@
 //! `backlash`: a play of width `gap`. After a reversal the motor crosses the gap and does not feel
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint, sign};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
+use crate::robot::friction::sign;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "backlash",
-    family: Family::Memory,
-    role: Role::Columns,
-    shape: &[Key::new("gap", Unit::Position)],
-    linear: &[Key::new("c", Unit::Torque)],
-    places: every_joint,
+    families: &[Family::Memory],
+    keys: &[
+        Key::shape("gap", Unit::Position).above_zero("must be above 0"),
+        Key::size("c", Unit::Torque),
+    ],
+    search: Search::Refined,
+    ladder: Some(Ladder::NARROW),
+    separate_by: "reversals with a ladder of amplitudes: a gap keeps its width, a presliding loop \
+                  shrinks with the amplitude",
+    formula: "-c sgn(v) inside the play operator's gap",
+    source: "play between gear teeth: what lies behind it is not felt until it is used up",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["gap"],
     starts: |cover, place| {
         let joint = cover.at(place);
         if joint.reversals < 4 {
@@ -22,7 +36,7 @@ pub const KIND: Kind = Kind {
         let range = cover.at(place).range();
         vec![[1e-4 * range, 0.3 * range]]
     },
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;
         let half = 0.5 * shape[0];
@@ -36,7 +50,5 @@ pub const KIND: Kind = Kind {
                 out[0][k] = -sign(*v);
             }
         }
-    },
-    separate_by: "reversals with a ladder of amplitudes: a gap keeps its width, a presliding loop \
-                  shrinks with the amplitude",
+    })
 };

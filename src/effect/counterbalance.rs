@@ -1,36 +1,50 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
 //! points, as a cubic B-spline over the travel that was seen; held at its end values beyond it.
 
-use super::{Family, Key, Kind, Place, Role, Unit};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
 use crate::robot::JointKind;
 
 /// Coefficients of the spline.
 const COUNT: usize = 6;
 
-pub const KIND: Kind = Kind {
+/// A coefficient of the spline.
+const fn moment(name: &'static str) -> Key {
+    Key::size(name, Unit::Torque)
+}
+
+pub static ENTRY: Entry = Entry {
     name: "counterbalance",
-    family: Family::Position,
-    role: Role::Columns,
-    shape: &[
-        Key::new("from", Unit::Position),
-        Key::new("to", Unit::Position),
+    families: &[Family::Position],
+    keys: &[
+        Key::size("stiffness", Unit::Fixed("N/m")),
+        Key::shape("free_length", Unit::Fixed("m")),
+        Key::shape("a", Unit::Fixed("m")),
+        Key::shape("b", Unit::Fixed("m")),
+        Key::shape("angle", Unit::Fixed("rad")),
+        Key::shape("from", Unit::Position),
+        Key::shape("to", Unit::Position),
+        moment("m_1"),
+        moment("m_2"),
+        moment("m_3"),
+        moment("m_4"),
+        moment("m_5"),
+        moment("m_6"),
     ],
-    linear: &[
-        Key::new("m_1", Unit::Torque),
-        Key::new("m_2", Unit::Torque),
-        Key::new("m_3", Unit::Torque),
-        Key::new("m_4", Unit::Torque),
-        Key::new("m_5", Unit::Torque),
-        Key::new("m_6", Unit::Torque),
-    ],
+    search: Search::Grid,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "a slow sweep over the whole travel, both ways, with two payloads",
+    formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \
+                axis; or a cubic B-spline on three pieces between from and to",
+    source: "a spring or gas cylinder between two fixed points",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["from", "to"],
     // a lever that turns
-    places: |robot, _| {
-        let turns = |j: &usize| robot.joint_kind(*j) == JointKind::Revolute;
-        (0..robot.joints())
-            .filter(turns)
-            .map(Place::Joint)
-            .collect()
-    },
+    fits: |robot, _, place| place.kind(robot) == JointKind::Revolute,
     starts: |cover, place| {
         let joint = cover.at(place);
         joint.is_wide()?;
@@ -39,24 +53,22 @@ pub const KIND: Kind = Kind {
         }
         Ok(vec![joint.position.to_vec()])
     },
-    // the spline's ends are those of the travel: nothing to search
-    limits: |cover, place| {
-        let [low, high] = cover.at(place).position;
-        vec![[low, low], [high, high]]
-    },
-    columns: |scene, place, shape, _, out| {
-        let Some(j) = place.joint() else { return };
-        let width = (shape[1] - shape[0]).max(f64::MIN_POSITIVE);
-        let pieces = (COUNT - 3) as f64;
-        for (k, q) in scene.stretch.q[j].iter().enumerate() {
-            let x = ((q - shape[0]) / width * pieces).clamp(0.0, pieces);
-            let piece = (x as usize).min(COUNT - 4);
-            for (i, b) in basis(x - piece as f64).into_iter().enumerate() {
-                out[piece + i][k] = b;
+    ..Law::linear(
+        &ENTRY,
+        &["m_1", "m_2", "m_3", "m_4", "m_5", "m_6"],
+        |scene, place, shape, _, out| {
+            let Some(j) = place.joint() else { return };
+            let width = (shape[1] - shape[0]).max(f64::MIN_POSITIVE);
+            let pieces = (COUNT - 3) as f64;
+            for (k, q) in scene.stretch.q[j].iter().enumerate() {
+                let x = ((q - shape[0]) / width * pieces).clamp(0.0, pieces);
+                let piece = (x as usize).min(COUNT - 4);
+                for (i, b) in basis(x - piece as f64).into_iter().enumerate() {
+                    out[piece + i][k] = b;
+                }
             }
-        }
-    },
-    separate_by: "a slow sweep over the whole travel, both ways, with two payloads",
+        },
+    )
 };
 
 /// The four uniform cubic B-splines on one piece, u in 0..1; they sum to 1.

@@ -1,6 +1,6 @@
 //! What a set of logs covers: by this an effect is refused that the data cannot show.
 
-use super::Place;
+use super::place::Place;
 use crate::motion::Stretch;
 use crate::robot::{JointKind, Robot};
 
@@ -49,7 +49,7 @@ impl Cover {
             dt: stretches.first().map_or(1.0, |s| s.dt),
             cutoff_hz,
         };
-        let held = held_joints(robot, stretches);
+        let held = stationary_joints(robot, stretches);
         for (j, joint) in cover.joints.iter_mut().enumerate() {
             let mut position = [f64::INFINITY, f64::NEG_INFINITY];
             let (mut square, mut count) = (0.0, 0usize);
@@ -137,7 +137,7 @@ const HELD: f64 = 0.01;
 
 /// Whether each joint is held along each stretch, `[stretch][joint]`: one-joint logs are recognised
 /// by it. A torque at rest is anything up to static friction, and no law of v says which.
-pub fn held_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
+pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
     let travel = |s: &Stretch, j: usize| {
         let ends = s.q[j]
             .iter()

@@ -1,21 +1,25 @@
 //! `drift`: a torque that grows with time, c t, in both directions.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint, no_limits, no_shape};
+use super::entry::{Entry, Family, Key};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "drift",
-    family: Family::Slow,
-    role: Role::Columns,
-    shape: &[],
-    linear: &[Key::new("c", Unit::TorqueRate)],
-    places: every_joint,
-    starts: no_shape,
-    limits: no_limits,
-    columns: |scene, _, _, _, out| {
-        let s = scene.stretch;
-        for (k, x) in out[0].iter_mut().enumerate() {
-            *x = s.began + s.dt * k as f64;
-        }
-    },
+    families: &[Family::Slow],
+    keys: &[
+        Key::size("c", Unit::TorqueRate),
+        Key::size("walk", Unit::TorqueWalk),
+    ],
     separate_by: "hold the joint still at one pose at the begin and at the end of the log",
+    formula: "c t + a random walk of rms walk sqrt(t)",
+    source: "a torque sensor or an amplifier that warms up",
+    ..Entry::USUAL
 };
+
+pub static LAW: Law = Law::linear(&ENTRY, &["c"], |scene, _, _, _, out| {
+    let s = scene.stretch;
+    for (k, x) in out[0].iter_mut().enumerate() {
+        *x = s.began + s.dt * k as f64;
+    }
+});

@@ -7,25 +7,65 @@
 
 use nalgebra::Matrix4;
 
-use super::{Family, Key, Kind, Role, Scene, Unit, every_joint};
+use super::entry::{Entry, Family, Key, Search};
+use super::law::{KeyValue, Law, Reparametrisation, Scene};
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "elasticity",
-    family: Family::Timing,
-    role: Role::Columns,
-    shape: &[
-        Key::new("frequency", Unit::Text("Hz")),
-        Key::new("damping", Unit::Text("")),
+    families: &[Family::Timing],
+    keys: &[
+        Key::size("stiffness", Unit::Stiffness).above_zero("must be above 0"),
+        Key::shape("inertia", Unit::Inertia).above_zero(
+            "must be below the joint's, and leave the motor less than the joint's least",
+        ),
+        Key::shape("damping", Unit::One).within(0.0, f64::INFINITY, "must not be below 0"),
     ],
-    linear: &[Key::new("inertia", Unit::Inertia)],
-    places: every_joint,
+    search: Search::Refined,
+    positive: &["inertia"],
+    separate_by: "reversals with high jerk at two poses of different inertia: the ringing keeps its \
+                  frequency at any speed",
+    formula: "a spring between motor and link of that inertia, four fifths of the joint's by \
+                default; encoder and friction on the motor's side; damping ratio of the link on it",
+    source: "harmonic drives, belts and long shafts (Spong 1987)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["frequency", "damping"],
     starts: |cover, _| {
         let starts = [0.5, 1.0, 2.0, 4.0].map(|times| vec![times * cover.cutoff_hz, DAMPING]);
         let seen = starts.into_iter().filter(|s| s[0] < highest(cover.dt));
         Ok(seen.collect())
     },
     limits: |cover, _| vec![[0.1 * cover.cutoff_hz, highest(cover.dt)], [1e-3, 1.0]],
-    columns: |scene, place, shape, _, out| {
+    // stiffness = inertia (2 pi frequency)^2
+    reparametrised: Some(Reparametrisation {
+        of_keys: |values| {
+            let (stiffness, inertia) = (values.get("stiffness")?, values.get("inertia")?);
+            let square = stiffness / inertia;
+            if square.is_nan() || square <= 0.0 {
+                return Err(values.unusable("stiffness", stiffness));
+            }
+            let frequency = square.sqrt() / std::f64::consts::TAU;
+            Ok([vec![frequency, values.get("damping")?], vec![inertia]])
+        },
+        to_keys: |shape, linear| {
+            let (frequency, inertia) = (shape[0], linear[0]);
+            let square = (std::f64::consts::TAU * frequency).powi(2);
+            let stiffness = square * inertia;
+            vec![
+                KeyValue {
+                    key: "stiffness",
+                    value: stiffness,
+                    slopes: vec![2.0 * stiffness / frequency, 0.0, square],
+                },
+                KeyValue::plain("inertia", inertia, 2, 3),
+                KeyValue::plain("damping", shape[1], 1, 3),
+            ]
+        },
+    }),
+    ..Law::linear(&ENTRY, &["inertia"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let inertia = inertia(scene, j);
         if inertia <= 0.0 {
@@ -42,9 +82,7 @@ pub const KIND: Kind = Kind {
             }
             *column = -(pull(k) - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
         }
-    },
-    separate_by: "reversals with high jerk at two poses of different inertia: the ringing keeps its \
-                  frequency at any speed",
+    })
 };
 
 /// Damping ratio to begin with.

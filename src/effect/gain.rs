@@ -1,20 +1,22 @@
 //! `gain`: torque constant or gear off by a factor, k tau on one joint. A fit that was free while
 //! carrying it absorbs it: it is looked for only with the model held.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint, no_limits, no_shape};
+use super::entry::{Entry, Family, Key, Role};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "gain",
-    family: Family::Load,
+    families: &[Family::Load],
+    keys: &[Key::size("k", Unit::One).within(-0.9, 9.0, "must lie in -0.9..9")],
     role: Role::Kept,
-    shape: &[],
-    linear: &[Key::new("k", Unit::Text(""))],
-    places: every_joint,
-    starts: no_shape,
-    limits: no_limits,
-    columns: |scene, place, _, _, out| {
-        let Some(j) = place.joint() else { return };
-        out[0].copy_from_slice(&scene.hat[j]);
-    },
     separate_by: "a known payload, the model held by --keep",
+    formula: "k times the acting torque: logged is (1 + k) times that",
+    source: "a wrong torque constant or gear ratio",
+    ..Entry::USUAL
 };
+
+pub static LAW: Law = Law::linear(&ENTRY, &["k"], |scene, place, _, _, out| {
+    let Some(j) = place.joint() else { return };
+    out[0].copy_from_slice(&scene.hat[j]);
+});

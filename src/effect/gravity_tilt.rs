@@ -2,26 +2,30 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
-use super::{Family, Key, Kind, Place, Role, Scene, Unit, no_limits, no_shape};
+use super::entry::{Entry, Family, Key};
+use super::law::{Law, Scene};
+use super::place::{Place, Places};
+use super::unit::Unit;
 use crate::robot::tree::MOST_JOINTS;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "gravity-tilt",
-    family: Family::Offset,
-    role: Role::Columns,
-    shape: &[],
-    linear: &[
-        Key::new("gx", Unit::Text("m/s^2")),
-        Key::new("gy", Unit::Text("m/s^2")),
+    families: &[Family::Offset],
+    keys: &[
+        Key::size("gx", Unit::Fixed("m/s^2")),
+        Key::size("gy", Unit::Fixed("m/s^2")),
     ],
-    places: |robot, _| match robot.knows_links() {
-        true => vec![Place::All],
-        false => Vec::new(),
-    },
-    starts: no_shape,
-    limits: no_limits,
-    columns,
+    places: Places::Whole,
     separate_by: "the same motion with the arm turned by a quarter and by half a turn about q2",
+    formula: "slope of -sum m_i (gx p_x + gy p_y) over the chain; a sliding axis along x: \
+                -inertia gx",
+    source: "a base that stands askew",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    fits: |robot, _, _| robot.knows_links(),
+    ..Law::linear(&ENTRY, &["gx", "gy"], columns)
 };
 
 fn columns(scene: &Scene, _: Place, _: &[f64], joint: usize, out: &mut [Vec<f64>]) {

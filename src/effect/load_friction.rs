@@ -1,18 +1,27 @@
 //! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v)
 //! (Hamon, Gautier and Garrec 2010).
 
-use super::{Family, Key, Kind, Role, Unit, every_joint};
+use super::entry::{Entry, Family, Key, Search};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "load-friction",
-    family: Family::Load,
-    role: Role::Columns,
-    shape: &[Key::new("w", Unit::Text("1/speed"))],
-    linear: &[
-        Key::new("mu_c", Unit::Text("")),
-        Key::new("mu_v", Unit::Text("1/speed")),
+    families: &[Family::Load],
+    keys: &[
+        Key::size("mu_c", Unit::One),
+        Key::size("mu_v", Unit::Slope),
+        Key::shape("w", Unit::Slope),
     ],
-    places: every_joint,
+    search: Search::Refined,
+    separate_by: "the same path at the same speed with and without a known payload",
+    formula: "(mu_c + mu_v abs(v)) abs(tau_l) tanh(w v)",
+    source: "gear teeth and bearings under load (Hamon, Gautier and Garrec 2010)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["w"],
     starts: |cover, place| {
         let joint = cover.at(place);
         if joint.reversals < 2 {
@@ -28,13 +37,12 @@ pub const KIND: Kind = Kind {
         let top = cover.at(place).fastest();
         vec![[4.0 / top, 2000.0 / top]]
     },
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["mu_c", "mu_v"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (k, (v, load)) in scene.stretch.v[j].iter().zip(&scene.load[j]).enumerate() {
             let x = load.abs() * (shape[0] * v).tanh();
             out[0][k] = x;
             out[1][k] = v.abs() * x;
         }
-    },
-    separate_by: "the same path at the same speed with and without a known payload",
+    })
 };

@@ -1,27 +1,42 @@
 //! `nonlinear-viscous`: friction that bends with speed, c sgn(v) |v|^p.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint, sign};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
+use crate::robot::friction::sign;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "nonlinear-viscous",
-    family: Family::Velocity,
-    role: Role::Columns,
-    shape: &[Key::new("p", Unit::Text(""))],
-    linear: &[Key::new("c", Unit::Text("torque per speed^p"))],
-    places: every_joint,
+    families: &[Family::Velocity],
+    keys: &[
+        Key::size("c", Unit::Power),
+        Key::shape("p", Unit::One).within(
+            0.1,
+            5.0,
+            "must lie in 0.1..5; 0 is `asymmetric-friction` or Coulomb friction",
+        ),
+    ],
+    search: Search::Refined,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "plateaus of constant speed, both ways, up to the top speed",
+    formula: "c sgn(v) abs(v)^p",
+    source: "lubricants that shear thin, or churn at speed",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["p"],
     starts: |cover, place| {
         if cover.at(place).reversals < 2 {
             return Err("fewer than two reversals: friction is not seen in both directions".into());
         }
         Ok([0.35, 0.5, 0.7, 1.6, 2.0, 2.5].map(|p| vec![p]).to_vec())
     },
-    // between 0.8 and 1.5 it is viscous friction
     limits: |_, _| vec![[0.3, 3.0]],
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
             *x = sign(*v) * v.abs().powf(shape[0]);
         }
-    },
-    separate_by: "plateaus of constant speed, both ways, up to the top speed",
+    })
 };

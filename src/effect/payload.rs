@@ -2,42 +2,89 @@
 //! second moment about the vertical axis of the link's frame, about which alone a tool that stays level
 //! turns. A fit whose logs carried it absorbs it: it is looked for only with the model held.
 
-use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
+use super::entry::{Entry, Family, Key, Role, Search};
+use super::law::{KeyValue, Law, Reparametrisation};
+use super::place::Places;
+use super::unit::Unit;
+use super::values::{EffectError, Values};
 use crate::robot::tree::MOST_JOINTS;
 
-/// What parts a payload from the inertias that a fit finds.
-pub(super) const SEPARATE_BY: &str = "identify unloaded, then diagnose loaded logs with --keep";
-
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "payload",
-    family: Family::Inertia,
-    role: Role::Kept,
-    shape: &[],
-    linear: &[
-        Key::new("mass", Unit::Text("kg")),
-        Key::new("mx", Unit::Text("kg m")),
-        Key::new("my", Unit::Text("kg m")),
-        Key::new("mz", Unit::Text("kg m")),
-        // told, in files and tables, as that about the body's own centre
-        Key::new("inertia", Unit::Text("kg m^2")),
+    families: &[Family::Inertia],
+    keys: &[
+        Key::size("mass", Unit::Fixed("kg")).above_zero("must be above 0"),
+        Key::size("mx", Unit::Fixed("kg m")),
+        Key::size("my", Unit::Fixed("kg m")),
+        Key::size("mz", Unit::Fixed("kg m")),
+        Key::size("inertia", Unit::Fixed("kg m^2")),
     ],
-    places: |robot, _| match robot.tool_stays_level() {
-        true => vec![Place::All],
-        false => Vec::new(),
-    },
-    starts: no_shape,
-    limits: no_limits,
-    columns: |scene, _, _, joint, out| {
-        let (s, n) = (scene.stretch, scene.robot.joints());
-        let mut state = [[0.0; MOST_JOINTS]; 3];
-        for k in 0..s.len() {
-            let [q, v, a] = state.each_mut().map(|x| &mut x[..n]);
-            s.at(k, q, v, a);
-            let row = scene.robot.level_tool_row(joint, q, v, a);
-            for (column, x) in out.iter_mut().zip(row) {
-                column[k] = x;
-            }
-        }
-    },
-    separate_by: SEPARATE_BY,
+    places: Places::Whole,
+    role: Role::Kept,
+    search: Search::Refined,
+    separate_by: "identify unloaded, then diagnose loaded logs with --keep",
+    formula: "a body with its centre at (mx, my, mz)/mass in the frame of the last link, and its \
+                inertia about that centre: about the vertical axis, on a serial robot the same \
+                about every axis",
+    source: "a tool or a load that the model was not identified with",
+    ..Entry::USUAL
 };
+
+pub static LAW: Law = Law {
+    fits: |robot, _, _| robot.tool_stays_level(),
+    // files have the inertia about the body's own centre; a point where nothing is said of its extent
+    reparametrised: Some(Reparametrisation {
+        of_keys: |values| {
+            let [mass, mx, my, mz] = body(values)?;
+            let second = values.get_or("inertia", 0.0)? + (mx * mx + mz * mz) / mass;
+            Ok([Vec::new(), vec![mass, mx, my, mz, second]])
+        },
+        to_keys: |_, linear| {
+            let [mass, mx, _, mz, second] = [0, 1, 2, 3, 4].map(|i| linear[i]);
+            let keys = ["mass", "mx", "my", "mz"].into_iter().enumerate();
+            let mut out: Vec<KeyValue> = keys
+                .map(|(i, key)| KeyValue::plain(key, linear[i], i, 5))
+                .collect();
+            let far = (mx * mx + mz * mz) / mass;
+            // robots whose columns have no second moment leave it at rest
+            if second != 0.0 {
+                out.push(KeyValue {
+                    key: "inertia",
+                    value: second - far,
+                    slopes: vec![far / mass, -2.0 * mx / mass, 0.0, -2.0 * mz / mass, 1.0],
+                });
+            }
+            out
+        },
+    }),
+    ..Law::linear(
+        &ENTRY,
+        &["mass", "mx", "my", "mz", "second"],
+        |scene, _, _, joint, out| {
+            let (s, n) = (scene.stretch, scene.robot.joints());
+            let mut state = [[0.0; MOST_JOINTS]; 3];
+            for k in 0..s.len() {
+                let [q, v, a] = state.each_mut().map(|x| &mut x[..n]);
+                s.at(k, q, v, a);
+                let row = scene.robot.level_tool_row(joint, q, v, a);
+                for (column, x) in out.iter_mut().zip(row) {
+                    column[k] = x;
+                }
+            }
+        },
+    )
+};
+
+/// Mass and first moments of a body in a file.
+pub(super) fn body(values: &Values) -> Result<[f64; 4], EffectError> {
+    let mass = values.get("mass")?;
+    if mass == 0.0 {
+        return Err(values.unusable("mass", mass));
+    }
+    Ok([
+        mass,
+        values.get("mx")?,
+        values.get("my")?,
+        values.get("mz")?,
+    ])
+}

@@ -1,16 +1,31 @@
 //! `position-friction`: friction whose width changes with position, sgn(v) (sin, cos at an order):
 //! it flips with the direction, a ripple does not (Remark 1 of the report).
 
-use super::ripple::{order_limits, orders, wavenumber};
-use super::{Family, Key, Kind, Role, Unit, every_joint, sign};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::order::{order_limits, orders, wavenumber};
+use super::unit::Unit;
+use crate::robot::friction::sign;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "position-friction",
-    family: Family::Position,
-    role: Role::Columns,
-    shape: &[Key::new("order", Unit::Order)],
-    linear: &[Key::new("sin", Unit::Torque), Key::new("cos", Unit::Torque)],
-    places: every_joint,
+    families: &[Family::Position],
+    keys: &[
+        Key::shape("order", Unit::Order),
+        Key::size("sin", Unit::Torque),
+        Key::size("cos", Unit::Torque),
+    ],
+    search: Search::Orders,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "the same stretch of travel in both directions at one speed",
+    formula: "sgn(v) (sin sin(order q) + cos cos(order q))",
+    source: "a bent screw or an eccentric gear that rubs more at some positions (Remark 1 of the \
+               report)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["order"],
     starts: |cover, place| {
         if !cover.at(place).both_ways() {
             return Err("the joint moves in one direction only: move it both ways".into());
@@ -18,7 +33,7 @@ pub const KIND: Kind = Kind {
         orders(cover, place, &cover.at(place).friction_orders)
     },
     limits: order_limits,
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let per_unit = wavenumber(scene.robot, j, shape[0]);
         let motion = scene.stretch.q[j].iter().zip(&scene.stretch.v[j]);
@@ -27,6 +42,5 @@ pub const KIND: Kind = Kind {
             out[0][k] = sign(*v) * s;
             out[1][k] = sign(*v) * c;
         }
-    },
-    separate_by: "the same stretch of travel in both directions at one speed",
+    })
 };

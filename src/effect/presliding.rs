@@ -3,19 +3,36 @@
 //! dh/dt = rate (v - |v| h) and h in -1..1, and its rate of change damps: sigma1 dh/dt / rate.
 //! sigma0 = fc rate.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::{KeyValue, Law, Reparametrisation};
+use super::unit::Unit;
+use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "presliding",
-    family: Family::Memory,
-    role: Role::Columns,
-    shape: &[Key::new("rate", Unit::Text("1/position"))],
-    linear: &[
-        Key::new("fc", Unit::Torque),
-        Key::new("sigma1", Unit::Viscous),
+    families: &[Family::Memory],
+    keys: &[
+        Key::size("sigma0", Unit::Stiffness)
+            .above_zero("sigma0 must be above 0 and sigma1 not negative"),
+        Key::size("sigma1", Unit::Viscous).within(
+            0.0,
+            f64::INFINITY,
+            "sigma0 must be above 0 and sigma1 not negative",
+        ),
+        Key::shape("fc", Unit::Torque),
     ],
-    places: every_joint,
+    search: Search::Refined,
+    positive: &["fc"],
+    ladder: Some(Ladder::NARROW),
+    separate_by: "slow reversals with a ladder of amplitudes below and above breakaway",
+    formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",
+    source: "bristles that bend before they slip (Dahl 1968; Canudas de Wit et al. 1995)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["rate"],
     starts: |cover, place| {
         let joint = cover.at(place);
         if joint.reversals < 4 {
@@ -28,7 +45,31 @@ pub const KIND: Kind = Kind {
         let range = cover.at(place).range();
         vec![[3.0 / range, 1e4 / range]]
     },
-    columns: |scene, place, shape, _, out| {
+    // sigma0 = fc rate
+    reparametrised: Some(Reparametrisation {
+        of_keys: |values| {
+            let (sigma0, fc) = (values.get("sigma0")?, values.get("fc")?);
+            let rate = sigma0 / fc;
+            if rate.is_nan() || rate <= 0.0 {
+                return Err(values.unusable("sigma0", sigma0));
+            }
+            Ok([vec![rate], vec![fc, values.get("sigma1")?]])
+        },
+        to_keys: |shape, linear| {
+            let (rate, fc) = (shape[0], linear[0]);
+            let sigma0 = KeyValue {
+                key: "sigma0",
+                value: fc * rate,
+                slopes: vec![fc, rate, 0.0],
+            };
+            vec![
+                sigma0,
+                KeyValue::plain("sigma1", linear[1], 2, 3),
+                KeyValue::plain("fc", fc, 1, 3),
+            ]
+        },
+    }),
+    ..Law::linear(&ENTRY, &["fc", "sigma1"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;
         let rate = shape[0];
@@ -37,7 +78,7 @@ pub const KIND: Kind = Kind {
         for (k, (friction, damping)) in friction.iter_mut().zip(damping).enumerate() {
             let v = s.v[j][k];
             // exact over one step of constant speed: h -> sgn(v) with exp(-rate |v| dt)
-            let target = super::sign(v);
+            let target = sign(v);
             let decay = (-rate * v.abs() * s.dt).exp();
             let next = target + (h - target) * decay;
             let middle = 0.5 * (h + next);
@@ -45,21 +86,20 @@ pub const KIND: Kind = Kind {
             *damping = (next - h) / (s.dt * rate);
             h = next;
         }
-    },
-    separate_by: "slow reversals with a ladder of amplitudes below and above breakaway",
+    })
 };
 
 /// Saturating part of a law over its height, -1..1.
 fn saturating(law: &JointFriction, v: f64) -> f64 {
     match law {
         JointFriction::None => 0.0,
-        JointFriction::ViscousCoulomb(_) => super::sign(v),
+        JointFriction::ViscousCoulomb(_) => sign(v),
         JointFriction::DoubleTanh(law) => {
             let height = law.coulomb_1 + law.coulomb_2;
             if height.abs() > 1e-12 {
                 (law.torque(v) - law.viscous * v) / height
             } else {
-                super::sign(v)
+                sign(v)
             }
         }
     }

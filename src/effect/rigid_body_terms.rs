@@ -1,38 +1,37 @@
 //! `rigid-body-terms`: the base parameters of the full chain that the declared structure drops: for
 //! the CFT robot with 12 parameters the other ten of its 22.
 
-use super::{Family, Key, Kind, Place, Role, Unit, no_limits, no_shape};
+use super::entry::{Entry, Family, Key};
+use super::law::Law;
+use super::place::Places;
+use super::unit::Unit;
 use crate::robot::cft::UNPRINTED;
 
-/// Name and unit of an extra parameter of the full chain.
-const fn extra(i: usize) -> Key {
-    Key::new(UNPRINTED[i], Unit::Text("kg m^2"))
-}
+/// The parameters of the full chain that the report does not print.
+const KEYS: [Key; 10] = {
+    let mut keys = [Key::size("", Unit::Fixed("kg m^2")); 10];
+    let mut i = 0;
+    while i < keys.len() {
+        keys[i].name = UNPRINTED[i];
+        i += 1;
+    }
+    keys
+};
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "rigid-body-terms",
-    family: Family::Inertia,
-    role: Role::Columns,
-    shape: &[],
-    linear: &[
-        extra(0),
-        extra(1),
-        extra(2),
-        extra(3),
-        extra(4),
-        extra(5),
-        extra(6),
-        extra(7),
-        extra(8),
-        extra(9),
-    ],
-    places: |robot, _| match robot.dropped_parameters() {
-        [] => Vec::new(),
-        _ => vec![Place::All],
-    },
-    starts: no_shape,
-    limits: no_limits,
-    columns: |scene, _, _, joint, out| {
+    families: &[Family::Inertia],
+    keys: &KEYS,
+    places: Places::Whole,
+    separate_by: "declare `parameters = 22` and excite all joints together, fast",
+    formula: "the ten columns that the twelve parameters leave out",
+    source: "links that are no thin rods, by the full chain of the report",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    fits: |robot, _, _| !robot.dropped_parameters().is_empty(),
+    ..Law::linear(&ENTRY, &UNPRINTED, |scene, _, _, joint, out| {
         let s = scene.stretch;
         let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);
         let mut row = [0.0; UNPRINTED.len()];
@@ -43,6 +42,5 @@ pub const KIND: Kind = Kind {
                 column[k] = *x;
             }
         }
-    },
-    separate_by: "declare `parameters = 22` and excite all joints together, fast",
+    })
 };

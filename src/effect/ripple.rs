@@ -1,19 +1,42 @@
 //! `ripple`: torque that repeats with position and does not flip with direction. Each harmonic is an
 //! effect of its own order.
 
-use super::{Cover, Family, Key, Kind, Place, Role, Starts, Unit, every_joint};
-use crate::robot::{JointKind, Robot};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::order::{order_limits, orders, wavenumber};
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+/// The sine or cosine part of a harmonic.
+const fn amplitude(name: &'static str) -> Key {
+    Key::size(name, Unit::Torque)
+}
+
+pub static ENTRY: Entry = Entry {
     name: "ripple",
-    family: Family::Position,
-    role: Role::Columns,
-    shape: &[Key::new("order", Unit::Order)],
-    linear: &[Key::new("sin", Unit::Torque), Key::new("cos", Unit::Torque)],
-    places: every_joint,
+    families: &[Family::Position],
+    keys: &[
+        Key::shape("order", Unit::Order),
+        amplitude("sin"),
+        amplitude("cos"),
+        amplitude("sin2"),
+        amplitude("cos2"),
+        amplitude("sin3"),
+        amplitude("cos3"),
+    ],
+    search: Search::Orders,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "the same stretch of travel at two constant speeds: the order stays, the \
+                  frequency moves",
+    formula: "sin sin(order q) + cos cos(order q), and harmonics 2 and 3",
+    source: "cogging of a motor, teeth of a gear, an eccentric encoder",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["order"],
     starts: |cover, place| orders(cover, place, &cover.at(place).ripple_orders),
     limits: order_limits,
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let per_unit = wavenumber(scene.robot, j, shape[0]);
         for (k, q) in scene.stretch.q[j].iter().enumerate() {
@@ -21,60 +44,5 @@ pub const KIND: Kind = Kind {
             out[0][k] = s;
             out[1][k] = c;
         }
-    },
-    separate_by: "the same stretch of travel at two constant speeds: the order stays, the \
-                  frequency moves",
+    })
 };
-
-/// rad per rad or per metre of an order (1/rev or 1/m).
-pub fn wavenumber(robot: &Robot, j: usize, order: f64) -> f64 {
-    match robot.joint_kind(j) {
-        JointKind::Revolute => order,
-        JointKind::Prismatic => std::f64::consts::TAU * order,
-    }
-}
-
-/// Peaks of the spectrum that the travel covers; what is missing where there are none.
-pub fn orders(cover: &Cover, place: Place, peaks: &[f64]) -> Starts {
-    let travel = cover.travel(place);
-    if travel * MOST_ORDER < LEAST_WAVES {
-        return Err("the joint stands still: no order can be seen".into());
-    }
-    let least = LEAST_WAVES / travel;
-    let kept: Vec<Vec<f64>> = peaks
-        .iter()
-        .filter(|o| **o >= least && is_whole(cover, place, **o))
-        .map(|o| vec![*o])
-        .collect();
-    if kept.is_empty() {
-        Err(format!(
-            "no order above {least:.3}, below which the travel covers less than {LEAST_WAVES} waves"
-        ))
-    } else {
-        Ok(kept)
-    }
-}
-
-/// Whether an order can be that of the place: after a full turn a joint is where it was, so that on
-/// one which turns further its orders are whole, within half of 1/travel.
-pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
-    let turns = cover.travel(place);
-    let revolute = place
-        .joint()
-        .is_some_and(|j| cover.kinds[j] == JointKind::Revolute);
-    !revolute || turns < FULL_TURNS || (order - order.round()).abs() <= 0.5 / turns
-}
-
-/// Turns from which on an order must be whole.
-const FULL_TURNS: f64 = 1.5;
-
-/// Orders between what the travel covers and what the position filter lets through.
-pub fn order_limits(cover: &Cover, place: Place) -> Vec<[f64; 2]> {
-    let travel = cover.travel(place).max(f64::MIN_POSITIVE);
-    vec![[LEAST_WAVES / travel, MOST_ORDER]]
-}
-
-/// Waves that the travel must cover.
-pub const LEAST_WAVES: f64 = 1.5;
-/// No order above this is looked for.
-const MOST_ORDER: f64 = 1e6;

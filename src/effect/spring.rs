@@ -1,14 +1,28 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "spring",
-    family: Family::Position,
-    role: Role::Columns,
-    shape: &[Key::new("q0", Unit::Position)],
-    linear: &[Key::new("k", Unit::Stiffness), Key::new("k3", Unit::Cubic)],
-    places: every_joint,
+    families: &[Family::Position],
+    keys: &[
+        Key::size("k", Unit::Stiffness),
+        Key::shape("q0", Unit::Position),
+        Key::size("k3", Unit::Cubic),
+    ],
+    search: Search::Refined,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "a slow sweep over the whole travel with two payloads: gravity scales, a spring \
+                  does not",
+    formula: "k (q - q0) + k3 (q - q0)^3",
+    source: "a cable, a hose or a return spring",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["q0"],
     starts: |cover, place| {
         let joint = cover.at(place);
         joint.is_wide()?;
@@ -25,14 +39,12 @@ pub const KIND: Kind = Kind {
         let beyond = 0.25 * (high - low);
         vec![[low - beyond, high + beyond]]
     },
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["k", "k3"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (k, q) in scene.stretch.q[j].iter().enumerate() {
             let x = q - shape[0];
             out[0][k] = x;
             out[1][k] = x * x * x;
         }
-    },
-    separate_by: "a slow sweep over the whole travel with two payloads: gravity scales, a spring \
-                  does not",
+    })
 };

@@ -1,20 +1,33 @@
 //! `stribeck`: friction that falls at low speed, c sgn(v) exp(-(v/vs)^2) (Armstrong-Helouvry,
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
-use super::{Family, Key, Kind, Place, Role, Unit, sign};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
+use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "stribeck",
-    family: Family::Velocity,
-    role: Role::Columns,
-    shape: &[Key::new("vs", Unit::Speed)],
-    linear: &[Key::new("c", Unit::Torque)],
-    places: |robot, laws| {
-        (0..robot.joints())
-            .filter(|j| !matches!(laws[*j], JointFriction::DoubleTanh(_)))
-            .map(Place::Joint)
-            .collect()
+    families: &[Family::Velocity],
+    keys: &[
+        Key::size("c", Unit::Torque),
+        Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
+    ],
+    search: Search::Refined,
+    ladder: Some(Ladder::USUAL),
+    separate_by: "a ladder of slow constant speeds, both ways, from a hundredth of the top speed up",
+    formula: "c sgn(v) exp(-(v/vs)^2)",
+    source: "a lubricant film that builds up with speed (Armstrong-Helouvry, Dupont and Canudas \
+               de Wit 1994)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["vs"],
+    fits: |_, laws, place| {
+        let law = place.joint().map(|j| laws[j]);
+        !matches!(law, Some(JointFriction::DoubleTanh(_)))
     },
     starts: |cover, place| {
         let joint = cover.at(place);
@@ -29,11 +42,10 @@ pub const KIND: Kind = Kind {
         let top = cover.at(place).fastest();
         vec![[0.003 * top, 0.8 * top]]
     },
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
             *x = sign(*v) * (-(v / shape[0]).powi(2)).exp();
         }
-    },
-    separate_by: "a ladder of slow constant speeds, both ways, from a hundredth of the top speed up",
+    })
 };

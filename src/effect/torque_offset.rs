@@ -1,17 +1,19 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint, no_limits, no_shape};
+use super::entry::{Entry, Family, Key, Ladder};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "torque-offset",
-    family: Family::Offset,
-    role: Role::Columns,
-    shape: &[],
-    linear: &[Key::new("c", Unit::Torque)],
-    places: every_joint,
-    starts: no_shape,
-    limits: no_limits,
-    columns: |_, _, _, _, out| out[0].fill(1.0),
+    families: &[Family::Offset],
+    keys: &[Key::size("c", Unit::Torque)],
+    ladder: Some(Ladder::USUAL),
     separate_by: "hold the joint still at several poses under brake-free control, then move it \
                   both ways at three or more constant speeds",
+    formula: "c",
+    source: "bias of a torque sensor or of an amplifier",
+    ..Entry::USUAL
 };
+
+pub static LAW: Law = Law::linear(&ENTRY, &["c"], |_, _, _, _, out| out[0].fill(1.0));

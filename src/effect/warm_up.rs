@@ -1,14 +1,30 @@
 //! `warm-up`: friction times 1 + k (1 - exp(-t/T)), t since the begin of the log.
 
-use super::{Family, Key, Kind, Role, Unit, every_joint};
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::unit::Unit;
 
-pub const KIND: Kind = Kind {
+pub static ENTRY: Entry = Entry {
     name: "warm-up",
-    family: Family::Slow,
-    role: Role::Columns,
-    shape: &[Key::new("T", Unit::Text("s"))],
-    linear: &[Key::new("k", Unit::Text(""))],
-    places: every_joint,
+    families: &[Family::Slow],
+    keys: &[
+        Key::size("k", Unit::One).within(
+            -1.0,
+            f64::INFINITY,
+            "must be at least -1, or friction drives the joint",
+        ),
+        Key::shape("T", Unit::Fixed("s")).above_zero("must be above 0 s"),
+    ],
+    search: Search::Refined,
+    ladder: Some(Ladder::LONG),
+    separate_by: "the same segment of motion at the begin and at the end of an hour",
+    formula: "F(v) k (1 - exp(-t/T))",
+    source: "grease that warms up",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["T"],
     starts: |cover, place| {
         if cover.at(place).reversals < 4 {
             return Err("fewer than four reversals: friction is not seen early and late".into());
@@ -18,13 +34,12 @@ pub const KIND: Kind = Kind {
             .to_vec())
     },
     limits: |cover, _| vec![[0.03 * cover.duration_s, 10.0 * cover.duration_s]],
-    columns: |scene, place, shape, _, out| {
+    ..Law::linear(&ENTRY, &["k"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;
         for (k, v) in s.v[j].iter().enumerate() {
             let t = s.began + s.dt * k as f64;
             out[0][k] = scene.laws[j].torque(*v) * -(-t / shape[0]).exp_m1();
         }
-    },
-    separate_by: "the same segment of motion at the begin and at the end of an hour",
+    })
 };

@@ -6,7 +6,7 @@ use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
 use crate::config::model_file::{Effect, EffectParameter, ModelProvenance};
-use crate::effect::{Added, Refined, Told};
+use crate::effect::{self, Added, AugmentedModel, EffectNumber};
 use crate::log::Provenance;
 use crate::robot::model::Model;
 
@@ -14,7 +14,7 @@ use crate::robot::model::Model;
 ///
 /// # Errors
 /// A file that lacks a parameter, or an effect that cannot be.
-pub fn refined(file: &ModelFile, name: &str) -> Result<Refined, IdentifyError> {
+pub fn refined(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyError> {
     with_effects(file, name, file.model(name)?)
 }
 
@@ -22,14 +22,18 @@ pub fn refined(file: &ModelFile, name: &str) -> Result<Refined, IdentifyError> {
 ///
 /// # Errors
 /// Those of [`refined`].
-pub fn refined_or_friction(file: &ModelFile, name: &str) -> Result<Refined, IdentifyError> {
+pub fn refined_or_friction(file: &ModelFile, name: &str) -> Result<AugmentedModel, IdentifyError> {
     with_effects(file, name, file.model_or_friction(name)?)
 }
 
-fn with_effects(file: &ModelFile, name: &str, model: Model) -> Result<Refined, IdentifyError> {
+fn with_effects(
+    file: &ModelFile,
+    name: &str,
+    model: Model,
+) -> Result<AugmentedModel, IdentifyError> {
     let effects = file.effects.iter().map(|e| {
         let values = e.parameters.iter().map(|(k, p)| (k.clone(), p.value));
-        Added::of_keys(&model.robot, &e.name, e.joint.as_deref(), &values.collect()).map_err(
+        effect::read(&model.robot, &e.name, e.joint.as_deref(), &values.collect()).map_err(
             |error| IdentifyError::Effect {
                 model: name.to_owned(),
                 error,
@@ -37,13 +41,13 @@ fn with_effects(file: &ModelFile, name: &str, model: Model) -> Result<Refined, I
         )
     });
     let effects = effects.collect::<Result<_, _>>()?;
-    Ok(Refined { model, effects })
+    Ok(AugmentedModel { model, effects })
 }
 
 /// An effect as a model file holds it.
-pub fn in_file(effect: &Added, machine: &LoggedRobot, told: &[Told]) -> Effect {
+pub fn in_file(effect: &Added, machine: &LoggedRobot, told: &[EffectNumber]) -> Effect {
     Effect {
-        name: effect.kind.name.to_owned(),
+        name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),
         parameters: told
             .iter()

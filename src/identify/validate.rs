@@ -6,7 +6,7 @@ use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::open_log::summary_warnings;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
 
@@ -24,7 +24,7 @@ pub struct Validated {
 /// Logs that cannot be used.
 pub fn validate(
     machine: &LoggedRobot,
-    refined: &Refined,
+    refined: &AugmentedModel,
     logs: &[Log],
     control: &Control,
     row: &mut dyn FnMut(&Reconstructed, Instant),

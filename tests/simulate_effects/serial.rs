@@ -175,21 +175,19 @@ fn what_the_diagnosis_looks_for_on_a_serial_robot_the_simulator_can_build() {
     let (robot, _) = truth.rigid_body();
     let laws = vec![cft_ident::robot::model::JointFriction::None; 3];
     let mut found = 0;
-    for kind in cft_ident::effect::KINDS {
-        let sought = !(kind.places)(robot, &laws).is_empty();
+    for law in cft_ident::effect::LAWS {
+        let sought = !law.places(robot, &laws).is_empty();
         let built = cft_ident::simulate::effects::KINDS
             .iter()
-            .find(|k| k.name == kind.name)
+            .find(|k| k.name == law.entry.name)
             .expect("both rooms know it");
         if sought {
             found += 1;
-            assert_ne!(places(built), "no", "{}", kind.name);
+            assert_ne!(places(built), "no", "{}", law.entry.name);
             // what is found can be simulated: the same keys
-            let keys = kind.shape.iter().chain(kind.linear);
-            for key in keys {
-                let known = built.keys.iter().any(|k| k.name == key.name);
-                let rewritten = matches!(kind.name, "presliding" | "elasticity" | "payload");
-                assert!(known || rewritten, "{}: {}", kind.name, key.name);
+            for key in law.key_names() {
+                let known = built.keys.iter().any(|k| k.name == key);
+                assert!(known, "{}: {key}", law.entry.name);
             }
         }
     }

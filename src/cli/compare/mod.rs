@@ -14,7 +14,7 @@ use super::pages::{self, Look, curve, speeds};
 use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs};
 use crate::compare::{self, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::{InMemory, LoggedRobot, read_whole, refined, refined_or_friction};
 use crate::log::{LogSpec, escape};
 use crate::motion::Parallel;
@@ -59,7 +59,7 @@ pub const DIFFERENT: f64 = 1.96;
 /// A model file with what it stands for.
 pub struct Side {
     pub given: Given<ModelFile>,
-    pub model: Refined,
+    pub model: AugmentedModel,
 }
 
 /// Both models on the same logs.

@@ -298,7 +298,7 @@ fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             if alike.is_empty() {
                 "separated from all others".to_owned()
             } else {
-                format!("{}: {}", alike.join(", "), effect.kind.separate_by)
+                format!("{}: {}", alike.join(", "), effect.law.entry.separate_by)
             },
         ]);
     }

@@ -2,7 +2,7 @@
 
 use super::look::Look;
 use crate::config::ModelFile;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::report::Writer;
 use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -12,7 +12,7 @@ use crate::robot::model::JointFriction;
 const POINTS: usize = 90;
 
 /// The curves of every joint that has friction.
-pub fn figure(look: &Look, file: &ModelFile, model: &Refined) -> FrictionFigure {
+pub fn figure(look: &Look, file: &ModelFile, model: &AugmentedModel) -> FrictionFigure {
     let machine = look.machine;
     let joints = machine.robot.joint_names().iter().enumerate();
     let panels = joints

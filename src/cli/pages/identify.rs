@@ -8,7 +8,7 @@ use super::torque::Drawn;
 use super::{diagnose, fit, parameters, quality, residual, torque, validate};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::{IdentifiedDynamics, IdentifiedFriction, LoggedRobot, Validated};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
@@ -25,7 +25,7 @@ pub struct Identify<'a> {
     /// The model as it was declared, and with the effects that were found.
     pub declared: &'a ModelFile,
     pub refined: Option<&'a ModelFile>,
-    pub numbers: &'a Refined,
+    pub numbers: &'a AugmentedModel,
     pub validated: Option<&'a Validated>,
     pub diagnosed: Option<&'a Diagnosed>,
     pub fault: Option<&'a DataFault>,

@@ -2,7 +2,7 @@
 
 use super::super::{CliError, Context};
 use crate::diagnose::{JointEvidence, evidence};
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
 use crate::log::escape;
 use crate::motion::{Parallel, Stretch};
@@ -66,7 +66,7 @@ impl<'a> Look<'a> {
     /// Stretches that are too short for the filter.
     pub fn evidence(
         &self,
-        model: &Refined,
+        model: &AugmentedModel,
         wanted: &dyn Fn(usize) -> bool,
     ) -> Result<Vec<JointEvidence>, CliError> {
         let stretches: Vec<&Stretch> = self.stretches.iter().filter(|s| wanted(s.log)).collect();

@@ -5,7 +5,7 @@ use super::look::Look;
 use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::{IdentifiedDynamics, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
@@ -18,7 +18,7 @@ pub struct Lsq<'a> {
     pub found: &'a IdentifiedDynamics,
     /// The model that was fitted.
     pub file: &'a ModelFile,
-    pub model: &'a Refined,
+    pub model: &'a AugmentedModel,
     pub logs: &'a [LogSpec],
     /// Robot file, and the model file that gave the friction.
     pub given: Vec<Provenance>,

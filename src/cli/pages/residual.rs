@@ -3,7 +3,7 @@
 use super::super::CliError;
 use super::look::Look;
 use crate::diagnose::JointEvidence;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
 use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
@@ -15,8 +15,8 @@ use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 pub fn figure(
     look: &Look,
     wanted: &dyn Fn(usize) -> bool,
-    before: &Refined,
-    after: Option<&Refined>,
+    before: &AugmentedModel,
+    after: Option<&AugmentedModel>,
 ) -> Result<ResidualFigure, CliError> {
     let names = look.names.iter().enumerate();
     let names: Vec<&str> = names

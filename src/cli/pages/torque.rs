@@ -2,7 +2,7 @@
 
 use super::super::CliError;
 use super::look::Look;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
 use crate::motion::Stretch;
 use crate::number;
@@ -14,12 +14,12 @@ pub struct Drawn<'a> {
     /// Name of its torque, and of its residual.
     pub names: [&'a str; 2],
     pub styles: [TraceStyle; 2],
-    pub model: &'a Refined,
+    pub model: &'a AugmentedModel,
 }
 
 impl<'a> Drawn<'a> {
     /// The only model.
-    pub fn only(model: &'a Refined) -> Self {
+    pub fn only(model: &'a AugmentedModel) -> Self {
         Drawn {
             names: ["reconstructed", "measured \u{2212} reconstructed"],
             styles: [TraceStyle::Model, TraceStyle::Residual],

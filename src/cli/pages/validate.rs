@@ -5,7 +5,7 @@ use super::look::Look;
 use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::identify::{LoggedRobot, Validated};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
@@ -17,7 +17,7 @@ use crate::validate::Validation;
 pub struct Validate<'a> {
     pub machine: &'a LoggedRobot,
     pub file: &'a ModelFile,
-    pub model: &'a Refined,
+    pub model: &'a AugmentedModel,
     pub logs: &'a [LogSpec],
     pub found: &'a Validated,
     /// Limit that the user set on every joint's relative error.

@@ -8,7 +8,9 @@ use crate::diagnose::problem::fit::{Fitted, Ground};
 use crate::diagnose::problem::rows::{clear, scene, standing};
 use crate::diagnose::run::Case;
 use crate::diagnose::selection::accept::{Candidate, Worth, decide};
-use crate::effect::{Added, KINDS, Kind, Place, Refined, Role, Torques, order_is_whole, shifted};
+use crate::effect::{
+    Added, AugmentedModel, LAWS, Law, Place, Role, Search, Torques, order_is_whole, shifted,
+};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
 
@@ -39,16 +41,16 @@ pub fn search(
     let judge = Judge::new(at, ground);
     let robot = &at.model.model.robot;
     let laws = &at.model.model.friction;
-    let places: Vec<(&'static Kind, Place)> = KINDS
+    let places: Vec<(&'static Law, Place)> = LAWS
         .iter()
-        .filter(|kind| !case.without.iter().any(|name| name == kind.name))
-        .flat_map(|kind| (kind.places)(robot, laws).into_iter().map(|p| (*kind, p)))
+        .filter(|law| !case.without.iter().any(|name| name == law.entry.name))
+        .flat_map(|law| law.places(robot, laws).into_iter().map(|p| (*law, p)))
         .collect();
     let tried: Vec<(Candidate, usize)> = places
         .par_iter()
-        .map(|&(kind, place)| {
+        .map(|&(law, place)| {
             if stop() {
-                return Ok((refused(kind, place, "interrupted".into()), 0));
+                return Ok((refused(law, place, "interrupted".into()), 0));
             }
             let least = floor_of(at, ground, bar, place) * case.limits.over_noise / at.square;
             one(
@@ -56,7 +58,7 @@ pub fn search(
                 ground,
                 &judge,
                 torques,
-                (kind, place),
+                (law, place),
                 case.keep,
                 HOPELESS * least,
             )
@@ -97,13 +99,13 @@ fn floor_of(at: &Fitted, ground: &Ground, bar: &Bar, place: Place) -> f64 {
 }
 
 /// A candidate that was not tried.
-fn refused(kind: &'static Kind, place: Place, reason: String) -> Candidate {
+fn refused(law: &'static Law, place: Place, reason: String) -> Candidate {
     Candidate {
         effect: Added {
-            kind,
+            law,
             place,
-            shape: vec![f64::NAN; kind.shape.len()],
-            linear: vec![0.0; kind.linear.len()],
+            shape: vec![f64::NAN; law.shape.len()],
+            linear: vec![0.0; law.linear.len()],
         },
         score: None,
         accepted: false,
@@ -118,7 +120,7 @@ fn one(
     ground: &Ground,
     judge: &Judge,
     torques: &[Torques],
-    (kind, place): (&'static Kind, Place),
+    (law, place): (&'static Law, Place),
     keep: bool,
     least: f64,
 ) -> Result<(Candidate, usize), MotionError> {
@@ -128,27 +130,27 @@ fn one(
         .all(|j| ground.cover.joints[j].held)
     {
         let reason = "the joint is held in these logs: move it to see what it does";
-        return Ok((refused(kind, place, reason.into()), 0));
+        return Ok((refused(law, place, reason.into()), 0));
     }
-    if kind.role == Role::Kept && !keep {
+    if law.entry.role == Role::Kept && !keep {
         let reason = "a fit that is free while carrying it absorbs it; give the model of logs \
                       without it, and --keep";
-        return Ok((refused(kind, place, reason.into()), 0));
+        return Ok((refused(law, place, reason.into()), 0));
     }
-    let there = |e: &Added| e.kind.name == kind.name && e.place == place;
+    let there = |e: &Added| e.name() == law.entry.name && e.place == place;
     let again = at.model.effects.iter().any(there);
-    let periodic = matches!(kind.name, "ripple" | "position-friction");
+    let periodic = law.entry.search == Search::Orders;
     // only waves come more than once, each with an order of its own
     if again && !periodic {
-        return Ok((refused(kind, place, "it is in the model".into()), 0));
+        return Ok((refused(law, place, "it is in the model".into()), 0));
     }
-    let starts = match (kind.starts)(&ground.cover, place) {
+    let starts = match (law.starts)(&ground.cover, place) {
         Ok(starts) => starts,
-        Err(lacking) => return Ok((refused(kind, place, lacking), 0)),
+        Err(lacking) => return Ok((refused(law, place, lacking), 0)),
     };
-    let k = kind.linear.len();
+    let k = law.linear.len();
     let mut effect = Added {
-        kind,
+        law,
         place,
         shape: Vec::new(),
         linear: vec![0.0; k],
@@ -169,13 +171,13 @@ fn one(
     if best.0 == f64::NEG_INFINITY {
         let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
                       [filter] to look for them";
-        return Ok((refused(kind, place, reason.into()), count));
+        return Ok((refused(law, place, reason.into()), count));
     }
     effect.shape = best.1;
     // a shape worth refining: positive, so that steps are ratios
-    let limits = (kind.limits)(&ground.cover, place);
+    let limits = (law.limits)(&ground.cover, place);
     let free = !effect.shape.is_empty()
-        && kind.name != "coupling"
+        && law.entry.search.refines()
         && limits.iter().all(|[low, high]| low < high)
         && best.0 > least;
     if free {
@@ -186,11 +188,9 @@ fn one(
         let steps: Vec<f64> = effect
             .shape
             .iter()
-            .map(|s| match kind.name {
-                "ripple" | "position-friction" => {
-                    0.15 / (s.abs() * ground.cover.travel(place)).max(0.5)
-                }
-                _ => 0.2,
+            .map(|s| match periodic {
+                true => 0.15 / (s.abs() * ground.cover.travel(place)).max(0.5),
+                false => 0.2,
             })
             .collect();
         let centre = effect.shape.clone();
@@ -223,14 +223,14 @@ fn one(
             .iter()
             .any(|e| there(e) && near(&e.shape, &effect.shape))
     {
-        return Ok((refused(kind, place, "it is in the model".into()), count));
+        return Ok((refused(law, place, "it is in the model".into()), count));
     }
     if periodic && !order_is_whole(&ground.cover, place, effect.shape[0]) {
         let reason = format!(
             "{:.3} waves a turn: after a full turn the joint is where it was, and orders are whole",
             effect.shape[0]
         );
-        return Ok((refused(kind, place, reason), count));
+        return Ok((refused(law, place, reason), count));
     }
     let columns = columns(&at.model, ground, torques, &effect)?;
     let score = judge.score(&columns, k, effect.shape.len());
@@ -288,7 +288,7 @@ fn near(a: &[f64], b: &[f64]) -> bool {
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn columns(
-    model: &Refined,
+    model: &AugmentedModel,
     ground: &Ground,
     torques: &[Torques],
     effect: &Added,
@@ -320,7 +320,7 @@ pub fn columns(
 
 /// Of accepted candidates the one to add, and those that the data do not separate from it: within
 /// one standard error over the folds. Among these the one with the fewest parameters is taken, then
-/// the first in the order of [`KINDS`].
+/// the first in the order of [`LAWS`].
 pub fn choose(found: &[Candidate], skip: &[usize]) -> Option<(usize, Vec<usize>)> {
     let scored = |i: usize| found[i].score.as_ref();
     let open: Vec<usize> = (0..found.len())
@@ -343,9 +343,8 @@ pub fn choose(found: &[Candidate], skip: &[usize]) -> Option<(usize, Vec<usize>)
         })
         .collect();
     let order = |i: usize| {
-        KINDS
-            .iter()
-            .position(|k| k.name == found[i].effect.kind.name)
+        LAWS.iter()
+            .position(|k| k.entry.name == found[i].effect.name())
     };
     let chosen = near
         .iter()

@@ -2,7 +2,7 @@
 //! by the model that is given.
 
 use crate::diagnose::problem::plan::{Plan, Role};
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// What is wrong with the torque channel of a joint.
@@ -25,7 +25,7 @@ const KNOWN: f64 = 0.25;
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn suspicion(
-    model: &Refined,
+    model: &AugmentedModel,
     stretches: &[Stretch],
     parallel: &Parallel,
     plan: &Plan,

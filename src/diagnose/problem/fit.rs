@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::plan::{Plan, Role};
 use super::rows::{Base, Inertial, inertial};
 use super::unknowns::{Open, Unknown, Unknowns, step};
-use crate::effect::{Cover, Refined, Torques};
+use crate::effect::{AugmentedModel, Cover, Torques};
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::Robot;
 
@@ -40,7 +40,7 @@ pub fn inertial_of(
 
 impl Ground<'_> {
     /// Torques of a model along every stretch; none along those that decide nothing.
-    pub fn torques(&self, model: &Refined) -> Vec<Torques> {
+    pub fn torques(&self, model: &AugmentedModel) -> Vec<Torques> {
         let stretches = self.stretches.par_iter().enumerate();
         let of = |(i, stretch): (usize, &Stretch)| {
             if self.plan.idle(i) {
@@ -57,7 +57,7 @@ impl Ground<'_> {
 #[derive(Debug, Clone)]
 pub struct Prior {
     /// The model about which it is centred.
-    pub centre: Refined,
+    pub centre: AugmentedModel,
     /// Information (inverse covariance) in the order of [`crate::robot::model::Model::gradient`],
     /// row-major.
     pub information: DMatrix<f64>,
@@ -85,7 +85,7 @@ impl Prior {
     }
 
     /// How far a model is from the centre; effects have none.
-    fn off(&self, unknowns: &Unknowns, model: &Refined) -> DVector<f64> {
+    fn off(&self, unknowns: &Unknowns, model: &AugmentedModel) -> DVector<f64> {
         let off = unknowns.list.iter().map(|x| match self.place(*x) {
             Some(_) => value(&self.centre, *x) - value(model, *x),
             None => 0.0,
@@ -94,7 +94,7 @@ impl Prior {
     }
 
     /// Information and its pull on the present model, over the unknowns.
-    fn over(&self, unknowns: &Unknowns, model: &Refined) -> (DMatrix<f64>, DVector<f64>) {
+    fn over(&self, unknowns: &Unknowns, model: &AugmentedModel) -> (DMatrix<f64>, DVector<f64>) {
         let u = unknowns.len();
         let places: Vec<Option<usize>> = unknowns.list.iter().map(|x| self.place(*x)).collect();
         let mut information = DMatrix::zeros(u, u);
@@ -111,7 +111,7 @@ impl Prior {
 }
 
 /// Value of an unknown in a model; 0 for an effect that it does not have.
-pub fn value(model: &Refined, unknown: Unknown) -> f64 {
+pub fn value(model: &AugmentedModel, unknown: Unknown) -> f64 {
     match unknown {
         Unknown::Theta(i) => model.model.theta[i],
         Unknown::Offset(j) => model.model.offset[j],
@@ -130,7 +130,7 @@ pub fn value(model: &Refined, unknown: Unknown) -> f64 {
 
 /// A fitted model with the linear system at its solution.
 pub struct Fitted {
-    pub model: Refined,
+    pub model: AugmentedModel,
     pub base: Base,
     /// 1 / residual rms of each joint.
     pub weights: Vec<f64>,
@@ -155,7 +155,7 @@ const HALVINGS: usize = 6;
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn fit(start: &Refined, ground: &Ground) -> Result<Fitted, MotionError> {
+pub fn fit(start: &AugmentedModel, ground: &Ground) -> Result<Fitted, MotionError> {
     descend(evaluate(start.clone(), ground, None)?, ground, None)
 }
 
@@ -216,7 +216,7 @@ fn objective(at: &Fitted, ground: &Ground) -> f64 {
 
 /// The rows and sums of a model as it stands.
 fn evaluate(
-    model: Refined,
+    model: AugmentedModel,
     ground: &Ground,
     weights: Option<&[f64]>,
 ) -> Result<Fitted, MotionError> {
@@ -247,7 +247,7 @@ fn weights_of(base: &Base, ground: &Ground) -> Vec<f64> {
         .collect()
 }
 
-fn summed(model: Refined, base: Base, weights: Vec<f64>, ground: &Ground) -> Fitted {
+fn summed(model: AugmentedModel, base: Base, weights: Vec<f64>, ground: &Ground) -> Fitted {
     let total = base.total(&ground.plan, &weights, &Role::fitted);
     let (information, pull) = ground.prior.over(&base.unknowns, &model);
     Fitted {
@@ -276,7 +276,7 @@ impl Fitted {
     ///
     /// # Errors
     /// [`MotionError`] of the filter.
-    pub fn with(&self, model: Refined, ground: &Ground) -> Result<Fitted, MotionError> {
+    pub fn with(&self, model: AugmentedModel, ground: &Ground) -> Result<Fitted, MotionError> {
         evaluate(model, ground, Some(&self.weights))
     }
 

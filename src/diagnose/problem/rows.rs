@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::plan::{Plan, Role};
 use super::unknowns::{Unknown, Unknowns};
-use crate::effect::{Refined, Scene, Torques, shifted};
+use crate::effect::{AugmentedModel, Scene, Torques, shifted};
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
@@ -68,7 +68,7 @@ fn regressor(robot: &Robot, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn filtered(
-    model: &Refined,
+    model: &AugmentedModel,
     unknowns: &Unknowns,
     (stretch, inertial): (&Stretch, &Inertial),
     parallel: &Parallel,
@@ -170,7 +170,12 @@ const STANDING: f64 = 0.01;
 
 /// Rows in which a joint with a jump in its friction law stands still for as long as the filter
 /// remembers: static friction takes any torque up to its limit there, and no law of v says which.
-pub fn standing(model: &Refined, stretch: &Stretch, parallel: &Parallel, j: usize) -> Vec<usize> {
+pub fn standing(
+    model: &AugmentedModel,
+    stretch: &Stretch,
+    parallel: &Parallel,
+    j: usize,
+) -> Vec<usize> {
     if !model.model.friction[j].jumps() {
         return Vec::new();
     }
@@ -205,7 +210,7 @@ const REACH: f64 = 1.0;
 /// Which rows are within the filter's reach of a sample at which a joint with a jump in its friction law stands or
 /// turns: the law says more of friction there than friction does.
 pub fn near_rests(
-    model: &Refined,
+    model: &AugmentedModel,
     stretch: &Stretch,
     parallel: &Parallel,
     cutoff_hz: f64,
@@ -242,7 +247,11 @@ pub fn clear(column: &mut [f64], rows: &[usize]) {
 }
 
 /// The scene of a model along a stretch.
-pub fn scene<'a>(model: &'a Refined, stretch: &'a Stretch, torques: &'a Torques) -> Scene<'a> {
+pub fn scene<'a>(
+    model: &'a AugmentedModel,
+    stretch: &'a Stretch,
+    torques: &'a Torques,
+) -> Scene<'a> {
     Scene {
         robot: &model.model.robot,
         theta: &model.model.theta,
@@ -254,7 +263,13 @@ pub fn scene<'a>(model: &'a Refined, stretch: &'a Stretch, torques: &'a Torques)
 }
 
 /// d(torque of an effect)/d(shape k), by central differences.
-fn shape_derivative(model: &Refined, scene: &Scene, effect: usize, k: usize, j: usize) -> Vec<f64> {
+fn shape_derivative(
+    model: &AugmentedModel,
+    scene: &Scene,
+    effect: usize,
+    k: usize,
+    j: usize,
+) -> Vec<f64> {
     let added = &model.effects[effect];
     let step = 1e-4 * added.shape[k].abs().max(1e-6);
     let torque = |by: f64| {
@@ -296,7 +311,7 @@ impl Base {
     /// # Errors
     /// [`MotionError`] of the filter.
     pub fn of(
-        model: &Refined,
+        model: &AugmentedModel,
         unknowns: Unknowns,
         (stretches, inertial): (&[Stretch], &[Inertial]),
         parallel: &Parallel,
@@ -484,7 +499,7 @@ mod tests {
         };
         let near = |law: JointFriction| {
             let robot = Robot::single_joint("slide", crate::robot::JointKind::Prismatic);
-            let model = Refined::plain(Model {
+            let model = AugmentedModel::plain(Model {
                 robot,
                 theta: vec![1.0],
                 friction: vec![law],
@@ -531,7 +546,7 @@ mod tests {
         let parallel = Parallel::design(&FilterSettings::default(), stretch.dt).unwrap();
         let held = |j: usize| j == 1;
         let kept = inertial(&robot, &stretch, &parallel, &held).unwrap();
-        let plain = Refined::plain(Model {
+        let plain = AugmentedModel::plain(Model {
             theta: (0..12).map(|i| 1.0 + f64::from(i)).collect(),
             friction: vec![JointFriction::None; 4],
             offset: vec![0.0; 4],
@@ -539,9 +554,8 @@ mod tests {
         });
         let late_by = |d: f64| {
             let values = BTreeMap::from([("d".to_owned(), d)]);
-            let delay =
-                crate::effect::Added::of_keys(&plain.model.robot, "delay", Some("q4"), &values);
-            Refined {
+            let delay = crate::effect::read(&plain.model.robot, "delay", Some("q4"), &values);
+            AugmentedModel {
                 effects: vec![delay.unwrap()],
                 ..plain.clone()
             }
@@ -551,7 +565,7 @@ mod tests {
             offset: vec![true; 4],
             friction: vec![Vec::new(); 4],
         };
-        let rows = |model: &Refined| {
+        let rows = |model: &AugmentedModel| {
             let unknowns = Unknowns::of(model, &open, &cover);
             filtered(model, &unknowns, (&stretch, &kept), &parallel, &held).unwrap()
         };

@@ -1,6 +1,6 @@
 //! The unknowns of the joint fit: inertias, friction, offsets, and what effects bring.
 
-use crate::effect::{Cover, Refined, Role};
+use crate::effect::{AugmentedModel, Cover, Role};
 use crate::robot::model::JointFriction;
 
 /// One unknown.
@@ -37,7 +37,7 @@ pub struct Open {
 
 impl Unknowns {
     /// The unknowns of a model.
-    pub fn of(model: &Refined, open: &Open, cover: &Cover) -> Self {
+    pub fn of(model: &AugmentedModel, open: &Open, cover: &Cover) -> Self {
         let plain = &model.model;
         let n = plain.robot.joints();
         let mut list: Vec<Unknown> = (0..plain.theta.len()).map(Unknown::Theta).collect();
@@ -49,11 +49,12 @@ impl Unknowns {
         list.extend((0..n).filter(|j| open.offset[*j]).map(Unknown::Offset));
         for (effect, added) in model.effects.iter().enumerate() {
             list.extend((0..added.linear.len()).map(|k| Unknown::Linear { effect, k }));
-            let limits = (added.kind.limits)(cover, added.place);
+            if !added.law.entry.search.refines() {
+                continue;
+            }
+            let limits = (added.law.limits)(cover, added.place);
             let free = (0..added.shape.len()).filter(|k| limits[*k][0] < limits[*k][1]);
-            // a sign is chosen, not refined
-            let refined = free.filter(|_| added.kind.name != "coupling");
-            list.extend(refined.map(|k| Unknown::Shape { effect, k }));
+            list.extend(free.map(|k| Unknown::Shape { effect, k }));
         }
         let touches = |u: &Unknown, j: usize| match *u {
             Unknown::Theta(_) => true,
@@ -75,7 +76,7 @@ impl Unknowns {
 }
 
 /// Adds a step to a model; shapes stay within their limits, slopes positive.
-pub fn step(model: &mut Refined, unknowns: &Unknowns, delta: &[f64], cover: &Cover) {
+pub fn step(model: &mut AugmentedModel, unknowns: &Unknowns, delta: &[f64], cover: &Cover) {
     for (unknown, d) in unknowns.list.iter().zip(delta) {
         match *unknown {
             Unknown::Theta(i) => model.model.theta[i] += d,
@@ -86,7 +87,7 @@ pub fn step(model: &mut Refined, unknowns: &Unknowns, delta: &[f64], cover: &Cov
             Unknown::Linear { effect, k } => {
                 let added = &mut model.effects[effect];
                 added.linear[k] += d;
-                if added.kind.role == Role::Shift {
+                if added.law.entry.role == Role::Shift {
                     // a derivative holds for a few samples
                     let most = 50.0 * cover.dt;
                     added.linear[k] = added.linear[k].clamp(-most, most);
@@ -94,7 +95,7 @@ pub fn step(model: &mut Refined, unknowns: &Unknowns, delta: &[f64], cover: &Cov
             }
             Unknown::Shape { effect, k } => {
                 let added = &mut model.effects[effect];
-                let [low, high] = (added.kind.limits)(cover, added.place)[k];
+                let [low, high] = (added.law.limits)(cover, added.place)[k];
                 // half of the way at most: a derivative by a shape holds near by
                 let most = 0.5 * added.shape[k].abs().max(1e-3 * (high - low));
                 let next = added.shape[k] + d.clamp(-most, most);

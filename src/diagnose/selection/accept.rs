@@ -89,12 +89,6 @@ pub fn decide(
 ) {
     let Some(s) = &candidate.score else { return };
     let corrected = s.p_value * tried as f64;
-    let physical = match candidate.effect.kind.name {
-        // a drive cannot be stiffer than stiff
-        "elasticity" => candidate.effect.linear[0] > 0.0,
-        "presliding" => candidate.effect.linear[0] > 0.0,
-        _ => true,
-    };
     let refusal = if !s.beta.iter().all(|b| b.is_finite()) {
         Some("its coefficients are not finite".to_owned())
     } else if s.unique_share < limits.unique_share {
@@ -102,7 +96,7 @@ pub fn decide(
             "only {:.2} % of it is its own: what is declared stands in for the rest",
             100.0 * s.unique_share
         ))
-    } else if !physical {
+    } else if !candidate.effect.is_possible() {
         Some("its coefficient has a sign that the effect cannot have".to_owned())
     } else if corrected > limits.false_alarm {
         Some(format!(
@@ -174,10 +168,12 @@ mod tests {
             vetoes: [vec![1.0; 10], vec![0.9; 10]],
         };
         change(&mut score);
-        let kind = crate::effect::kind("torque-offset").unwrap();
+        let laws = crate::effect::LAWS;
+        let law = laws.iter().find(|l| l.entry.name == "torque-offset");
+        let law = law.unwrap();
         let mut candidate = Candidate {
             effect: Added {
-                kind,
+                law,
                 place: Place::Joint(0),
                 shape: Vec::new(),
                 linear: vec![1.0],

@@ -110,7 +110,7 @@ mod tests {
     use crate::diagnose::problem::fit::{Prior, fit};
     use crate::diagnose::problem::plan::{LogRole, Plan};
     use crate::diagnose::problem::unknowns::Open;
-    use crate::effect::{Cover, Refined};
+    use crate::effect::{AugmentedModel, Cover};
     use crate::motion::{FilterSettings, Parallel};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
@@ -166,7 +166,7 @@ mod tests {
             viscous: 0.1,
             coulomb: 0.1,
         };
-        let start = Refined::plain(Model {
+        let start = AugmentedModel::plain(Model {
             robot: robot.clone(),
             theta: vec![1.0],
             friction: vec![JointFriction::ViscousCoulomb(law)],

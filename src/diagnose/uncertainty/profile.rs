@@ -48,7 +48,7 @@ pub fn widen(
         };
         let added = &at.model.effects[effect];
         let value = added.shape[k];
-        let [low, high] = (added.kind.limits)(&ground.cover, added.place)[k];
+        let [low, high] = (added.law.limits)(&ground.cover, added.place)[k];
         let std = before[(i, i)].sqrt();
         let linear = std.is_finite() && std > 0.0 && !least.at_rest(i);
         let (first, inflation) = match linear {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::diagnose::problem::plan::{Plan, Role};
 use crate::diagnose::problem::rows::standing;
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Errors of one joint.
@@ -73,7 +73,7 @@ pub enum Counted {
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn errors(
-    model: &Refined,
+    model: &AugmentedModel,
     units: &[String],
     stretches: &[Stretch],
     parallel: &Parallel,
@@ -134,7 +134,7 @@ pub fn errors(
     Ok(Some(summed(model, units, &pieces)))
 }
 
-fn summed(model: &Refined, units: &[String], pieces: &[Vec<Sums>]) -> Errors {
+fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<Sums>]) -> Errors {
     let n = units.len();
     let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
     let relative = |picked: &[usize]| -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! What a person looks at: the filtered residual over position, velocity, load and time, forward and
 //! backward apart, and its spectra over order and frequency, for a model before and after.
 
-use crate::effect::Refined;
+use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::JointKind;
 
@@ -49,7 +49,7 @@ struct Rows {
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn evidence(
-    model: &Refined,
+    model: &AugmentedModel,
     stretches: &[&Stretch],
     parallel: &Parallel,
     cutoff_hz: f64,

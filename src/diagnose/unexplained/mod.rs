@@ -8,7 +8,7 @@ mod period;
 use self::errors::Errors;
 use self::noise_floor::floor;
 use crate::diagnose::run::Case;
-use crate::effect::held_joints;
+use crate::effect::stationary_joints;
 use crate::motion::{MotionError, Stretch};
 
 /// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
@@ -41,7 +41,7 @@ pub fn noise(
         &case.parallel,
         case.cutoff_hz,
         case.averaged,
-        &held_joints(&case.given.model.robot, stretches),
+        &stationary_joints(&case.given.model.robot, stretches),
     )
 }
 

@@ -1,12 +1,13 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
-use super::{Added, Scene};
+use super::added::Added;
+use super::law::Scene;
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 
 /// A model and what was added to it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Refined {
+pub struct AugmentedModel {
     pub model: Model,
     pub effects: Vec<Added>,
 }
@@ -20,10 +21,10 @@ pub struct Torques {
     pub load: Vec<Vec<f64>>,
 }
 
-impl Refined {
+impl AugmentedModel {
     /// A model to which nothing was added.
     pub fn plain(model: Model) -> Self {
-        Refined {
+        AugmentedModel {
             model,
             effects: Vec::new(),
         }

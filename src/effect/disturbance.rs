@@ -1,0 +1,19 @@
+//! `disturbance`: somebody pushes. The diagnosis finds such an episode and cuts it out; it has no parameter.
+
+use super::entry::{Entry, Family, Key, Role};
+use super::unit::Unit;
+
+pub static ENTRY: Entry = Entry {
+    name: "disturbance",
+    families: &[Family::Event],
+    keys: &[
+        Key::shape("at", Unit::Fixed("s")),
+        Key::shape("seconds", Unit::Fixed("s")).above_zero("must be above 0 s"),
+        Key::size("c", Unit::Torque),
+    ],
+    role: Role::Fault,
+    separate_by: "cut it out",
+    formula: "c from at to at + seconds",
+    source: "somebody or something that pushes the arm",
+    ..Entry::USUAL
+};

@@ -1,0 +1,230 @@
+//! What is known of an effect, whoever models it. The estimator and the simulator read the same entries and
+//! have laws of their own, so that each checks the other.
+
+use super::place::Places;
+use super::unit::Unit;
+
+/// Families of effects that look alike: named first, the member only where the data separate it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    Offset,
+    Velocity,
+    Cross,
+    Load,
+    Position,
+    Memory,
+    Timing,
+    Inertia,
+    Slow,
+    Event,
+    Data,
+}
+
+impl Family {
+    /// Name in results and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Family::Offset => "offset",
+            Family::Velocity => "velocity",
+            Family::Cross => "cross",
+            Family::Load => "load",
+            Family::Position => "position",
+            Family::Memory => "memory",
+            Family::Timing => "timing",
+            Family::Inertia => "inertia",
+            Family::Slow => "slow",
+            Family::Event => "event",
+            Family::Data => "data",
+        }
+    }
+}
+
+/// How an effect's coefficients are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Columns that are added to the torque.
+    Columns,
+    /// Shifts the whole torque of its joints in time; its column is the derivative by the shift.
+    Shift,
+    /// Cannot be found by a fit that was free while carrying it: only with the model fixed.
+    Kept,
+    /// The data are cut or refused where it shows: no parameter is found.
+    Fault,
+}
+
+/// What the search does with the parameters that shape an effect's columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Search {
+    /// There are none.
+    Linear,
+    /// The best of a few is taken as it is.
+    Grid,
+    /// The best of a few is refined: by the simplex method, then by its derivatives with all other unknowns;
+    /// its deviation is that of the profile.
+    Refined,
+    /// The effect repeats with position: orders from the peaks of the residual's spectrum, refined likewise. Each
+    /// order is an effect of its own, so that it may come more than once.
+    Orders,
+}
+
+impl Search {
+    /// Whether shapes are refined, and not only chosen.
+    pub fn refines(self) -> bool {
+        matches!(self, Search::Refined | Search::Orders)
+    }
+}
+
+/// A motion of one joint alone, both ways at ten speeds over its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ladder {
+    /// Duration \[s\].
+    pub seconds: u32,
+    /// Share of the range, where it is not the whole.
+    pub travel: Option<f64>,
+}
+
+impl Ladder {
+    /// As long as a person waits for.
+    pub const USUAL: Ladder = Ladder {
+        seconds: 60,
+        travel: None,
+    };
+    /// Beside logs over the whole range: a gap keeps its width, a loop shrinks with the amplitude.
+    pub const NARROW: Ladder = Ladder {
+        travel: Some(0.1),
+        ..Ladder::USUAL
+    };
+    /// Long enough for friction to warm up.
+    pub const LONG: Ladder = Ladder {
+        seconds: 600,
+        ..Ladder::USUAL
+    };
+}
+
+/// One number of an effect, as files, results and the command line name it.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    pub name: &'static str,
+    pub unit: Unit,
+    /// Whether the key is a size of the effect. Where one size is given the other sizes are zero, and where none
+    /// is they take their defaults; every other key takes its own default.
+    pub size: bool,
+    /// What a machine can have.
+    pub range: Option<Range>,
+}
+
+/// Values that a key can have.
+#[derive(Debug, Clone, Copy)]
+pub struct Range {
+    pub least: f64,
+    pub most: f64,
+    /// Whether the least is none of them.
+    pub open: bool,
+    /// In words: `must be above 0`.
+    pub rule: &'static str,
+}
+
+impl Key {
+    /// A size of the effect.
+    pub const fn size(name: &'static str, unit: Unit) -> Self {
+        let size = true;
+        Self {
+            name,
+            unit,
+            size,
+            range: None,
+        }
+    }
+
+    /// A number that shapes the effect.
+    pub const fn shape(name: &'static str, unit: Unit) -> Self {
+        let size = false;
+        Self {
+            size,
+            ..Self::size(name, unit)
+        }
+    }
+
+    /// The key with numbers from `least` to `most` alone.
+    pub const fn within(self, least: f64, most: f64, rule: &'static str) -> Self {
+        let range = Some(Range {
+            least,
+            most,
+            open: false,
+            rule,
+        });
+        Self { range, ..self }
+    }
+
+    /// The key with numbers above zero alone.
+    pub const fn above_zero(self, rule: &'static str) -> Self {
+        let range = Some(Range {
+            least: 0.0,
+            most: f64::INFINITY,
+            open: true,
+            rule,
+        });
+        Self { range, ..self }
+    }
+}
+
+impl Range {
+    /// Whether a number is one of them.
+    pub fn holds(&self, value: f64) -> bool {
+        let low = match self.open {
+            true => value > self.least,
+            false => value >= self.least,
+        };
+        low && value <= self.most
+    }
+}
+
+/// An effect.
+#[derive(Debug)]
+pub struct Entry {
+    /// As results, files and the command line name it.
+    pub name: &'static str,
+    /// That which results name, then others that it looks like.
+    pub families: &'static [Family],
+    pub keys: &'static [Key],
+    pub places: Places,
+    pub role: Role,
+    pub search: Search,
+    /// Keys that are above zero where the effect is real: a fit with another sign has found something else.
+    pub positive: &'static [&'static str],
+    /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
+    pub ladder: Option<Ladder>,
+    /// The experiment that separates it, in words.
+    pub separate_by: &'static str,
+    /// Torque that it adds, or what it does to a log.
+    pub formula: &'static str,
+    /// Where it comes from in a machine, and who wrote of it.
+    pub source: &'static str,
+}
+
+impl Entry {
+    /// What most have: columns without a shape, at any joint.
+    pub const USUAL: Entry = Entry {
+        name: "",
+        families: &[],
+        keys: &[],
+        places: Places::Joints,
+        role: Role::Columns,
+        search: Search::Linear,
+        positive: &[],
+        ladder: None,
+        separate_by: "",
+        formula: "",
+        source: "",
+    };
+
+    /// The family that results name.
+    pub fn family(&self) -> Family {
+        self.families[0]
+    }
+
+    /// The key of a name.
+    pub fn key(&self, name: &str) -> Option<&'static Key> {
+        self.keys.iter().find(|key| key.name == name)
+    }
+}

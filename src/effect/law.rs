@@ -1,0 +1,152 @@
+//! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
+//! shaped by others.
+
+use super::cover::Cover;
+use super::entry::Entry;
+use super::place::Place;
+use super::values::{EffectError, Values};
+use crate::motion::Stretch;
+use crate::robot::Robot;
+use crate::robot::model::JointFriction;
+
+/// Along one stretch: the motion, and what the model as it stands makes of it.
+pub struct Scene<'a> {
+    pub robot: &'a Robot,
+    pub theta: &'a [f64],
+    pub laws: &'a [JointFriction],
+    pub stretch: &'a Stretch,
+    /// Reconstructed torque per joint, effects included, timing effects not [N or Nm].
+    pub hat: &'a [Vec<f64>],
+    /// Load torque per joint: the reconstructed torque less friction and offset.
+    pub load: &'a [Vec<f64>],
+}
+
+impl Scene<'_> {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.stretch.len()
+    }
+
+    /// Whether the stretch holds no sample.
+    pub fn is_empty(&self) -> bool {
+        self.stretch.is_empty()
+    }
+}
+
+/// Shapes to begin the search from, or what the data lack for the effect.
+pub type Starts = Result<Vec<Vec<f64>>, String>;
+
+/// Fills the columns of one joint along a scene: place, shape, joint, columns.
+pub type Fill = fn(&Scene, Place, &[f64], usize, &mut [Vec<f64>]);
+
+/// The estimator's law of an effect.
+pub struct Law {
+    pub entry: &'static Entry,
+    /// Whether it can sit at one of the entry's places on this robot.
+    pub fits: fn(&Robot, &[JointFriction], Place) -> bool,
+    /// Parameters that shape the columns, searched.
+    pub shape: &'static [&'static str],
+    /// Coefficients of the columns, one each.
+    pub linear: &'static [&'static str],
+    /// Shapes to try on these data, or what they lack.
+    pub starts: fn(&Cover, Place) -> Starts,
+    /// Limits of each shape parameter that is refined, on these data.
+    pub limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
+    /// Adds to `out` (one vector per linear coefficient, zero before) the columns of joint `joint`.
+    pub columns: Fill,
+    /// Between the entry's keys and shape and coefficients, where they are not the same.
+    pub reparametrised: Option<Reparametrisation>,
+}
+
+/// Two ways to say the numbers of one effect.
+pub struct Reparametrisation {
+    /// Shape and coefficients of the keys in a file.
+    pub of_keys: fn(&Values) -> Result<[Vec<f64>; 2], EffectError>,
+    /// The keys, in the order in which they are told, of shape and coefficients.
+    pub to_keys: fn(&[f64], &[f64]) -> Vec<KeyValue>,
+}
+
+/// A key's number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyValue {
+    pub key: &'static str,
+    pub value: f64,
+    /// Its derivatives by shape, then coefficients.
+    pub slopes: Vec<f64>,
+}
+
+impl Law {
+    /// A law without shape, at every place of its entry, on any data.
+    pub const fn linear(
+        entry: &'static Entry,
+        linear: &'static [&'static str],
+        columns: Fill,
+    ) -> Self {
+        Law {
+            entry,
+            fits: |_, _, _| true,
+            shape: &[],
+            linear,
+            starts: |_, _| Ok(vec![Vec::new()]),
+            limits: |_, _| Vec::new(),
+            columns,
+            reparametrised: None,
+        }
+    }
+
+    /// Where on this robot it can sit.
+    pub fn places(&self, robot: &Robot, laws: &[JointFriction]) -> Vec<Place> {
+        let mut places = self.entry.places.on(robot);
+        places.retain(|place| (self.fits)(robot, laws, *place));
+        places
+    }
+
+    /// Its numbers by the entry's keys.
+    pub fn keys(&self, shape: &[f64], linear: &[f64]) -> Vec<KeyValue> {
+        if let Some(with) = &self.reparametrised {
+            return (with.to_keys)(shape, linear);
+        }
+        let keys = self.shape.iter().chain(self.linear);
+        let values = shape.iter().chain(linear).enumerate();
+        let count = shape.len() + linear.len();
+        keys.zip(values)
+            .map(|(key, (i, value))| KeyValue::plain(key, *value, i, count))
+            .collect()
+    }
+
+    /// Shape and coefficients of numbers in a file.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a key that is absent or unusable.
+    pub fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
+        if let Some(with) = &self.reparametrised {
+            return (with.of_keys)(values);
+        }
+        let numbers =
+            |keys: &[&str]| -> Result<_, _> { keys.iter().map(|key| values.get(key)).collect() };
+        Ok([numbers(self.shape)?, numbers(self.linear)?])
+    }
+
+    /// Names of its keys in files.
+    pub fn key_names(&self) -> Vec<&'static str> {
+        match self.reparametrised {
+            None => self.shape.iter().chain(self.linear).copied().collect(),
+            Some(_) => self.entry.keys.iter().map(|key| key.name).collect(),
+        }
+    }
+}
+
+impl KeyValue {
+    /// That of parameter `i` itself, of `count` parameters.
+    pub fn plain(key: &'static str, value: f64, i: usize, count: usize) -> Self {
+        let mut slopes = vec![0.0; count];
+        slopes[i] = 1.0;
+        KeyValue { key, value, slopes }
+    }
+}
+
+impl std::fmt::Debug for Law {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.entry.name)
+    }
+}

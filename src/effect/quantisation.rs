@@ -1,0 +1,15 @@
+//! `quantisation`: a logged torque of few digits.
+
+use super::entry::{Entry, Family, Key, Role};
+use super::unit::Unit;
+
+pub static ENTRY: Entry = Entry {
+    name: "quantisation",
+    families: &[Family::Data],
+    keys: &[Key::size("step", Unit::Torque).above_zero("must be above 0")],
+    role: Role::Fault,
+    separate_by: "log the raw current",
+    formula: "none; the logged torque is rounded to whole steps",
+    source: "a drive that sends per mille of its rated torque, or a log with few digits",
+    ..Entry::USUAL
+};

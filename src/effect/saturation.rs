@@ -1,0 +1,15 @@
+//! `saturation`: a logged torque with flat tops.
+
+use super::entry::{Entry, Family, Key, Role};
+use super::unit::Unit;
+
+pub static ENTRY: Entry = Entry {
+    name: "saturation",
+    families: &[Family::Data],
+    keys: &[Key::size("limit", Unit::Torque).above_zero("must be above 0")],
+    role: Role::Fault,
+    separate_by: "move slower",
+    formula: "none; the logged torque stays within the limit",
+    source: "the range of a sensor, an amplifier or a bus message",
+    ..Entry::USUAL
+};

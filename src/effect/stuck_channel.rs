@@ -1,0 +1,20 @@
+//! `stuck-channel`: a channel that repeats its last value.
+
+use super::entry::{Entry, Family, Key, Role};
+use super::unit::Unit;
+
+pub static ENTRY: Entry = Entry {
+    name: "stuck-channel",
+    families: &[Family::Data],
+    keys: &[
+        Key::shape("at", Unit::Fixed("s")),
+        Key::shape("seconds", Unit::Fixed("s")),
+        // 1 the torque, 0 the position
+        Key::shape("torque", Unit::One),
+    ],
+    role: Role::Fault,
+    separate_by: "log again",
+    formula: "none; torque (1) or position (0) repeats its last value",
+    source: "a bus that lost messages, or a logger that fills gaps",
+    ..Entry::USUAL
+};
