@@ -10,13 +10,13 @@ mod study;
 use std::path::Path;
 
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
-use cft_ident::friction::passes::Ending;
 use cft_ident::identify::narrowed;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::encoder::{GRIDS, accumulate_shifted, add_scatter};
 use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::inertia::verdict::verdict;
 use cft_ident::inertia::{accumulate, add_processing};
+use cft_ident::math::descent::Ending;
 use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::dynamics::{Coefficients, inertia};

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::config::campaign::EstimatorKind;
 use crate::identify::{Account, LoggedRobot};
 use crate::inertia::instruments::ReferenceSource;
-use crate::inertia::robust::Status;
+use crate::math::descent::Ending;
 use crate::number;
 
 impl ValueEnum for EstimatorKind {
@@ -70,8 +70,9 @@ pub fn json(account: &Account, machine: &LoggedRobot) -> Value {
 pub fn text(account: &Account, machine: &LoggedRobot) -> String {
     let names = machine.robot.joint_names();
     let ended = match account.status {
-        Status::Converged => "converged",
-        Status::IterationLimit => "stopped at the limit of iterations",
+        Ending::Converged => "converged",
+        Ending::IterationLimit => "stopped at the limit of iterations",
+        Ending::Diverged => "diverged",
     };
     let mut out = String::new();
     if account.iterations > 1 {

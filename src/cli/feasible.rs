@@ -41,7 +41,7 @@ pub fn json(of: &ConsistentLinks, machine: &LoggedRobot) -> Value {
         "relative_error_after": per_joint(&of.after),
         "prior_weight": PRIOR_WEIGHT,
         "iterations": of.found.iterations,
-        "status": of.found.status,
+        "status": of.found.ending,
     })
 }
 

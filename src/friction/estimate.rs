@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::excitation::{FrictionError, Speeds, speeds};
 use super::inputs::Inputs;
-use super::passes::{Ending, GivenNoise, Maximum, add_choices, bands, maximise};
+use super::passes::{GivenNoise, Maximum, add_choices, bands, maximise};
 use super::plateau::{Plateau, plateaus};
 use super::prepare::Prepared;
 use super::problem::FRICTION;
 use super::slope::{open_above, profile_slope};
 use super::start::{FrictionStart, constant_inertia, from_log};
+use crate::math::descent::Ending;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 

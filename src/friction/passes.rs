@@ -6,6 +6,8 @@
 //! maximum of the likelihood at fixed parameters, the noise levels with them, and the covariance
 //! is linearised there.
 
+use std::convert::Infallible;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::ExtendedKalmanFilter;
@@ -14,6 +16,7 @@ use super::prepare::Prepared;
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Parameters};
 use super::score::{LikelihoodScore, log_likelihood, score};
 use super::start::FrictionStart;
+use crate::math::descent::{Ending, StepControl, Tried, descend};
 use crate::math::minimise;
 
 /// Factors on both noises in the annealed passes from a start that may be far off, and from one
@@ -42,15 +45,16 @@ const BANDS_HZ: [f64; 5] = [60.0, 36.0, 22.0, 13.0, 8.0];
 const LIKELIER: f64 = 1.0;
 /// Most Gauss-Newton steps of one refinement.
 const MOST_STEPS: usize = 40;
-
-/// How a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Ending {
-    Converged,
-    IterationLimit,
-    Diverged,
-}
+/// A step that gains less log-likelihood than this is the last.
+const SETTLED: f64 = 1e-4;
+/// Damping of the steps.
+const DAMPING: StepControl = StepControl {
+    start: 1e-3,
+    accepted: 0.1,
+    rejected: 10.0,
+    range: [1e-9, 1e8],
+    rejected_from: 1e-4,
+};
 
 /// Levels that the user gives; what is not given comes from the log.
 #[derive(Debug, Clone, Copy, Default)]
@@ -274,63 +278,32 @@ pub(super) fn refine_others(
     fixed: &[usize],
 ) -> RefinedParameters {
     let block = block(problem);
-    let mut p = start;
-    let mut at = score(problem, &p, noise, block);
-    let mut damping = 1e-3;
-    for _ in 0..most {
-        let Some(step) = damped(&at, spread, damping, fixed) else {
-            return RefinedParameters {
-                parameters: p,
-                score: at,
-                ending: Ending::Diverged,
+    let score = |p: &[f64]| score(problem, p, noise, block);
+    let first = score(&start);
+    let Ok(((parameters, score), ending, _)) =
+        descend((start, first), &DAMPING, most, &mut |(p, at), damping| {
+            let Some(step) = damped(at, spread, damping, fixed) else {
+                return Ok::<_, Infallible>(Tried::NoStep);
             };
-        };
-        // no step longer than the prior: the Gauss-Newton model is local
-        let longest = step
-            .iter()
-            .zip(spread)
-            .fold(0.0f64, |m, (d, s)| m.max(d.abs() / s));
-        let shorten = if longest > 0.5 { 0.5 / longest } else { 1.0 };
-        let mut trial: Parameters = p
-            .iter()
-            .zip(step.iter())
-            .map(|(x, d)| x + shorten * d)
-            .collect();
-        problem.clamp(&mut trial);
-        let next = score(problem, &trial, noise, block);
-        let gain = next.log_likelihood - at.log_likelihood;
-        if gain.is_finite() && gain >= 0.0 {
-            p = trial;
-            at = next;
-            damping = (damping * 0.1).max(1e-9);
-            if gain < 1e-4 {
-                return RefinedParameters {
-                    parameters: p,
-                    score: at,
-                    ending: Ending::Converged,
-                };
-            }
-        } else if gain.is_finite() && gain > -1e-4 * (1.0 + 1e-9 * at.log_likelihood.abs()) {
-            return RefinedParameters {
-                parameters: p,
-                score: at,
-                ending: Ending::Converged,
-            };
-        } else {
-            damping = damping.max(1e-4) * 10.0;
-            if damping > 1e8 {
-                return RefinedParameters {
-                    parameters: p,
-                    score: at,
-                    ending: Ending::Converged,
-                };
-            }
-        }
-    }
+            // no step longer than the prior: the Gauss-Newton model is local
+            let parts = step.iter().zip(spread).map(|(d, s)| d.abs() / s);
+            let shorten = 0.5 / parts.fold(0.5, f64::max);
+            let mut trial: Parameters = p.iter().zip(&step).map(|(x, d)| x + shorten * d).collect();
+            problem.clamp(&mut trial);
+            let next = score(&trial);
+            let gain = next.log_likelihood - at.log_likelihood;
+            let rounding = 1e-9 * at.log_likelihood.abs();
+            Ok(match gain.is_finite() {
+                true if gain >= SETTLED => Tried::Accepted((trial, next)),
+                true if gain >= 0.0 => Tried::Last((trial, next)),
+                true if gain > -SETTLED * (1.0 + rounding) => Tried::Settled,
+                _ => Tried::Rejected,
+            })
+        });
     RefinedParameters {
-        parameters: p,
-        score: at,
-        ending: Ending::IterationLimit,
+        parameters,
+        score,
+        ending,
     }
 }
 

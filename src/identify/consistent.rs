@@ -8,8 +8,8 @@ use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
 use crate::config::model_file::LinkBody;
 use crate::inertia::feasible::{ConsistencyProblem, Feasible, feasible};
-use crate::inertia::robust::Status;
 use crate::inertia::solve::{factor, residual_of, weights_of};
+use crate::math::descent::Ending;
 use crate::robot::bodies::StandardMap;
 use crate::robot::standard::{Body, pseudo_inertia};
 
@@ -114,7 +114,7 @@ impl ConsistentLinks {
                 ),
             }
         )];
-        if self.found.status == Status::IterationLimit {
+        if self.found.ending == Ending::IterationLimit {
             out.push("the search for feasible links did not settle; its last result stands".into());
         }
         out

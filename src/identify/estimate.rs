@@ -14,8 +14,9 @@ use crate::inertia::encoder::{GRIDS, add_scatter};
 use crate::inertia::feasible::nearest;
 use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
 use crate::inertia::refine::{self, RefinedFit};
-use crate::inertia::robust::{self, Robust, Status, Weigher};
+use crate::inertia::robust::{self, Robust, Weigher};
 use crate::inertia::solve::{self, Fit, FitError, fit};
+use crate::math::descent::Ending;
 use crate::motion::FilterSettings;
 
 /// What an estimator says of its own work.
@@ -24,7 +25,7 @@ pub struct Account {
     pub estimator: EstimatorKind,
     /// The estimator that was asked for cannot do without the refinement of the friction law.
     pub law_refined: bool,
-    pub status: Status,
+    pub status: Ending,
     /// Passes over the logs; 1 for least squares.
     pub iterations: usize,
     /// Per joint: scale of the residual [N or Nm] and share of rows of less than half weight.
@@ -49,7 +50,7 @@ impl Account {
         Account {
             estimator,
             law_refined: false,
-            status: Status::Converged,
+            status: Ending::Converged,
             iterations: 1,
             down_weighted: None,
             before: None,
@@ -176,7 +177,7 @@ fn refined(
     };
     let refined = refine::refine(start, &mut pass)?;
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
-    account.status = refined.status;
+    account.status = refined.ending;
     account.iterations = refined.iterations;
     account.before = Some(refined.before.clone());
     let sums = refined.factors.in_one_block();
@@ -199,7 +200,7 @@ fn robust_regression(
         fit,
         factors: sums,
         weigher,
-        status,
+        ending: status,
         iterations,
         scale,
         down_weighted,
@@ -226,7 +227,7 @@ fn instrumental(
     let mut simulate_by = plain.theta.clone();
     let Instrumental {
         fit,
-        status,
+        ending: status,
         iterations,
     } = instruments::iterate(columns, &plain, &mut |theta| {
         simulate_by = nearest(&map, &whole, effective, theta)?;

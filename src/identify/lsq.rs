@@ -16,9 +16,9 @@ use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::essential::{Essential, essential};
 use crate::inertia::instruments::ReferenceSource;
-use crate::inertia::robust::Status;
 use crate::inertia::solve::{Confounded, Fit, factor, residual_of, weights_of};
 use crate::log::Provenance;
+use crate::math::descent::Ending;
 use crate::motion::Summary;
 use crate::number;
 use crate::robot::friction::DoubleTanh;
@@ -152,7 +152,7 @@ impl Account {
                 ));
             }
         }
-        if self.status == Status::IterationLimit {
+        if self.status == Ending::IterationLimit {
             out.push(format!(
                 "{} did not settle in {} passes over the logs; its last result stands",
                 self.estimator.name(),

@@ -18,9 +18,9 @@ use super::closed_loop::{ClosedLoop, Gains};
 use super::columns::{GRADIENT, RegressorColumns};
 use super::covariance::{at_least, bandwidth};
 use super::encoder::next;
-use super::robust::Status;
 use super::solve::{Fit, FitError, weights_of};
 use crate::log::Block;
+use crate::math::descent::Ending;
 use crate::math::long_run::long_run;
 use crate::math::rank;
 use crate::motion::{self, FilterSettings, ParallelFilter, RunError, Summary};
@@ -341,7 +341,7 @@ fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Res
 #[derive(Debug, Clone)]
 pub struct Instrumental {
     pub fit: Fit,
-    pub status: Status,
+    pub ending: Ending,
     /// Simulations.
     pub iterations: usize,
 }
@@ -368,10 +368,10 @@ pub fn iterate<E: From<FitError>>(
         if settled || iterations == MOST {
             return Ok(Instrumental {
                 fit,
-                status: if settled {
-                    Status::Converged
+                ending: if settled {
+                    Ending::Converged
                 } else {
-                    Status::IterationLimit
+                    Ending::IterationLimit
                 },
                 iterations,
             });
@@ -379,7 +379,7 @@ pub fn iterate<E: From<FitError>>(
     }
     Ok(Instrumental {
         fit,
-        status: Status::IterationLimit,
+        ending: Ending::IterationLimit,
         iterations: MOST,
     })
 }
@@ -505,7 +505,7 @@ mod tests {
     #[test]
     fn without_noise_in_position_instruments_change_nothing() {
         let (plain, found) = (plain(0.0, 1), instrumental(0.0, 1, ReferenceSource::Logged));
-        assert_eq!(found.status, Status::Converged);
+        assert_eq!(found.ending, Ending::Converged);
         for i in 0..3 {
             let std = plain.covariance[(i, i)].sqrt();
             assert!((plain.theta[i] - found.fit.theta[i]).abs() < std, "{i}");

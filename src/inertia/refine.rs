@@ -14,10 +14,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::columns::{GRADIENT, KnownFriction, Own, RegressorColumns};
-use super::robust::Status;
 use super::solve::{
     Fit, FitError, FitInputs, PriorRows, Weighting, fit, fit_with, least_square, weights_of,
 };
+use crate::math::descent::{Ending, StepControl, Tried, descend};
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
 
@@ -26,8 +26,14 @@ use crate::robot::friction::DoubleTanh;
 const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
 const MOST: usize = 40;
-/// Damping to begin with, and its bounds.
-const DAMPING: [f64; 3] = [1e-3, 1e-9, 1e6];
+/// Damping of the steps.
+const DAMPING: StepControl = StepControl {
+    start: 1e-3,
+    accepted: 0.1,
+    rejected: 10.0,
+    range: [1e-9, 1e6],
+    rejected_from: 0.0,
+};
 /// Slopes of the columns that begin a law, times the joint's rms speed.
 const SLOPES: [f64; 8] = [0.7, 1.5, 3.3, 7.0, 15.0, 33.0, 70.0, 150.0];
 /// A slope may change by this factor in one step.
@@ -42,7 +48,7 @@ pub struct RefinedFit {
     pub columns: RegressorColumns,
     /// All unknowns in the order of [`RegressorColumns::with_free_friction`].
     pub fit: Fit,
-    pub status: Status,
+    pub ending: Ending,
     /// Passes over the logs.
     pub iterations: usize,
     /// Relative residual per joint before the refinement.
@@ -192,6 +198,96 @@ fn cost(
     Ok(least_square(&factors.with_own(&without_law(&factors.columns)), inputs)? + known)
 }
 
+/// A point of the descent: the friction, the rows about it, and the least cost there.
+struct Point {
+    columns: RegressorColumns,
+    /// The laws' changes are among the unknowns.
+    factors: BlockFactors,
+    known: Option<PriorRows>,
+    weights: Vec<f64>,
+    cost: f64,
+}
+
+impl Point {
+    fn of(
+        columns: RegressorColumns,
+        factors: BlockFactors,
+        known: Option<PriorRows>,
+        linear: &Fit,
+    ) -> Result<Self, FitError> {
+        let weights = weights_of(&factors, &linear.residual_std);
+        Ok(Point {
+            cost: cost(&factors, &weights, known.as_ref())?,
+            columns,
+            factors,
+            known,
+            weights,
+        })
+    }
+
+    /// The damped step; none where it promises nothing.
+    fn step(&self, damping: f64) -> Result<Option<DVector<f64>>, FitError> {
+        let damped_rows = damped(&self.factors, &self.weights, self.known.as_ref(), damping);
+        let inputs = FitInputs {
+            weights: &self.weights,
+            slope: None,
+            prior: Some(&damped_rows),
+        };
+        let promised = self.cost - least_square(&self.factors, inputs)?;
+        // a cost of one a row is one of the noise: far below it there is none
+        if promised <= SETTLED * self.cost || self.cost <= 1e-6 * self.factors.rows as f64 {
+            return Ok(None);
+        }
+        Ok(Some(fit_with(&self.factors, inputs)?.theta))
+    }
+
+    /// The fit here: values of the last step that was taken, the covariance of the fit about them.
+    fn fit(&self) -> Result<Fit, FitError> {
+        let (linear, all) = (&self.columns, &self.factors.columns);
+        let inputs = FitInputs {
+            weights: &self.weights,
+            slope: None,
+            prior: self.known.as_ref(),
+        };
+        let mut fit = fit_with(&self.factors, inputs)?;
+        let found = linear_fit(&self.factors)?;
+        fit.theta.fill(0.0);
+        for c in 0..linear.shared {
+            fit.theta[c] = found.theta[c];
+        }
+        for j in 0..linear.joints {
+            for k in 0..linear.own[j].len() {
+                fit.theta[all.first_own(j) + k] = found.theta[linear.first_own(j) + k];
+            }
+        }
+        add_laws(linear, &mut fit.theta);
+        fit.residual_std = found.residual_std;
+        fit.relative_error = found.relative_error;
+        Ok(fit)
+    }
+}
+
+/// The fit of all but the laws.
+fn linear_fit(factors: &BlockFactors) -> Result<Fit, FitError> {
+    fit(
+        &factors.with_own(&without_law(&factors.columns)),
+        Weighting::Wls,
+    )
+}
+
+/// Rms speed of each joint that has a law; 0 of the others.
+fn speeds(factors: &BlockFactors) -> Vec<f64> {
+    let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
+    let speed = |(j, own)| match place(own) {
+        Some(k) => {
+            let column = factors.columns.shared + k;
+            factors.joint(j).column(column).norm() / (factors.rows as f64).sqrt()
+        }
+        None => 0.0,
+    };
+    factors.columns.own.iter().enumerate().map(speed).collect()
+}
+
 /// Fits all parameters, from the friction in `start` and drawn to it by its covariance. `pass`
 /// reads the logs once.
 ///
@@ -201,106 +297,44 @@ pub fn refine<E: From<FitError>>(
     start: RegressorColumns,
     pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
 ) -> Result<RefinedFit, E> {
-    let speeds = |factors: &BlockFactors| -> Vec<f64> {
-        let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
-        let speed = |(j, own)| match place(own) {
-            Some(k) => {
-                factors.joint(j).column(factors.columns.shared + k).norm()
-                    / (factors.rows as f64).sqrt()
-            }
-            None => 0.0,
-        };
-        factors.columns.own.iter().enumerate().map(speed).collect()
-    };
-    let mut now = sorted(start.clone());
-    let mut factors = pass(&now)?.with_free_friction();
-    let linear = |factors: &BlockFactors| {
-        fit(
-            &factors.with_own(&without_law(&factors.columns)),
-            Weighting::Wls,
-        )
-    };
-    let first = linear(&factors)?;
+    let columns = sorted(start.clone());
+    let factors = pass(&columns)?.with_free_friction();
+    let first = linear_fit(&factors)?;
     // correlated rows hold less than their number says: what was known must not drown among them
     let strength = (first.rows as f64 / first.effective_rows).max(1.0);
-    let before = first.relative_error.clone();
-    let mut weights = weights_of(&factors, &first.residual_std);
-    let mut known = prior(&start, &now, strength)?;
-    let mut lowest = cost(&factors, &weights, known.as_ref())?;
-    let (mut damping, mut iterations) = (DAMPING[0], 1);
-    let mut status = Status::IterationLimit;
     let speed = speeds(&factors);
-    while iterations < MOST {
-        let damped_rows = damped(&factors, &weights, known.as_ref(), damping);
-        let inputs = FitInputs {
-            weights: &weights,
-            slope: None,
-            prior: Some(&damped_rows),
+    let known = prior(&start, &columns, strength)?;
+    let begun = Point::of(columns, factors, known, &first)?;
+    let mut iterations = 1;
+    let (at, ending, _) = descend(begun, &DAMPING, MOST - 1, &mut |at, damping| {
+        let Some(step) = at.step(damping)? else {
+            return Ok::<_, E>(Tried::Settled);
         };
-        let promised = lowest - least_square(&factors, inputs)?;
-        // a cost of one a row is one of the noise: far below it there is none
-        if promised <= SETTLED * lowest || lowest <= 1e-6 * factors.rows as f64 {
-            status = Status::Converged;
-            break;
-        }
-        let step = fit_with(&factors, inputs)?.theta;
-        let next = sorted(moved(&now, &step, &speed));
-        let trial = pass(&next)?.with_free_friction();
+        let columns = sorted(moved(&at.columns, &step, &speed));
+        let factors = pass(&columns)?.with_free_friction();
         iterations += 1;
-        let trial_known = prior(&start, &next, strength)?;
-        let found = cost(&trial, &weights, trial_known.as_ref())?;
-        if found < lowest {
-            let little = lowest - found <= SETTLED * lowest;
-            (now, factors, known) = (next, trial, trial_known);
-            weights = weights_of(&factors, &linear(&factors)?.residual_std);
-            lowest = cost(&factors, &weights, known.as_ref())?;
-            damping = (damping / 10.0).max(DAMPING[1]);
-            if little {
-                status = Status::Converged;
-                break;
-            }
-        } else if damping < DAMPING[2] {
-            damping *= 10.0;
-        } else {
-            // no step is short enough to be of use: the lowest point that rounding lets be seen
-            status = Status::Converged;
-            break;
+        let known = prior(&start, &columns, strength)?;
+        let gained = at.cost - cost(&factors, &at.weights, known.as_ref())?;
+        if gained.is_nan() || gained <= 0.0 {
+            return Ok(Tried::Rejected);
         }
-    }
-    let at_end = linear(&factors)?;
-    let mut refined = RefinedFit {
-        columns: now,
-        fit: at_end.clone(),
-        status,
+        let linear = linear_fit(&factors)?;
+        let next = Point::of(columns, factors, known, &linear)?;
+        Ok(match gained <= SETTLED * at.cost {
+            true => Tried::Last(next),
+            false => Tried::Accepted(next),
+        })
+    })?;
+    Ok(RefinedFit {
+        fit: at.fit()?,
+        columns: at.columns,
+        ending,
         iterations,
-        before,
-        factors,
-        weights,
-        prior: known,
-    };
-    let inputs = FitInputs {
-        weights: &refined.weights,
-        slope: None,
-        prior: refined.prior.as_ref(),
-    };
-    let mut fit = fit_with(&refined.factors, inputs)?;
-    // the values are those of the last step that was taken; the fit about them gives the covariance
-    fit.theta.fill(0.0);
-    let linear_columns = &refined.columns;
-    for c in 0..linear_columns.shared {
-        fit.theta[c] = at_end.theta[c];
-    }
-    for j in 0..linear_columns.joints {
-        for k in 0..linear_columns.own[j].len() {
-            fit.theta[refined.factors.columns.first_own(j) + k] =
-                at_end.theta[linear_columns.first_own(j) + k];
-        }
-    }
-    add_laws(&refined.columns, &mut fit.theta);
-    fit.residual_std = at_end.residual_std;
-    fit.relative_error = at_end.relative_error;
-    refined.fit = fit;
-    Ok(refined)
+        before: first.relative_error,
+        factors: at.factors,
+        weights: at.weights,
+        prior: at.known,
+    })
 }
 
 /// The steeper part first.
@@ -349,7 +383,7 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
 }
 
 /// Begins the law of every joint whose own terms name viscous friction: the columns with the laws
-/// as known friction of no covariance, without those terms. Also the linear fit that came first.
+/// as known friction of no covariance, without those terms.
 ///
 /// # Errors
 /// Those of `pass`, and [`FitError`].
@@ -357,87 +391,131 @@ pub fn begin<E: From<FitError>>(
     linear: &RegressorColumns,
     pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
 ) -> Result<RegressorColumns, E> {
-    let viscous = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Viscous);
-    let first = pass(linear)?;
-    let plain = fit(&first, Weighting::Wls)?;
-    let mut many = linear.clone();
-    let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
-    for (j, slopes) in slopes.iter_mut().enumerate() {
-        let Some(k) = viscous(&linear.own[j]) else {
-            continue;
-        };
-        let speed = plain.column_rms[(j, linear.first_own(j) + k)];
-        let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
-        *slopes = SLOPES.map(|s| s * unit);
-        many.own[j].retain(|o| *o != Own::Coulomb);
-        many.own[j].extend(slopes.map(Own::Saturating));
-    }
-    let factors = pass(&many)?;
+    let plain = fit(&pass(linear)?, Weighting::Wls)?;
+    let ladder = SlopeLadder::of(linear, &plain);
+    let factors = pass(&ladder.columns)?;
     let weights = weights_of(&factors, &plain.residual_std);
-    let base = |j: usize| -> Vec<usize> {
-        let all = many.own[j].iter().enumerate();
-        all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
-            .map(|(k, _)| k)
-            .collect()
-    };
-    let keep = |j: usize, pair: [usize; 2]| -> Vec<usize> {
-        let mut keep = base(j);
-        if viscous(&many.own[j]).is_some() {
-            let first = many.own[j].len() - SLOPES.len();
-            keep.extend(pair.map(|k| first + k));
-        }
-        keep
-    };
-    // one block of each joint's R factor is all that a choice needs
-    let small = factors.in_one_block();
-    let mut pairs = vec![[SLOPES.len() - 2, 2]; linear.joints];
     let inputs = FitInputs {
         weights: &weights,
         ..FitInputs::default()
     };
-    for j in 0..linear.joints {
-        if viscous(&linear.own[j]).is_none() {
-            continue;
+    // one block of each joint's R factor is all that a choice needs
+    let factors = factors.in_one_block();
+    let pairs = ladder.best_pairs(&factors, inputs)?;
+    Ok(ladder.laws(&factors, inputs, &pairs)?)
+}
+
+/// Place of viscous friction among a joint's own terms.
+fn viscous(own: &[Own]) -> Option<usize> {
+    own.iter().position(|o| *o == Own::Viscous)
+}
+
+/// Columns of tanh(w_k v) for all slopes, of every joint with viscous friction.
+struct SlopeLadder<'a> {
+    linear: &'a RegressorColumns,
+    columns: RegressorColumns,
+    /// w_k per joint [s/m or s/rad].
+    slopes: Vec<[f64; SLOPES.len()]>,
+}
+
+impl<'a> SlopeLadder<'a> {
+    fn of(linear: &'a RegressorColumns, plain: &Fit) -> Self {
+        let mut columns = linear.clone();
+        let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
+        for (j, slopes) in slopes.iter_mut().enumerate() {
+            let Some(k) = viscous(&linear.own[j]) else {
+                continue;
+            };
+            let speed = plain.column_rms[(j, linear.first_own(j) + k)];
+            let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
+            *slopes = SLOPES.map(|s| s * unit);
+            columns.own[j].retain(|o| *o != Own::Coulomb);
+            columns.own[j].extend(slopes.map(Own::Saturating));
         }
-        let mut best = (f64::INFINITY, pairs[j]);
-        for steep in 1..SLOPES.len() {
-            for flat in 0..steep {
-                pairs[j] = [steep, flat];
-                let chosen: Vec<Vec<usize>> =
-                    (0..linear.joints).map(|i| keep(i, pairs[i])).collect();
-                let square = least_square(&small.with_own(&chosen), inputs)?;
-                if square < best.0 {
-                    best = (square, pairs[j]);
+        SlopeLadder {
+            linear,
+            columns,
+            slopes,
+        }
+    }
+
+    /// Places of a joint's own terms beside the ladder.
+    fn base(&self, j: usize) -> Vec<usize> {
+        let all = self.columns.own[j].iter().enumerate();
+        all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
+            .map(|(k, _)| k)
+            .collect()
+    }
+
+    /// The same with a pair of slopes on each joint.
+    fn with_pairs(&self, pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
+        let of = |(j, pair): (usize, &[usize; 2])| {
+            let mut keep = self.base(j);
+            if viscous(&self.columns.own[j]).is_some() {
+                let first = self.columns.own[j].len() - SLOPES.len();
+                keep.extend(pair.map(|k| first + k));
+            }
+            keep
+        };
+        pairs.iter().enumerate().map(of).collect()
+    }
+
+    /// The two slopes that explain most, joint after joint.
+    fn best_pairs(
+        &self,
+        factors: &BlockFactors,
+        inputs: FitInputs,
+    ) -> Result<Vec<[usize; 2]>, FitError> {
+        let mut pairs = vec![[SLOPES.len() - 2, 2]; self.linear.joints];
+        for j in (0..pairs.len()).filter(|j| viscous(&self.linear.own[*j]).is_some()) {
+            let mut best = (f64::INFINITY, pairs[j]);
+            for steep in 1..SLOPES.len() {
+                for flat in 0..steep {
+                    pairs[j] = [steep, flat];
+                    let chosen = factors.with_own(&self.with_pairs(&pairs));
+                    let square = least_square(&chosen, inputs)?;
+                    if square < best.0 {
+                        best = (square, pairs[j]);
+                    }
                 }
             }
+            pairs[j] = best.1;
         }
-        pairs[j] = best.1;
+        Ok(pairs)
     }
-    let chosen: Vec<Vec<usize>> = (0..linear.joints).map(|j| keep(j, pairs[j])).collect();
-    let found = fit_with(&small.with_own(&chosen), inputs)?;
-    let mut start = linear.clone();
-    for j in 0..linear.joints {
-        let Some(k) = viscous(&linear.own[j]) else {
-            continue;
-        };
-        let chosen = small.with_own(&chosen).columns;
-        let at = |k: usize| found.theta[chosen.first_own(j) + k];
-        let last = chosen.own[j].len();
-        let [steep, flat] = pairs[j].map(|k| slopes[j][k]);
-        let viscous = base(j).iter().position(|b| *b == k).unwrap_or_default();
-        start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
-        start.known[j] = Some(KnownFriction {
-            law: DoubleTanh::from_parameters([
-                at(viscous),
-                at(last - 2),
-                at(last - 1),
-                steep,
-                flat,
-            ]),
-            covariance: [[0.0; GRADIENT]; GRADIENT],
-        });
+
+    /// The columns with laws of the chosen slopes in place of viscous and Coulomb friction.
+    fn laws(
+        &self,
+        factors: &BlockFactors,
+        inputs: FitInputs,
+        pairs: &[[usize; 2]],
+    ) -> Result<RegressorColumns, FitError> {
+        let chosen = factors.with_own(&self.with_pairs(pairs));
+        let found = fit_with(&chosen, inputs)?;
+        let mut start = self.linear.clone();
+        for j in 0..self.linear.joints {
+            let Some(k) = viscous(&self.linear.own[j]) else {
+                continue;
+            };
+            let at = |k: usize| found.theta[chosen.columns.first_own(j) + k];
+            let last = chosen.columns.own[j].len();
+            let [steep, flat] = pairs[j].map(|k| self.slopes[j][k]);
+            let place = self.base(j).iter().position(|b| *b == k);
+            start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
+            start.known[j] = Some(KnownFriction {
+                law: DoubleTanh::from_parameters([
+                    at(place.unwrap_or_default()),
+                    at(last - 2),
+                    at(last - 1),
+                    steep,
+                    flat,
+                ]),
+                covariance: [[0.0; GRADIENT]; GRADIENT],
+            });
+        }
+        Ok(start)
     }
-    Ok(start)
 }
 
 #[cfg(test)]
@@ -511,7 +589,7 @@ mod tests {
         };
         let start = begin(&linear, &mut pass).unwrap();
         let found = refine(start, &mut pass).unwrap();
-        assert_eq!(found.status, Status::Converged);
+        assert_eq!(found.ending, Ending::Converged);
         let truth = [INERTIA, 0.3, LAW[0], LAW[1], LAW[2], LAW[3], LAW[4]];
         for (i, truth) in truth.into_iter().enumerate() {
             let off = (found.fit.theta[i] / truth - 1.0).abs();

@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
 use super::solve::{Fit, FitError, FitInputs, Weighting, fit, fit_with};
+use crate::math::descent::Ending;
 
 /// Tuning of Huber's loss: 95 % efficiency where residuals are normal.
 const HUBER: f64 = 1.345;
@@ -244,16 +245,6 @@ impl Weigher {
 /// The mean of psi' over that of the weights is at least this; it is near 1 but for wild residuals.
 const LEAST_SLOPE: f64 = 0.1;
 
-/// How an estimator that iterates ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Status {
-    /// The last iteration moved nothing that matters.
-    Converged,
-    /// The iterations are used up; the last one's result stands.
-    IterationLimit,
-}
-
 /// A robust fit.
 #[derive(Debug, Clone)]
 pub struct Robust {
@@ -262,7 +253,7 @@ pub struct Robust {
     pub factors: BlockFactors,
     /// Gives other readings of the logs the weights of the fit.
     pub weigher: Weigher,
-    pub status: Status,
+    pub ending: Ending,
     /// Passes over the logs with weights.
     pub iterations: usize,
     /// Scale of each joint's residuals [N or Nm].
@@ -285,10 +276,10 @@ pub fn irls<E: From<FitError>>(
     pass(Some(&mut seen))?;
     let mut scale = seen.scales(&floor);
     let mut iterations = 1;
-    let mut status = Status::IterationLimit;
+    let mut ending = Ending::IterationLimit;
     let mut last = None;
     for loss in [Loss::Huber, Loss::Bisquare] {
-        status = Status::IterationLimit;
+        ending = Ending::IterationLimit;
         for _ in 0..MOST {
             seen = Weigher::new(loss, fit.theta.clone(), scale, &rms);
             let factors = pass(Some(&mut seen))?;
@@ -304,7 +295,7 @@ pub fn irls<E: From<FitError>>(
             fit = next;
             last = Some(factors);
             if settled {
-                status = Status::Converged;
+                ending = Ending::Converged;
                 break;
             }
         }
@@ -317,7 +308,7 @@ pub fn irls<E: From<FitError>>(
         scale: seen.scale.clone(),
         weigher: seen,
         fit,
-        status,
+        ending,
         iterations,
     })
 }
@@ -373,7 +364,7 @@ mod tests {
         let plain = fit(&read(0.02, 3, None).unwrap(), Weighting::Wls).unwrap();
         assert!((plain.theta[2] - 0.7).abs() > 0.4, "{}", plain.theta);
         let robust = irls(&mut |w| read(0.02, 3, w)).unwrap();
-        assert_eq!(robust.status, Status::Converged);
+        assert_eq!(robust.ending, Ending::Converged);
         for (i, truth) in TRUTH.into_iter().enumerate() {
             let std = robust.fit.covariance[(i, i)].sqrt();
             let off = (robust.fit.theta[i] - truth).abs();

@@ -6,10 +6,12 @@
 //! | [`rfactor`] | triangular factor of a stacked matrix that never exists as a whole | none |
 //! | [`rank`] | singular values, rank, condition number | `faer` |
 //! | [`jacobi`] | one-sided Jacobi singular values: fallback and test oracle | none |
+//! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
+pub mod descent;
 pub mod jacobi;
 pub mod long_run;
 pub mod minimise;

@@ -10,8 +10,8 @@ pub mod log_cholesky;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::robust::Status;
 use super::solve::FitError;
+use crate::math::descent::{Ending, StepControl, Tried, descend};
 use crate::math::rfactor::RFactor;
 use crate::robot::bodies::StandardMap;
 use crate::robot::standard::{Body, STANDARD, pseudo_inertia};
@@ -31,6 +31,14 @@ pub const PLAIN: Body = Body {
 pub const PLAIN_DRIVE: f64 = 0.1;
 /// A step that lowers the cost by less than this share is the last.
 const SETTLED: f64 = 1e-6;
+/// Damping of the steps.
+const DAMPING: StepControl = StepControl {
+    start: 1e-3,
+    accepted: 0.2,
+    rejected: 4.0,
+    range: [1e-12, 1e12],
+    rejected_from: 0.0,
+};
 /// Most steps under each weight of the prior.
 const MOST: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
@@ -61,7 +69,7 @@ pub struct Feasible {
     pub drives: Vec<f64>,
     /// Whether each link's prior comes from the robot file.
     pub given: Vec<bool>,
-    pub status: Status,
+    pub ending: Ending,
     pub iterations: usize,
 }
 
@@ -87,36 +95,31 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
         .fill(PLAIN_DRIVE.ln());
 
     let reduced = EliminatedFactor::of(task);
-    let mut x = prior.clone();
-    let mut iterations = 0;
-    let mut status = Status::IterationLimit;
+    let (mut x, mut iterations, mut ending) = (prior.clone(), 0, Ending::IterationLimit);
     // from the prior outward: a search that begins without it runs along the border of what
     // is consistent, where its numbers go to infinity and it hardly moves
     for weight in WEIGHTS {
-        let (mut damping, limit) = (1e-3, iterations + MOST);
-        let (mut lowest, mut jacobian, mut residual) = reduced.at(task.map, &x, &prior, weight);
-        status = Status::IterationLimit;
-        while iterations < limit {
-            iterations += 1;
-            let step = damped_step(&jacobian, &residual, damping);
-            let next = &x + step.map(|s| s.clamp(-FARTHEST, FARTHEST));
-            let (cost, j, r) = reduced.at(task.map, &next, &prior, weight);
-            if cost < lowest {
-                let gained = lowest - cost;
-                (x, jacobian, residual) = (next, j, r);
-                damping = (damping / 5.0f64).max(1e-12);
-                lowest = cost;
-                if gained <= SETTLED * cost {
-                    status = Status::Converged;
-                    break;
-                }
-            } else if damping < 1e12 {
-                damping *= 4.0;
-            } else {
-                status = Status::Converged;
-                break;
-            }
-        }
+        let at = |x: DVector<f64>| {
+            let (cost, jacobian, residual) = reduced.at(task.map, &x, &prior, weight);
+            (x, cost, jacobian, residual)
+        };
+        let found = descend(
+            at(x),
+            &DAMPING,
+            MOST,
+            &mut |(x, lowest, jacobian, residual), d| {
+                let step = damped_step(jacobian, residual, d);
+                let next = at(x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
+                Ok::<_, FitError>(match next.1 {
+                    cost if cost < *lowest && lowest - cost <= SETTLED * cost => Tried::Last(next),
+                    cost if cost < *lowest => Tried::Accepted(next),
+                    _ => Tried::Rejected,
+                })
+            },
+        )?;
+        x = found.0.0;
+        ending = found.1;
+        iterations += found.2;
     }
     let (standard, _) = standard_at(&x, links, drives);
     let mapped = &task.map.matrix * &standard;
@@ -131,7 +134,7 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
             .copied()
             .collect(),
         given,
-        status,
+        ending,
         iterations,
     })
 }
