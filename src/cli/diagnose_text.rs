@@ -1,10 +1,10 @@
 //! What `diagnose` tells a person: the effects, their numbers, what is left, and the errors before and after.
 
-use super::diagnose::{Diagnosed, in_words, verdict};
+use super::diagnose::in_words;
 use super::typed;
 use crate::diagnose::{Candidate, Diagnosis, Errors, Pair};
 use crate::effect::Added;
-use crate::identify::LoggedRobot;
+use crate::identify::{Diagnosed, LoggedRobot};
 use crate::number;
 use crate::report::table::{Align, Table, hanging};
 
@@ -15,7 +15,7 @@ const MARGIN: &str = "     ";
 pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
     let d = &found.diagnosis;
     let robot = &machine.robot;
-    let mut out = match verdict(d) {
+    let mut out = match found.verdict() {
         "effects-found" => format!("{name} lacks:\n"),
         "nothing-missing" => format!("{}\n", nothing_missing(d, &format!(" in {name}"))),
         _ if d.steps.is_empty() => {
@@ -36,7 +36,7 @@ pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
             "{} ({}): {}",
             effect.title(robot),
             effect.family().name(),
-            in_words(machine, d, step.effect)
+            in_words(machine, found, step.effect)
         );
         out += &hanging(&format!("{:>3}. ", i + 1), &found, 7);
         if let Some(s) = &step.candidate.score {

@@ -7,12 +7,15 @@ use serde_json::{Value, json};
 
 use super::pages::{self, Look, held_for_pictures};
 use super::{
-    CliError, Context, Exit, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
+    CliError, Context, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
     logs_of, lsq, validate,
 };
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
-use crate::identify::{self, FrictionSettings, LoggedRobot, LsqSettings, new_model, refined};
+use crate::identify::{
+    self, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, ErrorKind, FrictionSettings, LoggedRobot,
+    LsqSettings, new_model, refined,
+};
 use crate::log::{LogSpec, Provenance};
 use crate::output::write_whole;
 use crate::report::json::Document;
@@ -198,32 +201,40 @@ fn execute(
     let mut training = logs(base, &roles.identification)?;
     // friction is fitted again beside an effect, from the logs that it came from
     training.extend(one_joint.iter().cloned());
-    let roles = diagnose::Logs {
-        train: &training,
+    let (fitted_to, decided) = (logs_of(&training), logs_of(&unseen));
+    let roles = DiagnoseLogs {
+        train: &fitted_to,
         veto: &[],
-        holdout: &unseen,
+        holdout: &decided,
     };
-    match diagnose::diagnose(&machine, &model, "model.toml", &roles, false, context) {
-        Ok(diagnose::Found::DataFault(fault)) => {
+    let settings = DiagnoseSettings::default();
+    match identify::diagnose(
+        &machine,
+        ("model.toml", &model),
+        &roles,
+        &settings,
+        context.control(),
+    ) {
+        Ok(DiagnoseEnd::DataFault(fault)) => {
             diagnose_json = diagnose_fault::json(&fault);
             lacking = diagnose_fault::text(&fault);
             at_fault = Some(fault);
         }
-        Ok(diagnose::Found::Diagnosed(found)) => {
+        Ok(DiagnoseEnd::Diagnosed(found)) => {
             diagnose_json = diagnose::json(&machine, &found);
             lacking = diagnose_text::text(&machine, &found, "model.toml");
             if !found.diagnosis.steps.is_empty() {
-                let refined = diagnose::into_model(&machine, &model, &found);
+                let refined = found.model(&machine, &model);
                 write(folder, "refined.toml", &refined.to_toml()?, &mut files)?;
                 refined_model = Some(refined);
             }
             diagnosed = Some(found);
         }
         // logs too short to look for effects are no reason to lose the fit
-        Err(error) if error.exit() == Exit::Undetermined => {
-            warnings.push(format!("no diagnosis: {error}"));
+        Err(error) if error.kind() == ErrorKind::Undetermined => {
+            warnings.push(format!("no diagnosis: {}", CliError::from(error)));
         }
-        Err(error) => return Err(error),
+        Err(error) => return Err(error.into()),
     }
 
     // only now, with everything decided, may the truth be looked at

@@ -9,7 +9,6 @@ pub mod completions;
 pub mod convert;
 pub mod diagnose;
 mod diagnose_fault;
-mod diagnose_prior;
 mod diagnose_text;
 pub mod excite;
 pub mod export;

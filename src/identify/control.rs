@@ -67,6 +67,9 @@ impl Control {
             control: self.clone(),
         }
     }
+    pub(super) fn note(&self, text: &str) {
+        self.tell(Progress::Note(text));
+    }
 
     fn tell(&self, progress: Progress) {
         if let Some(tell) = &self.tell {

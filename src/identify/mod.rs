@@ -8,10 +8,12 @@
 //! |---|---|---|
 //! | [`friction`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
 //! | [`lsq`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
+//! | [`diagnose`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
 //! | [`validate`] | logs that were not used, a model | [`Validated`]: torque errors |
 
 mod consistent;
 mod control;
+mod diagnose;
 mod error;
 mod estimate;
 mod friction;
@@ -23,12 +25,14 @@ mod model;
 mod one_joint;
 mod open_log;
 mod passes;
+mod prior;
 mod reference;
 mod unknowns;
 mod validate;
 
 pub use consistent::ConsistentLinks;
 pub use control::{Control, Progress};
+pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
 pub use error::{ErrorKind, IdentifyError, ReadError};
 pub use estimate::{Account, Simulated};
 pub use friction::{FrictionSettings, IdentifiedFriction, friction};
@@ -36,7 +40,7 @@ pub use in_memory::{InMemory, read_whole};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
 pub use lsq::{IdentifiedDynamics, LsqSettings, lsq};
-pub use model::{in_file, new_model, refined, refined_or_friction};
+pub use model::{new_model, refined, refined_or_friction};
 pub use open_log::{OpenLog, summary_warnings};
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};

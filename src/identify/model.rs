@@ -45,7 +45,7 @@ fn with_effects(
 }
 
 /// An effect as a model file holds it.
-pub fn in_file(effect: &Added, machine: &LoggedRobot, told: &[EffectNumber]) -> Effect {
+pub(super) fn in_file(effect: &Added, machine: &LoggedRobot, told: &[EffectNumber]) -> Effect {
     Effect {
         name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),

@@ -1,7 +1,6 @@
 //! The page of `diagnose`, and its picture.
 
-use super::super::diagnose::{Diagnosed, in_words, into_model, verdict};
-use super::super::diagnose_fault::DataFault;
+use super::super::diagnose::in_words;
 use super::super::diagnose_text::{doubts, nothing_missing};
 use super::super::{CliError, Context};
 use super::look::Look;
@@ -9,7 +8,7 @@ use super::torque::Drawn;
 use super::{fit, friction, parameters, quality, residual, torque};
 use crate::config::ModelFile;
 use crate::diagnose::{Candidate, Errors, Pair};
-use crate::identify::LoggedRobot;
+use crate::identify::{DataFault, Diagnosed, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::figure::ResidualFigure;
@@ -49,7 +48,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
         .iter()
         .map(|s| d.model.effects[s.effect].title(&machine.robot))
         .collect();
-    match verdict(d) {
+    match found.verdict() {
         "effects-found" => {
             let mut text = format!("The model lacks: {}.", titles.join("; "));
             if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
@@ -95,7 +94,7 @@ pub fn diagnose(
     errors(&mut page, machine, found);
     sections(&mut page, machine, found, figure)?;
     let look = look(machine, found)?;
-    let refined = into_model(machine, of.file, found);
+    let refined = found.model(machine, of.file);
     parameters::section(&mut page, &refined, &|_| None);
     friction::section(
         &mut page,
@@ -292,7 +291,7 @@ fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             } else {
                 format!("{title}, or what it stands in for")
             },
-            in_words(machine, d, step.effect),
+            in_words(machine, found, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
             unseen,
             if alike.is_empty() {

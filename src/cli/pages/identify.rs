@@ -1,7 +1,5 @@
 //! The page of `identify`: the whole campaign.
 
-use super::super::diagnose::Diagnosed;
-use super::super::diagnose_fault::DataFault;
 use super::super::{CliError, Context, friction};
 use super::look::Look;
 use super::torque::Drawn;
@@ -9,7 +7,9 @@ use super::{diagnose, fit, parameters, quality, residual, torque, validate};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::effect::AugmentedModel;
-use crate::identify::{IdentifiedDynamics, IdentifiedFriction, LoggedRobot, Validated};
+use crate::identify::{
+    DataFault, Diagnosed, IdentifiedDynamics, IdentifiedFriction, LoggedRobot, Validated,
+};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::sections::provenance;

@@ -2,17 +2,17 @@
 
 use nalgebra::DMatrix;
 
+use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
 use crate::diagnose::{LogRole, Open};
 use crate::effect::{AugmentedModel, stationary_joints};
-use crate::identify::LoggedRobot;
 use crate::motion::Stretch;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
 /// Which parameters the fit may move: all but those that the friction stage left open.
-pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> Open {
+pub(super) fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> Open {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()
@@ -52,7 +52,11 @@ pub fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> 
 }
 
 /// Joints that move in a log in which all others are held.
-pub fn moved_alone(given: &AugmentedModel, stretches: &[Stretch], roles: &[LogRole]) -> Vec<bool> {
+pub(super) fn moved_alone(
+    given: &AugmentedModel,
+    stretches: &[Stretch],
+    roles: &[LogRole],
+) -> Vec<bool> {
     let robot = &given.model.robot;
     let fitted = stretches.iter().filter(|s| roles[s.log] == LogRole::Train);
     let fitted: Vec<Stretch> = fitted.cloned().collect();
@@ -73,7 +77,7 @@ const FRICTION_DOUBT: f64 = 3.0;
 /// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it. The
 /// friction of a joint that is `alone` in a log of its own, the others held, is fitted from that log:
 /// what the friction stage made of it would count twice, and without the effect that is looked for.
-pub fn information(
+pub(super) fn information(
     file: &ModelFile,
     given: &AugmentedModel,
     open: &Open,

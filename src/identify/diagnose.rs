@@ -1,0 +1,334 @@
+//! What the torque residual still holds, and the effects behind it.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::in_memory::{InMemory, read_whole};
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::{in_file, new_model, refined};
+use super::prior::{information, moved_alone, open};
+use crate::config::ModelFile;
+use crate::config::model_file::Parameter;
+use crate::diagnose::{
+    self, Case, DiagnoseError, Diagnosis, Limits, LogRole, Prior, Suspicion, Unknown,
+};
+use crate::effect::{self, AugmentedModel, EffectNumber};
+use crate::motion::Parallel;
+use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
+use crate::robot::model::JointFriction;
+use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
+
+/// Logs by what they are for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DiagnoseLogs<'a> {
+    /// Fitted.
+    pub train: &'a [Log],
+    /// May veto a step; without any, blocks of the others are set aside for it.
+    pub veto: &'a [Log],
+    /// Evaluated once, after everything is decided; without any, blocks are set aside.
+    pub holdout: &'a [Log],
+}
+
+/// How effects are looked for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DiagnoseSettings {
+    /// The given model stays within its covariance: finds payload, gain and tilt.
+    pub keep: bool,
+    /// What an effect must keep to be accepted.
+    pub limits: Limits,
+}
+
+/// What the stage ends with.
+pub enum DiagnoseEnd {
+    /// A diagnosis.
+    Diagnosed(Box<Diagnosed>),
+    /// A fault of the data, which comes before any physics.
+    DataFault(DataFault),
+}
+
+/// What `diagnose` found.
+pub struct Diagnosed {
+    pub diagnosis: Diagnosis,
+    /// The logs that it looked at.
+    pub held: InMemory,
+    /// Names of the logs, in order: fitted, veto, holdout.
+    pub logs: Vec<String>,
+    /// The model as it was given.
+    pub given: AugmentedModel,
+    pub parallel: Parallel,
+    pub cutoff_hz: f64,
+}
+
+/// A fault of the data.
+#[derive(Debug, Clone)]
+pub struct DataFault {
+    pub kind: String,
+    pub channel: Option<String>,
+    pub effect: String,
+    pub remedy: String,
+}
+
+/// Diagnoses a model, whose file is called `name`, on logs.
+///
+/// # Errors
+/// Logs or a model that cannot be used, and logs too short to look for effects.
+pub fn diagnose(
+    machine: &LoggedRobot,
+    (name, file): (&str, &ModelFile),
+    logs: &DiagnoseLogs,
+    settings: &DiagnoseSettings,
+    control: &Control,
+) -> Result<DiagnoseEnd, IdentifyError> {
+    let given = refined(file, name)?;
+    if let Some(fault) = refused(machine, logs.train, control)? {
+        return Ok(DiagnoseEnd::DataFault(fault));
+    }
+    let groups = [
+        (logs.train, LogRole::Train),
+        (logs.veto, LogRole::Veto),
+        (logs.holdout, LogRole::Holdout),
+    ];
+    let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
+    let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
+    let all = [logs.train, logs.veto, logs.holdout].concat();
+    let mut held = read_whole(machine, &all, control)?;
+    let case = case(machine, (name, file), given, &mut held, (roles, settings))?;
+    let work = control.begin("search", None);
+    let found = diagnose::diagnose(
+        &case,
+        &mut |step| control.note(&format!("added {step}")),
+        &|| control.stopped(),
+    );
+    drop(work);
+    let diagnosis = match found {
+        Ok(diagnosis) => diagnosis,
+        Err(DiagnoseError::Channels(found)) => {
+            return Ok(DiagnoseEnd::DataFault(wrong_channel(machine, found)));
+        }
+        Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
+        Err(error) => return Err(IdentifyError::Diagnose(error)),
+    };
+    held.stretches = case.stretches;
+    let logs: Vec<String> = all.iter().map(Log::name).collect();
+    for aside in &diagnosis.set_aside {
+        if aside.role == LogRole::Holdout {
+            let text = format!(
+                "{}: {:.2}..{:.2} s set aside as the holdout",
+                logs[aside.log], aside.from_s, aside.to_s
+            );
+            control.note(&text);
+        }
+    }
+    Ok(DiagnoseEnd::Diagnosed(Box::new(Diagnosed {
+        diagnosis,
+        held,
+        logs,
+        given: case.given,
+        parallel: case.parallel,
+        cutoff_hz: case.cutoff_hz,
+    })))
+}
+
+/// The first fault for which a fit refuses one of the logs.
+fn refused(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<Option<DataFault>, IdentifyError> {
+    for log in logs {
+        if let Some(fault) = machine.fault(log, control)? {
+            return Ok(Some(DataFault {
+                kind: fault.kind.word().to_owned(),
+                channel: fault.channel,
+                effect: format!("{}: {}", log.name(), fault.effect),
+                remedy: fault.remedy,
+            }));
+        }
+    }
+    Ok(None)
+}
+
+/// What the search is about; it takes the stretches of the logs.
+fn case(
+    machine: &LoggedRobot,
+    (name, file): (&str, &ModelFile),
+    given: AugmentedModel,
+    held: &mut InMemory,
+    (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
+) -> Result<Case, IdentifyError> {
+    let processing = machine.settings();
+    let parallel = Parallel::design(&processing, held.summary.dt)
+        .map_err(|error| IdentifyError::motion(name, error))?;
+    let open = open(machine, file, &given);
+    let rate = 1.0 / (held.summary.dt * parallel.decimation as f64);
+    let alone = moved_alone(&given, &held.stretches, &roles);
+    let prior = Prior {
+        information: information(file, &given, &open, settings.keep, &alone),
+        centre: given.clone(),
+        rows_per_independent: (rate / (2.0 * processing.cutoff_hz)).max(1.0),
+    };
+    Ok(Case {
+        given,
+        prior,
+        open,
+        stretches: std::mem::take(&mut held.stretches),
+        roles,
+        parallel,
+        cutoff_hz: processing.cutoff_hz,
+        units: (0..machine.robot.joints())
+            .map(|j| machine.file.torque_unit(j).to_owned())
+            .collect(),
+        averaged: held.averaged,
+        keep: settings.keep,
+        without: Vec::new(),
+        limits: settings.limits,
+    })
+}
+
+/// A torque channel that the model knows otherwise, as a fault.
+fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
+    let names = machine.robot.joint_names();
+    let (joint, effect, remedy) = match found {
+        Suspicion::Turned { joint } => (
+            joint,
+            format!(
+                "the torque of {} has the other sign than the model's",
+                names[joint]
+            ),
+            "set `torque_scale` of the joint to its negative in [log], or correct the log",
+        ),
+        Suspicion::Exchanged { joint, with } => (
+            joint,
+            format!(
+                "the torques of {} and {} have changed places",
+                names[joint], names[with]
+            ),
+            "exchange the two torque columns in [log]",
+        ),
+    };
+    DataFault {
+        kind: effect::wrong_sign_or_order::ENTRY.name.to_owned(),
+        channel: Some(names[joint].clone()),
+        effect,
+        remedy: remedy.to_owned(),
+    }
+}
+
+impl Diagnosed {
+    /// Whether there is a verdict of effects, of nothing, or of structure without a name.
+    pub fn verdict(&self) -> &'static str {
+        let diagnosis = &self.diagnosis;
+        let named = |step| diagnosis.explained(step);
+        if diagnosis.steps.iter().any(named) {
+            "effects-found"
+        } else if diagnosis.structured() {
+            "unexplained-residual"
+        } else {
+            "nothing-missing"
+        }
+    }
+
+    /// Parameters of an accepted effect with their standard deviations.
+    pub fn told(&self, machine: &LoggedRobot, effect: usize) -> Vec<EffectNumber> {
+        let added = &self.diagnosis.model.effects[effect];
+        let joint = added.place.joint().unwrap_or(0);
+        let covariance = self.diagnosis.covariance_of(effect);
+        added.numbers(
+            &machine.robot,
+            machine.file.torque_unit(joint),
+            Some(&covariance),
+        )
+    }
+
+    /// The refined model, where `file` is the one that was given.
+    pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
+        let diagnosis = &self.diagnosis;
+        let mut model = new_model(machine, "diagnose", &self.held.inputs);
+        model.parameters.clone_from(&file.parameters);
+        let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
+        let mut undetermined = Vec::new();
+        for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
+            let Some((name, joint, value)) = self.fitted(*unknown) else {
+                continue;
+            };
+            let there = |p: &&mut Parameter| p.name == name && p.joint == joint;
+            let Some(p) = model.parameters.iter_mut().find(there) else {
+                continue;
+            };
+            let variance = diagnosis.covariance[(i, i)];
+            let found = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+            match put(p, value, found) {
+                Some(factor) => {
+                    widened.push(factor);
+                    keys.push(p.key());
+                    places.push(i);
+                }
+                None => undetermined.push(p.key()),
+            }
+        }
+        model.forget_covariance(&undetermined);
+        model.replace_covariance(&keys, &|a, b| {
+            widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
+        });
+        let joints = machine.robot.joint_names().iter();
+        for (joint, std) in joints.zip(&diagnosis.residual_std) {
+            model.residual_std.insert(joint.clone(), *std);
+        }
+        let effects = diagnosis.model.effects.iter().enumerate();
+        model.effects = effects
+            .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
+            .collect();
+        model
+    }
+
+    /// Name, joint and value of an unknown that model files hold; none for those of effects.
+    fn fitted(&self, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
+        let fitted = &self.diagnosis.model.model;
+        let robot = &fitted.robot;
+        let (name, joint, value) = match unknown {
+            Unknown::Theta(k) => (
+                robot.parameters()[k].name.to_string(),
+                None,
+                fitted.theta[k],
+            ),
+            Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
+            Unknown::Friction { joint, k } => match &fitted.friction[joint] {
+                JointFriction::None => return None,
+                JointFriction::DoubleTanh(law) => (
+                    DoubleTanh::NAMES[k].to_owned(),
+                    Some(joint),
+                    law.parameters()[k],
+                ),
+                JointFriction::ViscousCoulomb(law) => (
+                    ViscousCoulomb::NAMES[k].to_owned(),
+                    Some(joint),
+                    [law.viscous, law.coulomb][k],
+                ),
+            },
+            Unknown::Linear { .. } | Unknown::Shape { .. } => return None,
+        };
+        Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
+    }
+}
+
+/// Gives a parameter the value and the standard deviation that were found, and says by how much the
+/// latter is widened; none where others stand in for the parameter in these logs.
+fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
+    if !found.is_finite() {
+        p.value = value;
+        p.std = None;
+        p.verdict = Some(Verdict::NotIdentifiable);
+        return None;
+    }
+    // what smoothing and the encoders' steps did to the given model, they do to this one
+    let std = found.max(p.std.unwrap_or(0.0));
+    // a parameter without a torque worth mentioning is known well enough as it is
+    let negligible = p.verdict == Some(Verdict::Identified)
+        && p.std.is_some_and(|s| s > IDENTIFIED * p.value.abs());
+    p.value = value;
+    p.std = Some(std);
+    if !negligible {
+        p.verdict = Some(verdict_of(value, std));
+    }
+    Some(if found > 0.0 { std / found } else { 1.0 })
+}
