@@ -76,7 +76,7 @@ const DOORS: &[(&str, &str)] = &[
     ("zstd", "log/content.rs|output/log.rs"),
     ("resvg", "report/figure/png.rs"),
     ("sha2", "log/source.rs"),
-    ("quick_xml", "config/urdf/xml.rs"),
+    ("roxmltree", "config/urdf/xml.rs"),
 ];
 
 /// Circles of imports that are still there: the folder, and those of its files and folders that tie

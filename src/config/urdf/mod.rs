@@ -70,13 +70,14 @@ impl UrdfChain {
     /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
     /// of the link or joint that cannot be used.
     pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
-        let root = xml::root(text).map_err(|wrong| ConfigError::Syntax {
+        let text = xml::without_comments(text);
+        let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
             file: file.to_owned(),
             line: wrong.line,
             message: wrong.message,
         })?;
         let place = Place { file };
-        tree::chain(&parts::parts(&root, &place)?, tip, &place)
+        tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
     }
 
     /// Reads a URDF file.

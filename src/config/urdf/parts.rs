@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Place;
-use super::xml::Element;
+use super::xml::{EXPAND, Element, MACRO};
 use crate::config::ConfigError;
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
@@ -80,11 +80,11 @@ pub(super) struct Parts {
 }
 
 /// Reads what stands in a `<robot>`.
-pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError> {
-    if root.name != "robot" {
+pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> {
+    if root.name() != "robot" {
         return Err(place.wrong(
-            root.line,
-            &format!("<{}>", escape(&root.name)),
+            root.line(),
+            &format!("<{}>", escape(root.name())),
             "is not the <robot> of a URDF",
             "give a URDF file; an SDF or a xacro file is to be converted first",
         ));
@@ -95,16 +95,16 @@ pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError>
     };
     let mut links: BTreeMap<&str, usize> = BTreeMap::new();
     let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
-    for child in &root.children {
-        let known = match child.name.as_str() {
+    for child in root.children() {
+        let known = match child.name() {
             "link" => &mut links,
             "joint" => &mut joints,
             name if name.starts_with("xacro:") => {
                 return Err(place.wrong(
-                    child.line,
+                    child.line(),
                     &format!("<{}>", escape(name)),
-                    "is a macro of xacro, not yet expanded",
-                    "expand it first: `xacro robot.urdf.xacro > robot.urdf`",
+                    MACRO,
+                    EXPAND,
                 ));
             }
             // materials, transmissions, sensors, gazebo
@@ -113,21 +113,21 @@ pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError>
         let name = child.attribute("name").unwrap_or_default();
         if name.trim().is_empty() {
             return Err(place.wrong(
-                child.line,
-                &format!("<{}>", child.name),
+                child.line(),
+                &format!("<{}>", child.name()),
                 "has no name",
                 "give it one: name=\"...\"",
             ));
         }
-        if let Some(line) = known.insert(name, child.line) {
+        if let Some(line) = known.insert(name, child.line()) {
             return Err(place.wrong(
-                child.line,
-                &format!("{} {}", child.name, escape(name)),
+                child.line(),
+                &format!("{} {}", child.name(), escape(name)),
                 &format!("has the name of that of line {line}"),
                 "give each its own name",
             ));
         }
-        if child.name == "link" {
+        if child.name() == "link" {
             parts.links.push(link(child, name, place)?);
         } else {
             parts.joints.push(joint(child, name, place)?);
@@ -135,7 +135,7 @@ pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError>
     }
     if parts.links.is_empty() {
         return Err(place.wrong(
-            root.line,
+            root.line(),
             "<robot>",
             "has no <link>",
             "give the URDF of a whole robot",
@@ -161,7 +161,7 @@ pub(super) fn parts(root: &Element, place: &Place) -> Result<Parts, ConfigError>
     Ok(parts)
 }
 
-fn link(element: &Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
+fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
     let at = Reading {
         place,
         what: format!("link {}", escape(name)),
@@ -190,12 +190,12 @@ fn link(element: &Element, name: &str, place: &Place) -> Result<Link, ConfigErro
     };
     Ok(Link {
         name: name.to_owned(),
-        line: element.line,
+        line: element.line(),
         body,
     })
 }
 
-fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigError> {
+fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigError> {
     let at = Reading {
         place,
         what: format!("joint {}", escape(name)),
@@ -203,7 +203,7 @@ fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigEr
     let kind = element.attribute("type").unwrap_or_default();
     let Some((_, kind)) = KINDS.iter().find(|(known, _)| *known == kind) else {
         return Err(place.wrong(
-            element.line,
+            element.line(),
             &at.what,
             &format!("has the type `{}`", escape(kind)),
             "give revolute, continuous, prismatic or fixed",
@@ -223,7 +223,7 @@ fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigEr
     let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
     if moving && axis.iter().all(|x| x.abs() < 1e-6) {
         return Err(place.wrong(
-            element.line,
+            element.line(),
             &at.what,
             "has an axis without length",
             "give an axis, e.g. xyz=\"0 0 1\"",
@@ -241,7 +241,7 @@ fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigEr
         let (low, high) = (low?, high?);
         if low > high {
             return Err(place.wrong(
-                limit.line,
+                limit.line(),
                 &at.what,
                 &format!("has the lower limit {low} above the upper {high}"),
                 "exchange the two",
@@ -264,7 +264,7 @@ fn joint(element: &Element, name: &str, place: &Place) -> Result<Joint, ConfigEr
     };
     Ok(Joint {
         name: name.to_owned(),
-        line: element.line,
+        line: element.line(),
         kind: *kind,
         parent: linked("parent")?,
         child: linked("child")?,
@@ -285,10 +285,14 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    fn part<'e>(&self, element: &'e Element, name: &str) -> Result<&'e Element, ConfigError> {
+    fn part<'a, 't>(
+        &self,
+        element: Element<'a, 't>,
+        name: &str,
+    ) -> Result<Element<'a, 't>, ConfigError> {
         element.child(name).ok_or_else(|| {
             self.place.wrong(
-                element.line,
+                element.line(),
                 &self.what,
                 &format!("has no <{name}>"),
                 &format!("add <{name} .../> to it"),
@@ -296,36 +300,31 @@ impl Reading<'_> {
         })
     }
 
-    fn lacks(&self, element: &Element, key: &str) -> ConfigError {
+    fn lacks(&self, element: Element, key: &str) -> ConfigError {
         self.place.wrong(
-            element.line,
+            element.line(),
             &self.what,
-            &format!("has a <{}> without {key}", element.name),
+            &format!("has a <{}> without {key}", element.name()),
             &format!("add {key}=\"...\""),
         )
     }
 
-    fn number(
-        &self,
-        element: &Element,
-        key: &str,
-        absent: Option<f64>,
-    ) -> Result<f64, ConfigError> {
+    fn number(&self, element: Element, key: &str, absent: Option<f64>) -> Result<f64, ConfigError> {
         let Some(text) = element.attribute(key) else {
             return absent.ok_or_else(|| self.lacks(element, key));
         };
         let value = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
         value.ok_or_else(|| {
             self.place.wrong(
-                element.line,
+                element.line(),
                 &self.what,
-                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name),
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
                 "give a finite number with a decimal point",
             )
         })
     }
 
-    fn vector(&self, element: &Element, key: &str, absent: Vector) -> Result<Vector, ConfigError> {
+    fn vector(&self, element: Element, key: &str, absent: Vector) -> Result<Vector, ConfigError> {
         let Some(text) = element.attribute(key) else {
             return Ok(absent);
         };
@@ -336,16 +335,16 @@ impl Reading<'_> {
         match numbers[..] {
             [x, y, z] if text.split_whitespace().count() == 3 => Ok([x, y, z]),
             _ => Err(self.place.wrong(
-                element.line,
+                element.line(),
                 &self.what,
-                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name),
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
                 "give three finite numbers with spaces between",
             )),
         }
     }
 
     /// Position [m] and roll, pitch, yaw [rad] of the `<origin>` inside.
-    fn origin(&self, element: &Element) -> Result<(Vector, Vector), ConfigError> {
+    fn origin(&self, element: Element) -> Result<(Vector, Vector), ConfigError> {
         let Some(origin) = element.child("origin") else {
             return Ok(([0.0; 3], [0.0; 3]));
         };
