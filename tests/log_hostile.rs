@@ -1,39 +1,13 @@
 //! Files that lie about themselves, and files of random bytes: refused or read, within bounded memory.
 
-mod log_support;
+#[path = "log_support/memory.rs"]
+mod memory;
 
-use std::alloc::{GlobalAlloc, Layout as Memory, System};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use cft_ident::log::{Block, Layout, LogError, LogSpec, Reader};
+use memory::{ONE, most_while};
 use proptest::prelude::*;
-
-/// Counts what is allocated, to see that a length in a file is never taken at its word.
-struct Counting;
-
-static NOW: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
-/// One test at a time, so that what one allocates is not counted for another.
-static ONE: Mutex<()> = Mutex::new(());
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, memory: Memory) -> *mut u8 {
-        let now = NOW.fetch_add(memory.size(), Relaxed) + memory.size();
-        MOST.fetch_max(now, Relaxed);
-        unsafe { System.alloc(memory) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, memory: Memory) {
-        NOW.fetch_sub(memory.size(), Relaxed);
-        unsafe { System.dealloc(pointer, memory) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn layout() -> Layout {
     Layout::joint_columns(&["q1", "q2", "q4", "q5"])
@@ -41,9 +15,7 @@ fn layout() -> Layout {
 
 /// Reads a file to its end or its first error; rows, and bytes that were allocated at most.
 fn read(path: &Path, layout: &Layout) -> (Result<usize, LogError>, usize) {
-    let before = NOW.load(Relaxed);
-    MOST.store(before, Relaxed);
-    let outcome = Reader::open(&LogSpec::whole(path), layout).and_then(|mut reader| {
+    let read = |mut reader: Reader| {
         let mut block = Block::default();
         let (mut rows, mut last) = (0, f64::NEG_INFINITY);
         while reader.read(&mut block)? {
@@ -57,8 +29,8 @@ fn read(path: &Path, layout: &Layout) -> (Result<usize, LogError>, usize) {
         }
         reader.warnings();
         Ok(rows)
-    });
-    (outcome, MOST.load(Relaxed) - before)
+    };
+    most_while(|| Reader::open(&LogSpec::whole(path), layout).and_then(read))
 }
 
 fn file(folder: &tempfile::TempDir, name: &str, bytes: &[u8]) -> PathBuf {
