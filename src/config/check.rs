@@ -1,11 +1,8 @@
 //! What a robot file may say: everything that no type can rule out.
 
-use std::collections::BTreeMap;
-
 use super::document::Document;
 use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
-use super::{ConfigError, check_log, serial_section};
-use crate::log::{list, nearest};
+use super::{ConfigError, check_log, serial_chain};
 
 /// Checks a robot file that was read from `document`.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
@@ -13,12 +10,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     friction(file, document)?;
     check_log::check(file, document)?;
     filter(file, document)?;
-    known_names(
-        document,
-        &["noise", "joint"],
-        &file.noise.joint,
-        &file.joint_names(),
-    )?;
+    document.known_names(&["noise", "joint"], &file.noise.joint, &file.joint_names())?;
     for (joint, noise) in &file.noise.joint {
         let at = |key| ["noise", "joint", joint.as_str(), key];
         document.not_negative(&at("position_resolution"), noise.position_resolution)?;
@@ -67,7 +59,7 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
                     return Err(foreign(key, "single-joint"));
                 }
             }
-            serial_section::check(robot, document)
+            serial_chain::check(robot, document)
         }
         ModelKind::Cft => {
             if robot.setup.is_none() {
@@ -98,7 +90,7 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
                     "the joint's name, e.g. `joint = \"q1\"`",
                 ));
             };
-            plain_name(document, &["robot", "joint"], joint)?;
+            document.plain_name(&["robot", "joint"], joint)?;
             if robot.kind.is_none() {
                 return Err(document.missing(
                     &["robot", "kind"],
@@ -114,28 +106,6 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     }
 }
 
-/// Whether a text can be the name of a joint.
-pub(super) fn is_plain_name(joint: &str) -> bool {
-    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-    !joint.is_empty() && joint.len() <= 64 && joint.chars().all(plain)
-}
-
-/// Refuses what is no name for a joint.
-pub(super) fn plain_name(
-    document: &Document,
-    path: &[&str],
-    joint: &str,
-) -> Result<(), ConfigError> {
-    if !is_plain_name(joint) {
-        return Err(document.value(
-            path,
-            "is no name for a joint",
-            "use letters, digits, `_`, `-` and `.`",
-        ));
-    }
-    Ok(())
-}
-
 fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let friction = &file.friction;
     let law = file.friction_law();
@@ -146,12 +116,7 @@ fn friction(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             "set `fitted_with_inertias = true` as well",
         ));
     }
-    known_names(
-        document,
-        &["friction", "joint"],
-        &friction.joint,
-        &file.joint_names(),
-    )?;
+    document.known_names(&["friction", "joint"], &friction.joint, &file.joint_names())?;
     for (joint, start) in &friction.joint {
         let at = |key| ["friction", "joint", joint.as_str(), key];
         let keys = [
@@ -244,12 +209,7 @@ fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 }
 
 fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
-    known_names(
-        document,
-        &["limits"],
-        &file.limits,
-        &file.coordinate_names(),
-    )?;
+    document.known_names(&["limits"], &file.limits, &file.coordinate_names())?;
     for (name, limits) in &file.limits {
         let at = |key| ["limits", name.as_str(), key];
         if let Some([low, high]) = limits.position {
@@ -325,26 +285,6 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         ));
     }
     Ok(())
-}
-
-/// Refuses a table for a joint or coordinate that the robot does not have.
-pub(super) fn known_names<T>(
-    document: &Document,
-    table: &[&str],
-    entries: &BTreeMap<String, T>,
-    known: &[String],
-) -> Result<(), ConfigError> {
-    let Some(name) = entries.keys().find(|name| !known.contains(name)) else {
-        return Ok(());
-    };
-    let all = || known.iter().map(String::as_str);
-    let near = nearest(name, all())
-        .map(|near| format!("did you mean `{near}`? "))
-        .unwrap_or_default();
-    let mut path = table.to_vec();
-    path.push(name);
-    let remedy = format!("{near}this robot has {}", list(all()));
-    Err(document.value(&path, "is nothing that this robot has", &remedy))
 }
 
 /// Refuses a list that is neither empty nor one finite number for each joint or coordinate.

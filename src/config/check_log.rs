@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use super::ConfigError;
 use super::channels::gear_matrix;
-use super::check::known_names;
 use super::document::Document;
 use super::log_section::{ActuatorChannels, JointChannels, PositionUnit, TorqueIs, TorqueUnit};
 use super::robot_file::{ModelKind, RobotFile};
@@ -14,7 +13,7 @@ use crate::robot::cft::COORDINATES;
 /// Checks the `[log]` section of a robot file.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let log = &file.log;
-    known_names(document, &["log", "joint"], &log.joint, &file.joint_names())?;
+    document.known_names(&["log", "joint"], &log.joint, &file.joint_names())?;
     document.finite(&["log", "torque_delay_s"], log.torque_delay_s.as_slice())?;
     gears(file, document)?;
     foreign_effort(file, document)?;
@@ -65,7 +64,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         ));
     }
     let coordinates = COORDINATES.map(str::to_owned);
-    known_names(document, &["log", "actuator"], &log.actuator, &coordinates)?;
+    document.known_names(&["log", "actuator"], &log.actuator, &coordinates)?;
     for (name, channels) in &log.actuator {
         actuator_channels(document, name, channels)?;
         for (key, column) in [("position", &channels.position), ("volts", &channels.volts)] {

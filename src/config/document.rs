@@ -1,12 +1,13 @@
 //! One TOML text, read with errors that name file, line and the way out.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 
 use super::ConfigError;
-use crate::log::{escape, escape_whole, nearest};
+use crate::log::{escape, escape_whole, list, nearest};
 
 /// A TOML text and the name under which errors speak of it.
 pub(crate) struct Document<'a> {
@@ -139,6 +140,34 @@ impl<'a> Document<'a> {
         }
     }
 
+    /// Refuses what is no name for a joint.
+    pub(crate) fn plain_name(&self, path: &[&str], joint: &str) -> Result<(), ConfigError> {
+        if is_plain_name(joint) {
+            return Ok(());
+        }
+        let remedy = "use letters, digits, `_`, `-` and `.`";
+        Err(self.value(path, "is no name for a joint", remedy))
+    }
+
+    /// Refuses a table for a joint or coordinate that the robot does not have.
+    pub(crate) fn known_names<T>(
+        &self,
+        table: &[&str],
+        entries: &BTreeMap<String, T>,
+        known: &[String],
+    ) -> Result<(), ConfigError> {
+        let Some(name) = entries.keys().find(|name| !known.contains(name)) else {
+            return Ok(());
+        };
+        let all = || known.iter().map(String::as_str);
+        let near = nearest(name, all())
+            .map(|near| format!("did you mean `{near}`? "))
+            .unwrap_or_default();
+        let path = [table, &[name.as_str()]].concat();
+        let remedy = format!("{near}this robot has {}", list(all()));
+        Err(self.value(&path, "is nothing that this robot has", &remedy))
+    }
+
     /// Refuses what is not a finite number above 0.
     pub(crate) fn positive(&self, path: &[&str], value: f64) -> Result<(), ConfigError> {
         if value.is_finite() && value > 0.0 {
@@ -168,6 +197,17 @@ impl<'a> Document<'a> {
             Some(value) => Err(self.value(path, &format!("holds {value}"), "give finite numbers")),
         }
     }
+}
+
+/// Whether a text can be the name of a joint.
+pub(super) fn is_plain_name(joint: &str) -> bool {
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    !joint.is_empty() && joint.len() <= 64 && joint.chars().all(plain)
+}
+
+/// Whether a section says nothing: it is not written then.
+pub(super) fn is_default<T: Default + PartialEq>(section: &T) -> bool {
+    *section == T::default()
 }
 
 /// The path of a key as it is written in TOML.

@@ -16,6 +16,7 @@ pub mod model_file;
 mod model_text;
 pub mod robot_file;
 pub mod schema;
+mod serial_chain;
 pub mod serial_section;
 pub mod trajectory;
 mod trajectory_text;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::document::is_default;
 use super::log_section::LogSection;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::robot::cft::{self, Setup, Structure};
@@ -290,11 +291,6 @@ pub struct RobotFile {
     /// Sensors of the simulator.
     #[serde(default, skip_serializing_if = "is_default")]
     pub sensors: SensorsSection,
-}
-
-/// Sections that say nothing are not written.
-pub(super) fn is_default<T: Default + PartialEq>(section: &T) -> bool {
-    *section == T::default()
 }
 
 impl RobotFile {

@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::math::rank::{self, Svd};
+use crate::math::jacobi::Svd;
+use crate::math::rank;
 use crate::math::rfactor::RFactor;
 use crate::robot::RobotError;
 

@@ -5,7 +5,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::rank::Svd;
+/// Thin singular value decomposition `A = U diag(s) V'` of an `m x n` matrix, `k = min(m, n)`.
+#[derive(Debug, Clone)]
+pub struct Svd {
+    /// Left singular vectors, `m x k`.
+    pub u: DMatrix<f64>,
+    /// Singular values in falling order, `k`.
+    pub s: DVector<f64>,
+    /// Right singular vectors, `n x k`, one per column (not transposed).
+    pub v: DMatrix<f64>,
+}
 
 /// Sweeps over all pairs of columns; ten are usual, even at 60 columns.
 const SWEEPS: usize = 60;

@@ -7,16 +7,14 @@
 
 use std::cell::RefCell;
 
-use argmin::core::{CostFunction, Error, Executor, Gradient, TerminationReason, TerminationStatus};
-use argmin::core::{OptimizationResult, State};
+use argmin::core::{CostFunction, Error, Executor, Gradient, OptimizationResult, State};
+use argmin::core::{TerminationReason, TerminationStatus};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
-use serde::Serialize;
 
 /// How a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// Within the tolerance.
     Converged,
@@ -29,7 +27,7 @@ pub enum Ending {
 }
 
 /// The best point that a search evaluated.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The point.
     pub x: Vec<f64>,
@@ -55,13 +53,15 @@ pub fn nelder_mead(
     max_evaluations: u64,
 ) -> Minimum {
     let mut values = |x: &[f64], _: &mut [f64]| f(x);
-    let problem = Problem::new(&mut values, start, max_evaluations);
-    if let Some(end) = problem.at_start() {
-        return end;
+    let mut search = Search::new(&mut values, start, max_evaluations);
+    search.refuses = Refusal::ByBestValue;
+    if let Some(ending) = search.begin() {
+        return search.end(ending);
     }
+    let search = RefCell::new(search);
     let mut shrink = 1.0;
     loop {
-        let (centre, before) = problem.best();
+        let (centre, before) = search.borrow().best.clone();
         let mut simplex = vec![centre.clone()];
         for (i, step) in steps.iter().enumerate().take(centre.len()) {
             let mut corner = centre.clone();
@@ -71,16 +71,16 @@ pub fn nelder_mead(
         let outcome = NelderMead::new(simplex)
             .with_sd_tolerance(tolerance)
             .and_then(|solver| {
-                Executor::new(Values(&problem), solver)
+                Executor::new(Problem(&search), solver)
                     // every step asks for a value at least: this only bounds what follows a refusal
                     .configure(|state| state.max_iters(max_evaluations))
                     .timer(false)
                     .run()
             });
-        let ending = problem.ending(&outcome);
-        let gained = before - problem.best().1;
+        let ending = search.borrow().ending(&outcome);
+        let gained = before - search.borrow().best.1;
         if ending != Ending::Converged || (shrink < 1.0 && gained <= tolerance) {
-            return problem.minimum(ending);
+            return search.into_inner().end(ending);
         }
         shrink = 0.25;
     }
@@ -97,39 +97,48 @@ pub fn lbfgs(
     gradient_tolerance: f64,
     max_evaluations: u64,
 ) -> Minimum {
-    let problem = Problem::new(f, start, max_evaluations);
-    if let Some(end) = problem.at_start() {
-        return end;
+    let mut search = Search::new(f, start, max_evaluations);
+    if let Some(ending) = search.begin() {
+        return search.end(ending);
     }
     // The search tries `x - gradient` first: far out of range where the gradient is large.
-    let scale = 1.0 / problem.gradient_norm().max(1.0);
-    problem.0.borrow_mut().scale = scale;
+    let norm = |g: &[f64]| g.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let scale = 1.0 / norm(&search.gradient).max(1.0);
+    search.scale = scale;
+    let search = RefCell::new(search);
     loop {
-        let (centre, before) = problem.best();
+        let (centre, before) = search.borrow().best.clone();
         let outcome = LBFGS::new(MoreThuenteLineSearch::new(), 8)
             .with_tolerance_grad(gradient_tolerance * scale)
             .and_then(|solver| solver.with_tolerance_cost(f64::EPSILON * scale))
             .and_then(|solver| {
-                Executor::new(&problem, solver)
+                Executor::new(Problem(&search), solver)
                     .configure(|state| state.param(centre))
                     .timer(false)
                     .run()
             });
-        let ending = problem.ending(&outcome);
+        let ending = search.borrow().ending(&outcome);
         // A line search that fails may only need a fresh memory.
-        if ending != Ending::Stalled || problem.best().1 >= before {
-            return problem.minimum(ending);
+        if ending != Ending::Stalled || search.borrow().best.1 >= before {
+            return search.into_inner().end(ending);
         }
     }
 }
 
-/// The function with its budget and the best point so far.
-struct Problem<'a>(RefCell<Search<'a>>);
+/// What `argmin` is told when it asks beyond the limit.
+#[derive(Clone, Copy, PartialEq)]
+enum Refusal {
+    Error,
+    /// The simplex method unwraps errors; with the best value so far it levels out and ends.
+    ByBestValue,
+}
 
+/// The function with its budget and the best point so far.
 struct Search<'a> {
     f: &'a mut dyn FnMut(&[f64], &mut [f64]) -> f64,
     evaluations: u64,
     limit: u64,
+    refuses: Refusal,
     /// Whether an evaluation beyond the limit was asked for.
     refused: bool,
     /// Factor from the function to what `argmin` sees.
@@ -141,72 +150,50 @@ struct Search<'a> {
     gradient: Vec<f64>,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> Search<'a> {
     fn new(f: &'a mut dyn FnMut(&[f64], &mut [f64]) -> f64, start: &[f64], limit: u64) -> Self {
-        Self(RefCell::new(Search {
+        Self {
             f,
             evaluations: 0,
             limit,
+            refuses: Refusal::Error,
             refused: false,
             scale: 1.0,
             best: (start.to_vec(), f64::INFINITY),
             latest: (Vec::new(), f64::INFINITY),
             gradient: vec![0.0; start.len()],
-        }))
+        }
     }
 
-    /// The end of a search that cannot begin.
-    fn at_start(&self) -> Option<Minimum> {
-        let start = self.best().0;
-        let value = self.0.borrow_mut().at(&start);
-        let ending = match value {
-            Ok(value) if value.is_finite() && !start.is_empty() => return None,
-            Ok(_) => Ending::NoStart,
-            Err(_) => Ending::EvaluationLimit,
-        };
-        Some(self.minimum(ending))
+    /// Evaluates the start; the ending of a search that cannot go on from there.
+    fn begin(&mut self) -> Option<Ending> {
+        let start = self.best.0.clone();
+        match self.at(&start) {
+            Ok(value) if value.is_finite() && !start.is_empty() => None,
+            Ok(_) => Some(Ending::NoStart),
+            Err(_) => Some(Ending::EvaluationLimit),
+        }
     }
 
-    fn gradient_norm(&self) -> f64 {
-        let search = self.0.borrow();
-        search.gradient.iter().map(|g| g * g).sum::<f64>().sqrt()
-    }
-
-    fn best(&self) -> (Vec<f64>, f64) {
-        self.0.borrow().best.clone()
-    }
-
-    fn minimum(&self, ending: Ending) -> Minimum {
-        let search = self.0.borrow();
-        let (x, value) = search.best.clone();
+    fn end(self, ending: Ending) -> Minimum {
+        let (x, value) = self.best;
         Minimum {
             x,
             value,
-            evaluations: search.evaluations,
+            evaluations: self.evaluations,
             ending,
         }
     }
 
-    fn ending<O, S, I: State>(
-        &self,
-        outcome: &Result<OptimizationResult<O, S, I>, Error>,
-    ) -> Ending {
-        if self.0.borrow().refused {
-            return Ending::EvaluationLimit;
-        }
-        let status = outcome
-            .as_ref()
-            .map(|run| run.state().get_termination_status());
-        match status {
-            Ok(TerminationStatus::Terminated(TerminationReason::SolverConverged)) => {
-                Ending::Converged
-            }
+    fn ending<O, S, I: State>(&self, run: &Result<OptimizationResult<O, S, I>, Error>) -> Ending {
+        let done = TerminationStatus::Terminated(TerminationReason::SolverConverged);
+        match run {
+            _ if self.refused => Ending::EvaluationLimit,
+            Ok(run) if *run.state().get_termination_status() == done => Ending::Converged,
             _ => Ending::Stalled,
         }
     }
-}
 
-impl Search<'_> {
     fn at(&mut self, x: &[f64]) -> Result<f64, Error> {
         if self.latest.0 == x {
             return Ok(self.latest.1);
@@ -228,32 +215,24 @@ impl Search<'_> {
     }
 }
 
-impl CostFunction for &Problem<'_> {
+/// What `argmin` sees of a search.
+struct Problem<'s, 'f>(&'s RefCell<Search<'f>>);
+
+impl CostFunction for Problem<'_, '_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
         let mut search = self.0.borrow_mut();
-        Ok(search.at(x)? * search.scale)
+        let value = match search.at(x) {
+            Err(_) if search.refuses == Refusal::ByBestValue => Ok(search.best.1),
+            value => value,
+        };
+        Ok(value? * search.scale)
     }
 }
 
-/// The function without errors: the simplex method of `argmin` unwraps them. What is asked for
-/// beyond the limit has the best value so far, so that the simplex levels out and the search ends.
-struct Values<'p, 'f>(&'p Problem<'f>);
-
-impl CostFunction for Values<'_, '_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, x: &Vec<f64>) -> Result<f64, Error> {
-        let mut search = self.0.0.borrow_mut();
-        let value = search.at(x);
-        Ok(value.unwrap_or(search.best.1))
-    }
-}
-
-impl Gradient for &Problem<'_> {
+impl Gradient for Problem<'_, '_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
 

@@ -8,18 +8,8 @@ use faer::linalg::svd::{ComputeSvdVectors, svd as faer_svd, svd_scratch};
 use faer::{Mat, Par};
 use nalgebra::{DMatrix, DVector};
 
-use super::{MathError, jacobi};
-
-/// Thin singular value decomposition `A = U diag(s) V'` of an `m x n` matrix, `k = min(m, n)`.
-#[derive(Debug, Clone)]
-pub struct Svd {
-    /// Left singular vectors, `m x k`.
-    pub u: DMatrix<f64>,
-    /// Singular values in falling order, `k`.
-    pub s: DVector<f64>,
-    /// Right singular vectors, `n x k`, one per column (not transposed).
-    pub v: DMatrix<f64>,
-}
+use super::MathError;
+use super::jacobi::{self, Svd};
 
 /// Thin singular value decomposition.
 ///

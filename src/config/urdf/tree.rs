@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::parts::{Body, Joint, Kind, Parts};
 use super::{Place, UrdfChain, turned};
 use crate::config::ConfigError;
-use crate::config::check::is_plain_name;
+use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::{
     BASE, FollowsSection, FrameSection, InertialSection, LinkSection,
