@@ -84,14 +84,13 @@ const DOORS: &[(&str, &str)] = &[
 const KNOWN_CIRCLES: &[&str] = &[
     "cli: compare, diagnose, diagnose_text, fitted, friction, lsq, pages, validate",
     "cli: machine, reference",
-    "diagnose: left, run, search",
+    "diagnose: candidates, run, selection, uncertainty, unexplained",
     "excite: blend, usage",
     "inertia: covariance, solve",
     "inspect: judge, lag, shape, together, verdicts",
     "log: recording, row, text",
     "log/recording: bag, container, mcap",
     "motion: cutter, run",
-    "robot: cft, serial, standard",
     "simulate: cft, effects, plant, single_joint",
     "simulate: order, serial_experiment",
 ];
