@@ -22,87 +22,50 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
 
 fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     let robot = &file.robot;
-    let foreign = |key: &str, model: &str| {
-        let remedy = format!("delete it, or set `model = \"{model}\"`");
-        document.value(&["robot", key], "does not belong to this model", &remedy)
-    };
-    if robot.model != ModelKind::Serial {
-        for (key, given) in [
-            ("gravity", robot.gravity.is_some()),
-            ("drive_inertia", robot.drive_inertia.is_some()),
-            ("urdf", robot.urdf.is_some()),
-            ("tip", robot.tip.is_some()),
-            ("coupling", !robot.coupling.is_empty()),
-            ("link", !robot.link.is_empty()),
-            ("frame", !robot.frame.is_empty()),
-        ] {
-            if given {
-                return Err(foreign(key, "serial"));
-            }
-        }
+    let keys = [
+        ("gravity", robot.gravity.is_some(), ModelKind::Serial),
+        (
+            "drive_inertia",
+            robot.drive_inertia.is_some(),
+            ModelKind::Serial,
+        ),
+        ("urdf", robot.urdf.is_some(), ModelKind::Serial),
+        ("tip", robot.tip.is_some(), ModelKind::Serial),
+        ("coupling", !robot.coupling.is_empty(), ModelKind::Serial),
+        ("link", !robot.link.is_empty(), ModelKind::Serial),
+        ("frame", !robot.frame.is_empty(), ModelKind::Serial),
+        ("setup", robot.setup.is_some(), ModelKind::Cft),
+        ("parameters", robot.parameters.is_some(), ModelKind::Cft),
+        ("joint", robot.joint.is_some(), ModelKind::SingleJoint),
+        ("kind", robot.kind.is_some(), ModelKind::SingleJoint),
+    ];
+    let foreign = |(_, given, model): &&(&str, bool, ModelKind)| *given && *model != robot.model;
+    if let Some((key, _, model)) = keys.iter().find(foreign) {
+        let remedy = format!("delete it, or set `model = \"{}\"`", model.name());
+        return Err(document.value(&["robot", key], "does not belong to this model", &remedy));
     }
+    let missing = |key, remedy| Err(document.missing(&["robot", key], remedy));
     match robot.model {
-        ModelKind::Serial => {
-            for (key, given) in [
-                ("setup", robot.setup.is_some()),
-                ("parameters", robot.parameters.is_some()),
-            ] {
-                if given {
-                    return Err(foreign(key, "cft"));
+        ModelKind::Serial => serial_chain::check(robot, document),
+        ModelKind::Cft => match (robot.setup, robot.parameters) {
+            (None, _) => missing("setup", "`setup = \"tuedacs\"` or `\"dspace\"`"),
+            (_, None | Some(12 | 22)) => Ok(()),
+            (_, Some(count)) => Err(document.value(
+                &["robot", "parameters"],
+                &format!("is {count}"),
+                "give 12 (the report's structure) or 22 (the full chain)",
+            )),
+        },
+        ModelKind::SingleJoint => match (&robot.joint, robot.kind) {
+            (None, _) => missing("joint", "the joint's name, e.g. `joint = \"q1\"`"),
+            (Some(joint), kind) => {
+                document.plain_name(&["robot", "joint"], joint)?;
+                match kind {
+                    None => missing("kind", "`kind = \"prismatic\"` or `\"revolute\"`"),
+                    Some(_) => Ok(()),
                 }
             }
-            for (key, given) in [
-                ("joint", robot.joint.is_some()),
-                ("kind", robot.kind.is_some()),
-            ] {
-                if given {
-                    return Err(foreign(key, "single-joint"));
-                }
-            }
-            serial_chain::check(robot, document)
-        }
-        ModelKind::Cft => {
-            if robot.setup.is_none() {
-                return Err(
-                    document.missing(&["robot", "setup"], "`setup = \"tuedacs\"` or `\"dspace\"`")
-                );
-            }
-            if let Some(count) = robot.parameters
-                && count != 12
-                && count != 22
-            {
-                return Err(document.value(
-                    &["robot", "parameters"],
-                    &format!("is {count}"),
-                    "give 12 (the report's structure) or 22 (the full chain)",
-                ));
-            }
-            match (&robot.joint, robot.kind) {
-                (Some(_), _) => Err(foreign("joint", "single-joint")),
-                (_, Some(_)) => Err(foreign("kind", "single-joint")),
-                _ => Ok(()),
-            }
-        }
-        ModelKind::SingleJoint => {
-            let Some(joint) = &robot.joint else {
-                return Err(document.missing(
-                    &["robot", "joint"],
-                    "the joint's name, e.g. `joint = \"q1\"`",
-                ));
-            };
-            document.plain_name(&["robot", "joint"], joint)?;
-            if robot.kind.is_none() {
-                return Err(document.missing(
-                    &["robot", "kind"],
-                    "`kind = \"prismatic\"` or `\"revolute\"`",
-                ));
-            }
-            match (robot.setup, robot.parameters) {
-                (Some(_), _) => Err(foreign("setup", "cft")),
-                (_, Some(_)) => Err(foreign("parameters", "cft")),
-                _ => Ok(()),
-            }
-        }
+        },
     }
 }
 

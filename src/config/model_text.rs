@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::document::Document;
 use super::log_section::LogSection;
@@ -48,16 +48,6 @@ pub(super) struct ModelToml {
     #[serde(default)]
     drive_inertia: BTreeMap<String, f64>,
     provenance: Option<ModelProvenance>,
-}
-
-#[derive(Serialize)]
-struct Effects<'a> {
-    effect: &'a [Effect],
-}
-
-#[derive(Serialize)]
-struct ProvenanceTable<'a> {
-    provenance: &'a ModelProvenance,
 }
 
 impl ModelFile {
@@ -164,12 +154,8 @@ impl ModelFile {
         }
         if !self.effects.is_empty() {
             text.push_str("\n# Effects added to the declared model.\n");
-            text.push_str(
-                &toml::to_string(&Effects {
-                    effect: &self.effects,
-                })
-                .map_err(unwritable)?,
-            );
+            let effects = BTreeMap::from([("effect", &self.effects)]);
+            text.push_str(&toml::to_string(&effects).map_err(unwritable)?);
         }
         if !self.links.is_empty() {
             text.push_str("\n# Links that can exist and give the parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
@@ -183,9 +169,7 @@ impl ModelFile {
             text.push_str(&toml::to_string(&self.drive_inertia).map_err(unwritable)?);
         }
         text.push('\n');
-        let provenance = ProvenanceTable {
-            provenance: &self.provenance,
-        };
+        let provenance = BTreeMap::from([("provenance", &self.provenance)]);
         text.push_str(&toml::to_string(&provenance).map_err(unwritable)?);
         Ok(text)
     }

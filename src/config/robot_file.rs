@@ -23,6 +23,17 @@ pub enum ModelKind {
     Serial,
 }
 
+impl ModelKind {
+    /// As it is written in files.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Cft => "cft",
+            Self::SingleJoint => "single-joint",
+            Self::Serial => "serial",
+        }
+    }
+}
+
 /// `[robot]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -34,7 +34,7 @@ pub struct FourierCoordinate {
 }
 
 /// A finite Fourier series in every coordinate, eq. (43).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fourier {
     /// Which coordinates the series is in.
     pub coordinates: Coordinates,
@@ -48,11 +48,12 @@ pub struct Fourier {
     /// Whole periods between the blends; the motion does not end by itself where absent.
     pub periods: Option<u32>,
     /// One series per coordinate, in the file's order.
+    #[serde(rename = "coordinate")]
     pub series: Vec<FourierCoordinate>,
 }
 
 /// One joint (or actuator) runs back and forth over its range at a ladder of speeds, the others are held.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SingleJointMove {
     /// The joint that moves.
     pub joint: String,
@@ -78,16 +79,18 @@ pub struct Point {
 }
 
 /// A list of poses at times.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Points {
     /// Which coordinates the poses are in.
     pub coordinates: Coordinates,
     /// The poses, at least two.
+    #[serde(rename = "point")]
     pub points: Vec<Point>,
 }
 
 /// A checked trajectory file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Trajectory {
     /// `kind = "fourier"`.
     Fourier(Fourier),

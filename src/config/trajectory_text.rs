@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::trajectory::{Coordinates, Trajectory};
+use super::trajectory::Trajectory;
 
 impl Trajectory {
     /// The file's text, which [`Trajectory::parse`] reads back to the same numbers. `head` is put
@@ -15,84 +15,8 @@ impl Trajectory {
         if !head.is_empty() {
             text.push('\n');
         }
-        let mut key = |name: &str, value: &str| {
-            let _ = writeln!(text, "{name} = {value}");
-        };
-        match self {
-            Self::Fourier(file) => {
-                key("kind", "\"fourier\"");
-                key("coordinates", name(file.coordinates));
-                key("fundamental_hz", &number(file.fundamental_hz));
-                if let Some(start) = file.start_s {
-                    key("start_s", &number(start));
-                }
-                if let Some(blend) = file.blend_s {
-                    key("blend_s", &number(blend));
-                }
-                if let Some(periods) = file.periods {
-                    key("periods", &periods.to_string());
-                }
-                for coordinate in &file.series {
-                    let _ = write!(
-                        text,
-                        "\n[[coordinate]]\nname = {}\noffset = {}\na = {}\nb = {}\n",
-                        quoted(&coordinate.name),
-                        number(coordinate.offset),
-                        list(&coordinate.a),
-                        list(&coordinate.b)
-                    );
-                }
-            }
-            Self::SingleJoint(file) => {
-                key("kind", "\"single-joint\"");
-                key("joint", &quoted(&file.joint));
-                key("speeds", &list(&file.speeds));
-                if let Some(range) = file.range {
-                    key("range", &list(&range));
-                }
-                if let Some(acceleration) = file.acceleration {
-                    key("acceleration", &number(acceleration));
-                }
-                if let Some(turn) = file.turn_s {
-                    key("turn_s", &number(turn));
-                }
-            }
-            Self::Points(file) => {
-                key("kind", "\"points\"");
-                key("coordinates", name(file.coordinates));
-                for point in &file.points {
-                    let _ = write!(
-                        text,
-                        "\n[[point]]\nt = {}\nposition = {}\n",
-                        number(point.t),
-                        list(&point.position)
-                    );
-                }
-            }
-        }
-        text
+        text + &toml::to_string(self).expect("names and numbers are TOML")
     }
-}
-
-fn name(coordinates: Coordinates) -> &'static str {
-    match coordinates {
-        Coordinates::Cartesian => "\"cartesian\"",
-        Coordinates::Joint => "\"joint\"",
-    }
-}
-
-/// The shortest text that reads back to the same number.
-fn number(value: f64) -> String {
-    format!("{value:?}")
-}
-
-fn list(values: &[f64]) -> String {
-    let texts: Vec<String> = values.iter().map(|value| number(*value)).collect();
-    format!("[{}]", texts.join(", "))
-}
-
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
 }
 
 /// A comment must not contain control characters.
@@ -103,7 +27,9 @@ fn printable(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::trajectory::{Fourier, FourierCoordinate, Point, Points, SingleJointMove};
+    use crate::config::trajectory::{
+        Coordinates, Fourier, FourierCoordinate, Point, Points, SingleJointMove,
+    };
 
     #[test]
     fn every_kind_reads_back_as_it_was() {

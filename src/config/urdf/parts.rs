@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::Place;
 use super::xml::{EXPAND, Element, MACRO};
 use crate::config::ConfigError;
+use crate::config::robot_file::CoordinateLimits;
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 
@@ -63,12 +64,7 @@ pub(super) struct Joint {
     pub xyz: Vector,
     pub rpy: Vector,
     pub axis: Vector,
-    /// Lower and upper end, where they are given.
-    pub position: Option<[f64; 2]>,
-    /// Largest speed, where it is given and above 0.
-    pub speed: Option<f64>,
-    /// Largest torque or force, likewise.
-    pub effort: Option<f64>,
+    pub limits: CoordinateLimits,
     pub mimic: Option<Mimic>,
 }
 
@@ -144,21 +140,26 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
     for joint in &parts.joints {
         for (what, link) in [("parent", &joint.parent), ("child", &joint.child)] {
             if !links.contains_key(link.as_str()) {
-                let all = parts.links.iter().map(|l| l.name.as_str());
-                let remedy = match nearest(link, all.clone()) {
-                    Some(near) => format!("did you mean `{}`?", escape(near)),
-                    None => format!("the links are {}", list(all.take(20))),
-                };
-                return Err(place.wrong(
-                    joint.line,
-                    &format!("joint {}", escape(&joint.name)),
-                    &format!("has the {what} `{}`, which is no link", escape(link)),
-                    &remedy,
-                ));
+                return Err(no_link(joint, what, link, &parts.links, place));
             }
         }
     }
     Ok(parts)
+}
+
+/// The error for a joint whose parent or child is no link.
+fn no_link(joint: &Joint, what: &str, link: &str, links: &[Link], place: &Place) -> ConfigError {
+    let all = links.iter().map(|l| l.name.as_str());
+    let remedy = match nearest(link, all.clone()) {
+        Some(near) => format!("did you mean `{}`?", escape(near)),
+        None => format!("the links are {}", list(all.take(20))),
+    };
+    place.wrong(
+        joint.line,
+        &format!("joint {}", escape(&joint.name)),
+        &format!("has the {what} `{}`, which is no link", escape(link)),
+        &remedy,
+    )
 }
 
 fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
@@ -229,39 +230,7 @@ fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigErr
             "give an axis, e.g. xyz=\"0 0 1\"",
         ));
     }
-    let (mut position, mut speed, mut effort) = (None, None, None);
-    if let Some(limit) = element.child("limit") {
-        let positive = |key| -> Result<Option<f64>, ConfigError> {
-            // 0 stands in many files for a limit that nobody knows
-            Ok(Some(at.number(limit, key, Some(0.0))?).filter(|x| *x > 0.0))
-        };
-        (speed, effort) = (positive("velocity")?, positive("effort")?);
-        let ends = ["lower", "upper"].map(|key| at.number(limit, key, Some(0.0)));
-        let [low, high] = ends;
-        let (low, high) = (low?, high?);
-        if low > high {
-            return Err(place.wrong(
-                limit.line(),
-                &at.what,
-                &format!("has the lower limit {low} above the upper {high}"),
-                "exchange the two",
-            ));
-        }
-        if low < high && *kind != Kind::Continuous {
-            position = Some([low, high]);
-        }
-    }
-    let mimic = match element.child("mimic") {
-        None => None,
-        Some(mimic) => Some(Mimic {
-            joint: mimic
-                .attribute("joint")
-                .ok_or_else(|| at.lacks(mimic, "joint"))?
-                .to_owned(),
-            multiplier: at.number(mimic, "multiplier", Some(1.0))?,
-            offset: at.number(mimic, "offset", Some(0.0))?,
-        }),
-    };
+    let limits = at.limits(element, *kind)?;
     Ok(Joint {
         name: name.to_owned(),
         line: element.line(),
@@ -271,10 +240,8 @@ fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigErr
         xyz,
         rpy,
         axis,
-        position,
-        speed,
-        effort,
-        mimic,
+        mimic: at.mimic(element)?,
+        limits,
     })
 }
 
@@ -350,5 +317,42 @@ impl Reading<'_> {
         };
         let at = |key| self.vector(origin, key, [0.0; 3]);
         Ok((at("xyz")?, at("rpy")?))
+    }
+    /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows.
+    fn limits(&self, joint: Element, kind: Kind) -> Result<CoordinateLimits, ConfigError> {
+        let Some(limit) = joint.child("limit") else {
+            return Ok(CoordinateLimits::default());
+        };
+        let value = |key| self.number(limit, key, Some(0.0));
+        let (speed, effort) = (value("velocity")?, value("effort")?);
+        let (low, high) = (value("lower")?, value("upper")?);
+        if low > high {
+            return Err(self.place.wrong(
+                limit.line(),
+                &self.what,
+                &format!("has the lower limit {low} above the upper {high}"),
+                "exchange the two",
+            ));
+        }
+        Ok(CoordinateLimits {
+            position: (low < high && kind != Kind::Continuous).then_some([low, high]),
+            speed: (speed > 0.0).then_some(speed),
+            torque: (effort > 0.0).then_some(effort),
+            ..CoordinateLimits::default()
+        })
+    }
+
+    fn mimic(&self, joint: Element) -> Result<Option<Mimic>, ConfigError> {
+        let Some(mimic) = joint.child("mimic") else {
+            return Ok(None);
+        };
+        let followed = mimic.attribute("joint");
+        Ok(Some(Mimic {
+            joint: followed
+                .ok_or_else(|| self.lacks(mimic, "joint"))?
+                .to_owned(),
+            multiplier: self.number(mimic, "multiplier", Some(1.0))?,
+            offset: self.number(mimic, "offset", Some(0.0))?,
+        }))
     }
 }

@@ -49,36 +49,12 @@ pub(super) fn chain(
         .enumerate()
         .map(|(i, link)| (link.name.as_str(), i))
         .collect();
-    // every link's joint before it and joints behind it; the names were looked up before
-    let mut before: Vec<Option<usize>> = vec![None; parts.links.len()];
-    let mut behind: Vec<Vec<(usize, usize)>> = vec![Vec::new(); parts.links.len()];
-    for (j, joint) in parts.joints.iter().enumerate() {
-        let (Some(&parent), Some(&child)) = (
-            index.get(joint.parent.as_str()),
-            index.get(joint.child.as_str()),
-        ) else {
-            continue;
-        };
-        if let Some(other) = before[child] {
-            return Err(place.wrong(
-                joint.line,
-                &format!("joint {}", escape(&joint.name)),
-                &format!(
-                    "moves the link `{}`, which hangs on joint `{}` already",
-                    escape(&joint.child),
-                    escape(&parts.joints[other].name)
-                ),
-                "a closed loop is no tree: cut it, and let the dependent joints follow (mimic)",
-            ));
-        }
-        before[child] = Some(j);
-        behind[parent].push((j, child));
-    }
+    let (before, behind) = joints_of_links(parts, &index, place)?;
     let (wanted, root) = match tip {
         None => (vec![true; parts.joints.len()], root(parts, &before, place)?),
         Some(tip) => path_to(parts, &index, &before, tip, place)?,
     };
-    let mut seats: Vec<Option<Seat>> = vec![None; parts.links.len()];
+    let mut reached = vec![false; parts.links.len()];
     let mut moving: Vec<Moving> = Vec::new();
     let mut fixed: Vec<(&str, Seat)> = Vec::new();
     // links to visit, the next one last; a link stands here once, for it has one joint before it
@@ -107,7 +83,7 @@ pub(super) fn chain(
         if joint.is_some_and(|j| parts.joints[j].kind == Kind::Fixed) && seat.on.is_some() {
             fixed.push((&parts.links[link].name, seat));
         }
-        seats[link] = Some(seat);
+        reached[link] = true;
         for &(j, child) in behind[link].iter().rev() {
             if wanted[j] {
                 next.push((Some(j), child, seat));
@@ -115,7 +91,7 @@ pub(super) fn chain(
         }
     }
     if tip.is_none()
-        && let Some(lost) = seats.iter().position(Option::is_none)
+        && let Some(lost) = reached.iter().position(|reached| !reached)
     {
         return Err(circle(
             &parts.links[lost].name,
@@ -135,6 +111,42 @@ pub(super) fn chain(
     fixed.sort_by_key(|(_, seat)| seat.on);
     let frames = frames(&fixed, &moving);
     finish(moving, frames, place)
+}
+
+/// The joint before each link, and the joints behind it with the links that they carry.
+type JointsOfLinks = (Vec<Option<usize>>, Vec<Vec<(usize, usize)>>);
+
+fn joints_of_links(
+    parts: &Parts,
+    index: &BTreeMap<&str, usize>,
+    place: &Place,
+) -> Result<JointsOfLinks, ConfigError> {
+    let mut before: Vec<Option<usize>> = vec![None; parts.links.len()];
+    let mut behind: Vec<Vec<(usize, usize)>> = vec![Vec::new(); parts.links.len()];
+    for (j, joint) in parts.joints.iter().enumerate() {
+        let (Some(&parent), Some(&child)) = (
+            index.get(joint.parent.as_str()),
+            index.get(joint.child.as_str()),
+        ) else {
+            // the names were looked up before
+            continue;
+        };
+        if let Some(other) = before[child] {
+            return Err(place.wrong(
+                joint.line,
+                &format!("joint {}", escape(&joint.name)),
+                &format!(
+                    "moves the link `{}`, which hangs on joint `{}` already",
+                    escape(&joint.child),
+                    escape(&parts.joints[other].name)
+                ),
+                "a closed loop is no tree: cut it, and let the dependent joints follow (mimic)",
+            ));
+        }
+        before[child] = Some(j);
+        behind[parent].push((j, child));
+    }
+    Ok((before, behind))
 }
 
 /// The frames that are fixed to moving links. A name that a moving link has taken gets an ending.
@@ -336,16 +348,8 @@ fn finish(
     for (m, follows) in moving.iter_mut().zip(follows) {
         m.section.inertial = lumped(&m.bodies, m.joint, place)?;
         m.section.follows = follows;
-        let (position, speed, torque) = (m.joint.position, m.joint.speed, m.joint.effort);
-        let some = position.is_some() || speed.is_some() || torque.is_some();
-        if some && m.joint.mimic.is_none() {
-            let found = CoordinateLimits {
-                position,
-                speed,
-                torque,
-                ..CoordinateLimits::default()
-            };
-            limits.push((m.joint.name.clone(), found));
+        if m.joint.limits != CoordinateLimits::default() && m.joint.mimic.is_none() {
+            limits.push((m.joint.name.clone(), m.joint.limits.clone()));
         }
     }
     Ok(UrdfChain {
