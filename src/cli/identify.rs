@@ -13,10 +13,9 @@ use super::{
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
 use crate::identify::{
-    self, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, ErrorKind, FrictionSettings, LoggedRobot,
-    LsqSettings, new_model, refined,
+    self, Campaigned, DiagnoseEnd, IdentifySettings, LoggedRobot, RoleLogs, StageEnd,
 };
-use crate::log::{LogSpec, Provenance};
+use crate::log::LogSpec;
 use crate::output::write_whole;
 use crate::report::json::Document;
 use crate::report::summary;
@@ -119,141 +118,81 @@ fn execute(
     let machine = LoggedRobot::load(&robot.to_string_lossy())?;
     let roles = &campaign.logs;
     let mut files: Vec<String> = Vec::new();
-    let mut inputs: Vec<Provenance> = Vec::new();
-    let mut text = String::new();
-
-    // friction of single joints, where there are logs of it
     let one_joint = logs(base, &roles.friction)?;
-    let found = match one_joint.as_slice() {
-        [] => None,
-        some => Some(identify::friction(
-            &machine,
-            &logs_of(some),
-            &FrictionSettings::default(),
-            context.control(),
-        )?),
+    let mut training = logs(base, &roles.identification)?;
+    let unseen = logs(base, &roles.validation)?;
+    let title = names_of(&unseen);
+    let role_logs = RoleLogs {
+        friction: logs_of(&one_joint),
+        identification: logs_of(&training),
+        validation: logs_of(&unseen),
     };
-    let mut friction_json = Value::Null;
-    let known = match &found {
-        None => None,
-        Some(found) => {
-            let mut model = new_model(&machine, "identify", &found.inputs);
-            found.write_into(&machine, &mut model);
-            write(folder, "friction.toml", &model.to_toml()?, &mut files)?;
-            let figure = friction::figure(&machine, found).svg();
-            write(folder, "friction.svg", &figure, &mut files)?;
-            friction_json = friction::json(&machine, found);
-            warnings.extend(found.warnings.iter().cloned());
-            inputs.extend(found.inputs.iter().cloned());
-            Some(model)
-        }
-    };
-
-    // inertias
-    let settings = LsqSettings {
+    training.extend(one_joint.iter().cloned());
+    let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
         consistent: campaign.settings.feasible,
-        friction: known.as_ref().map(|model| ("friction.toml", model)),
+        ..IdentifySettings::default()
     };
-    let together = logs_of(&logs(base, &roles.identification)?);
-    let fitted = identify::lsq(&machine, &together, &settings, context.control())?;
-    let model = fitted.model(&machine, known.as_ref());
-    write(folder, "model.toml", &model.to_toml()?, &mut files)?;
-    warnings.extend(fitted.warnings.iter().cloned());
-    inputs.extend(fitted.inputs.iter().cloned());
-
-    // torque on logs that were not used
-    let unseen = logs(base, &roles.validation)?;
-    let mut validated = None;
-    let mut validate_json = Value::Null;
-    let mut missed = Vec::new();
-    let mut errors = String::from("no validation log: the errors on unseen data are not known\n");
-    let numbers = refined(&model, "model.toml")?;
-    if !unseen.is_empty() {
-        let found = identify::validate(
-            &machine,
-            &numbers,
-            &logs_of(&unseen),
-            context.control(),
-            &mut |_, _| {},
-        )?;
-        let names: Vec<String> = unseen.iter().map(LogSpec::name).collect();
-        let title = names.join(", ");
-        let figure = validate::figure(&machine, &found.validation, &title).svg();
-        write(folder, "validation.svg", &figure, &mut files)?;
-        validate_json = validate::json(&machine, &found.validation);
-        errors = validate::text(
-            &machine,
-            &found.validation,
-            &format!("torque on unseen data ({title})"),
-        );
-        missed = validate::missed(&found.validation, campaign.settings.max_relative_error);
-        warnings.extend(found.warnings.iter().cloned());
-        inputs.extend(found.inputs.iter().cloned());
-        validated = Some(found);
-    }
-
-    // what the declared model lacks; the validation logs decide nothing
-    let mut refined_model = None;
-    let mut diagnose_json = Value::Null;
-    let mut lacking = String::new();
+    let control = context.control();
+    let Campaigned {
+        friction: of_joints,
+        dynamics,
+        model,
+        numbers,
+        validated,
+        diagnosed: last,
+        refined,
+        inputs,
+        warnings: told,
+    } = identify::identify(&machine, &role_logs, &settings, control, &mut |end| {
+        keep(end, &machine, &title, folder, &mut files)
+    })?;
+    let of_joints = of_joints.as_ref().map(|(found, _)| found);
+    warnings.extend(told);
     let (mut diagnosed, mut at_fault) = (None, None);
-    let mut training = logs(base, &roles.identification)?;
-    // friction is fitted again beside an effect, from the logs that it came from
-    training.extend(one_joint.iter().cloned());
-    let (fitted_to, decided) = (logs_of(&training), logs_of(&unseen));
-    let roles = DiagnoseLogs {
-        train: &fitted_to,
-        veto: &[],
-        holdout: &decided,
-    };
-    let settings = DiagnoseSettings::default();
-    match identify::diagnose(
-        &machine,
-        ("model.toml", &model),
-        &roles,
-        &settings,
-        context.control(),
-    ) {
+    let (diagnose_json, lacking) = match last {
         Ok(DiagnoseEnd::DataFault(fault)) => {
-            diagnose_json = diagnose_fault::json(&fault);
-            lacking = diagnose_fault::text(&fault);
+            let told = (diagnose_fault::json(&fault), diagnose_fault::text(&fault));
             at_fault = Some(fault);
+            told
         }
         Ok(DiagnoseEnd::Diagnosed(found)) => {
-            diagnose_json = diagnose::json(&machine, &found);
-            lacking = diagnose_text::text(&machine, &found, "model.toml");
-            if !found.diagnosis.steps.is_empty() {
-                let refined = found.model(&machine, &model);
-                write(folder, "refined.toml", &refined.to_toml()?, &mut files)?;
-                refined_model = Some(refined);
-            }
+            let told = (
+                diagnose::json(&machine, &found),
+                diagnose_text::text(&machine, &found, "model.toml"),
+            );
             diagnosed = Some(found);
+            told
         }
-        // logs too short to look for effects are no reason to lose the fit
-        Err(error) if error.kind() == ErrorKind::Undetermined => {
+        Err(error) => {
             warnings.push(format!("no diagnosis: {}", CliError::from(error)));
+            (Value::Null, String::new())
         }
-        Err(error) => return Err(error.into()),
-    }
+    };
 
     // only now, with everything decided, may the truth be looked at
     let truth = match &campaign.truth {
         None => None,
         Some(path) => Some(load_truth(&base.join(path))?),
     };
-    text += &parameters(refined_model.as_ref().unwrap_or(&model), truth.as_ref());
-    text += &lsq::quality(&machine, &fitted);
-    text.push('\n');
-    text += &errors;
-    text.push('\n');
-    text += &lacking;
+    let errors = match &validated {
+        None => "no validation log: the errors on unseen data are not known\n".to_owned(),
+        Some(found) => validate::text(
+            &machine,
+            &found.validation,
+            &format!("torque on unseen data ({title})"),
+        ),
+    };
+    let latest = refined.as_ref().unwrap_or(&model);
+    let parameters = parameters(latest, truth.as_ref());
+    let quality = lsq::quality(&machine, &dynamics);
+    let text = format!("{parameters}{quality}\n{errors}\n{lacking}");
     let truth_json = match &truth {
         None => Value::Null,
-        Some(truth) => comparison(refined_model.as_ref().unwrap_or(&model), truth),
+        Some(truth) => comparison(latest, truth),
     };
     let held = match diagnosed {
-        None if !unseen.is_empty() => held_for_pictures(&machine, &logs_of(&unseen), context)?,
+        None if !unseen.is_empty() => held_for_pictures(&machine, &role_logs.validation, context)?,
         _ => None,
     };
     let look = held.as_ref().map(|held| {
@@ -264,10 +203,10 @@ fn execute(
     let page = pages::Identify {
         machine: &machine,
         campaign: (name, &campaign_text),
-        friction: found.as_ref(),
-        fitted: &fitted,
+        friction: of_joints,
+        fitted: &dynamics,
         declared: &model,
-        refined: refined_model.as_ref(),
+        refined: refined.as_ref(),
         numbers: &numbers,
         validated: validated.as_ref(),
         diagnosed: diagnosed.as_deref(),
@@ -294,9 +233,9 @@ fn execute(
     write(folder, "summary.txt", &text, &mut files)?;
     files.push("result.json".into());
     let result = json!({
-        "friction": friction_json,
-        "lsq": lsq::json(&machine, &fitted),
-        "validate": validate_json,
+        "friction": of_joints.map(|found| friction::json(&machine, found)),
+        "lsq": lsq::json(&machine, &dynamics),
+        "validate": validated.as_ref().map(|v| validate::json(&machine, &v.validation)),
         "diagnose": diagnose_json,
         "truth": truth_json,
         "files": files,
@@ -305,11 +244,42 @@ fn execute(
     write_whole(&folder.join("result.json"), |f| {
         f.write_all(document.text().as_bytes())
     })?;
+    let missed = validated
+        .as_ref()
+        .map(|found| validate::missed(&found.validation, campaign.settings.max_relative_error));
     Ok(Outcome {
         text,
         document,
-        missed,
+        missed: missed.unwrap_or_default(),
     })
+}
+
+fn names_of(logs: &[LogSpec]) -> String {
+    let names: Vec<String> = logs.iter().map(LogSpec::name).collect();
+    names.join(", ")
+}
+
+/// Writes what a stage leaves; `unseen` names the validation logs.
+fn keep(
+    end: StageEnd,
+    machine: &LoggedRobot,
+    unseen: &str,
+    folder: &Path,
+    files: &mut Vec<String>,
+) -> Result<(), CliError> {
+    match end {
+        StageEnd::Friction(found, model) => {
+            write(folder, "friction.toml", &model.to_toml()?, files)?;
+            let figure = friction::figure(machine, found).svg();
+            write(folder, "friction.svg", &figure, files)
+        }
+        StageEnd::Dynamics(_, model) => write(folder, "model.toml", &model.to_toml()?, files),
+        StageEnd::Validated(found) => {
+            let figure = validate::figure(machine, &found.validation, unseen).svg();
+            write(folder, "validation.svg", &figure, files)
+        }
+        StageEnd::Refined(model) => write(folder, "refined.toml", &model.to_toml()?, files),
+    }
 }
 
 fn write(folder: &Path, name: &str, text: &str, files: &mut Vec<String>) -> Result<(), CliError> {

@@ -10,7 +10,12 @@
 //! | [`lsq`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
 //! | [`diagnose`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
 //! | [`validate`] | logs that were not used, a model | [`Validated`]: torque errors |
+//! | [`compare`] | two models, logs | [`Compared`]: differences of parameters and of errors |
+//! | [`torque`] | positions, a model | [`FeedForward`]: torques with their band |
+//! | [`identify`] | logs by role | [`Campaigned`]: all of it, one after the other |
 
+mod campaign;
+mod compare;
 mod consistent;
 mod control;
 mod diagnose;
@@ -27,9 +32,12 @@ mod open_log;
 mod passes;
 mod prior;
 mod reference;
+mod torque;
 mod unknowns;
 mod validate;
 
+pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
+pub use compare::{Compared, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
 pub use consistent::ConsistentLinks;
 pub use control::{Control, Progress};
 pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
@@ -42,5 +50,6 @@ pub use logged_robot::{LoggedRobot, narrowed};
 pub use lsq::{IdentifiedDynamics, LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use open_log::{OpenLog, summary_warnings};
+pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};

@@ -1,8 +1,8 @@
 //! The tables of `compare`.
 
-use super::{Compared, LETTERS, Tried};
+use super::LETTERS;
 use crate::compare::{Apart, Difference, ParameterEstimate, Reason};
-use crate::identify::LoggedRobot;
+use crate::identify::{Compared, LoggedRobot, Tried};
 use crate::number;
 use crate::report::table::{Align, Table, paragraph};
 

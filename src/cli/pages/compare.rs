@@ -1,10 +1,11 @@
 //! The page of `compare`.
 
-use super::super::compare::{Compared, apart_table, error_table, parameter_table};
+use super::super::compare::{apart_table, error_table, parameter_table};
 use super::super::{CliError, Context};
 use super::look::Look;
 use super::torque::Drawn;
 use super::{quality, torque};
+use crate::identify::Compared;
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::sections::provenance;
 use crate::report::{Report, TraceStyle, Writer};
@@ -68,7 +69,7 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
     let summary = of.tried.as_ref().map(|tried| &tried.held.summary);
     let mut made_from: Vec<Provenance> = Vec::new();
     for side in &of.sides {
-        made_from.extend(side.given.value.provenance.inputs.iter().cloned());
+        made_from.extend(side.given.file.provenance.inputs.iter().cloned());
     }
     made_from.dedup();
     let file = &of.machine.file;
@@ -79,7 +80,7 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
 /// A log that one of the models was made from favours that model.
 fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
     for (letter, side) in ["A", "B"].iter().zip(&of.sides) {
-        let made_from = &side.given.value.provenance.inputs;
+        let made_from = &side.given.file.provenance.inputs;
         let known = |i: &&Provenance| {
             let mut made = made_from.iter().filter(|m| m.samples > 0);
             made.any(|m| m.sha256 == i.sha256)

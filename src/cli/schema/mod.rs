@@ -6,9 +6,10 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
-use crate::cli::{convert, export, new, simulate, torque};
+use crate::cli::{convert, export, new, simulate};
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
+use crate::identify::TorqueAlong;
 use crate::inspect::Inspection;
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -82,7 +83,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
         Kind::Inspect => json::schema::<Inspection>("inspect"),
-        Kind::Torque => json::schema::<torque::Along>("torque"),
+        Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),
         Kind::Export => json::schema::<export::Exported>("export"),
         Kind::New => json::schema::<new::Drafted>("new"),

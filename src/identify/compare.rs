@@ -1,0 +1,238 @@
+//! Two models of one robot beside each other, and on the same logs.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::in_memory::{InMemory, read_whole};
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::{refined, refined_or_friction};
+use crate::compare::{self, ErrorDifferences, ParameterPair, SideBySide};
+use crate::config::ModelFile;
+use crate::effect::AugmentedModel;
+use crate::log::{Provenance, escape};
+use crate::motion::Parallel;
+use crate::robot::model::JointFriction;
+use crate::validate::{Reconstruction, Validation};
+
+/// Deviation from which on two estimates are called different: 95 % of a normal distribution.
+pub const DIFFERENT: f64 = 1.96;
+
+/// A model file that is given.
+#[derive(Debug, Clone)]
+pub struct GivenModel {
+    /// The file as the user named it, for messages.
+    pub name: String,
+    pub file: ModelFile,
+    /// Its entry among the inputs of the result.
+    pub provenance: Provenance,
+}
+
+/// A model file with what it stands for.
+pub struct Side {
+    pub given: GivenModel,
+    pub model: AugmentedModel,
+}
+
+/// Both models on the same logs.
+pub struct Tried {
+    pub held: InMemory,
+    pub validations: [Validation; 2],
+    pub differences: ErrorDifferences,
+}
+
+/// Result of the comparison.
+pub struct Compared {
+    pub machine: LoggedRobot,
+    pub sides: [Side; 2],
+    pub table: SideBySide,
+    pub curves: Vec<Curves>,
+    /// None where no log is given.
+    pub tried: Option<Tried>,
+    pub warnings: Vec<String>,
+}
+
+/// Friction of one joint by both models.
+pub struct Curves {
+    pub joint: String,
+    pub speed_unit: String,
+    pub torque_unit: String,
+    /// Largest speed of the curves, and where it is from.
+    pub most: f64,
+    pub speeds_from: &'static str,
+    pub laws: [Option<JointFriction>; 2],
+}
+
+/// A model; without logs one of friction alone will do.
+fn side(given: GivenModel, logs: bool) -> Result<Side, IdentifyError> {
+    let model = match logs {
+        true => refined(&given.file, &given.name)?,
+        false => refined_or_friction(&given.file, &given.name)?,
+    };
+    Ok(Side { given, model })
+}
+
+/// Refuses two models whose parameters and torques are not of one robot.
+fn one_robot([a, b]: [&Side; 2]) -> Result<(), IdentifyError> {
+    let describe = |side: &Side| {
+        let (robot, file) = (&side.model.model.robot, &side.given.file.robot);
+        let joints = robot.joint_names().iter().enumerate();
+        let words = joints.map(|(j, name)| {
+            let position = robot.joint_kind(j).position_unit();
+            format!("{} ({position}, {})", escape(name), file.torque_unit(j))
+        });
+        words.collect::<Vec<_>>().join(", ")
+    };
+    let (ours, theirs) = (describe(a), describe(b));
+    if ours == theirs {
+        return Ok(());
+    }
+    Err(IdentifyError::OtherRobot {
+        first: a.given.name.clone(),
+        second: b.given.name.clone(),
+        ours,
+        theirs,
+    })
+}
+
+/// What a reader has to know before believing a difference.
+fn cautions([a, b]: [&Side; 2], logs: bool) -> Vec<String> {
+    let mut out = Vec::new();
+    let (first, second) = (&a.given.file, &b.given.file);
+    let made = |file: &ModelFile| file.provenance.inputs.clone();
+    let shared: Vec<String> = made(first)
+        .iter()
+        .filter(|i| i.samples > 0)
+        .filter(|i| made(second).iter().any(|o| o.sha256 == i.sha256))
+        .map(|i| escape(&i.name))
+        .collect();
+    if !shared.is_empty() {
+        out.push(format!(
+            "both models are made from {}: their errors are not independent, so differences in \
+             standard deviations are a hint and no test",
+            shared.join(", ")
+        ));
+    }
+    if logs && first.robot.robot.setup != second.robot.robot.setup {
+        out.push("the models are of different set-ups; the logs are read as the first says".into());
+    }
+    if logs && first.robot.log != second.robot.log {
+        out.push("the models map logs differently; the logs are read as the first says".into());
+    }
+    if logs && first.robot.filter != second.robot.filter {
+        out.push(
+            "the models declare different filters; both are judged with that of the first".into(),
+        );
+    }
+    out
+}
+
+/// Compares two models, and both on the same logs where there are some.
+///
+/// # Errors
+/// Models and logs that cannot be used, and models of different robots.
+pub fn compare(
+    [a, b]: [GivenModel; 2],
+    logs: &[Log],
+    control: &Control,
+) -> Result<Compared, IdentifyError> {
+    let sides = [side(a, !logs.is_empty())?, side(b, !logs.is_empty())?];
+    one_robot(sides.each_ref())?;
+    let first = &sides[0].given;
+    let machine = LoggedRobot::new(&first.name, first.file.robot.clone());
+    let mut warnings = cautions(sides.each_ref(), !logs.is_empty());
+    let tried = match logs {
+        [] => None,
+        logs => Some(on_logs(&machine, &sides, logs, control)?),
+    };
+    if let Some(tried) = &tried {
+        warnings.extend(tried.held.warnings.iter().cloned());
+    }
+    Ok(Compared {
+        table: compare::side_by_side(&sides[0].given.file, &sides[1].given.file),
+        curves: curves(&machine, &sides, tried.as_ref()),
+        machine,
+        sides,
+        tried,
+        warnings,
+    })
+}
+
+fn on_logs(
+    machine: &LoggedRobot,
+    sides: &[Side; 2],
+    logs: &[Log],
+    control: &Control,
+) -> Result<Tried, IdentifyError> {
+    let held = read_whole(machine, logs, control)?;
+    let settings = machine.settings();
+    let named = |error| IdentifyError::motion(&machine.name, error);
+    let validation = |side: &Side| {
+        let mut all = Reconstruction::new(&side.model.model);
+        for (segment, stretch) in held.stretches.iter().enumerate() {
+            let hat = side.model.reconstruct(stretch);
+            all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})
+                .map_err(named)?;
+        }
+        Ok::<_, IdentifyError>(all.finish(held.summary.clone()))
+    };
+    let validations = [validation(&sides[0])?, validation(&sides[1])?];
+    control.check()?;
+    let parallel = Parallel::design(&settings, held.summary.dt).map_err(named)?;
+    let models = sides.each_ref().map(|side| &side.model);
+    let differences = compare::differences(models, &held.stretches, &parallel).map_err(named)?;
+    Ok(Tried {
+        held,
+        validations,
+        differences,
+    })
+}
+
+/// Friction of the joints where a model has some.
+fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Vec<Curves> {
+    let robot = &machine.robot;
+    let joints = robot.joint_names().iter().enumerate();
+    joints
+        .filter_map(|(j, joint)| {
+            let laws = sides.each_ref().map(|side| {
+                let law = side.model.model.friction.get(j).copied();
+                law.filter(|law| *law != JointFriction::None)
+            });
+            laws.iter().flatten().next()?;
+            let seen = tried.and_then(|tried| {
+                let all = tried.held.stretches.iter().filter_map(|s| s.v.get(j));
+                let most = all.flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
+                (most > 0.0).then_some(most)
+            });
+            let limit = |side: &Side| side.given.file.robot.limits.get(joint)?.speed;
+            let limit = || sides.iter().find_map(limit);
+            let (most, speeds_from) = match seen {
+                Some(most) => (most, "logs"),
+                None => limit().map_or((1.0, "assumed"), |most| (most, "limits")),
+            };
+            Some(Curves {
+                joint: joint.clone(),
+                speed_unit: format!("{}/s", robot.joint_kind(j).position_unit()),
+                torque_unit: machine.file.torque_unit(j).to_owned(),
+                most,
+                speeds_from,
+                laws,
+            })
+        })
+        .collect()
+}
+
+impl Compared {
+    /// Name of a model's file.
+    pub fn name(&self, side: usize) -> String {
+        escape(&self.sides[side].given.provenance.name)
+    }
+
+    /// Parameters that differ by more than chance explains, the largest deviation first.
+    pub fn different(&self) -> Vec<&ParameterPair> {
+        let beyond = |p: &&ParameterPair| p.deviation.is_some_and(|d| d.abs() > DIFFERENT);
+        let mut found: Vec<&ParameterPair> = self.table.parameters.iter().filter(beyond).collect();
+        let size = |p: &ParameterPair| p.deviation.unwrap_or(0.0).abs();
+        found.sort_by(|x, y| size(y).total_cmp(&size(x)));
+        found
+    }
+}

@@ -1,0 +1,161 @@
+//! Feed-forward torque along a recorded or planned motion, with its prediction band.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::open_log::summary_warnings;
+use crate::config::ModelFile;
+use crate::effect::AugmentedModel;
+use crate::log::{Instant, Provenance};
+use crate::motion::{self, FilterSettings, Summary};
+
+/// The torque along a motion.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TorqueAlong {
+    pub joints: Vec<JointAlong>,
+    /// Rows of the motion.
+    pub samples: u64,
+    pub processing: Summary,
+}
+
+/// The torque of one joint.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct JointAlong {
+    pub joint: String,
+    /// "N" or "Nm".
+    pub unit: String,
+    /// Root mean square \[unit\].
+    pub rms: f64,
+    /// Largest modulus \[unit\].
+    pub peak: f64,
+}
+
+/// What `torque` found.
+pub struct FeedForward {
+    pub along: TorqueAlong,
+    pub inputs: Vec<Provenance>,
+    pub warnings: Vec<String>,
+}
+
+/// Torques along a log of positions by a model, `refined` being what its `file` stands for. `row` gets
+/// the time of each sample \[s\], the torque of every joint and then their standard deviations
+/// \[N or Nm\], and the instant from which time is counted.
+///
+/// # Errors
+/// A log that cannot be used.
+pub fn torque(
+    machine: &LoggedRobot,
+    (file, refined): (&ModelFile, &AugmentedModel),
+    log: &Log,
+    control: &Control,
+    row: &mut dyn FnMut(f64, &[f64], Instant),
+) -> Result<FeedForward, IdentifyError> {
+    let model = &refined.model;
+    let n = machine.robot.joints();
+    let p = model.parameters();
+    let covariance = file.model_covariance(model);
+    let joints = machine.robot.joint_names().iter();
+    let residual: Vec<f64> = joints
+        .map(|j| file.residual_std.get(j).copied().unwrap_or(0.0))
+        .collect();
+    // every row gets its torque: nothing is decimated, and nothing left off at the ends
+    let settings = FilterSettings {
+        decimation: Some(1),
+        q_trim_s: Some(0.0),
+        trim_s: Some(0.0),
+        ..machine.settings()
+    };
+    let work = control.begin("torque", None);
+    let mut open = machine.open_positions(log, control)?;
+    let origin = open.origin();
+    let mut peak = vec![0.0f64; n];
+    let mut square = vec![0.0f64; n];
+    let mut emit = |t: f64, values: &[f64]| {
+        for j in 0..n {
+            peak[j] = peak[j].max(values[j].abs());
+            square[j] += values[j] * values[j];
+        }
+        row(t, values, origin);
+    };
+    let band = |q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]| {
+        GRADIENT.with_borrow_mut(|g| {
+            g.resize(p, 0.0);
+            for (j, out) in out.iter_mut().enumerate() {
+                model.gradient(j, q, v, a, g);
+                *out = (quadratic(&covariance, g) + residual[j] * residual[j]).sqrt();
+            }
+        });
+    };
+    let mut read = |block: &mut _| open.read(block);
+    let failed = |e| IdentifyError::of_run(&log.name(), e);
+    let summary = if refined.effects.is_empty() {
+        let compute = |s: &motion::MotionSample, out: &mut [f64]| {
+            let (tau, std) = out.split_at_mut(n);
+            model.torque(s.q, s.v, s.a, tau);
+            band(s.q, s.v, s.a, std);
+        };
+        let mut emit = |row: &motion::FilteredRow| emit(row.t, row.raw);
+        motion::run(&mut read, n, &settings, None, 2 * n, &compute, &mut emit).map_err(failed)?
+    } else {
+        // effects remember: they need a stretch from its begin
+        let (found, summary) = motion::stretches(0, n, &settings, &mut read).map_err(failed)?;
+        let mut values = vec![0.0; 2 * n];
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for stretch in &found {
+            let hat = refined.reconstruct(stretch);
+            for (k, t) in stretch.t.iter().enumerate() {
+                stretch.at(k, &mut q, &mut v, &mut a);
+                for (x, hat) in values.iter_mut().zip(&hat) {
+                    *x = hat[k];
+                }
+                band(&q, &v, &a, &mut values[n..]);
+                emit(*t, &values);
+            }
+        }
+        summary
+    };
+    drop(work);
+    control.check()?;
+    let mut warnings = open.warnings();
+    warnings.extend(summary_warnings(&log.name(), &summary));
+    let inputs = vec![open.provenance()?];
+    let rows = summary.rows.max(1) as f64;
+    let names = machine.robot.joint_names().iter().enumerate();
+    let joints = names.map(|(j, joint)| JointAlong {
+        joint: joint.clone(),
+        unit: machine.file.torque_unit(j).to_owned(),
+        rms: (square[j] / rows).sqrt(),
+        peak: peak[j],
+    });
+    Ok(FeedForward {
+        along: TorqueAlong {
+            joints: joints.collect(),
+            samples: summary.rows,
+            processing: summary,
+        },
+        inputs,
+        warnings,
+    })
+}
+
+thread_local! {
+    /// Gradient of one sample, kept from sample to sample.
+    static GRADIENT: std::cell::RefCell<Vec<f64>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+/// g' C g for a row-major square C; never negative.
+fn quadratic(covariance: &[f64], g: &[f64]) -> f64 {
+    let p = g.len();
+    let sum: f64 = (0..p)
+        .filter(|i| g[*i] != 0.0)
+        .map(|i| {
+            let row = &covariance[i * p..(i + 1) * p];
+            g[i] * row.iter().zip(g).map(|(c, x)| c * x).sum::<f64>()
+        })
+        .sum();
+    sum.max(0.0)
+}
