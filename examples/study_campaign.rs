@@ -23,8 +23,8 @@ use cft_ident::robot::cft::dynamics::{Coefficients, inertia};
 use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::robot::model::{JointFriction, Model};
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_phase, follow};
-use cft_ident::simulate::{CftTruth, Sensors, Settings};
+use cft_ident::simulate::cft::{excitation_at_random_phase, follow, mechanism};
+use cft_ident::simulate::{CftTruth, OneJointMove, Sensors, Settings};
 use cft_ident::validate::Reconstruction;
 use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
@@ -75,7 +75,7 @@ fn campaign(seed: u64) -> Value {
     let mut known = Vec::new();
     for (j, name) in JOINTS.iter().enumerate() {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
-            .reference(Setup::Tuedacs)
+            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
             .expect("a ladder");
         let recording =
             follow(&truth, &[], motion, &noisy(20.0, 10 * seed + j as u64)).expect("a run");

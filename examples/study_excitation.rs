@@ -19,8 +19,8 @@ use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::motion::ZeroOrderHold;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation_at_random_phase, follow};
-use cft_ident::simulate::{CftTruth, Noise, Recording, Settings};
+use cft_ident::simulate::cft::{excitation_at_random_phase, follow, mechanism};
+use cft_ident::simulate::{CftTruth, Noise, OneJointMove, Settings, SimulatedRun};
 use serde_json::{Value, json};
 use study::{
     JOINTS, along, block, estimated, noisy, percent, processing, quantile, series, source, study,
@@ -41,7 +41,7 @@ fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFrict
     let names: Vec<String> = infos.iter().map(|p| p.name.to_string()).collect();
     let of = |j: usize| {
         let motion = OneJointMove::new(j, 20.0, Some(seed))
-            .reference(Setup::Tuedacs)
+            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
             .expect("a ladder");
         let settings = noisy(20.0, 10 * seed + j as u64);
         let log = block(&follow(truth, &[], motion, &settings).expect("a run"));
@@ -65,7 +65,7 @@ fn campaigns(seed: u64) -> Value {
         own: vec![Vec::new(); 4],
         known: friction(&robot, &truth, seed),
     };
-    let theta = |recording: &Recording<4>| -> Vec<f64> {
+    let theta = |recording: &SimulatedRun<4>| -> Vec<f64> {
         let mut log = block(recording);
         ZeroOrderHold::new(4).centre(&robot, &mut log);
         let found = accumulate(&robot, &columns, &processing(), &mut source(&log)).expect("a log");

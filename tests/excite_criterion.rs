@@ -9,7 +9,7 @@ use cft_ident::excite::machine::Machine;
 use cft_ident::excite::search::{Found, Task, design, keeps_limits};
 use cft_ident::excite::series::Series;
 use cft_ident::excite::usage::along_period;
-use cft_ident::excite::{Criterion, Given, Prior, machine, series_of, trajectory};
+use cft_ident::excite::{Criterion, Given, PriorInformation, machine, series_of, trajectory};
 
 fn built(robot: &str) -> Machine {
     let robot = RobotFile::load(Path::new(robot)).expect("embedded");
@@ -105,7 +105,7 @@ fn a_design_after_another_tells_what_the_first_leaves_open() {
     given.add_motion(&information, 2500.0);
     let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
     let criterion = Criterion::AOptimal(vec![1.0; 12]);
-    let prior = Prior {
+    let prior = PriorInformation {
         information: given.weighted(&weights),
         rows: 2500.0,
     };

@@ -133,7 +133,7 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
     let log = simulate::simulate(&Order {
         robot: &file,
         model: None,
-        motion: simulate::Motion::Trajectory(&written),
+        experiment: simulate::Experiment::Trajectory(&written),
         seconds: None,
         effects: Vec::new(),
         seed: 1,
@@ -141,7 +141,7 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
     .expect("simulated");
     assert_eq!(log.ending, simulate::Ending::Completed);
     assert!(log.saturated.iter().all(|(_, share)| *share == 0.0));
-    let motion = Motion::of_file(&machine, &file, None, &written, 20.0, 1).expect("a motion");
+    let motion = Motion::of_file(&machine, &written, 20.0, 1).expect("a motion");
     let rows: Vec<&[f64]> = log.rows().collect();
     let seconds = rows[rows.len() - 1][0];
     assert!((seconds - motion.seconds()).abs() < 2e-3, "{seconds}");
@@ -161,11 +161,10 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
 
 #[test]
 fn other_motions_are_judged_by_the_same_limits() {
-    let file = robot("configs/cft.toml");
     let machine = built("configs/cft.toml");
     let judged = |text: &str| {
         let trajectory = Trajectory::parse("t.toml", text).expect("a trajectory");
-        let motion = Motion::of_file(&machine, &file, None, &trajectory, 20.0, 1);
+        let motion = Motion::of_file(&machine, &trajectory, 20.0, 1);
         worst(&motion.expect("a motion").usage(&machine, &machine.channels))
     };
     let move_of = "kind = \"single-joint\"\njoint = \"q4\"\nspeeds = [0.005, 0.02, 0.1, 0.5]\n";

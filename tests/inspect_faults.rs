@@ -5,21 +5,21 @@ mod altered_log;
 use std::sync::OnceLock;
 
 use altered_log::{Log, assert_faults, faults};
-use cft_ident::simulate::Motion;
+use cft_ident::simulate::Experiment;
 
 const CFT: Option<&str> = Some("configs/cft.toml");
 
 /// All joints move (Table 3 of the report), 20 s at 1 kHz.
 fn all_move() -> Log {
     static LOG: OnceLock<Log> = OnceLock::new();
-    LOG.get_or_init(|| Log::simulated(Motion::Usual, 20.0))
+    LOG.get_or_init(|| Log::simulated(Experiment::Usual, 20.0))
         .clone()
 }
 
 /// q4 moves at several speeds, with rests; the others are held.
 fn one_moves() -> Log {
     static LOG: OnceLock<Log> = OnceLock::new();
-    LOG.get_or_init(|| Log::simulated(Motion::of_joint("q4"), 20.0))
+    LOG.get_or_init(|| Log::simulated(Experiment::of_joint("q4"), 20.0))
         .clone()
 }
 

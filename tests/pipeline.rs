@@ -12,8 +12,8 @@ use cft_ident::log::Block;
 use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
-use cft_ident::simulate::cft_experiment::{excitation, follow};
-use cft_ident::simulate::{CftTruth, Recording, Sensors, Settings};
+use cft_ident::simulate::cft::{excitation, follow};
+use cft_ident::simulate::{CftTruth, Sensors, Settings, SimulatedRun};
 
 fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, Infallible> + '_ {
     move |out| {
@@ -24,7 +24,7 @@ fn source(block: &Block) -> impl FnMut(&mut Block) -> Result<bool, Infallible> +
     }
 }
 
-fn fitted(robot: &Robot, truth: &CftTruth, recording: &Recording<4>) -> Fit {
+fn fitted(robot: &Robot, truth: &CftTruth, recording: &SimulatedRun<4>) -> Fit {
     let mut log = Block {
         t: recording.t.clone(),
         q: recording.q.concat(),

@@ -1,16 +1,16 @@
 //! The CFT robot as the simulator runs it: equations, limits, saturation, start and rest.
 
 use cft_ident::robot::cft::Setup;
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation, follow, tracking_error};
+use cft_ident::simulate::cft::{excitation, follow, mechanism, tracking_error};
 use cft_ident::simulate::reference::travel;
-use cft_ident::simulate::{CftPlant, CftTruth, Ending, Settings, Status};
+use cft_ident::simulate::{CftTruth, Ending, MotorStatus, OneJointMove, Settings};
 
 /// Runs one of the five standard experiments: ladders of q1, q2, q4, q5, then Table 3.
-fn standard(setup: Setup, number: usize, seed: u64) -> cft_ident::simulate::Recording<4> {
+fn standard(setup: Setup, number: usize, seed: u64) -> cft_ident::simulate::SimulatedRun<4> {
     let truth = CftTruth::synthetic(setup);
     let reference = if number < 4 {
         OneJointMove::new(number, 20.0, Some(seed))
-            .reference(setup)
+            .reference(&mechanism(setup).expect("four joints"))
             .expect("ladder fits")
     } else {
         excitation(setup)
@@ -30,7 +30,7 @@ fn standard_experiments_stay_inside_every_limit_and_below_saturation() {
                 .status
                 .iter()
                 .flatten()
-                .all(|s| *s == Status::Running);
+                .all(|s| *s == MotorStatus::Running);
             assert!(all_running, "{setup:?} {number}");
         }
     }
@@ -39,7 +39,7 @@ fn standard_experiments_stay_inside_every_limit_and_below_saturation() {
 #[test]
 fn controller_tracks_within_millimetres_and_hundredths_of_a_radian() {
     for setup in [Setup::Tuedacs, Setup::Dspace] {
-        let plant = CftPlant::new(&CftTruth::synthetic(setup));
+        let plant = CftTruth::synthetic(setup).plant().expect("a pose");
         for number in 0..5 {
             let (worst, _) = tracking_error(&plant, &standard(setup, number, 1));
             for (i, bound) in [0.006, 0.003, 0.013, 0.002].into_iter().enumerate() {
@@ -76,11 +76,11 @@ fn ladders_hold_the_other_joints_and_cover_their_own_range() {
 #[test]
 fn travel_of_a_joint_ends_at_the_margin_of_a_limit() {
     let setup = Setup::Tuedacs;
-    let plant = CftPlant::new(&CftTruth::synthetic(setup));
+    let plant = CftTruth::synthetic(setup).plant().expect("a pose");
     let limits = setup.limits();
     let pose = cft_ident::robot::cft::pantograph::joints(&limits.middles()).expect("reachable");
     for joint in 0..4 {
-        let room = travel(&plant, &pose, joint, 0.05, &[1.0; 4]).expect("inside");
+        let room = travel(&plant.mechanism, &pose, joint, 0.05, &[1.0; 4]).expect("inside");
         for end in [room.range.0, room.range.1] {
             let mut q = pose;
             q[joint] = end;

@@ -17,14 +17,13 @@ mod static_torques;
 
 use cft_ident::robot::cft::pantograph::reference_jacobian;
 use cft_ident::robot::cft::{Coefficients, Setup, dynamics};
-use cft_ident::simulate::cft_experiment::{effects, excitation, follow};
+use cft_ident::simulate::cft::{effects, excitation, follow};
 use cft_ident::simulate::effects::{Effect, KINDS, Motion};
-use cft_ident::simulate::plant::{Moving, Plant};
-use cft_ident::simulate::single_joint::{SingleJointFriction, SingleJointTruth};
+use cft_ident::simulate::moving::Moving;
 use cft_ident::simulate::{
-    CftPlant, CftTruth, Drive, EffectSpec, Effects, Sensors, Settings, SimulateError, Start,
-    VoltSeries, run,
+    CftTruth, Drive, EffectSpec, Effects, Sensors, Settings, SimulateError, Start, VoltSeries, run,
 };
+use cft_ident::simulate::{SingleJointTruth, SmoothFriction};
 
 fn truth() -> CftTruth {
     CftTruth::synthetic(Setup::Tuedacs)
@@ -37,7 +36,7 @@ fn build(texts: &[&str]) -> Result<Effects, SimulateError> {
 
 /// Torque that the effects take from the motors at a state.
 fn added(effects: Effects, q: [f64; 4], v: [f64; 4]) -> [f64; 4] {
-    let plant = CftPlant::new(&truth());
+    let plant = truth().plant().expect("a pose");
     let with = Moving {
         plant: &plant,
         effects,
@@ -225,7 +224,7 @@ fn joint() -> SingleJointTruth {
         name: "q".to_owned(),
         kind: cft_ident::robot::JointKind::Prismatic,
         inertia: 2.0,
-        friction: SingleJointFriction::DoubleTanh(cft_ident::robot::friction::DoubleTanh {
+        friction: SmoothFriction::DoubleTanh(cft_ident::robot::friction::DoubleTanh {
             viscous: 4.0,
             coulomb_1: 0.0,
             coulomb_2: 0.0,
@@ -239,7 +238,7 @@ fn joint() -> SingleJointTruth {
     }
 }
 
-fn pushed(effect: Box<dyn Effect>, volts: Vec<f64>) -> cft_ident::simulate::Recording<1> {
+fn pushed(effect: Box<dyn Effect>, volts: Vec<f64>) -> cft_ident::simulate::SimulatedRun<1> {
     let mut effects = Effects::default();
     effects.push(effect);
     let times = (0..volts.len()).map(|k| k as f64).collect();
@@ -251,7 +250,7 @@ fn pushed(effect: Box<dyn Effect>, volts: Vec<f64>) -> cft_ident::simulate::Reco
         speed: [0.0],
     };
     run(
-        &joint(),
+        &joint().plant().expect("a joint"),
         effects,
         &start,
         &Drive::Volts(series),
@@ -331,7 +330,7 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
         slope_1: 1.0,
         slope_2: 1.0,
     }; 4];
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let mass = 63.2;
     let mut effects = Effects::default();
     effects.push(Box::new(Rotor { mass }));

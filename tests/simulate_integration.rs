@@ -3,10 +3,12 @@
 use cft_ident::robot::cft::geometry::{GRAVITY, L4, L6, U};
 use cft_ident::robot::cft::{Setup, dynamics};
 use cft_ident::robot::friction::DoubleTanh;
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation, follow};
+use cft_ident::simulate::cft::{excitation, follow, mechanism};
 use cft_ident::simulate::integrate::{DormandPrince, System, Tolerance};
-use cft_ident::simulate::plant::{Moving, Plant};
-use cft_ident::simulate::{CftPlant, CftTruth, Effects, Recording, Sensors, Settings};
+use cft_ident::simulate::moving::Moving;
+use cft_ident::simulate::{
+    CftTruth, Effects, OneJointMove, Plant, Sensors, Settings, SimulatedRun,
+};
 use serde_json::Value;
 
 const FREE: DoubleTanh = DoubleTanh {
@@ -17,7 +19,7 @@ const FREE: DoubleTanh = DoubleTanh {
     slope_2: 1.0,
 };
 
-fn moving(plant: &CftPlant, volts: [f64; 4]) -> Moving<'_, CftPlant, 4> {
+fn moving(plant: &Plant<4>, volts: [f64; 4]) -> Moving<'_, 4> {
     Moving {
         plant,
         effects: Effects::default(),
@@ -51,7 +53,7 @@ fn plant_accelerates_as_the_reference_states_say() {
             k + 1
         );
     }
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let states = oracle["states"].as_array().expect("states");
     assert_eq!(states.len(), 40);
     for state in states {
@@ -93,7 +95,7 @@ fn energy(q: &[f64; 4], v: &[f64; 4], theta: &[f64; 12]) -> f64 {
 fn energy_is_conserved_without_friction_and_volts() {
     let mut truth = CftTruth::synthetic(Setup::Tuedacs);
     truth.friction = [FREE; 4];
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let mut system = moving(&plant, [0.0; 4]);
     let theta = truth.printed();
     let mut y = [0.4, 0.3, -0.9, 1.9, 0.3, 1.0, 0.5, -0.4];
@@ -128,18 +130,18 @@ fn energy_is_conserved_without_friction_and_volts() {
 
 #[test]
 fn friction_and_volts_change_the_energy_by_their_work() {
-    struct Powered<'a>(Moving<'a, CftPlant, 4>, [DoubleTanh; 4]);
+    struct Powered<'a>(Moving<'a, 4>, [DoubleTanh; 4]);
     impl System<16> for Powered<'_> {
         fn rates(&self, t: f64, y: &[f64; 16], dydt: &mut [f64; 16]) {
             self.0.rates(t, y, dydt);
             let q = std::array::from_fn(|i| y[i]);
-            let torque = self.0.plant.torque(&q, &self.0.volts);
+            let torque = self.0.plant.mechanism.torque(&q, &self.0.volts);
             let power = |i: usize| (torque[i] - self.1[i].torque(y[4 + i])) * y[4 + i];
             dydt[8] = (0..4).map(power).sum();
         }
     }
     let truth = CftTruth::synthetic(Setup::Tuedacs);
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let volts = [-0.9, 0.3, 0.5, 2.0];
     let mut system = Powered(moving(&plant, volts), truth.friction);
     let mut y = [0.0; 16];
@@ -167,7 +169,7 @@ fn friction_and_volts_change_the_energy_by_their_work() {
 }
 
 /// Largest difference of joint positions and speeds between two runs.
-fn difference(a: &Recording<4>, b: &Recording<4>) -> (f64, f64) {
+fn difference(a: &SimulatedRun<4>, b: &SimulatedRun<4>) -> (f64, f64) {
     let worst = |a: &[[f64; 4]], b: &[[f64; 4]]| {
         let pairs = a.as_flattened().iter().zip(b.as_flattened());
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -186,7 +188,7 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
         let with = |tolerance: Tolerance| {
             let reference = if number < 4 {
                 OneJointMove::new(number, 20.0, None)
-                    .reference(truth.setup)
+                    .reference(&mechanism(truth.setup).expect("four joints"))
                     .expect("fits")
             } else {
                 excitation(truth.setup)
@@ -218,7 +220,7 @@ fn halving_the_tolerance_moves_nothing_that_an_encoder_could_see() {
 #[test]
 fn runge_kutta_with_a_bounded_step_agrees_through_the_stiff_reversal() {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     // Every joint is braked through zero speed by friction and volts.
     let start = [0.2, 0.3, -0.9, 1.9, 0.02, 0.1, 0.1, -0.1];
     let mut system = moving(&plant, [-0.5, 0.0, -0.2, -0.9]);

@@ -3,12 +3,12 @@
 use cft_ident::robot::cft::{Setup, pantograph};
 use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident::robot::{JointKind, RobotError};
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation, follow};
-use cft_ident::simulate::single_joint::{SingleJointFriction, SingleJointTruth};
+use cft_ident::simulate::cft::{excitation, follow, mechanism};
 use cft_ident::simulate::{
-    CftPlant, CftTruth, Control, Drive, Effects, Ending, Frame, OnLimit, Path, Recording,
-    Reference, Sensors, Settings, SimulateError, Start, Status, VoltSeries, run,
+    CftTruth, Drive, Effects, Ending, Frame, MotorStatus, OnLimit, Path, Reference, Sensors,
+    Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
 };
+use cft_ident::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 
 fn truth() -> CftTruth {
     CftTruth::synthetic(Setup::Tuedacs)
@@ -36,9 +36,9 @@ fn play(
     start: &Start<4>,
     drive: &Drive<4>,
     settings: &Settings<4>,
-) -> Result<Recording<4>, SimulateError> {
+) -> Result<SimulatedRun<4>, SimulateError> {
     run(
-        &CftPlant::new(&truth()),
+        &truth().plant().expect("a pose"),
         Effects::default(),
         start,
         drive,
@@ -80,7 +80,7 @@ fn robot_at_rest_without_gravity_load_and_volts_stays_at_rest() {
     truth.theta[12] = 1.0;
     truth.theta[14] = 1.0;
     truth.theta[13] = 1.0;
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let start = at_rest([-0.13, 0.27, 2.8, 0.2]);
     let recording = run(
         &plant,
@@ -96,15 +96,14 @@ fn robot_at_rest_without_gravity_load_and_volts_stays_at_rest() {
 
 #[test]
 fn gravity_pulls_the_arm_down_and_balancing_volts_hold_it() {
-    let plant = CftPlant::new(&truth());
+    let plant = truth().plant().expect("a pose");
     let start = at_rest([-0.1343, 0.2766, 2.8, 0.2]);
     let recording = play(&start, &constant([0.0; 4]), &perfect(0.2)).expect("runs");
     let down = recording.x.last().expect("rows")[0] - recording.x[0][0];
     assert!(down > 1e-3, "{down} m");
     let q = recording.actual.q[0];
-    use cft_ident::simulate::plant::Plant;
     let (_, load) = plant.dynamics(&q, &[0.0; 4]);
-    let volts = plant.volts(&q, &load).expect("regular");
+    let volts = plant.mechanism.volts(&q, &load).expect("regular");
     assert!(
         (volts[0] + 0.66).abs() < 0.01 && (volts[1] - 0.16).abs() < 0.01,
         "{volts:?}"
@@ -150,7 +149,7 @@ fn limit_stops_the_run_and_says_which_coordinate_and_when() {
         .iter()
         .position(|c| *c == event.coordinate);
     let place = place.expect("a coordinate");
-    assert_eq!(recording.status[last][place], Status::LimitReached);
+    assert_eq!(recording.status[last][place], MotorStatus::LimitReached);
     assert_eq!(event.t, recording.t[last]);
     let upper = Setup::Tuedacs.limits().upper[place];
     assert!(
@@ -190,7 +189,10 @@ fn clamped_run_goes_on_and_keeps_every_coordinate_inside() {
             }
         }
         let at_the_end = recording.status.last().expect("rows");
-        assert!(at_the_end.contains(&Status::LimitReached), "{at_the_end:?}");
+        assert!(
+            at_the_end.contains(&MotorStatus::LimitReached),
+            "{at_the_end:?}"
+        );
     }
 }
 
@@ -214,7 +216,7 @@ fn stop_against_which_a_coordinate_runs_takes_energy_and_gives_none() {
         on_limit: OnLimit::Clamp,
         ..perfect(0.05)
     };
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let recording = run(
         &plant,
         Effects::default(),
@@ -224,7 +226,6 @@ fn stop_against_which_a_coordinate_runs_takes_energy_and_gives_none() {
     )
     .expect("runs");
     let energy = |k: usize| {
-        use cft_ident::simulate::plant::Plant;
         let (q, v) = (recording.actual.q[k], recording.actual.v[k]);
         let (mass, _) = plant.dynamics(&q, &v);
         (0..4)
@@ -235,7 +236,7 @@ fn stop_against_which_a_coordinate_runs_takes_energy_and_gives_none() {
     let hit = recording
         .status
         .iter()
-        .position(|s| s[3] == Status::LimitReached)
+        .position(|s| s[3] == MotorStatus::LimitReached)
         .expect("a hit");
     assert!(
         recording.actual.v[hit][0].abs() < 1e-12,
@@ -258,16 +259,16 @@ fn saturation_cuts_the_volts_and_marks_the_channel() {
     };
     let drive = Drive::Follow {
         reference,
-        control: Control::cft(Setup::Tuedacs),
+        control: truth().plant().expect("a pose").control(),
     };
     // 10 cm off on x_c4: the controller asks for 240 V.
     let start = at_rest([-0.1343, 0.2766, 2.8, 0.1]);
     let recording = play(&start, &drive, &perfect(1.0)).expect("runs");
     assert_eq!(recording.volts[0][3], 10.0);
-    assert_eq!(recording.status[0][3], Status::Saturated);
-    assert_eq!(recording.status[0][2], Status::Running);
+    assert_eq!(recording.status[0][3], MotorStatus::Saturated);
+    assert_eq!(recording.status[0][2], MotorStatus::Running);
     assert!(recording.volts.iter().flatten().all(|u| u.abs() <= 10.0));
-    assert_eq!(recording.status.last(), Some(&[Status::Running; 4]));
+    assert_eq!(recording.status.last(), Some(&[MotorStatus::Running; 4]));
     let other = Settings {
         saturation: 2.5,
         ..perfect(1.0)
@@ -347,7 +348,7 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
     assert!(
         !matches!(
             outcome,
-            Ok(Recording {
+            Ok(SimulatedRun {
                 ending: Ending::Completed,
                 ..
             })
@@ -373,7 +374,7 @@ fn single_joint_follows_its_equation_exactly() {
         name: "q1".to_owned(),
         kind: JointKind::Prismatic,
         inertia: 95.0,
-        friction: SingleJointFriction::viscous_coulomb(
+        friction: SmoothFriction::viscous_coulomb(
             ViscousCoulomb {
                 viscous: 200.0,
                 coulomb: 0.0,
@@ -385,6 +386,7 @@ fn single_joint_follows_its_equation_exactly() {
         resolution: 0.0,
         limits: (f64::NEG_INFINITY, f64::INFINITY),
     };
+    let joint = joint.plant().expect("a joint");
     joint.check().expect("physical");
     let drive = Drive::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[1.0]; 2]).expect("a series"));
     let start = Start::State {
@@ -411,12 +413,13 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
         name: "q1".to_owned(),
         kind: JointKind::Prismatic,
         inertia: 95.0,
-        friction: SingleJointFriction::viscous_coulomb(law, 95.0),
+        friction: SmoothFriction::viscous_coulomb(law, 95.0),
         offset: 0.0,
         gain: 1.0,
         resolution: 1e-6,
         limits: (-1.0, 1.0),
     };
+    let joint = joint.plant().expect("a joint");
     let travelled = |force: f64| {
         let drive =
             Drive::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[force]; 2]).expect("a series"));
@@ -445,7 +448,8 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
     let recording = follow(
         &truth(),
         &[],
-        plan.reference(Setup::Tuedacs).expect("fits"),
+        plan.reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+            .expect("fits"),
         &perfect(20.0),
     )
     .expect("runs");
@@ -461,13 +465,13 @@ fn one_joint_moves_stay_inside_given_ranges_or_are_refused() {
         ..plan
     };
     let text = wide
-        .reference(Setup::Tuedacs)
+        .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
         .expect_err("too wide")
         .to_string();
     assert!(text.contains("q1 cannot move over [0, 2]"), "{text}");
     assert!(
         OneJointMove::new(9, 20.0, None)
-            .reference(Setup::Tuedacs)
+            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
             .is_err()
     );
 }

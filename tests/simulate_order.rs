@@ -6,7 +6,7 @@ use std::path::Path;
 use cft_ident::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident::log::{Block, LogSpec, Reader};
 use cft_ident::simulate::{
-    Ending, InitialConditions, Motion, Order, SimulateError, SimulatedLog, TruthFile, simulate,
+    Ending, Experiment, InitialConditions, Order, SimulateError, SimulatedLog, TruthFile, simulate,
     simulate_from,
 };
 
@@ -14,11 +14,11 @@ fn robot(name: &str) -> RobotFile {
     RobotFile::load(Path::new(name)).expect("embedded")
 }
 
-fn order<'a>(robot: &'a RobotFile, motion: Motion<'a>) -> Order<'a> {
+fn order<'a>(robot: &'a RobotFile, experiment: Experiment<'a>) -> Order<'a> {
     Order {
         robot,
         model: None,
-        motion,
+        experiment,
         seconds: Some(20.0),
         effects: Vec::new(),
         seed: 1,
@@ -66,7 +66,7 @@ fn read_back(robot: &RobotFile, log: &SimulatedLog) -> Block {
 #[test]
 fn cft_log_is_read_back_by_the_robot_file_that_ordered_it() {
     let robot = robot("configs/cft.toml");
-    let mut order = order(&robot, Motion::Usual);
+    let mut order = order(&robot, Experiment::Usual);
     order.seconds = Some(2.0);
     let log = simulate(&order).expect("runs");
     assert_eq!(log.header.len(), 1 + 4 * 4 + 4);
@@ -86,7 +86,7 @@ fn every_embedded_cft_robot_simulates_its_moves_without_reaching_a_limit() {
     for name in ["configs/cft.toml", "configs/cft-dspace.toml"] {
         let robot = robot(name);
         for mover in ["q1", "q2", "q4", "q5", "x_c1", "x_c2", "x_c3", "x_c4"] {
-            let log = simulate(&order(&robot, Motion::of_joint(mover))).expect(mover);
+            let log = simulate(&order(&robot, Experiment::of_joint(mover))).expect(mover);
             assert_eq!(
                 log.ending,
                 Ending::Completed,
@@ -106,7 +106,7 @@ fn every_embedded_cft_robot_simulates_its_moves_without_reaching_a_limit() {
 #[test]
 fn motor_moves_move_one_coordinate_and_hold_the_others() {
     let robot = robot("configs/cft.toml");
-    let log = simulate(&order(&robot, Motion::of_joint("x_c2"))).expect("runs");
+    let log = simulate(&order(&robot, Experiment::of_joint("x_c2"))).expect("runs");
     assert!(span(&column(&log, "x_c2")) > 0.5);
     for (name, most) in [("x_c1", 0.006), ("x_c3", 0.005), ("x_c4", 0.002)] {
         let moved = span(&column(&log, name));
@@ -119,7 +119,7 @@ fn raw_channels_are_written_as_the_log_section_reads_them() {
     let mut robot = robot("configs/cft.toml");
     let plain = simulate(&Order {
         seconds: Some(1.0),
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     })
     .expect("runs");
     let text = "[robot]\nmodel = \"cft\"\nsetup = \"tuedacs\"\n[log]\nchannels = \"actuator\"\n[log.actuator.x_c1]\nposition = \"enc1\"\n\
@@ -129,7 +129,7 @@ fn raw_channels_are_written_as_the_log_section_reads_them() {
         .log;
     let counted = simulate(&Order {
         seconds: Some(1.0),
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     })
     .expect("runs");
     assert!(
@@ -148,14 +148,14 @@ fn raw_channels_are_written_as_the_log_section_reads_them() {
 fn trajectory_files_of_every_kind_are_followed() {
     let robot = robot("configs/cft.toml");
     let table = Trajectory::load(Path::new("configs/table3.toml")).expect("embedded");
-    let by_file = simulate(&order(&robot, Motion::Trajectory(&table))).expect("runs");
-    let usual = simulate(&order(&robot, Motion::Usual)).expect("runs");
+    let by_file = simulate(&order(&robot, Experiment::Trajectory(&table))).expect("runs");
+    let usual = simulate(&order(&robot, Experiment::Usual)).expect("runs");
     assert_eq!(by_file.values, usual.values, "Table 3 is the usual motion");
 
     let one = trajectory(
         "kind = \"fourier\"\ncoordinates = \"joint\"\nfundamental_hz = 0.5\n[[coordinate]]\nname = \"q2\"\noffset = 0.2\na = [0.6]\nb = [0.0]\n",
     );
-    let log = simulate(&order(&robot, Motion::Trajectory(&one))).expect("runs");
+    let log = simulate(&order(&robot, Experiment::Trajectory(&one))).expect("runs");
     let expected = 2.0 * 0.6 / std::f64::consts::PI;
     assert!((span(&column(&log, "q_q2")) / expected - 1.0).abs() < 0.05);
     assert!(span(&column(&log, "q_q1")) < 0.01);
@@ -163,7 +163,7 @@ fn trajectory_files_of_every_kind_are_followed() {
     let ladder = trajectory(
         "kind = \"single-joint\"\njoint = \"q5\"\nspeeds = [0.5, 0.05]\nrange = [1.6, 2.2]\nacceleration = 5.0\n",
     );
-    let log = simulate(&order(&robot, Motion::Trajectory(&ladder))).expect("runs");
+    let log = simulate(&order(&robot, Experiment::Trajectory(&ladder))).expect("runs");
     assert!((span(&column(&log, "q_q5")) - 0.6).abs() < 0.02);
 
     let list = trajectory(
@@ -172,7 +172,7 @@ fn trajectory_files_of_every_kind_are_followed() {
          [[point]]\nt = 3.0\nposition = [-0.2, 0.3, 2.5, 0.3]\n\
          [[point]]\nt = 4.0\nposition = [-0.2, 0.3, 2.5, 0.3]\n",
     );
-    let mut request = order(&robot, Motion::Trajectory(&list));
+    let mut request = order(&robot, Experiment::Trajectory(&list));
     request.seconds = None;
     let log = simulate(&request).expect("runs");
     assert_eq!(log.rows().len(), 3000, "the list's own duration");
@@ -186,7 +186,7 @@ fn logged_volts_of_one_run_drive_another() {
     robot.sensors.quantisation = Some(false);
     let first = simulate(&Order {
         seconds: Some(2.0),
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     })
     .expect("runs");
     let times = column(&first, "t");
@@ -198,7 +198,7 @@ fn logged_volts_of_one_run_drive_another() {
         seconds: None,
         ..order(
             &robot,
-            Motion::Volts {
+            Experiment::Volts {
                 times: &times,
                 volts: &volts,
             },
@@ -216,7 +216,7 @@ fn logged_volts_of_one_run_drive_another() {
 fn ordered_initial_conditions_are_where_the_log_begins() {
     let robot = robot("configs/cft.toml");
     let (times, volts) = ([0.0, 0.01], [0.0; 8]);
-    let motion = Motion::Volts {
+    let motion = Experiment::Volts {
         times: &times,
         volts: &volts,
     };
@@ -246,7 +246,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     let robot = robot("configs/cft.toml");
     let synthetic = simulate(&Order {
         seconds: Some(1.0),
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     })
     .expect("runs");
     let mut parameters = synthetic.truth.parameters.clone();
@@ -265,7 +265,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
         seconds: Some(1.0),
         model: Some(("model.toml", &model)),
         effects: vec!["torque-offset:q4:c=1.0".parse().expect("read")],
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     })
     .expect("runs");
     assert_eq!(heavy.truth.parameters, model.parameters);
@@ -285,7 +285,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     short.parameters.truncate(5);
     let outcome = simulate(&Order {
         model: Some(("model.toml", &short)),
-        ..order(&robot, Motion::Usual)
+        ..order(&robot, Experiment::Usual)
     });
     assert!(matches!(outcome, Err(SimulateError::Config(_))));
 }
@@ -301,7 +301,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     robot.limits = extra.limits;
     robot.noise = extra.noise;
     robot.sensors = extra.sensors;
-    let refused = simulate(&order(&robot, Motion::Usual)).expect_err("no parameters");
+    let refused = simulate(&order(&robot, Experiment::Usual)).expect_err("no parameters");
     assert!(refused.to_string().contains("-m"), "{refused}");
     let parameter =
         |name: &str, joint: Option<&str>, value: f64| cft_ident::config::model_file::Parameter {
@@ -331,7 +331,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     };
     let ordered = Order {
         model: Some(("emps-model.toml", &model)),
-        ..order(&robot, Motion::of_joint("q1"))
+        ..order(&robot, Experiment::of_joint("q1"))
     };
     let log = simulate(&ordered).expect("runs");
     assert_eq!(log.header, ["t", "q1", "tau1"], "named as [log] reads them");
@@ -350,7 +350,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         .collect();
     assert_eq!(values, expected);
     let other = simulate(&Order {
-        motion: Motion::of_joint("q9"),
+        experiment: Experiment::of_joint("q9"),
         ..ordered
     });
     assert!(matches!(other, Err(SimulateError::UnknownJoint { .. })));
@@ -364,14 +364,14 @@ fn orders_that_name_what_is_not_there_are_refused() {
             .expect_err("refused")
             .to_string()
     };
-    assert!(text(Motion::of_joint("q3")).contains("q1, q2, q4, q5, x_c1"));
+    assert!(text(Experiment::of_joint("q3")).contains("q1, q2, q4, q5, x_c1"));
     let other = trajectory(
         "kind = \"points\"\ncoordinates = \"joint\"\n[[point]]\nt = 0.0\nposition = [0.1]\n[[point]]\nt = 1.0\nposition = [0.2]\n",
     );
-    assert!(text(Motion::Trajectory(&other)).contains("has 1 coordinates and the robot has 4"));
+    assert!(text(Experiment::Trajectory(&other)).contains("has 1 coordinates and the robot has 4"));
     let mut dspace = robot.clone();
     dspace.robot.setup = Some(cft_ident::robot::cft::Setup::Dspace);
     let table = Trajectory::load(Path::new("configs/table3.toml")).expect("embedded");
-    let refused = simulate(&order(&dspace, Motion::Trajectory(&table))).expect_err("outside");
+    let refused = simulate(&order(&dspace, Experiment::Trajectory(&table))).expect_err("outside");
     assert!(refused.to_string().contains("x_c4"), "{refused}");
 }

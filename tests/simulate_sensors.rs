@@ -2,10 +2,10 @@
 
 use cft_ident::robot::cft::actuation::{ENCODER_SCALE, counts};
 use cft_ident::robot::cft::{Setup, pantograph};
-use cft_ident::simulate::cft_experiment::{OneJointMove, excitation, follow};
-use cft_ident::simulate::{CftTruth, Noise, Recording, Sensors, Settings};
+use cft_ident::simulate::cft::{excitation, follow, mechanism};
+use cft_ident::simulate::{CftTruth, Noise, OneJointMove, Sensors, Settings, SimulatedRun};
 
-fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> Recording<4> {
+fn run(sensors: Sensors<4>, seed: u64, effects: &[&str]) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let effects: Vec<_> = effects
         .iter()
@@ -191,7 +191,7 @@ fn header_and_rows_agree() {
 fn seeds_vary_the_order_of_a_ladder() {
     let ladder = |seed| {
         OneJointMove::new(0, 20.0, Some(seed))
-            .reference(Setup::Tuedacs)
+            .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
             .expect("fits")
     };
     assert_eq!(ladder(1), ladder(1));

@@ -16,7 +16,7 @@ use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;
 use cft_ident::simulate::reference::Fourier;
-use cft_ident::simulate::{Frame, Noise, Path as Motion, Recording, Reference, Settings};
+use cft_ident::simulate::{Frame, Noise, Path as Motion, Reference, Settings, SimulatedRun};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -98,7 +98,7 @@ pub fn processing() -> Processing {
     }
 }
 
-pub fn block(recording: &Recording<4>) -> Block {
+pub fn block(recording: &SimulatedRun<4>) -> Block {
     Block {
         t: recording.t.clone(),
         q: recording.q.concat(),

@@ -15,8 +15,8 @@ use cft_ident::motion::{
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::robot::model::{JointFriction, Model};
-use cft_ident::simulate::cft_experiment::{OneJointMove, follow};
-use cft_ident::simulate::{CftTruth, EffectSpec, Recording, Reference};
+use cft_ident::simulate::cft::{follow, mechanism};
+use cft_ident::simulate::{CftTruth, EffectSpec, OneJointMove, Reference, SimulatedRun};
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
@@ -343,7 +343,7 @@ impl Lab {
         self.log(&follow(truth, specs, to, &settings).expect("a run"))
     }
 
-    fn log(&self, recording: &Recording<4>) -> Block {
+    fn log(&self, recording: &SimulatedRun<4>) -> Block {
         let mut log = block(recording);
         ZeroOrderHold::new(4).centre(&self.robot, &mut log);
         log
@@ -481,7 +481,9 @@ impl Campaign {
             .collect();
         let ladder = |j: usize, specs: &[EffectSpec]| {
             let plan = OneJointMove::new(j, SECONDS, Some(seed));
-            let reference = plan.reference(Setup::Tuedacs).expect("a ladder");
+            let reference = plan
+                .reference(&mechanism(Setup::Tuedacs).expect("four joints"))
+                .expect("a ladder");
             let settings = noisy(SECONDS, 10 * seed + j as u64);
             follow(truth, specs, reference, &settings).expect("a run")
         };

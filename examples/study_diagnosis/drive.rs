@@ -15,9 +15,10 @@ use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::robot::{JointKind, Robot};
 use cft_ident::simulate::reference::{Frame, LadderPlan, Path};
 use cft_ident::simulate::run::run;
-use cft_ident::simulate::single_joint::{SingleJointFriction, effects};
+use cft_ident::simulate::single_joint::effects;
 use cft_ident::simulate::{
-    Drive, EffectSpec, Noise, Recording, Reference, Settings, SingleJointTruth, Start,
+    Drive, EffectSpec, Noise, Reference, Settings, SimulatedRun, SingleJointTruth, SmoothFriction,
+    Start,
 };
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -61,7 +62,7 @@ pub fn truth(name: &str, seed: u64) -> SingleJointTruth {
             JointKind::Revolute
         },
         inertia,
-        friction: SingleJointFriction::viscous_coulomb(law, inertia),
+        friction: SmoothFriction::viscous_coulomb(law, inertia),
         offset: 0.0,
         gain: if slides { 35.0 } else { 2.0 },
         resolution: if slides { 1e-6 } else { 1e-5 },
@@ -93,13 +94,14 @@ pub fn log(truth: &SingleJointTruth, specs: &[EffectSpec], noise: f64, seed: u64
     let mut settings = Settings::new(SECONDS);
     settings.seed = seed;
     settings.sensors.torque_noise = Noise::Relative(noise);
+    let plant = truth.plant().expect("a joint");
     let drive = Drive::Follow {
         reference,
-        control: truth.control(),
+        control: plant.control(),
     };
     let (effects, _) = effects(truth, specs).expect("effects");
-    let recording: Recording<1> =
-        run(truth, effects, &Start::Settled, &drive, &settings).expect("a run");
+    let recording: SimulatedRun<1> =
+        run(&plant, effects, &Start::Settled, &drive, &settings).expect("a run");
     let mut log = Block {
         t: recording.t.clone(),
         q: recording.q.concat(),
@@ -150,8 +152,8 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
 /// The true model without effects.
 pub fn plain(truth: &SingleJointTruth) -> Model {
     let law = match truth.friction {
-        SingleJointFriction::ViscousCoulomb { law, .. } => law,
-        SingleJointFriction::DoubleTanh(_) => ViscousCoulomb {
+        SmoothFriction::ViscousCoulomb { law, .. } => law,
+        SmoothFriction::DoubleTanh(_) => ViscousCoulomb {
             viscous: 0.0,
             coulomb: 0.0,
         },
@@ -174,8 +176,8 @@ fn model(robot: &Robot, [inertia, viscous, coulomb]: [f64; 3]) -> Model {
 /// Values of an effect's keys that do not grow in proportion to its size.
 pub fn values(name: &str, truth: &SingleJointTruth, scale: f64) -> BTreeMap<String, f64> {
     let level = match truth.friction {
-        SingleJointFriction::ViscousCoulomb { law, .. } => law.coulomb,
-        SingleJointFriction::DoubleTanh(law) => law.coulomb_1 + law.coulomb_2,
+        SmoothFriction::ViscousCoulomb { law, .. } => law.coulomb,
+        SmoothFriction::DoubleTanh(law) => law.coulomb_1 + law.coulomb_2,
     };
     let travel = truth.limits.1 - truth.limits.0;
     let keys: &[(&str, f64)] = match name {

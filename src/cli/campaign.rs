@@ -10,7 +10,7 @@ use super::{CliError, Context};
 use crate::config::campaign::{CampaignLogs, CampaignSettings};
 use crate::config::{self, Campaign, RobotFile, Trajectory};
 use crate::output::write_whole;
-use crate::simulate::{EffectSpec, Motion, Order};
+use crate::simulate::{EffectSpec, Experiment, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
 const ROBOT: &str = "configs/cft.toml";
@@ -39,19 +39,19 @@ pub(super) fn simulate(
     let unseen = Trajectory::load(Path::new(UNSEEN))?;
     let joints = robot.joint_names();
     let moves: Vec<String> = joints.iter().map(|j| format!("{j}.csv")).collect();
-    let mut orders: Vec<(String, Motion, Option<f64>)> = joints
+    let mut orders: Vec<(String, Experiment, Option<f64>)> = joints
         .iter()
         .zip(&moves)
-        .map(|(joint, log)| (log.clone(), Motion::of_joint(joint), Some(ONE_JOINT_S)))
+        .map(|(joint, log)| (log.clone(), Experiment::of_joint(joint), Some(ONE_JOINT_S)))
         .collect();
     orders.push((
         "identification.csv".into(),
-        Motion::Trajectory(&excitation),
+        Experiment::Trajectory(&excitation),
         None,
     ));
     orders.push((
         "unseen.csv".into(),
-        Motion::Trajectory(&unseen),
+        Experiment::Trajectory(&unseen),
         Some(UNSEEN_S),
     ));
     let effects = vec![EFFECT.parse::<EffectSpec>().map_err(CliError::input)?];
@@ -59,11 +59,11 @@ pub(super) fn simulate(
     let said: Vec<Result<Vec<String>, CliError>> = orders
         .par_iter()
         .enumerate()
-        .map(|(i, (log, motion, seconds))| {
+        .map(|(i, (log, experiment, seconds))| {
             let order = Order {
                 robot: &robot,
                 model: None,
-                motion: *motion,
+                experiment: *experiment,
                 seconds: *seconds,
                 effects: effects.clone(),
                 // every experiment has noise of its own

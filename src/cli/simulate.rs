@@ -18,7 +18,7 @@ use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::simulate::effects::EffectValue;
 use crate::simulate::{
-    self, EffectSpec, Ending, InitialConditions, LimitEvent, Motion, Order, SimulatedLog,
+    self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order, SimulatedLog,
 };
 
 const EXAMPLE: &str = "\
@@ -116,24 +116,24 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     inputs.extend(volts.iter().map(|volts| volts.provenance.clone()));
 
-    let motion = match (&reference, &args.move_joint, &volts) {
-        (Some(reference), ..) => Motion::Trajectory(&reference.value),
-        (_, Some(joint), _) => Motion::Move {
+    let experiment = match (&reference, &args.move_joint, &volts) {
+        (Some(reference), ..) => Experiment::Trajectory(&reference.value),
+        (_, Some(joint), _) => Experiment::OneJoint {
             joint,
             part: args.travel.unwrap_or(1.0),
         },
-        (_, _, Some(volts)) => Motion::Volts {
+        (_, _, Some(volts)) => Experiment::Volts {
             times: &volts.times,
             volts: &volts.rows,
         },
-        _ => Motion::Usual,
+        _ => Experiment::Usual,
     };
     let order = Order {
         robot: &robot,
         model: model
             .as_ref()
             .map(|model| (model.name.as_str(), &model.value)),
-        motion,
+        experiment,
         seconds: args.seconds,
         effects: args.effects.clone(),
         seed: args.seed,

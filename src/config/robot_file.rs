@@ -25,7 +25,7 @@ pub enum ModelKind {
 
 impl ModelKind {
     /// As it is written in files.
-    pub(super) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Cft => "cft",
             Self::SingleJoint => "single-joint",

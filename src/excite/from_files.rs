@@ -6,29 +6,23 @@ use crate::config::robot_file::CoordinateLimits;
 use crate::config::trajectory::{Fourier, FourierCoordinate};
 use crate::config::{ModelFile, RobotFile};
 use crate::inertia::columns::{Own, RegressorColumns};
-use crate::robot::cft::pantograph::TURN_OFFSET;
-use crate::robot::cft::{COORDINATES, JOINTS, geometry};
+use crate::robot::friction::ViscousCoulomb;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::{JointKind, Robot};
-use crate::simulate::CftTruth;
-use crate::simulate::cft_experiment::coordinate_speeds;
+use crate::simulate::Mechanism;
 
 use super::ExciteError;
 use super::limits::{Channel, Quantity};
-use super::machine::{Machine, Motors};
-use super::series::Series;
+use super::machine::Machine;
+use super::series::{MOST, Series};
 
-/// Volts that the amplifiers give where `[control] saturation_v` says nothing.
-const VOLTS: f64 = 10.0;
-/// Least sin q5: links 4 and 5 stay 12 degrees off the line. Inside Table 5 it is above 0.6.
-const CLEARANCE: f64 = 0.2;
 /// Share of the speed limit within which the sign of a Coulomb column is smoothed in a search.
 const SIGN: f64 = 0.005;
 
-/// The machine of a robot file, with the torques of a model, or of the synthetic CFT robot.
+/// The machine of a robot file, with the torques of a model, or of the numbers that stand for the robot.
 ///
-/// Limits of the CFT robot are those of Table 5, 4000 revolutions per minute of every motor and
-/// 10 V (or `[control] saturation_v`), where `[limits]` does not have others. `noise` is left 1.
+/// Limits are those of `[limits]` and `[control] saturation_v`, and where these say nothing what is known of
+/// the robot: of the CFT robot Table 5, 4000 revolutions per minute of every motor and 10 V. `noise` is left 1.
 ///
 /// # Errors
 /// [`ExciteError`] where the model lacks a parameter or belongs to another robot, or a limit is
@@ -55,8 +49,6 @@ pub fn machine(
             }
         }
     }
-    let setup = robot.transmission().setup();
-    let motors = setup.map_or(Motors::Joints, Motors::Cft);
     let mut machine = Machine {
         columns: RegressorColumns {
             joints: n,
@@ -65,15 +57,12 @@ pub fn machine(
             known: vec![None; n],
         },
         model,
-        motors,
+        mechanism: Mechanism::of(file)?,
         channels: Vec::new(),
         noise: vec![1.0; n],
         coulomb_speed: vec![1.0; n],
     };
-    machine.channels = match motors {
-        Motors::Cft(_) => cft_channels(file, &machine)?,
-        Motors::Joints => joint_channels(file, &machine),
-    };
+    machine.channels = channels(file, &machine.mechanism)?;
     for i in 0..n {
         let of = |quantity| {
             let mut all = machine.channels.iter();
@@ -86,105 +75,136 @@ pub fn machine(
     Ok(machine)
 }
 
-/// Numbers of a robot that no model was given for: the synthetic CFT robot; a single joint of
-/// inertia 1 with the friction that its file starts from.
+/// Numbers of a robot that no model was given for: those that stand for it, else inertias of 1 with the
+/// friction that its file starts from.
 fn nominal(file: &RobotFile, robot: &Robot) -> Model {
-    match robot.transmission().setup() {
-        Some(setup) => {
-            let truth = CftTruth::synthetic(setup);
-            Model {
-                theta: truth.theta[..robot.parameters().len()].to_vec(),
-                friction: truth.friction.map(JointFriction::DoubleTanh).to_vec(),
-                offset: vec![0.0; 4],
-                robot: robot.clone(),
-            }
+    let (theta, friction) = match robot.nominal() {
+        Some(nominal) => {
+            let laws = nominal.friction.into_iter();
+            let laws = laws.map(JointFriction::DoubleTanh).collect();
+            (nominal.theta, laws)
         }
         None => {
             let friction = robot.joint_names().iter().map(|joint| {
                 let start = file.friction.joint.get(joint).cloned().unwrap_or_default();
                 match (start.viscous, start.coulomb) {
                     (None, None) => JointFriction::None,
-                    (viscous, coulomb) => {
-                        JointFriction::ViscousCoulomb(crate::robot::friction::ViscousCoulomb {
-                            viscous: viscous.unwrap_or(0.0),
-                            coulomb: coulomb.unwrap_or(0.0),
-                        })
-                    }
+                    (viscous, coulomb) => JointFriction::ViscousCoulomb(ViscousCoulomb {
+                        viscous: viscous.unwrap_or(0.0),
+                        coulomb: coulomb.unwrap_or(0.0),
+                    }),
                 }
             });
-            Model {
-                theta: vec![1.0; robot.parameters().len()],
-                friction: friction.collect(),
-                offset: vec![0.0; robot.joints()],
-                robot: robot.clone(),
-            }
+            (vec![1.0; robot.parameters().len()], friction.collect())
         }
+    };
+    Model {
+        theta,
+        friction,
+        offset: vec![0.0; robot.joints()],
+        robot: robot.clone(),
     }
 }
 
-fn cft_channels(file: &RobotFile, machine: &Machine) -> Result<Vec<Channel>, ExciteError> {
-    let Motors::Cft(setup) = machine.motors else {
-        return Ok(Vec::new());
-    };
-    let (table, gains, speeds) = (setup.limits(), setup.gains(), coordinate_speeds());
-    let saturation = file.control.saturation_v.unwrap_or(VOLTS);
+/// What a motion must keep: limits of the motors' coordinates, of joints that are none of these, and where the
+/// motors could lose hold of a joint.
+fn channels(file: &RobotFile, mechanism: &Mechanism<MOST>) -> Result<Vec<Channel>, ExciteError> {
+    let robot = &mechanism.robot;
     let mut channels = Vec::new();
-    for (i, name) in COORDINATES.iter().enumerate() {
-        let given = file.limits.get(*name).cloned().unwrap_or_default();
-        let unit = machine.coordinate_unit(i);
-        let [mut lower, mut upper] = given.position.unwrap_or([table.lower[i], table.upper[i]]);
-        let mut speed = given.speed.unwrap_or(speeds[i]);
-        let mut acceleration = given.acceleration.unwrap_or(f64::INFINITY);
-        // q1 and q2 are x_c4 and x_c3 but for a constant.
-        let same = [None, None, Some((1, TURN_OFFSET)), Some((0, -geometry::DS))][i];
-        if let Some((joint, shift)) = same
-            && let Some(of_joint) = file.limits.get(JOINTS[joint])
-        {
-            if let Some([low, high]) = of_joint.position {
-                (lower, upper) = (lower.max(low + shift), upper.min(high + shift));
-            }
-            speed = speed.min(of_joint.speed.unwrap_or(f64::INFINITY));
-            acceleration = acceleration.min(of_joint.acceleration.unwrap_or(f64::INFINITY));
+    for i in 0..robot.joints() {
+        of_coordinate(file, mechanism, i, &mut channels);
+    }
+    if mechanism.motors_at_joints() {
+        return Ok(channels);
+    }
+    for (joint, name) in robot.joint_names().iter().enumerate() {
+        let Some(given) = file.limits.get(name) else {
+            continue;
+        };
+        if given.volts.is_some() {
+            return Err(ExciteError::VoltsOfJoint {
+                joint: name.clone(),
+            });
         }
-        let symmetric =
-            |quantity, unit: &str, most: f64| Channel::symmetric(quantity, i, name, unit, most);
+        let transmission = robot.transmission();
+        let of_motors = (0..robot.joints()).filter_map(|i| transmission.joint_of(i));
+        let same = of_motors.into_iter().any(|(own, _)| own == joint);
+        of_joint(
+            given,
+            joint,
+            name,
+            robot.joint_kind(joint),
+            same,
+            &mut channels,
+        );
+    }
+    if let Some(practice) = &mechanism.practice {
+        let (joint, least) = practice.clearance;
+        let name = &robot.joint_names()[joint];
+        channels.push(Channel {
+            lower: least,
+            upper: f64::INFINITY,
+            ..Channel::symmetric(Quantity::Clearance, joint, name, "", 0.0)
+        });
+    }
+    Ok(channels)
+}
+
+/// Limits of the coordinate of motor i.
+fn of_coordinate(
+    file: &RobotFile,
+    mechanism: &Mechanism<MOST>,
+    i: usize,
+    channels: &mut Vec<Channel>,
+) {
+    let (robot, practice) = (&mechanism.robot, mechanism.practice.as_ref());
+    let (names, kind) = (robot.coordinate_names(), robot.coordinate_kind(i));
+    let (name, unit) = (&names[i], kind.position_unit());
+    let given = file.limits.get(name).cloned().unwrap_or_default();
+    let [mut lower, mut upper] = [mechanism.lower[i], mechanism.upper[i]];
+    let speed = given.speed.or(practice.map(|practice| practice.speeds[i]));
+    let mut speed = speed.unwrap_or(f64::INFINITY);
+    let mut acceleration = given.acceleration.unwrap_or(f64::INFINITY);
+    // a joint that is the coordinate but for a constant
+    if let Some((joint, shift)) = robot.transmission().joint_of(i)
+        && let Some(of_joint) = file.limits.get(&robot.joint_names()[joint])
+    {
+        if let Some([low, high]) = of_joint.position {
+            (lower, upper) = (lower.max(low + shift), upper.min(high + shift));
+        }
+        speed = speed.min(of_joint.speed.unwrap_or(f64::INFINITY));
+        acceleration = acceleration.min(of_joint.acceleration.unwrap_or(f64::INFINITY));
+    }
+    let symmetric =
+        |quantity, unit: &str, most: f64| Channel::symmetric(quantity, i, name, unit, most);
+    if lower.is_finite() && upper.is_finite() {
         channels.push(Channel {
             lower,
             upper,
             ..symmetric(Quantity::Position, unit, 0.0)
         });
+    }
+    if speed.is_finite() {
         channels.push(symmetric(Quantity::Speed, &format!("{unit}/s"), speed));
-        if acceleration.is_finite() {
-            let unit = format!("{unit}/s^2");
-            channels.push(symmetric(Quantity::Acceleration, &unit, acceleration));
-        }
-        // a limit on a motor's force is one on its volts
-        let force = given.torque.map_or(f64::INFINITY, |force| force / gains[i]);
-        let volts = given
-            .volts
-            .unwrap_or(f64::INFINITY)
-            .min(saturation)
-            .min(force);
-        channels.push(symmetric(Quantity::Drive, "V", volts));
     }
-    for (joint, name) in JOINTS.iter().enumerate() {
-        let Some(given) = file.limits.get(*name) else {
-            continue;
+    if acceleration.is_finite() {
+        let unit = format!("{unit}/s^2");
+        channels.push(symmetric(Quantity::Acceleration, &unit, acceleration));
+    }
+    // a limit on a motor's force is one on its volts; one volt is one unit of torque where no gain is known
+    let gain = robot.transmission().gains().map_or(1.0, |gains| gains[i]);
+    let force = given.torque.map(|force| force / gain);
+    let amplifier = practice.map(|practice| practice.volts);
+    let saturation = file.control.saturation_v.or(amplifier);
+    let most = [given.volts, saturation, force].into_iter().flatten();
+    let most = most.fold(f64::INFINITY, f64::min);
+    if most.is_finite() {
+        let unit = match mechanism.motors_at_joints() {
+            true => kind.torque_unit(),
+            false => "V",
         };
-        if given.volts.is_some() {
-            return Err(ExciteError::VoltsOfJoint {
-                joint: (*name).to_owned(),
-            });
-        }
-        let kind = machine.model.robot.joint_kind(joint);
-        of_joint(given, joint, name, kind, joint < 2, &mut channels);
+        channels.push(symmetric(Quantity::Drive, unit, most));
     }
-    channels.push(Channel {
-        lower: CLEARANCE,
-        upper: f64::INFINITY,
-        ..Channel::symmetric(Quantity::Clearance, 3, "q5", "", 0.0)
-    });
-    Ok(channels)
 }
 
 /// Limits of a joint that is no designed coordinate (torque alone where it is one, `same`).
@@ -219,44 +239,6 @@ fn of_joint(
         let unit = format!("{unit}/s^2");
         channels.push(symmetric(Quantity::JointAcceleration, &unit, most));
     }
-}
-
-fn joint_channels(file: &RobotFile, machine: &Machine) -> Vec<Channel> {
-    let robot = &machine.model.robot;
-    let mut channels = Vec::new();
-    for (i, name) in robot.joint_names().iter().enumerate() {
-        let Some(given) = file.limits.get(name) else {
-            continue;
-        };
-        let kind = robot.joint_kind(i);
-        let unit = kind.position_unit();
-        let symmetric =
-            |quantity, unit: &str, most: f64| Channel::symmetric(quantity, i, name, unit, most);
-        if let Some([lower, upper]) = given.position {
-            channels.push(Channel {
-                lower,
-                upper,
-                ..symmetric(Quantity::Position, unit, 0.0)
-            });
-        }
-        if let Some(speed) = given.speed {
-            channels.push(symmetric(Quantity::Speed, &format!("{unit}/s"), speed));
-        }
-        if let Some(most) = given.acceleration {
-            channels.push(symmetric(
-                Quantity::Acceleration,
-                &format!("{unit}/s^2"),
-                most,
-            ));
-        }
-        // one volt is one unit of torque
-        let most = [given.torque, given.volts, file.control.saturation_v];
-        let most = most.into_iter().flatten().fold(f64::INFINITY, f64::min);
-        if most.is_finite() {
-            channels.push(symmetric(Quantity::Drive, kind.torque_unit(), most));
-        }
-    }
-    channels
 }
 
 /// The series of a trajectory file, in the machine's designed coordinates. Coordinates that the file

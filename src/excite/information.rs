@@ -9,7 +9,7 @@ use crate::robot::RobotError;
 
 use super::criterion::Criterion;
 use super::machine::Machine;
-use super::objective::{NoValue, Prior};
+use super::objective::{NoValue, PriorInformation};
 use super::series::{Kinematics, Series};
 
 /// R factors of the rows of each joint along a motion.
@@ -85,7 +85,7 @@ impl Information {
         &self,
         machine: &Machine,
         criterion: &Criterion,
-        prior: Option<&Prior>,
+        prior: Option<&PriorInformation>,
     ) -> Result<f64, NoValue> {
         let weights: Vec<f64> = if criterion.weighted() {
             machine.noise.iter().map(|s| 1.0 / s).collect()

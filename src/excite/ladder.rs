@@ -8,29 +8,24 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::config::trajectory::{SingleJointMove, Trajectory};
-use crate::config::{ModelFile, RobotFile};
+use crate::config::identified::friction_unit;
+use crate::config::trajectory::SingleJointMove;
 use crate::math::minimise::nelder_mead;
 use crate::math::rank;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
-use crate::simulate::cft_experiment::OneJointMove;
-use crate::simulate::from_files::{
-    LadderOf, cft_limits, cft_reference, single_joint_ladder, single_joint_reference,
-    single_joint_truth,
-};
 use crate::simulate::reference::TURN;
-use crate::simulate::{Frame, Path, Reference};
+use crate::simulate::{OneJointMove, Path, Reference};
 
 use super::ExciteError;
 use super::foresee::Expected;
 use super::limits::Quantity;
-use super::machine::{Machine, Motors};
+use super::machine::Machine;
+use super::motion::differentiated;
+use super::series::MOST;
 
 /// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
 const RATE: f64 = 250.0;
-/// Step of the differences that give the acceleration \[s\].
-const STEP: f64 = 1e-4;
 /// Numbers of speeds that are tried.
 const COUNTS: [usize; 4] = [4, 6, 8, 10];
 /// Evaluations of each.
@@ -42,14 +37,14 @@ const SLOWER: f64 = 0.5;
 const TURNS: [f64; 2] = [0.1, 5.0];
 /// Weight of the variances of the law's other parameters beside those of its slopes.
 const OTHERS: f64 = 0.1;
+/// A speed that is nearer to its limit than this share stands at it.
+const AT_LIMIT: f64 = 1e-6;
 /// Directions of the nuisance below this share of the largest carry nothing.
 const NOTHING: f64 = 1e-10;
 
 /// What is to be designed.
 #[derive(Debug, Clone)]
-pub struct LadderTask<'a> {
-    pub robot: &'a RobotFile,
-    pub model: Option<(&'a str, &'a ModelFile)>,
+pub struct LadderTask {
     pub joint: String,
     /// Duration of the experiment \[s\].
     pub seconds: f64,
@@ -84,10 +79,11 @@ pub fn design_ladder(machine: &Machine, task: &LadderTask) -> Result<Ladder, Exc
             joint: task.joint.clone(),
         });
     }
-    let usual = Rungs {
+    let mut usual = Rungs {
         speeds: usual_speeds(machine, task, joint)?,
         turn: TURN,
     };
+    keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
     let before = expectation(machine, task, joint, &usual)?;
     let (slowest, fastest) = ends(&usual.speeds);
     let value = |rungs: &Rungs| match expectation(machine, task, joint, rungs) {
@@ -153,7 +149,7 @@ pub fn foresee_ladder(
     file: &SingleJointMove,
 ) -> Result<Vec<Expected>, ExciteError> {
     let joint = joint_of(machine, &task.joint)?;
-    let reference = Along::of(machine, task, file)?;
+    let reference = reference(machine, task, file)?;
     expected(machine, task, joint, &reference).map(|(expected, _)| expected)
 }
 
@@ -206,94 +202,42 @@ fn usual_speeds(
     task: &LadderTask,
     joint: usize,
 ) -> Result<Vec<f64>, ExciteError> {
-    fn speeds<const J: usize>(reference: &Reference<J>) -> Vec<f64> {
-        let Path::Ladder { ladder, .. } = &reference.path else {
-            return Vec::new();
-        };
-        let mut speeds: Vec<f64> = ladder.plateaus().map(|(v, _)| v.abs()).collect();
-        speeds.sort_by(f64::total_cmp);
-        speeds.dedup();
-        speeds
-    }
-    match machine.motors {
-        Motors::Cft(setup) => {
-            let ladder = OneJointMove {
-                limits: Some(cft_limits(task.robot, setup)),
-                ..OneJointMove::new(joint, task.seconds, Some(task.seed))
-            };
-            Ok(speeds(&ladder.reference(setup)?))
-        }
-        Motors::Joints => {
-            let truth = single_joint_truth(task.robot, task.model)?;
-            let (seconds, seed) = (task.seconds, task.seed);
-            let reference = single_joint_ladder(
-                task.robot,
-                &truth,
-                LadderOf::Usual { part: 1.0 },
-                seconds,
-                seed,
-            )?;
-            Ok(speeds(&reference))
-        }
-    }
+    let ladder = OneJointMove::new(joint, task.seconds, Some(task.seed));
+    let Path::Ladder { ladder, .. } = ladder.reference(&machine.mechanism)?.path else {
+        return Ok(Vec::new());
+    };
+    let mut speeds: Vec<f64> = ladder.plateaus().map(|(v, _)| v.abs()).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    Ok(speeds)
 }
 
-/// A reference in joint coordinates.
-enum Along {
-    Cft(Box<Reference<4>>),
-    One(Box<Reference<1>>),
+/// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
+fn keep_speed_limit(machine: &Machine, reserve: f64, joint: usize, speeds: &mut Vec<f64>) {
+    let quantity = match machine.mechanism.motors_at_joints() {
+        true => Quantity::Speed,
+        false => Quantity::JointSpeed,
+    };
+    let mut limits = machine.channels.iter();
+    let limit = limits.find(|c| c.quantity == quantity && c.index == joint);
+    let Some(limit) = limit.map(|c| c.upper) else {
+        return;
+    };
+    for speed in speeds.iter_mut().filter(|v| **v > limit * (1.0 - AT_LIMIT)) {
+        *speed = limit * (1.0 - reserve);
+    }
+    speeds.dedup();
 }
 
-impl Along {
-    fn of(
-        machine: &Machine,
-        task: &LadderTask,
-        file: &SingleJointMove,
-    ) -> Result<Self, ExciteError> {
-        let trajectory = Trajectory::SingleJoint(file.clone());
-        let (seconds, seed) = (Some(task.seconds), task.seed);
-        Ok(match machine.motors {
-            Motors::Cft(setup) => {
-                let reference = cft_reference(task.robot, &trajectory, setup, seconds, seed)?;
-                if reference.frame != Frame::Joints {
-                    return Err(ExciteError::UnknownCoordinate {
-                        name: file.joint.clone(),
-                        known: machine.model.robot.joint_names().join(", "),
-                    });
-                }
-                Self::Cft(Box::new(reference))
-            }
-            Motors::Joints => {
-                let truth = single_joint_truth(task.robot, task.model)?;
-                let reference =
-                    single_joint_reference(task.robot, &truth, &trajectory, seconds, seed)?;
-                Self::One(Box::new(reference))
-            }
-        })
-    }
-
-    /// Joint positions, velocities and accelerations into the slices.
-    fn at(&self, t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
-        fn write<const J: usize>(
-            reference: &Reference<J>,
-            t: f64,
-            q: &mut [f64],
-            v: &mut [f64],
-            a: &mut [f64],
-        ) {
-            let here = reference.path.at(t);
-            let [before, after] = [t - STEP, t + STEP].map(|t| reference.path.at(t).velocity);
-            for i in 0..J {
-                q[i] = here.position[i];
-                v[i] = here.velocity[i];
-                a[i] = (after[i] - before[i]) / (2.0 * STEP);
-            }
-        }
-        match self {
-            Self::Cft(reference) => write(reference, t, q, v, a),
-            Self::One(reference) => write(reference, t, q, v, a),
-        }
-    }
+/// The ladder of a file in joint coordinates.
+fn reference(
+    machine: &Machine,
+    task: &LadderTask,
+    file: &SingleJointMove,
+) -> Result<Reference<MOST>, ExciteError> {
+    let mechanism = &machine.mechanism;
+    let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
+    Ok(ladder.reference(mechanism)?)
 }
 
 /// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
@@ -303,7 +247,7 @@ fn expectation(
     joint: usize,
     rungs: &Rungs,
 ) -> Result<Vec<Expected>, ExciteError> {
-    let along = Along::of(machine, task, &move_of(&task.joint, rungs))?;
+    let along = reference(machine, task, &move_of(&task.joint, rungs))?;
     let (expected, used) = expected(machine, task, joint, &along)?;
     if used > 1.0 - task.reserve {
         return Err(ExciteError::NothingExcited {
@@ -336,28 +280,56 @@ fn expected(
     machine: &Machine,
     task: &LadderTask,
     joint: usize,
-    along: &Along,
+    along: &Reference<MOST>,
 ) -> Result<(Vec<Expected>, f64), ExciteError> {
+    let model = &machine.model;
+    let law = &model.friction[joint];
+    let (mut g, used) = information(machine, task.seconds, joint, along)?;
+    g *= task.rate_hz / RATE / (machine.noise[joint] * machine.noise[joint]);
+    let (names, values): (&[&str], Vec<f64>) = match law {
+        JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
+        JointFriction::ViscousCoulomb(law) => {
+            (&ViscousCoulomb::NAMES, vec![law.viscous, law.coulomb])
+        }
+        JointFriction::None => (&[], Vec::new()),
+    };
+    let variances = variances(&g, model.theta.len() + 1)?;
+    let torque = model.robot.joint_unit(joint);
+    let rows = names.iter().zip(values).zip(variances);
+    let expected = rows.map(|((name, value), variance)| {
+        let std = variance.map(f64::sqrt);
+        Expected {
+            name: (*name).to_owned(),
+            unit: friction_unit(&model.robot, joint, name, torque),
+            value,
+            std,
+            relative_std: std.filter(|_| value != 0.0).map(|s| s / value.abs()),
+        }
+    });
+    Ok((expected.collect(), used))
+}
+
+/// Sums of squares and products of a joint's rows along a reference, for inertial parameters, a constant torque
+/// and the friction law; and the largest share of a drive's limit.
+fn information(
+    machine: &Machine,
+    seconds: f64,
+    joint: usize,
+    along: &Reference<MOST>,
+) -> Result<(DMatrix<f64>, f64), ExciteError> {
     let model = &machine.model;
     let (n, p) = (machine.coordinates(), model.theta.len());
     let law = &model.friction[joint];
-    let f = law.parameters();
-    let width = p + 1 + f;
-    let samples = (task.seconds * RATE).ceil() as usize;
-    let mut y = vec![0.0; n * p];
-    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    let mut tau = vec![0.0; n];
-    let mut row = vec![0.0; width];
+    let width = p + 1 + law.parameters();
+    let (mut y, mut tau, mut row) = (vec![0.0; n * p], vec![0.0; n], vec![0.0; width]);
     let mut g = DMatrix::<f64>::zeros(width, width);
     let mut used = 0.0_f64;
-    let drives: Vec<_> = machine
-        .channels
-        .iter()
-        .filter(|c| c.quantity == Quantity::Drive)
-        .collect();
-    for m in 0..samples {
-        along.at((m as f64 + 0.5) / RATE, &mut q, &mut v, &mut a);
-        model.robot.regressor(&q, &v, &a, &mut y);
+    let drives = machine.channels.iter();
+    let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
+    for m in 0..(seconds * RATE).ceil() as usize {
+        let k = differentiated(along, (m as f64 + 0.5) / RATE);
+        let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
+        model.robot.regressor(q, v, a, &mut y);
         row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
         row[p] = 1.0;
         law.gradient(v[joint], &mut row[p + 1..]);
@@ -371,7 +343,7 @@ fn expected(
             let inertial: f64 = inertial.map(|(y, t)| y * t).sum();
             *tau = inertial + model.friction[j].torque(v[j]) + model.offset[j];
         }
-        let drive = machine.drives(&q, &tau)?;
+        let drive = machine.drives(q, &tau)?;
         for channel in &drives {
             used = used.max(channel.used(drive[channel.index]));
         }
@@ -381,36 +353,7 @@ fn expected(
             g[(j, i)] = g[(i, j)];
         }
     }
-    g *= task.rate_hz / RATE / (machine.noise[joint] * machine.noise[joint]);
-    let (names, values): (&[&str], Vec<f64>) = match law {
-        JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
-        JointFriction::ViscousCoulomb(law) => {
-            (&ViscousCoulomb::NAMES, vec![law.viscous, law.coulomb])
-        }
-        JointFriction::None => (&[], Vec::new()),
-    };
-    let variances = variances(&g, p + 1)?;
-    let kind = model.robot.joint_kind(joint);
-    let expected = (0..f)
-        .map(|k| {
-            let std = variances[k].map(f64::sqrt);
-            Expected {
-                name: names[k].to_owned(),
-                unit: crate::config::identified::friction_unit(
-                    &model.robot,
-                    joint,
-                    names[k],
-                    kind.torque_unit(),
-                ),
-                value: values[k],
-                std,
-                relative_std: std
-                    .filter(|_| values[k] != 0.0)
-                    .map(|s| s / values[k].abs()),
-            }
-        })
-        .collect();
-    Ok((expected, used))
+    Ok((g, used))
 }
 
 /// Variances of the unknowns behind the first `nuisance`, whose values are unknown too; `None` where

@@ -1,23 +1,14 @@
 //! A machine as a design sees it: designed coordinates to joints, torques and volts, and what a fit
 //! would estimate from them.
 
+use crate::config::trajectory::Coordinates;
 use crate::inertia::columns::{Own, RegressorColumns};
-use crate::robot::cft::pantograph::{joint_accelerations, joint_velocities, joints};
-use crate::robot::cft::{COORDINATES, Setup};
+use crate::robot::RobotError;
 use crate::robot::model::{JointFriction, Model};
-use crate::robot::{JointKind, RobotError};
+use crate::simulate::Mechanism;
 
 use super::limits::{Channel, Quantity};
 use super::series::{Kinematics, MOST};
-
-/// How the designed coordinates move the joints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motors {
-    /// The coordinates are the joints, and one volt is one unit of torque.
-    Joints,
-    /// x_c1..x_c4 of the CFT robot, through the pantograph and Table 6.
-    Cft(Setup),
-}
 
 /// A robot with the numbers that its torques are foreseen with, and its limits.
 #[derive(Debug, Clone)]
@@ -25,7 +16,8 @@ pub struct Machine {
     pub model: Model,
     /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
     pub columns: RegressorColumns,
-    pub motors: Motors,
+    /// Motors and limits, as the simulator knows them.
+    pub mechanism: Mechanism<MOST>,
     /// Limits that a motion must keep.
     pub channels: Vec<Channel>,
     /// Standard deviation of the noise on each joint's torque \[N or N m\], sample by sample.
@@ -80,28 +72,29 @@ impl Machine {
         self.columns.unknowns()
     }
 
-    /// Names of the designed coordinates.
+    /// Names of the designed coordinates: those of the motors.
     pub fn coordinate_names(&self) -> Vec<String> {
-        match self.motors {
-            Motors::Joints => self.model.robot.joint_names().to_vec(),
-            Motors::Cft(_) => COORDINATES.map(String::from).to_vec(),
+        self.model.robot.coordinate_names()
+    }
+
+    /// The coordinates in which motions of this machine are designed.
+    pub fn designed(&self) -> Coordinates {
+        match self.mechanism.motors_at_joints() {
+            true => Coordinates::Joint,
+            false => Coordinates::Cartesian,
         }
     }
 
     /// Unit of coordinate i: "m" or "rad".
     pub fn coordinate_unit(&self, i: usize) -> &'static str {
-        match self.motors {
-            Motors::Joints => self.model.robot.joint_kind(i).position_unit(),
-            Motors::Cft(_) if i == 2 => JointKind::Revolute.position_unit(),
-            Motors::Cft(_) => JointKind::Prismatic.position_unit(),
-        }
+        self.model.robot.coordinate_kind(i).position_unit()
     }
 
     /// Unit of what drives coordinate i: "V", or that of the joint's torque.
     pub fn drive_unit(&self, i: usize) -> &'static str {
-        match self.motors {
-            Motors::Joints => self.model.robot.joint_unit(i),
-            Motors::Cft(_) => "V",
+        match self.mechanism.motors_at_joints() {
+            true => self.model.robot.joint_unit(i),
+            false => "V",
         }
     }
 
@@ -135,7 +128,8 @@ impl Machine {
 
     /// Whether nothing but the position of coordinate i itself depends on it.
     pub(super) fn is_uniform(&self, i: usize) -> bool {
-        matches!(self.motors, Motors::Cft(_)) && i == 3
+        let practice = self.mechanism.practice.as_ref();
+        practice.is_some_and(|practice| practice.uniform == i)
     }
 
     /// Joint positions, velocities and accelerations of the coordinates.
@@ -148,22 +142,11 @@ impl Machine {
             k: *k,
             ..State::EMPTY
         };
-        match self.motors {
-            Motors::Joints => {
-                state.q = k.x;
-                state.v = k.xd;
-                state.a = k.xdd;
-            }
-            Motors::Cft(_) => {
-                let four = |x: &[f64; MOST]| [x[0], x[1], x[2], x[3]];
-                let q = joints(&four(&k.x))?;
-                let v = joint_velocities(&q, &four(&k.xd))?;
-                let a = joint_accelerations(&q, &v, &four(&k.xdd))?;
-                state.q[..4].copy_from_slice(&q);
-                state.v[..4].copy_from_slice(&v);
-                state.a[..4].copy_from_slice(&a);
-            }
-        }
+        let (n, transmission) = (self.coordinates(), self.model.robot.transmission());
+        let State { q, v, a, .. } = &mut state;
+        transmission.joints(&k.x[..n], &mut q[..n])?;
+        transmission.joint_velocities(&q[..n], &k.xd[..n], &mut v[..n])?;
+        transmission.joint_accelerations(&q[..n], &v[..n], &k.xdd[..n], &mut a[..n])?;
         Ok(state)
     }
 
@@ -199,15 +182,9 @@ impl Machine {
     /// Fills in the volts of the torques.
     #[inline]
     fn drive(&self, state: &mut State) -> Result<(), RobotError> {
-        match self.motors {
-            Motors::Joints => state.drive = state.tau,
-            Motors::Cft(setup) => {
-                let four = |x: &[f64; MOST]| [x[0], x[1], x[2], x[3]];
-                let volts = setup.torques_to_volts(&four(&state.q), &four(&state.tau))?;
-                state.drive[..4].copy_from_slice(&volts);
-            }
-        }
-        Ok(())
+        let (n, State { q, tau, drive, .. }) = (self.coordinates(), state);
+        let transmission = self.model.robot.transmission();
+        transmission.volts(&q[..n], &tau[..n], &mut drive[..n])
     }
 
     /// Friction and signs at the velocities of a state.
@@ -306,10 +283,11 @@ impl Machine {
             Quantity::JointPosition => state.q[i],
             Quantity::JointSpeed => state.v[i],
             Quantity::JointAcceleration => state.a[i],
-            Quantity::Clearance => match self.motors {
-                Motors::Joints => 1.0,
-                Motors::Cft(_) => state.q[3].sin(),
-            },
+            Quantity::Clearance => {
+                let transmission = self.model.robot.transmission();
+                let clearance = transmission.clearance(&state.q[..self.coordinates()]);
+                clearance.unwrap_or(1.0)
+            }
         }
     }
 }

@@ -36,7 +36,7 @@ pub use from_files::{machine, series_of, trajectory};
 pub use given::Given;
 pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
 pub use motion::Motion;
-pub use objective::{NoValue, Prior};
+pub use objective::{NoValue, PriorInformation};
 pub use start::usual_torque;
 
 use crate::config::{ConfigError, did_you_mean};

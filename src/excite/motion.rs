@@ -3,21 +3,17 @@
 
 use std::f64::consts::TAU;
 
-use crate::config::trajectory::{Coordinates, Fourier, Trajectory};
-use crate::config::{ModelFile, RobotFile};
-use crate::robot::cft::pantograph::{cartesian, cartesian_accelerations, cartesian_velocities};
-use crate::simulate::from_files::{
-    cft_reference, cft_truth, single_joint_reference, single_joint_truth,
-};
-use crate::simulate::{Frame, Reference};
+use crate::config::trajectory::{Fourier, Trajectory};
+use crate::robot::Robot;
+use crate::simulate::{Frame, Reference, experiment};
 
 use super::ExciteError;
 use super::blend::Blend;
 use super::from_files::series_of;
 use super::limits::Channel;
-use super::machine::{Machine, Motors};
-use super::series::{Kinematics, Series};
-use super::usage::{Path, Use, along, along_blend, along_period};
+use super::machine::Machine;
+use super::series::{Kinematics, MOST, Series};
+use super::usage::{Interval, Use, along, along_blend, along_period};
 
 /// Step of the differences that give the acceleration of a reference \[s\].
 const STEP: f64 = 1e-4;
@@ -44,8 +40,6 @@ impl Motion {
     /// [`ExciteError`] where the trajectory names what the machine does not have, or does not fit.
     pub fn of_file(
         machine: &Machine,
-        robot: &RobotFile,
-        model: Option<(&str, &ModelFile)>,
         file: &Trajectory,
         seconds: f64,
         seed: u64,
@@ -58,37 +52,19 @@ impl Motion {
                 blend: blend_of(fourier),
             });
         }
-        let length = |own: Option<f64>| match file {
+        let reference = experiment::of_file(&machine.mechanism, file, Some(seconds), seed)?;
+        reference.path.check()?;
+        let seconds = match (reference.path.seconds(), file) {
+            (Some(own), _) => own,
             // a period that repeats itself
-            Trajectory::Fourier(fourier) => own.unwrap_or(1.0 / fourier.fundamental_hz),
-            _ => own.unwrap_or(seconds),
+            (None, Trajectory::Fourier(fourier)) => 1.0 / fourier.fundamental_hz,
+            (None, _) => seconds,
         };
-        match machine.motors {
-            Motors::Cft(setup) => {
-                let truth = cft_truth(robot, model)?;
-                let reference = cft_reference(robot, file, truth.setup, Some(seconds), seed)?;
-                reference.path.check()?;
-                debug_assert_eq!(truth.setup, setup);
-                let seconds = length(reference.path.seconds());
-                Ok(Self::Path {
-                    at: Box::new(move |t| cft_kinematics(&reference, t)),
-                    seconds,
-                })
-            }
-            Motors::Joints => {
-                let truth = single_joint_truth(robot, model)?;
-                let reference = single_joint_reference(robot, &truth, file, Some(seconds), seed)?;
-                reference.path.check()?;
-                let seconds = length(reference.path.seconds());
-                Ok(Self::Path {
-                    at: Box::new(move |t| {
-                        let (x, xd, xdd) = differentiated(&reference, t);
-                        spread(&x, &xd, &xdd)
-                    }),
-                    seconds,
-                })
-            }
-        }
+        let robot = machine.model.robot.clone();
+        Ok(Self::Path {
+            at: Box::new(move |t| kinematics(&reference, &robot, t)),
+            seconds,
+        })
     }
 
     /// All coordinates at the time t of the motion \[s\].
@@ -117,23 +93,13 @@ impl Motion {
                 pairs.map(|(whole, ends)| whole.joined(ends)).collect()
             }
             Self::Path { at, seconds } => {
-                let path = Path {
+                let path = Interval {
                     at,
-                    interval: [0.0, *seconds],
+                    span: [0.0, *seconds],
                     parts: (PARTS * seconds).ceil().max(64.0) as usize,
                 };
                 along(machine, channels, &path)
             }
-        }
-    }
-}
-
-impl Machine {
-    /// The coordinates in which motions of this machine are designed.
-    pub fn designed(&self) -> Coordinates {
-        match self.motors {
-            Motors::Cft(_) => Coordinates::Cartesian,
-            Motors::Joints => Coordinates::Joint,
         }
     }
 }
@@ -147,37 +113,33 @@ fn blend_of(file: &Fourier) -> Blend {
     }
 }
 
-fn differentiated<const J: usize>(
-    reference: &Reference<J>,
-    t: f64,
-) -> ([f64; J], [f64; J], [f64; J]) {
+/// Positions, velocities and accelerations of a reference in its own coordinates.
+pub(super) fn differentiated(reference: &Reference<MOST>, t: f64) -> Kinematics {
     let here = reference.path.at(t);
     let (before, after) = (
         reference.path.at(t - STEP).velocity,
         reference.path.at(t + STEP).velocity,
     );
-    let acceleration = std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * STEP));
-    (here.position, here.velocity, acceleration)
-}
-
-fn spread(x: &[f64], xd: &[f64], xdd: &[f64]) -> Kinematics {
-    let mut k = Kinematics::REST;
-    k.x[..x.len()].copy_from_slice(x);
-    k.xd[..x.len()].copy_from_slice(xd);
-    k.xdd[..x.len()].copy_from_slice(xdd);
-    k
-}
-
-fn cft_kinematics(reference: &Reference<4>, t: f64) -> Kinematics {
-    let (x, xd, xdd) = differentiated(reference, t);
-    match reference.frame {
-        Frame::Motors => spread(&x, &xd, &xdd),
-        Frame::Joints => spread(
-            &cartesian(&x),
-            &cartesian_velocities(&x, &xd),
-            &cartesian_accelerations(&x, &xd, &xdd),
-        ),
+    Kinematics {
+        x: here.position,
+        xd: here.velocity,
+        xdd: std::array::from_fn(|i| (after[i] - before[i]) / (2.0 * STEP)),
     }
+}
+
+/// A reference in the motors' coordinates.
+fn kinematics(reference: &Reference<MOST>, robot: &Robot, t: f64) -> Kinematics {
+    let own = differentiated(reference, t);
+    if reference.frame == Frame::Motors {
+        return own;
+    }
+    let (n, mut k) = (robot.joints(), Kinematics::REST);
+    let (q, v, a) = (&own.x[..n], &own.xd[..n], &own.xdd[..n]);
+    let transmission = robot.transmission();
+    transmission.positions(q, &mut k.x[..n]);
+    transmission.velocities(q, v, &mut k.xd[..n]);
+    transmission.accelerations(q, v, a, &mut k.xdd[..n]);
+    k
 }
 
 /// Amplitudes of the speed per harmonic of a series, coordinate after coordinate \[m/s or rad/s\].

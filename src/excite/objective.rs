@@ -4,7 +4,7 @@
 //! The regressor is differentiated along the path by the coordinates themselves. It is linear in
 //! the accelerations and quadratic in the speeds, so that differences by these are exact; by the
 //! positions a five-point rule is good to 1e-11. The sum that is differentiated is one number per
-//! sample, 2 (F S) . F + sum kappa c, with S and kappa held: the chain rule through the singular
+//! sample, 2 (F S) . F + sum kappa c, with S and kappa fixed: the chain rule through the singular
 //! vectors and the multipliers.
 
 use nalgebra::DMatrix;
@@ -36,7 +36,7 @@ pub enum NoValue {
 
 /// Information that is there before the design, and how much the design adds.
 #[derive(Debug, Clone)]
-pub struct Prior {
+pub struct PriorInformation {
     /// F'F of the logs that exist, rows weighted as the criterion wants them (p x p).
     pub information: DMatrix<f64>,
     /// Rows per joint that the design will add.
@@ -58,7 +58,7 @@ pub(super) struct Objective<'a> {
     pub machine: &'a Machine,
     pub criterion: &'a Criterion,
     pub variables: Variables,
-    pub prior: Option<&'a Prior>,
+    pub prior: Option<&'a PriorInformation>,
     /// Samples at which the regressor is taken.
     basis: Basis,
     /// Samples at which limits are kept: friction turns round between those of the regressor.
@@ -91,7 +91,7 @@ impl<'a> Objective<'a> {
         criterion: &'a Criterion,
         channels: &[Channel],
         variables: Variables,
-        prior: Option<&'a Prior>,
+        prior: Option<&'a PriorInformation>,
         samples: usize,
     ) -> Self {
         let (linear, curved) = channels
@@ -483,7 +483,12 @@ mod tests {
         [limits.q1]\nposition = [-0.1, 0.2]\nspeed = 0.5\ntorque = 2.0\n";
 
     /// Relative differences of the derivative and of central differences of the value.
-    fn compare(machine: &Machine, criterion: &Criterion, prior: Option<&Prior>, step: f64) -> f64 {
+    fn compare(
+        machine: &Machine,
+        criterion: &Criterion,
+        prior: Option<&PriorInformation>,
+        step: f64,
+    ) -> f64 {
         let n = machine.coordinates();
         let free = (0..n).map(|i| (i == 2).then_some(1.7)).collect();
         let variables = Variables::new(&machine.channels, n, TAU * 0.4, 5, free);
@@ -548,7 +553,7 @@ mod tests {
     fn derivatives_hold_with_information_that_is_given() {
         let machine = built(CFT);
         let information = DMatrix::from_fn(12, 12, |i, j| if i == j { 30.0 } else { 1.0 });
-        let prior = Prior {
+        let prior = PriorInformation {
             information,
             rows: 500.0,
         };
@@ -561,7 +566,7 @@ mod tests {
         let full = CFT.replace("[limits.q4]", "parameters = 22\n[limits.q4]");
         // short of such a motion, G of 22 parameters has the condition 1e13: differences of its
         // value are all rounding, so that something is given besides
-        let prior = Prior {
+        let prior = PriorInformation {
             information: DMatrix::identity(22, 22),
             rows: 60.0,
         };

@@ -42,8 +42,8 @@ pub(super) fn repaired(
                 centred.offset[channel.index] = 0.5 * (channel.lower + channel.upper);
             }
         }
-        let held: Vec<Option<f64>> = centred.offset.iter().copied().map(Some).collect();
-        fitted(machine, channels, &centred, &held, care)
+        let fixed: Vec<Option<f64>> = centred.offset.iter().copied().map(Some).collect();
+        fitted(machine, channels, &centred, &fixed, care)
     })
 }
 

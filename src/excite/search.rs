@@ -11,7 +11,7 @@ use super::information::Information;
 use super::lagrangian::{Round, Search};
 use super::limits::{Channel, Quantity};
 use super::machine::Machine;
-use super::objective::{Objective, Prior};
+use super::objective::{Objective, PriorInformation};
 use super::repair::{Care, repaired};
 use super::series::Series;
 use super::start::random_motion;
@@ -31,7 +31,7 @@ pub struct Task {
     /// Share of every limit that is kept free, for what a controller strays from the path.
     pub reserve: f64,
     /// Information that is there already.
-    pub prior: Option<Prior>,
+    pub prior: Option<PriorInformation>,
     /// Random starts.
     pub starts: usize,
     /// Evaluations that each start may take; as many as its rounds have where absent.
@@ -56,71 +56,28 @@ pub struct Found {
 /// What a start has given: the criterion and the motion within the limits.
 type Best = Option<(f64, Series)>;
 
+const fn round(sharpness: f64, evaluations: u64) -> Round {
+    Round {
+        sharpness,
+        evaluations,
+    }
+}
+
 /// Rounds that every start gets.
-const FIRST: [Round; 3] = [
-    Round {
-        sharpness: 6.0,
-        evaluations: 60,
-    },
-    Round {
-        sharpness: 8.0,
-        evaluations: 40,
-    },
-    Round {
-        sharpness: 12.0,
-        evaluations: 40,
-    },
-];
+const FIRST: [Round; 3] = [round(6.0, 60), round(8.0, 40), round(12.0, 40)];
 /// Rounds that the best of them get on top.
 const SECOND: [Round; 8] = [
-    Round {
-        sharpness: 16.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 24.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 32.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 48.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 64.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 96.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 128.0,
-        evaluations: 100,
-    },
-    Round {
-        sharpness: 192.0,
-        evaluations: 100,
-    },
+    round(16.0, 100),
+    round(24.0, 100),
+    round(32.0, 100),
+    round(48.0, 100),
+    round(64.0, 100),
+    round(96.0, 100),
+    round(128.0, 100),
+    round(192.0, 100),
 ];
 /// Rounds after torques and volts have been looked at between the samples.
-const LAST: [Round; 3] = [
-    Round {
-        sharpness: 128.0,
-        evaluations: 80,
-    },
-    Round {
-        sharpness: 192.0,
-        evaluations: 80,
-    },
-    Round {
-        sharpness: 256.0,
-        evaluations: 80,
-    },
-];
+const LAST: [Round; 3] = [round(128.0, 80), round(192.0, 80), round(256.0, 80)];
 /// Excess between samples, as a share of the limit, that is left to the repair.
 const EXCESS: f64 = 2e-3;
 /// One start in so many gets the second part.
@@ -157,16 +114,12 @@ pub fn design(
     progress: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Found, ExciteError> {
-    let channels: Vec<Channel> = machine
-        .channels
-        .iter()
-        .map(|c| c.reserved(task.reserve))
-        .collect();
+    let reserved = machine.channels.iter().map(|c| c.reserved(task.reserve));
+    let channels: Vec<Channel> = reserved.collect();
     check(machine, task, &channels)?;
-    let n = machine.coordinates();
     let variables = Variables::new(
         &channels,
-        n,
+        machine.coordinates(),
         TAU * task.fundamental_hz,
         task.harmonics,
         task.offsets.clone(),
@@ -180,16 +133,11 @@ pub fn design(
         task.prior.as_ref(),
         samples,
     );
-    let spent = AtomicU64::new(0);
-    let stopped = || stop.load(Ordering::Relaxed);
-    let step = |objective: &Objective, search: &mut Search, rounds: &[Round]| {
-        let mut work = objective.work();
-        let before = search.evaluations;
-        let most = task.evaluations.unwrap_or(u64::MAX);
-        search.run(objective, rounds, most, &mut work, &stopped);
-        let more = search.evaluations - before;
-        spent.fetch_add(more, Ordering::Relaxed);
-        progress(more);
+    let effort = Effort {
+        most: task.evaluations.unwrap_or(u64::MAX),
+        spent: AtomicU64::new(0),
+        progress,
+        stop,
     };
     let finish = |search: &Search| {
         let mut series = objective.work().series;
@@ -203,21 +151,17 @@ pub fn design(
         .into_par_iter()
         .filter_map(|start| {
             // one start is looked through whatever happens
-            if start > 0 && stopped() {
+            if start > 0 && effort.stopped() {
                 return None;
             }
             let motion = random_motion(machine, &channels, &objective.variables, task.seed, start);
             let z = objective.variables.of(&motion);
             let mut search = Search::new(&objective, z);
-            step(&objective, &mut search, &FIRST);
+            effort.step(&objective, &mut search, &FIRST);
             let found = finish(&search);
             Some((start, search, found))
         })
         .collect();
-    let order = |a: &Best, b: &Best| {
-        let of = |x: &Best| x.as_ref().map_or(f64::INFINITY, |x| x.0);
-        of(a).total_cmp(&of(b))
-    };
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
     let usable = searches.iter().filter(|s| s.2.is_some()).count();
     let last = task.finalists().min(searches.len());
@@ -230,25 +174,55 @@ pub fn design(
                     *found = after;
                 }
             };
-            step(&objective, search, &SECOND);
+            effort.step(&objective, search, &SECOND);
             keep_better(search);
             if let Some(tightened) = objective.tightened(&search.z, EXCESS) {
-                step(&tightened, search, &LAST);
+                effort.step(&tightened, search, &LAST);
                 keep_better(search);
             }
         });
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
-    let evaluations = spent.into_inner();
-    let best = searches.into_iter().next();
-    match best {
+    match searches.into_iter().next() {
         Some((start, _, Some((_, series)))) => Ok(Found {
             series,
-            evaluations,
             start,
             usable,
-            stopped: stopped(),
+            stopped: effort.stopped(),
+            evaluations: effort.spent.into_inner(),
         }),
         _ => Err(nothing_fits(machine, &channels, &objective.variables, task)),
+    }
+}
+
+/// Which of two starts has given more; one without a motion comes last.
+fn order(a: &Best, b: &Best) -> std::cmp::Ordering {
+    let of = |x: &Best| x.as_ref().map_or(f64::INFINITY, |x| x.0);
+    of(a).total_cmp(&of(b))
+}
+
+/// What a design may take, and has taken.
+struct Effort<'a> {
+    /// Evaluations of each start.
+    most: u64,
+    /// Those of all starts so far.
+    spent: AtomicU64,
+    progress: &'a (dyn Fn(u64) + Sync),
+    stop: &'a AtomicBool,
+}
+
+impl Effort<'_> {
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Takes a search through some rounds.
+    fn step(&self, objective: &Objective, search: &mut Search, rounds: &[Round]) {
+        let mut work = objective.work();
+        let before = search.evaluations;
+        search.run(objective, rounds, self.most, &mut work, &|| self.stopped());
+        let more = search.evaluations - before;
+        self.spent.fetch_add(more, Ordering::Relaxed);
+        (self.progress)(more);
     }
 }
 

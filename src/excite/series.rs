@@ -27,7 +27,7 @@ pub struct Kinematics {
 }
 
 /// Most coordinates of a robot.
-pub const MOST: usize = 8;
+pub const MOST: usize = crate::robot::tree::MOST_JOINTS;
 
 impl Kinematics {
     /// At rest in the origin.

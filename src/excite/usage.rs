@@ -32,10 +32,10 @@ pub struct Use {
 }
 
 /// All coordinates as a function of time, over an interval.
-pub struct Path<'a> {
+pub struct Interval<'a> {
     pub at: &'a (dyn Fn(f64) -> Kinematics + Sync),
     /// From and to \[s\].
-    pub interval: [f64; 2],
+    pub span: [f64; 2],
     /// Equal parts to begin with.
     pub parts: usize,
 }
@@ -71,9 +71,9 @@ fn period(
     parts: usize,
     tolerance: f64,
 ) -> Vec<Use> {
-    let path = Path {
+    let path = Interval {
         at: &|t| series.at(t),
-        interval: [0.0, series.period()],
+        span: [0.0, series.period()],
         parts,
     };
     let (linear, curved): (Vec<&Channel>, Vec<&Channel>) =
@@ -90,7 +90,7 @@ fn period(
 }
 
 /// Channels along any path.
-pub fn along(machine: &Machine, channels: &[Channel], path: &Path) -> Vec<Use> {
+pub fn along(machine: &Machine, channels: &[Channel], path: &Interval) -> Vec<Use> {
     let channels: Vec<&Channel> = channels.iter().collect();
     of_path(machine, &channels, path, TOLERANCE)
 }
@@ -105,9 +105,9 @@ pub fn along_blend(
     let at = |t| blend.at(series, t);
     let parts = (PARTS as f64 * (blend.seconds / series.period()).max(0.25)).ceil() as usize;
     let over = |interval| {
-        let path = Path {
+        let path = Interval {
             at: &at,
-            interval,
+            span: interval,
             parts,
         };
         along(machine, channels, &path)
@@ -203,8 +203,8 @@ fn of_polynomial(channel: &Channel, series: &Series) -> Use {
     gathered(channel, peak(1.0), peak(-1.0))
 }
 
-fn of_path(machine: &Machine, channels: &[&Channel], path: &Path, tolerance: f64) -> Vec<Use> {
-    let [from, to] = path.interval;
+fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance: f64) -> Vec<Use> {
+    let [from, to] = path.span;
     let state = |t: f64| {
         let k = (path.at)(t);
         let state = machine.state(&k).ok();
@@ -231,7 +231,7 @@ fn of_path(machine: &Machine, channels: &[&Channel], path: &Path, tolerance: f64
                 let samples: Vec<f64> = grid.iter().map(|at| sign * value(channel, at)).collect();
                 let mut f = |t| sign * value(channel, &state(t));
                 let tolerance = tolerance * room(channel);
-                highest_from(&mut f, path.interval, &samples, None, tolerance)
+                highest_from(&mut f, path.span, &samples, None, tolerance)
             };
             gathered(channel, peak(1.0), peak(-1.0))
         })

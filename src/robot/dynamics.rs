@@ -1,7 +1,8 @@
 //! M and C v + G of a robot with given parameters: what a simulation solves for accelerations.
 
-use super::cft::dynamics::{Coefficients, inertia_and_bias};
+use super::cft::dynamics::{Coefficients, inertia_and_bias, solve_positive};
 use super::cft::{EXTENDED, PRINTED};
+use super::tree::MOST_JOINTS;
 use super::{Form, Robot};
 
 /// A robot with its inertial parameters, ready for many states.
@@ -24,7 +25,7 @@ impl Robot {
     }
 
     /// The coefficients of the report's closed forms, of the robot that it is about.
-    pub(super) fn coefficients(&self, theta: &[f64]) -> Option<Coefficients> {
+    pub fn coefficients(&self, theta: &[f64]) -> Option<Coefficients> {
         let Form::Report(_) = self.0.form else {
             return None;
         };
@@ -61,8 +62,8 @@ impl Dynamics {
             bias.copy_from_slice(&b);
             return;
         }
-        let mut unit = [0.0; super::tree::MOST_JOINTS];
-        let mut tau = [0.0; super::tree::MOST_JOINTS];
+        let mut unit = [0.0; MOST_JOINTS];
+        let mut tau = [0.0; MOST_JOINTS];
         let (unit, tau) = (&mut unit[..n], &mut tau[..n]);
         self.robot.torque(&self.theta, q, v, unit, bias);
         for k in 0..n {
@@ -74,4 +75,60 @@ impl Dynamics {
             }
         }
     }
+
+    /// x with M x = b, in the place of b; `false` where M, n x n row-major, is not positive definite. Does
+    /// not allocate.
+    ///
+    /// # Panics
+    /// As [`Self::inertia_and_bias`].
+    #[inline]
+    pub fn solve(&self, mass: &[f64], b: &mut [f64]) -> bool {
+        if self.closed.is_none() {
+            return cholesky(mass, b);
+        }
+        let (rows, _) = mass.as_chunks::<4>();
+        let rows: &[[f64; 4]; 4] = rows.try_into().expect("the CFT robot has four joints");
+        let found = solve_positive(rows, super::four(b));
+        if let Some(x) = found {
+            b.copy_from_slice(&x);
+        }
+        found.is_some()
+    }
+}
+
+/// x with L L^T x = b in the place of b; `false` where the n x n matrix is not positive definite.
+#[inline]
+fn cholesky(mass: &[f64], b: &mut [f64]) -> bool {
+    let n = b.len();
+    if n == 1 {
+        // a root and its square would round
+        b[0] /= mass[0];
+        return mass[0] > 0.0;
+    }
+    let mut l = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            if i == j {
+                let own = mass[i * n + i];
+                let left = own - sum;
+                // rounding of a matrix that is singular
+                if left.partial_cmp(&(1e-12 * own.abs())) != Some(std::cmp::Ordering::Greater) {
+                    return false;
+                }
+                l[i][i] = left.sqrt();
+            } else {
+                l[i][j] = (mass[i * n + j] - sum) / l[j][j];
+            }
+        }
+    }
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();
+        b[i] = (b[i] - sum) / l[i][i];
+    }
+    true
 }

@@ -15,6 +15,7 @@
 //! | [`dynamics`] | its inertia matrix and bias |
 //! | [`undeclared`] | what a declared model leaves out: tilt, payload, dropped parameters |
 //! | [`model`] | a robot with its numbers |
+//! | [`practice`] | numbers that stand for it, how it is run |
 
 pub mod bodies;
 pub mod cft;
@@ -23,6 +24,7 @@ pub mod error;
 pub mod friction;
 pub mod joint;
 pub mod model;
+pub mod practice;
 pub mod standard;
 pub mod transmission;
 pub mod tree;

@@ -1,13 +1,20 @@
-//! The CFT robot as a plant: theta_1..theta_32, volts through Table 6, encoders of Table 5.
+//! The CFT robot with theta_1..theta_32, and experiments on it with sound defaults.
 
 use rand::RngExt;
 
 use super::SimulateError;
 use super::chance::{Purpose, stream};
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::joint_friction::SmoothFriction;
+use super::mechanism::Mechanism;
 use super::plant::Plant;
-use crate::robot::cft::actuation::{ENCODER_SCALE, Limits, Setup};
-use crate::robot::cft::dynamics::{Coefficients, inertia, inertia_and_bias, solve_positive};
-use crate::robot::cft::{COORDINATES, JOINTS, pantograph};
+use super::reference::{Fourier, Frame, Path, Reference};
+use super::run::{Drive, Start, run};
+use super::settings::Settings;
+use super::simulated_run::SimulatedRun;
+use crate::robot::Robot;
+use crate::robot::cft::actuation::Setup;
+use crate::robot::cft::{PRINTED, Structure, practice};
 use crate::robot::friction::DoubleTanh;
 
 /// The true parameters of a simulated CFT robot.
@@ -21,18 +28,6 @@ pub struct CftTruth {
     pub friction: [DoubleTanh; 4],
 }
 
-/// theta_1..theta_12: the three values of Table 4 that survive, and synthetic ones that make M
-/// positive definite over the workspace.
-const SYNTHETIC_INERTIA: [f64; 12] = [
-    121.3049, 0.3107, 4.1955, 0.95, -0.07, 0.0012, 0.08, 0.0128, -0.94, -0.02, 4.67, 2.83,
-];
-
-/// theta_13..theta_32, synthetic: Bv, Bf1, Bf2, w1, w2, each for q1, q2, q4, q5.
-const SYNTHETIC_FRICTION: [f64; 20] = [
-    120.0, 9.0, 5.0, 4.0, 55.0, 9.0, 7.0, 5.0, -20.0, -3.0, -2.5, -1.8, 200.0, 60.0, 60.0, 60.0,
-    20.0, 6.0, 6.0, 6.0,
-];
-
 /// Draws that [`CftTruth::varied`] makes before it gives up on a positive definite M.
 const DRAWS: usize = 1000;
 
@@ -40,11 +35,11 @@ impl CftTruth {
     /// The synthetic robot that the built-in campaign simulates.
     pub fn synthetic(setup: Setup) -> Self {
         let mut theta = [0.0; 22];
-        theta[..12].copy_from_slice(&SYNTHETIC_INERTIA);
+        theta[..12].copy_from_slice(&practice::INERTIA);
         Self {
             setup,
             theta,
-            friction: DoubleTanh::cft_joints(&SYNTHETIC_FRICTION),
+            friction: DoubleTanh::cft_joints(&practice::FRICTION),
         }
     }
 
@@ -74,26 +69,24 @@ impl CftTruth {
     }
 
     /// # Errors
-    /// [`SimulateError::NotPositiveDefinite`] when M is not positive definite on a grid over the
-    /// limits of this set-up (or a parameter is not finite).
+    /// As [`Plant::check`].
     pub fn check(&self) -> Result<(), SimulateError> {
-        const STEPS: usize = 12;
-        let limits = self.setup.limits();
-        let coefficients = Coefficients::from_theta22(&self.theta);
-        let share =
-            |k: usize, i: usize| limits.lower[i] + limits.spans()[i] * k as f64 / STEPS as f64;
-        let laws = self.friction.iter().flat_map(DoubleTanh::parameters);
-        let finite = laws.chain(self.theta).all(f64::is_finite);
-        for (i, j, k) in (0..=STEPS)
-            .flat_map(|i| (0..=STEPS).flat_map(move |j| (0..=STEPS).map(move |k| (i, j, k))))
-        {
-            let x = [share(i, 0), share(j, 1), share(k, 2), share(0, 3)];
-            let q = pantograph::joints(&x)?;
-            if !finite || solve_positive(&inertia(&q, &coefficients), &[0.0; 4]).is_none() {
-                return Err(SimulateError::NotPositiveDefinite { x: x.to_vec() });
-            }
-        }
-        Ok(())
+        self.plant()?.check()
+    }
+
+    /// The plant: of 12 parameters where the ten others are 0.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn plant(&self) -> Result<Plant<4>, SimulateError> {
+        let printed = self.theta[PRINTED..].iter().all(|x| *x == 0.0);
+        let (structure, count) = match printed {
+            true => (Structure::Printed12, PRINTED),
+            false => (Structure::Full22, self.theta.len()),
+        };
+        let mechanism = Mechanism::new(Robot::cft(self.setup, structure))?;
+        let law = |j: usize, _| SmoothFriction::DoubleTanh(self.friction[j]);
+        Plant::new(mechanism, &self.theta[..count], law, [0.0; 4])
     }
 
     /// theta_1..theta_12.
@@ -107,88 +100,76 @@ impl CftTruth {
     }
 }
 
-/// The plant of a [`CftTruth`].
-#[derive(Debug, Clone)]
-pub struct CftPlant {
-    setup: Setup,
-    limits: Limits,
-    coefficients: Coefficients,
-    friction: [DoubleTanh; 4],
+/// The CFT robot on a set-up, with the limits of Table 5.
+///
+/// # Errors
+/// None: it has four joints.
+pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
+    Mechanism::new(Robot::cft(setup, Structure::Printed12))
 }
 
-impl CftPlant {
-    /// Plant with the true parameters.
-    pub fn new(truth: &CftTruth) -> Self {
-        Self {
-            setup: truth.setup,
-            limits: truth.setup.limits(),
-            coefficients: Coefficients::from_theta22(&truth.theta),
-            friction: truth.friction,
+/// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
+pub fn excitation(setup: Setup) -> Reference<4> {
+    excitation_of(Fourier::of(&practice::of(setup).excitation))
+}
+
+/// [`excitation`], begun anywhere in its period.
+pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
+    excitation_of(Fourier::of(&practice::of(setup).excitation).at_random_phase(seed))
+}
+
+fn excitation_of(series: Fourier<4>) -> Reference<4> {
+    Reference {
+        frame: Frame::Motors,
+        path: Path::Fourier(series),
+    }
+}
+
+/// The effects on a CFT robot.
+///
+/// # Errors
+/// As [`Effects::build`].
+pub fn effects(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    Effects::build(specs, &Sites::of(&truth.plant()?)?)
+}
+
+/// Runs a reference with the default gains, from the settled start.
+///
+/// # Errors
+/// As [`run`].
+pub fn follow(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+    reference: Reference<4>,
+    settings: &Settings<4>,
+) -> Result<SimulatedRun<4>, SimulateError> {
+    let plant = truth.plant()?;
+    plant.check()?;
+    let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
+    let drive = Drive::Follow {
+        reference,
+        control: plant.control(),
+    };
+    run(&plant, effects, &Start::Settled, &drive, settings)
+}
+
+/// Largest distance between the wanted and the actual motor coordinates, and its root mean square.
+pub fn tracking_error(plant: &Plant<4>, recording: &SimulatedRun<4>) -> ([f64; 4], [f64; 4]) {
+    let mut worst = [0.0; 4];
+    let mut squares = [0.0; 4];
+    for (q, target) in recording.actual.q.iter().zip(&recording.actual.target) {
+        let x = plant.mechanism.coordinates(q);
+        for i in 0..4 {
+            let error = (x[i] - target[i]).abs();
+            worst[i] = f64::max(worst[i], error);
+            squares[i] += error * error;
         }
     }
-
-    /// The same plant with other limits of x_c1..x_c4 than its set-up has.
-    pub fn with_limits(self, limits: Limits) -> Self {
-        Self { limits, ..self }
-    }
-}
-
-impl Plant<4> for CftPlant {
-    fn joint_names(&self) -> [String; 4] {
-        JOINTS.map(str::to_owned)
-    }
-
-    fn coordinate_names(&self) -> [String; 4] {
-        COORDINATES.map(str::to_owned)
-    }
-
-    fn coordinates(&self, q: &[f64; 4]) -> [f64; 4] {
-        pantograph::cartesian(q)
-    }
-
-    fn coordinate_speeds(&self, q: &[f64; 4], v: &[f64; 4]) -> [f64; 4] {
-        pantograph::cartesian_velocities(q, v)
-    }
-
-    fn joints(&self, x: &[f64; 4]) -> Result<[f64; 4], SimulateError> {
-        Ok(pantograph::joints(x)?)
-    }
-
-    fn joint_speeds(&self, q: &[f64; 4], xd: &[f64; 4]) -> Result<[f64; 4], SimulateError> {
-        Ok(pantograph::joint_velocities(q, xd)?)
-    }
-
-    #[inline]
-    fn torque(&self, q: &[f64; 4], volts: &[f64; 4]) -> [f64; 4] {
-        self.setup.volts_to_torques(q, volts)
-    }
-
-    fn volts(&self, q: &[f64; 4], torque: &[f64; 4]) -> Result<[f64; 4], SimulateError> {
-        Ok(self.setup.torques_to_volts(q, torque)?)
-    }
-
-    #[inline]
-    fn rigid(&self, q: &[f64; 4], v: &[f64; 4]) -> ([[f64; 4]; 4], [f64; 4]) {
-        inertia_and_bias(q, v, &self.coefficients)
-    }
-
-    #[inline]
-    fn friction(&self, v: &[f64; 4]) -> [f64; 4] {
-        std::array::from_fn(|i| self.friction[i].torque(v[i]))
-    }
-
-    #[inline]
-    fn solve(&self, mass: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]> {
-        solve_positive(mass, b)
-    }
-
-    fn limits(&self) -> ([f64; 4], [f64; 4]) {
-        (self.limits.lower, self.limits.upper)
-    }
-
-    fn resolution(&self) -> [f64; 4] {
-        ENCODER_SCALE
-    }
+    let rows = recording.rows().max(1) as f64;
+    (worst, squares.map(|s| (s / rows).sqrt()))
 }
 
 #[cfg(test)]
@@ -230,7 +211,30 @@ mod tests {
     #[test]
     fn friction_parameters_come_back_in_the_order_of_the_report() {
         let truth = CftTruth::synthetic(Setup::Tuedacs);
-        assert_eq!(truth.friction_theta(), SYNTHETIC_FRICTION);
-        assert_eq!(truth.printed(), SYNTHETIC_INERTIA);
+        assert_eq!(truth.friction_theta(), practice::FRICTION);
+        assert_eq!(truth.printed(), practice::INERTIA);
+    }
+
+    #[test]
+    fn cft_parameters_carry_the_numbers_of_the_report() {
+        let truth = CftTruth::synthetic(Setup::Tuedacs);
+        let parameters = truth.plant().expect("a pose").parameters();
+        assert_eq!(parameters.len(), 32);
+        let mut numbers: Vec<u32> = parameters.iter().filter_map(|p| p.theta).collect();
+        numbers.sort_unstable();
+        assert_eq!(numbers, (1..=32).collect::<Vec<_>>());
+        let friction = truth.friction_theta();
+        for p in &parameters {
+            let number = p.theta.expect("every parameter has a number") as usize;
+            let value = if number <= 12 {
+                truth.theta[number - 1]
+            } else {
+                friction[number - 13]
+            };
+            assert_eq!(p.value, value, "theta_{number}");
+        }
+        let mut full = truth;
+        full.theta[17] = 0.1;
+        assert_eq!(full.plant().expect("a pose").parameters().len(), 42);
     }
 }

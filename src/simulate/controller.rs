@@ -2,8 +2,8 @@
 //! optional derivative part on the encoder signal.
 //!
 //! u_i = kp_i (x_d - x) + kd_i (v_d - v), where v is the encoder signal differenced over one sample and
-//! passed through a first-order filter. The result is limited to the amplifiers' range and held until
-//! the next sample.
+//! passed through a first-order filter. The result is limited to the amplifiers' range and kept until
+//! the next sample (zero-order hold).
 
 use super::SimulateError;
 

@@ -22,6 +22,9 @@ pub enum SimulateError {
     /// A robot that the simulator cannot build.
     #[error("this robot cannot be simulated: {what}")]
     Unsupported { what: String },
+    /// More joints than the simulator is compiled for.
+    #[error("this robot has {joints} joints and the simulator has room for {most}")]
+    TooManyJoints { joints: usize, most: usize },
     /// A start outside the limits.
     #[error(
         "{coordinate} = {value:.5} at the start lies outside its limits [{lower}, {upper}]; begin inside them \

@@ -2,49 +2,59 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | [`plant`], [`cft`], [`single_joint`] | tau = M a + C v + G + F(v) + effects, volts to torques |
+//! | [`mechanism`], [`joint_friction`] | joints, motors, encoders, limits; friction without a jump |
+//! | [`plant`], [`moving`] | tau = M a + C v + G + F(v) + effects, volts to torques |
+//! | [`cft`], [`single_joint`] | plants of the report's robot and of one joint, from their numbers |
 //! | [`effects`] | what a declared model may lack |
 //! | [`integrate`] | Dormand-Prince 5(4) with error control |
+//! | [`experiment`], [`one_joint`] | what the robot is asked to do |
 //! | [`reference`] | Fourier series (43), one-joint ladder, point list |
-//! | [`controller`] | Cartesian P or PD controller, held volts |
+//! | [`controller`] | Cartesian P or PD controller with zero-order hold |
 //! | [`sensors`] | encoders, sampling, noise, all from one seed |
 //! | [`run`](mod@run) | the experiment, with limits and saturation |
-//! | [`recording`] | the log, and beside it what was true |
+//! | [`simulated_run`] | the log, and beside it what was true |
 //! | [`order`], [`truth`] | the same from files, and to files |
 //!
 //! No estimator may see what is true: it goes to a file of its own.
 
 pub mod cft;
-pub mod cft_experiment;
 pub mod chance;
 pub mod controller;
 pub mod effects;
 mod error;
-pub(crate) mod from_files;
+pub mod experiment;
 pub mod integrate;
+pub mod joint_friction;
+pub mod mechanism;
+pub mod moving;
+pub mod one_joint;
 pub mod order;
 pub mod plant;
-pub mod recording;
 pub mod reference;
 pub mod run;
 pub mod sensors;
-pub mod serial;
-mod serial_experiment;
 pub mod settings;
+mod settings_file;
+pub mod simulated_run;
 pub mod single_joint;
 pub mod truth;
 pub mod volts;
 
-pub use cft::{CftPlant, CftTruth};
+pub use cft::CftTruth;
 pub use controller::Control;
 pub use effects::{EffectSpec, Effects};
 pub use error::SimulateError;
-pub use order::{InitialConditions, Motion, Order, SimulatedLog, simulate, simulate_from};
-pub use recording::{Ending, LimitEvent, Recording, Status};
+pub use experiment::Experiment;
+pub use joint_friction::SmoothFriction;
+pub use mechanism::Mechanism;
+pub use one_joint::{Mover, OneJointMove};
+pub use order::{InitialConditions, Order, SimulatedLog, simulate, simulate_from};
+pub use plant::Plant;
 pub use reference::{Frame, Path, Reference};
 pub use run::{Drive, Start, run};
 pub use sensors::{Noise, Sensors};
 pub use settings::{OnLimit, Settings};
+pub use simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
 pub use single_joint::SingleJointTruth;
 pub use truth::TruthFile;
 pub use volts::VoltSeries;

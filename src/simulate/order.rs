@@ -1,46 +1,19 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
 use super::SimulateError;
-use super::cft::CftPlant;
-use super::cft_experiment;
-use super::controller::Control;
 use super::effects::{EffectSpec, EffectValue, Effects, Sites};
-use super::from_files;
+use super::experiment::{Experiment, SECONDS};
+use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::recording::{Ending, LimitEvent, Recording, Status};
-use super::reference::{Path, Reference};
+use super::reference::Path;
 use super::run::{Drive, Start, run};
-use super::serial_experiment;
-use super::settings::Settings;
+use super::settings_file;
+use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
-use crate::config::model_file::Parameter;
-use crate::config::robot_file::{ModelKind, RobotFile};
-use crate::config::{ModelFile, Trajectory};
+use crate::config::ModelFile;
+use crate::config::robot_file::RobotFile;
 use crate::log::{Channel, Channels};
-
-/// Duration of a motion that sets none \[s\].
-const SECONDS: f64 = 20.0;
-
-/// What the robot is to do.
-#[derive(Debug, Clone, Copy)]
-pub enum Motion<'a> {
-    /// Table 3 on the CFT robot, a ladder on a single joint.
-    Usual,
-    /// A trajectory file.
-    Trajectory(&'a Trajectory),
-    /// One joint (or motor coordinate) runs a ladder of speeds, within a part of its range about the middle.
-    Move { joint: &'a str, part: f64 },
-    /// Volts of a log: times \[s\], and volts row by row.
-    Volts { times: &'a [f64], volts: &'a [f64] },
-}
-
-impl<'a> Motion<'a> {
-    /// One joint over all of its range.
-    pub fn of_joint(joint: &'a str) -> Self {
-        Motion::Move { joint, part: 1.0 }
-    }
-}
 
 /// What is asked of the simulator.
 #[derive(Debug, Clone)]
@@ -49,7 +22,7 @@ pub struct Order<'a> {
     /// Model whose parameters are the truth, and its name in messages; the synthetic ones of the CFT
     /// robot where absent.
     pub model: Option<(&'a str, &'a ModelFile)>,
-    pub motion: Motion<'a>,
+    pub experiment: Experiment<'a>,
     /// Duration \[s\]; the motion's own, or 20 s, where absent.
     pub seconds: Option<f64>,
     pub effects: Vec<EffectSpec>,
@@ -88,17 +61,18 @@ pub struct InitialConditions {
 }
 
 impl InitialConditions {
-    fn start<const J: usize>(&self) -> Result<Start<J>, SimulateError> {
-        let fixed = |numbers: &[f64]| {
-            <[f64; J]>::try_from(numbers).map_err(|_| SimulateError::Parameter {
+    fn start<const J: usize>(&self, mechanism: &Mechanism<J>) -> Result<Start<J>, SimulateError> {
+        let of = |numbers: &[f64]| {
+            let widened = mechanism.widened(numbers, 0.0);
+            widened.ok_or(SimulateError::Parameter {
                 name: "number of initial conditions of a kind",
                 value: numbers.len() as f64,
                 rule: "must be one per motor",
             })
         };
         Ok(Start::State {
-            position: fixed(&self.position)?,
-            speed: fixed(&self.speed)?,
+            position: of(&self.position)?,
+            speed: of(&self.speed)?,
         })
     }
 }
@@ -119,146 +93,90 @@ pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
-    match order.robot.robot.model {
-        ModelKind::Cft => cft(order, initial),
-        ModelKind::SingleJoint => single(order, initial),
-        ModelKind::Serial => match order.robot.joint_names().len() {
-            1 => serial::<1>(order, initial),
-            2 => serial::<2>(order, initial),
-            3 => serial::<3>(order, initial),
-            4 => serial::<4>(order, initial),
-            5 => serial::<5>(order, initial),
-            6 => serial::<6>(order, initial),
-            7 => serial::<7>(order, initial),
-            _ => serial::<8>(order, initial),
-        },
+    match order.robot.joint_names().len() {
+        1 => run_order::<1>(order, initial),
+        2 => run_order::<2>(order, initial),
+        3 => run_order::<3>(order, initial),
+        4 => run_order::<4>(order, initial),
+        5 => run_order::<5>(order, initial),
+        6 => run_order::<6>(order, initial),
+        7 => run_order::<7>(order, initial),
+        8 => run_order::<8>(order, initial),
+        // many joints share the code of two widths
+        9..=16 => run_order::<16>(order, initial),
+        _ => run_order::<32>(order, initial),
     }
 }
 
-fn cft(order: &Order, initial: Option<&InitialConditions>) -> Result<SimulatedLog, SimulateError> {
-    let truth = from_files::cft_truth(order.robot, order.model)?;
-    truth.check()?;
-    let setup = truth.setup;
-    let limits = from_files::cft_limits(order.robot, setup);
-    let plant = CftPlant::new(&truth).with_limits(limits);
-    let (effects, values) = built_effects(order, &Sites::cft(&truth)?)?;
-    let reference = match order.motion {
-        Motion::Usual => Some(cft_experiment::excitation(setup)),
-        Motion::Trajectory(trajectory) => Some(from_files::cft_reference(
-            order.robot,
-            trajectory,
-            setup,
-            order.seconds,
-            order.seed,
-        )?),
-        Motion::Move { joint, part } => {
-            let mover = cft_experiment::Mover::named(joint)?;
-            let seconds = order.seconds.unwrap_or(SECONDS);
-            let ladder = cft_experiment::OneJointMove {
-                mover,
-                limits: Some(limits),
-                part,
-                ..cft_experiment::OneJointMove::new(0, seconds, Some(order.seed))
-            };
-            Some(ladder.reference(setup)?)
-        }
-        Motion::Volts { .. } => None,
-    };
-    let control = from_files::control(order.robot, Control::cft(setup))?;
-    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
-    let driven = Driven {
-        parameters: truth.parameters(),
-        values,
-        effects,
-        start,
-        reference,
-        control,
-        saturation: None,
-    };
-    let mut outcome = execute(order, &plant, driven)?;
-    outcome.truth.setup = Some(setup.name().to_owned());
-    Ok(outcome)
-}
-
-fn single(
+/// Runs the order with vectors of room for J joints, and lays the log out as the robot file's `[log]` reads it.
+fn run_order<const J: usize>(
     order: &Order,
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
-    let truth = from_files::single_joint_truth(order.robot, order.model)?;
-    truth.check()?;
-    let (effects, values) = built_effects(order, &Sites::single_joint(&truth))?;
-    let seconds = order.seconds.unwrap_or(SECONDS);
-    let reference = match order.motion {
-        Motion::Move { joint, .. } if joint != truth.name => {
-            return Err(SimulateError::UnknownJoint {
-                name: joint.to_owned(),
-                known: truth.name,
-            });
-        }
-        Motion::Usual | Motion::Move { .. } => {
-            let part = match order.motion {
-                Motion::Move { part, .. } => part,
-                _ => 1.0,
-            };
-            let ladder = from_files::LadderOf::Usual { part };
-            Some(from_files::single_joint_ladder(
-                order.robot,
-                &truth,
-                ladder,
-                seconds,
-                order.seed,
-            )?)
-        }
-        Motion::Trajectory(trajectory) => Some(from_files::single_joint_reference(
-            order.robot,
-            &truth,
-            trajectory,
-            order.seconds,
-            order.seed,
-        )?),
-        Motion::Volts { .. } => None,
+    let plant = Plant::<J>::of(order.robot, order.model)?;
+    let (effects, effect_values) = built_effects(order, &Sites::of(&plant)?)?;
+    let mechanism = &plant.mechanism;
+    let (drive, own_seconds) = drive(order, &plant)?;
+    let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
+    let mut settings = settings_file::settings(order.robot, mechanism)?;
+    settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
+    settings.seed = order.seed;
+    let recording = run(&plant, effects, &start, &drive, &settings)?;
+    let (header, values) = lay_out(order.robot, &recording);
+    let truth = truth_of(order, &plant, &recording, effect_values);
+    let rows = recording.rows().max(1) as f64;
+    let share = |(i, name): (usize, &String)| {
+        let saturated = recording.status.iter();
+        let saturated = saturated.filter(|s| s[i] == MotorStatus::Saturated).count();
+        (name.clone(), saturated as f64 / rows)
     };
-    let control = from_files::control(order.robot, truth.control())?;
-    let saturation = order.robot.control.saturation_v.or_else(|| {
-        let limits = order.robot.limits.get(&truth.name)?;
-        limits.torque.or(limits.volts)
-    });
-    let saturation = saturation.unwrap_or(f64::INFINITY);
-    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
-    let driven = Driven {
-        parameters: truth.parameters(),
+    let saturated = recording.coordinates.iter().enumerate().map(share);
+    Ok(SimulatedLog {
+        header,
         values,
-        effects,
-        start,
-        reference,
-        control,
-        saturation: Some(saturation),
-    };
-    execute(order, &truth, driven)
+        truth,
+        saturated: saturated.collect(),
+        ending: recording.ending,
+        limits: recording.limits,
+    })
 }
 
-fn serial<const J: usize>(
+/// What drives the motors, and how long it lasts where it says so \[s\].
+fn drive<const J: usize>(
     order: &Order,
-    initial: Option<&InitialConditions>,
-) -> Result<SimulatedLog, SimulateError> {
-    let truth = serial_experiment::truth::<J>(order)?;
-    let (robot, theta) = truth.rigid_body();
-    let places = Sites::serial(robot, theta, truth.sites());
-    let (effects, values) = built_effects(order, &places)?;
-    let reference = serial_experiment::reference(order, &truth)?;
-    let control = from_files::control(order.robot, truth.control())?;
-    let saturation = order.robot.control.saturation_v.unwrap_or(f64::INFINITY);
-    let start = initial.map_or(Ok(Start::Settled), InitialConditions::start)?;
-    let driven = Driven {
-        parameters: truth.parameters(),
-        values,
-        effects,
-        start,
-        reference,
-        control,
-        saturation: Some(saturation),
+    plant: &Plant<J>,
+) -> Result<(Drive<J>, Option<f64>), SimulateError> {
+    let mechanism = &plant.mechanism;
+    let experiment = order.experiment;
+    if let Some(reference) = experiment.reference(mechanism, order.seconds, order.seed)? {
+        let seconds = match &reference.path {
+            // A ladder lasts as long as it was built for; a list may end before the next sample.
+            Path::Points(points) => Some(points.seconds()),
+            Path::Fourier(series) => series.seconds(),
+            _ => None,
+        };
+        let control = settings_file::control(order.robot, plant)?;
+        return Ok((Drive::Follow { reference, control }, seconds));
+    }
+    let Experiment::Volts { times, volts } = experiment else {
+        return Err(SimulateError::Reference {
+            what: "there is neither a reference nor a series of volts".to_owned(),
+        });
     };
-    execute(order, &truth, driven)
+    let n = mechanism.joints();
+    if !volts.len().is_multiple_of(n) {
+        return Err(SimulateError::Volts {
+            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts"),
+        });
+    }
+    let rows = volts.chunks_exact(n);
+    let rows = rows.filter_map(|row| mechanism.widened(row, 0.0)).collect();
+    // A log's clock need not start at 0.
+    let first = times.first().copied().unwrap_or(0.0);
+    let times: Vec<f64> = times.iter().map(|t| t - first).collect();
+    let series = VoltSeries::new(times, rows)?;
+    let seconds = Some(series.seconds()).filter(|s| s.is_finite());
+    Ok((Drive::Volts(series), seconds))
 }
 
 /// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
@@ -302,100 +220,14 @@ fn built_effects(
     }
 }
 
-/// What the plant is run with.
-struct Driven<const J: usize> {
-    /// What is true of the plant, and of the effects.
-    parameters: Vec<Parameter>,
-    values: Vec<EffectValue>,
-    effects: Effects,
-    start: Start<J>,
-    /// `None` where volts are played back.
-    reference: Option<Reference<J>>,
-    control: Control<J>,
-    /// \[V\]; that of `[control]`, or 10 V, where absent.
-    saturation: Option<f64>,
-}
-
-/// Runs the plant and lays the log out as the robot file's `[log]` reads it.
-fn execute<P: Plant<J>, const J: usize>(
-    order: &Order,
-    plant: &P,
-    driven: Driven<J>,
-) -> Result<SimulatedLog, SimulateError> {
-    let Driven {
-        parameters,
-        values: effect_values,
-        effects,
-        start,
-        reference,
-        control,
-        saturation,
-    } = driven;
-    let (drive, own_seconds) = match (reference, order.motion) {
-        (Some(reference), _) => {
-            let seconds = match &reference.path {
-                // A ladder lasts as long as it was built for; a list may end before the next sample.
-                Path::Points(points) => Some(points.seconds()),
-                Path::Fourier(series) => series.seconds(),
-                _ => None,
-            };
-            (Drive::Follow { reference, control }, seconds)
-        }
-        (None, Motion::Volts { times, volts }) => {
-            let (rows, rest) = volts.as_chunks::<J>();
-            if !rest.is_empty() {
-                return Err(SimulateError::Volts {
-                    what: format!(
-                        "the robot has {J} motors, and the rows do not divide into {J} volts"
-                    ),
-                });
-            }
-            // A log's clock need not start at 0.
-            let first = times.first().copied().unwrap_or(0.0);
-            let times: Vec<f64> = times.iter().map(|t| t - first).collect();
-            let series = VoltSeries::new(times, rows.to_vec())?;
-            let seconds = Some(series.seconds()).filter(|s| s.is_finite());
-            (Drive::Volts(series), seconds)
-        }
-        (None, _) => {
-            return Err(SimulateError::Reference {
-                what: "there is neither a reference nor a series of volts".to_owned(),
-            });
-        }
-    };
-    let mut settings: Settings<J> = from_files::settings(order.robot)?;
-    settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
-    settings.seed = order.seed;
-    settings.saturation = saturation
-        .or(order.robot.control.saturation_v)
-        .unwrap_or(settings.saturation);
-    let recording = run(plant, effects, &start, &drive, &settings)?;
-    let (header, values) = lay_out(order.robot, &recording);
-    let rows = recording.rows().max(1) as f64;
-    let saturated = (0..J).map(|i| {
-        let count = recording
-            .status
-            .iter()
-            .filter(|s| s[i] == Status::Saturated)
-            .count();
-        (recording.coordinates[i].clone(), count as f64 / rows)
-    });
-    Ok(SimulatedLog {
-        header,
-        values,
-        truth: truth_of(order, &recording, parameters, effect_values),
-        saturated: saturated.collect(),
-        ending: recording.ending,
-        limits: recording.limits,
-    })
-}
-
 fn truth_of<const J: usize>(
     order: &Order,
-    recording: &Recording<J>,
-    parameters: Vec<Parameter>,
+    plant: &Plant<J>,
+    recording: &SimulatedRun<J>,
     effects: Vec<EffectValue>,
 ) -> TruthFile {
+    let robot = &plant.mechanism.robot;
+    let n = robot.joints();
     let mut ending = match recording.ending {
         Ending::Completed => "completed".to_owned(),
         Ending::StoppedAtLimit => "stopped at a limit".to_owned(),
@@ -409,24 +241,25 @@ fn truth_of<const J: usize>(
     TruthFile {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: order.seed,
-        model: match order.robot.robot.model {
-            ModelKind::Cft => "cft",
-            ModelKind::SingleJoint => "single-joint",
-            ModelKind::Serial => "serial",
-        }
-        .to_owned(),
-        setup: None,
+        model: order.robot.robot.model.name().to_owned(),
+        setup: robot
+            .transmission()
+            .setup()
+            .map(|setup| setup.name().to_owned()),
         ending,
-        volt_noise: recording.volt_noise.to_vec(),
-        torque_noise: recording.torque_noise.to_vec(),
-        parameters,
+        volt_noise: recording.volt_noise[..n].to_vec(),
+        torque_noise: recording.torque_noise[..n].to_vec(),
+        parameters: plant.parameters(),
         effects,
     }
 }
 
 /// Header and rows under the names, signs, scales and offsets with which the robot file reads logs: joint
 /// channels where it reads those, and for the CFT robot the raw channels and status behind them.
-fn lay_out<const J: usize>(robot: &RobotFile, recording: &Recording<J>) -> (Vec<String>, Vec<f64>) {
+fn lay_out<const J: usize>(
+    robot: &RobotFile,
+    recording: &SimulatedRun<J>,
+) -> (Vec<String>, Vec<f64>) {
     let layout = robot.layout();
     let (joint, actuator) = match (layout.channels, layout.otherwise.as_deref()) {
         (Channels::Joint, otherwise) => (Some(&layout), otherwise),
@@ -442,7 +275,8 @@ fn lay_out<const J: usize>(robot: &RobotFile, recording: &Recording<J>) -> (Vec<
         );
     }
     if actuator.is_some() {
-        header.extend((1..=J).map(|i| format!("status_{i}")));
+        let motors = 1..=recording.coordinates.len();
+        header.extend(motors.map(|i| format!("status_{i}")));
     }
     let mut values = Vec::with_capacity(header.len() * recording.rows());
     for k in 0..recording.rows() {
@@ -454,7 +288,8 @@ fn lay_out<const J: usize>(robot: &RobotFile, recording: &Recording<J>) -> (Vec<
         if let Some(part) = actuator {
             extend(&mut values, &part.positions, &recording.x[k]);
             extend(&mut values, &part.torques, &recording.volts[k]);
-            values.extend(recording.status[k].map(|s| f64::from(s.code())));
+            let status = recording.status[k].iter().take(recording.coordinates.len());
+            values.extend(status.map(|s| f64::from(s.code())));
         }
     }
     (header, values)

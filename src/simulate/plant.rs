@@ -1,298 +1,304 @@
-//! What moves: a plant maps volts to joint torques and joint torques to accelerations.
+//! The robot that is simulated: a mechanism with parameters that are true.
 //!
 //! Per joint the balance is tau = M a + C v + G + F(v) + E, eq. (60) with the effects E that a declared
-//! model may lack. A [`Moving`] plant is that balance as a differential equation with the state
-//! (q, v, z): z are the states of the effects.
+//! model may lack.
 
 use super::SimulateError;
-use super::effects::{Effects, Motion};
-use super::integrate::System;
+use super::joint_friction::SmoothFriction;
+use super::mechanism::Mechanism;
+use crate::config::robot_file::{FrictionLawKind, RobotFile};
+use crate::config::{ConfigError, ModelFile};
+use crate::robot::dynamics::Dynamics;
+use crate::robot::friction::ViscousCoulomb;
 
-/// A mechanism of J joints that J motors drive.
-pub trait Plant<const J: usize> {
-    /// Names of the joints, in the order of all joint vectors.
-    fn joint_names(&self) -> [String; J];
+/// Poses at which the inertia matrix must be positive definite before anything is run, where a grid would
+/// be too many; and steps of a grid over at most [`GRIDDED`] coordinates.
+const POSES: usize = 64;
+const STEPS: usize = 12;
+const GRIDDED: usize = 3;
 
-    /// Names of the motor coordinates, in the order of volts and encoders.
-    fn coordinate_names(&self) -> [String; J];
+/// A mechanism of n joints with its true parameters.
+#[derive(Debug, Clone)]
+pub struct Plant<const J: usize> {
+    pub mechanism: Mechanism<J>,
+    dynamics: Dynamics,
+    /// Friction and constant torque that the motors supply beside load and friction, per joint.
+    pub laws: Vec<SmoothFriction>,
+    pub offset: [f64; J],
+    /// M_jj in the middle of the travel, kg or kg m^2.
+    pub inertia: [f64; J],
+}
 
-    /// Motor coordinates of the joints q.
-    fn coordinates(&self, q: &[f64; J]) -> [f64; J];
-
-    /// Speeds of the motor coordinates.
-    fn coordinate_speeds(&self, q: &[f64; J], v: &[f64; J]) -> [f64; J];
-
-    /// Joints of the motor coordinates x.
+impl<const J: usize> Plant<J> {
+    /// The mechanism with inertial parameters in the order of the regressor's columns; `friction` makes the
+    /// law of joint j with the inertia M_jj in the middle of the travel.
     ///
     /// # Errors
-    /// [`SimulateError::Robot`] where no pose belongs to them.
-    fn joints(&self, x: &[f64; J]) -> Result<[f64; J], SimulateError>;
+    /// [`SimulateError::Robot`] where the middle of the limits is no pose.
+    pub fn new(
+        mechanism: Mechanism<J>,
+        theta: &[f64],
+        friction: impl Fn(usize, f64) -> SmoothFriction,
+        offset: [f64; J],
+    ) -> Result<Self, SimulateError> {
+        let mut plant = Self {
+            dynamics: mechanism.robot.dynamics(theta),
+            laws: Vec::new(),
+            offset,
+            inertia: [0.0; J],
+            mechanism,
+        };
+        let middle = plant.mechanism.pose(&plant.mechanism.middle())?;
+        let (mass, _) = plant.rigid(&middle, &[0.0; J]);
+        plant.inertia = plant.mechanism.filled(|j| mass[j][j]);
+        plant.laws = (0..plant.mechanism.joints())
+            .map(|j| friction(j, plant.inertia[j]))
+            .collect();
+        Ok(plant)
+    }
 
-    /// Joint speeds at the pose q of the motor speeds.
+    /// The robot of a file with the parameters of a model, or with its nominal ones.
     ///
     /// # Errors
-    /// [`SimulateError::Robot`] where the pose is singular.
-    fn joint_speeds(&self, q: &[f64; J], xd: &[f64; J]) -> Result<[f64; J], SimulateError>;
+    /// [`SimulateError::Unsupported`] without a model where no numbers stand for the robot,
+    /// [`SimulateError::Config`] where the model lacks a parameter or belongs to another robot, and as
+    /// [`Self::check`].
+    pub fn of(file: &RobotFile, model: Option<(&str, &ModelFile)>) -> Result<Self, SimulateError> {
+        let mechanism = Mechanism::of(file)?;
+        let robot = &mechanism.robot;
+        let mut offset = [0.0; J];
+        let plant = match (model, robot.nominal()) {
+            (Some((name, model)), _) => {
+                model.belongs_to(name, file)?;
+                let theta = model.inertial(name)?;
+                let law = file.friction_law();
+                let laws = robot.joint_names().iter();
+                let laws = laws.map(|joint| law_of(law, (name, model), joint));
+                let laws = laws.collect::<Result<Vec<_>, _>>()?;
+                for (offset, joint) in offset.iter_mut().zip(robot.joint_names()) {
+                    *offset = model.offset(joint);
+                }
+                Self::new(mechanism, &theta, |j, inertia| laws[j](inertia), offset)?
+            }
+            (None, Some(nominal)) => {
+                let law = |j: usize, _| SmoothFriction::DoubleTanh(nominal.friction[j]);
+                Self::new(mechanism, &nominal.theta, law, offset)?
+            }
+            (None, None) => {
+                let what = match robot.joints() {
+                    1 => "a single joint",
+                    _ => "a serial robot",
+                };
+                return Err(SimulateError::Unsupported {
+                    what: format!("{what} has no parameters of its own; give a model with -m"),
+                });
+            }
+        };
+        plant.check()?;
+        Ok(plant)
+    }
 
-    /// Joint torques of the volts at the pose q, eq. (66).
-    fn torque(&self, q: &[f64; J], volts: &[f64; J]) -> [f64; J];
+    /// Number of joints n.
+    #[inline]
+    pub fn joints(&self) -> usize {
+        self.mechanism.joints()
+    }
 
-    /// Volts that give the joint torques at the pose q, eq. (65).
-    ///
+    /// Inertial parameters.
+    pub fn theta(&self) -> &[f64] {
+        self.dynamics.theta()
+    }
+
     /// # Errors
-    /// [`SimulateError::Robot`] where the pose is singular.
-    fn volts(&self, q: &[f64; J], torque: &[f64; J]) -> Result<[f64; J], SimulateError>;
+    /// [`SimulateError::Parameter`] for the first number that no joint can have, and
+    /// [`SimulateError::NotPositiveDefinite`] with the pose where the parameters are those of no body: an
+    /// unconstrained fit can be so.
+    pub fn check(&self) -> Result<(), SimulateError> {
+        let n = self.joints();
+        let m = &self.mechanism;
+        for j in 0..n {
+            self.check_joint(j)?;
+        }
+        let finite = self.theta().iter().all(|x| x.is_finite());
+        for x in m.poses() {
+            let (mass, _) = self.rigid(&m.pose(&x)?, &[0.0; J]);
+            if !finite || self.solve(&mass, &[1.0; J]).is_none() {
+                let x = x[..n].to_vec();
+                return Err(SimulateError::NotPositiveDefinite { x });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_joint(&self, j: usize) -> Result<(), SimulateError> {
+        let m = &self.mechanism;
+        // that of one joint is a parameter; else M as a whole is looked at
+        let inertia = self.joints() > 1 || (self.inertia[j] > 0.0 && self.inertia[j].is_finite());
+        let gain = m.gain[j] > 0.0 && m.gain[j].is_finite();
+        let order = m.lower[j] < m.upper[j];
+        let findings = [
+            (inertia, "inertia", self.inertia[j], "must be above 0"),
+            (
+                self.laws[j].is_finite(),
+                "friction",
+                f64::NAN,
+                "must be finite",
+            ),
+            (
+                self.offset[j].is_finite(),
+                "offset",
+                self.offset[j],
+                "must be finite",
+            ),
+            (gain, "gain", m.gain[j], "must be above 0"),
+            (
+                m.resolution[j] >= 0.0,
+                "resolution",
+                m.resolution[j],
+                "must be 0 or more",
+            ),
+            (
+                order,
+                "lower limit",
+                m.lower[j],
+                "must lie below the upper limit",
+            ),
+        ];
+        match findings.into_iter().find(|(good, ..)| !good) {
+            None => Ok(()),
+            Some((_, name, value, rule)) => Err(SimulateError::Parameter { name, value, rule }),
+        }
+    }
 
     /// Inertia matrix M(q), and C(q, v) v + G(q).
-    fn rigid(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]);
+    #[inline]
+    pub fn rigid(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]) {
+        let n = self.joints();
+        let (mut mass, mut bias) = ([[0.0; J]; J], [0.0; J]);
+        self.dynamics.inertia_and_bias(
+            &q[..n],
+            &v[..n],
+            &mut mass.as_flattened_mut()[..n * n],
+            &mut bias[..n],
+        );
+        spread(&mut mass, n);
+        (mass, bias)
+    }
 
     /// Friction F(v) of each joint.
-    fn friction(&self, v: &[f64; J]) -> [f64; J];
-
-    /// Constant torque that the motors supply beside load and friction.
     #[inline]
-    fn offset(&self) -> [f64; J] {
-        [0.0; J]
+    pub fn friction(&self, v: &[f64; J]) -> [f64; J] {
+        let mut torque = [0.0; J];
+        for ((torque, law), v) in torque.iter_mut().zip(&self.laws).zip(v) {
+            *torque = law.torque(*v);
+        }
+        torque
     }
 
     /// Inertia matrix M(q), and C(q, v) v + G(q) + F(v) with the offset.
     #[inline]
-    fn dynamics(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]) {
+    pub fn dynamics(&self, q: &[f64; J], v: &[f64; J]) -> ([[f64; J]; J], [f64; J]) {
         let (mass, mut bias) = self.rigid(q, v);
-        let (friction, offset) = (self.friction(v), self.offset());
+        let friction = self.friction(v);
         for i in 0..J {
-            bias[i] += friction[i] + offset[i];
+            bias[i] += friction[i] + self.offset[i];
         }
         (mass, bias)
     }
 
     /// x with M x = b; `None` where M is not positive definite.
-    fn solve(&self, mass: &[[f64; J]; J], b: &[f64; J]) -> Option<[f64; J]>;
-
-    /// Lower and upper limit of the motor coordinates.
-    fn limits(&self) -> ([f64; J], [f64; J]);
-
-    /// One encoder count of each motor coordinate, m or rad; 0 for a perfect encoder.
-    fn resolution(&self) -> [f64; J];
-}
-
-/// A plant with its effects under a held drive: the differential equation that is integrated.
-///
-/// N is at least 2 J plus the number of the effects' states.
-#[derive(Debug)]
-pub struct Moving<'a, P, const J: usize> {
-    pub plant: &'a P,
-    pub effects: Effects,
-    /// Volts, held.
-    pub volts: [f64; J],
-}
-
-/// The motor's side of the joints and what the balance of torques came to.
-struct Balance<const J: usize> {
-    q: [f64; J],
-    v: [f64; J],
-    friction: [f64; J],
-    /// Motor torque that acts, less friction and added torques.
-    net: [f64; J],
-    acceleration: [f64; J],
-}
-
-impl<P: Plant<J>, const J: usize> Moving<'_, P, J> {
-    /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
-    /// the deflections of elastic joints.
-    pub fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
-        let (mut q, mut v) = (*q, *v);
-        for twist in self.effects.twists(z) {
-            q[twist.joint] += twist.deflection;
-            v[twist.joint] += twist.rate;
-        }
-        (q, v)
-    }
-
-    /// Acceleration of the joints at the state y under the held volts; NaN where M is not invertible.
     #[inline]
-    pub fn acceleration<const N: usize>(&self, t: f64, y: &[f64; N]) -> [f64; J] {
-        let (q, v) = (part::<J, N>(y, 0), part::<J, N>(y, J));
-        if self.effects.is_empty() {
-            let torque = self.plant.torque(&q, &self.volts);
-            let (mass, bias) = self.plant.dynamics(&q, &v);
-            let load = std::array::from_fn(|i| torque[i] - bias[i]);
-            return self.plant.solve(&mass, &load).unwrap_or([f64::NAN; J]);
-        }
-        self.balance(t, &q, &v, &y[2 * J..]).acceleration
-    }
-
-    /// The balance with effects: what the motors give, friction and added torques take; what is left is the
-    /// load tau_l with what depends on it, and where a joint is elastic the load is what the spring passes on.
-    fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
-        let (q, v) = self.motor_side(link, speed, z);
-        let friction = self.plant.friction(&v);
-        let motion = Motion {
-            t,
-            q: &q,
-            v: &v,
-            z,
-            friction: &friction,
-            ..Motion::default()
-        };
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
-        let mut added = self.plant.offset();
-        self.effects.torque(&motion, &mut added);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
-        let torque = self.plant.torque(&q, &self.volts);
-        let mut net: [f64; J] =
-            std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i]);
-        // tau_l (1 + share) = net is linear on each side of zero.
-        let mut load: [f64; J] = std::array::from_fn(|i| {
-            let [positive, negative] = share[i];
-            net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
-        });
-        for twist in self.effects.twists(z) {
-            let [positive, negative] = share[twist.joint];
-            load[twist.joint] = twist.torque;
-            net[twist.joint] -= twist.torque
-                * if twist.torque > 0.0 {
-                    positive
-                } else {
-                    negative
-                };
-        }
-        let (mut mass, mut bias) = self.plant.rigid(link, speed);
-        let motion = Motion {
-            q: link,
-            v: speed,
-            ..motion
-        };
-        self.effects
-            .inertia(&motion, mass.as_flattened_mut(), &mut bias);
-        for i in 0..J {
-            load[i] -= bias[i];
-        }
-        let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
-        let solved = if symmetric {
-            self.plant.solve(&mass, &load)
-        } else {
-            eliminate(mass, load)
-        };
-        Balance {
-            q,
-            v,
-            friction,
-            net,
-            acceleration: solved.unwrap_or([f64::NAN; J]),
-        }
-    }
-
-    /// Rigid-body torque C v + G with what effects add to it, at no acceleration.
-    pub fn load(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
-        let (mut mass, mut bias) = self.plant.rigid(q, v);
-        let motion = Motion {
-            t,
-            q,
-            v,
-            z,
-            ..Motion::default()
-        };
-        self.effects
-            .inertia(&motion, mass.as_flattened_mut(), &mut bias);
-        bias
-    }
-
-    /// Logged joint torque that keeps the state without acceleration: C v + G + F + E.
-    pub fn holding_torque(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
-        let load = self.load(t, q, v, z);
-        let friction = self.plant.friction(v);
-        let motion = Motion {
-            t,
-            q,
-            v,
-            z,
-            friction: &friction,
-            ..Motion::default()
-        };
-        let mut torque = self.plant.offset();
-        self.effects.torque(&motion, &mut torque);
-        let mut share = [[0.0; 2]; J];
-        self.effects.load(&motion, &mut share);
-        let mut acting = [1.0; J];
-        self.effects.drive(&mut acting);
-        std::array::from_fn(|i| {
-            let [positive, negative] = share[i];
-            let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
-            (load[i] + beside + friction[i] + torque[i]) / acting[i]
-        })
+    pub fn solve(&self, mass: &[[f64; J]; J], b: &[f64; J]) -> Option<[f64; J]> {
+        let (n, mut mass, mut x) = (self.joints(), *mass, *b);
+        gather(&mut mass, n);
+        let solved = self
+            .dynamics
+            .solve(&mass.as_flattened()[..n * n], &mut x[..n]);
+        solved.then_some(x)
     }
 }
 
-impl<P: Plant<J>, const J: usize, const N: usize> System<N> for Moving<'_, P, J> {
-    #[inline]
-    fn rates(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
-        dydt[..J].copy_from_slice(&y[J..2 * J]);
-        if N == 2 * J {
-            dydt[J..2 * J].copy_from_slice(&self.acceleration(t, y));
-            return;
-        }
-        let z = &y[2 * J..];
-        let balance = self.balance(t, &part::<J, N>(y, 0), &part::<J, N>(y, J), z);
-        dydt[J..2 * J].copy_from_slice(&balance.acceleration);
-        dydt[2 * J..].fill(0.0);
-        let motion = Motion {
-            t,
-            q: &balance.q,
-            v: &balance.v,
-            z,
-            friction: &balance.friction,
-            a: &balance.acceleration,
-            net: &balance.net,
-        };
-        self.effects.rates(&motion, &mut dydt[2 * J..]);
-    }
+/// The friction of a joint in a model, once its inertia is known.
+type Law = Box<dyn Fn(f64) -> SmoothFriction>;
 
-    fn accepted(&mut self, t: f64, y: &[f64; N]) -> bool {
-        if self.effects.is_empty() {
-            return false;
+fn law_of(
+    law: FrictionLawKind,
+    (name, model): (&str, &ModelFile),
+    joint: &str,
+) -> Result<Law, ConfigError> {
+    Ok(match law {
+        FrictionLawKind::DoubleTanh => {
+            let law = model.double_tanh(name, joint)?;
+            Box::new(move |_| SmoothFriction::DoubleTanh(law))
         }
-        let z = &y[2 * J..];
-        let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
-        self.effects.moved(&Motion {
-            t,
-            q: &q,
-            v: &v,
-            z,
-            ..Motion::default()
-        })
-    }
+        FrictionLawKind::ViscousCoulomb => {
+            let law: ViscousCoulomb = model.viscous_coulomb(name, joint)?;
+            Box::new(move |inertia| SmoothFriction::viscous_coulomb(law, inertia))
+        }
+    })
 }
 
-/// x with M x = b for any invertible M, by elimination with row exchange; `None` where M is not invertible.
-fn eliminate<const J: usize>(mut m: [[f64; J]; J], mut b: [f64; J]) -> Option<[f64; J]> {
-    for k in 0..J {
-        let largest = (k..J).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
-        m.swap(k, largest);
-        b.swap(k, largest);
-        let pivot = m[k];
-        if pivot[k] == 0.0 || !pivot[k].is_finite() {
-            return None;
-        }
-        for i in k + 1..J {
-            let share = m[i][k] / pivot[k];
-            for (own, from) in m[i].iter_mut().zip(pivot).skip(k) {
-                *own -= share * from;
-            }
-            b[i] -= share * b[k];
-        }
-    }
-    for k in (0..J).rev() {
-        let known: f64 = (k + 1..J).map(|j| m[k][j] * b[j]).sum();
-        b[k] = (b[k] - known) / m[k][k];
-    }
-    Some(b)
-}
-
-/// J numbers of the state from index `first` on.
+/// A matrix of n x n numbers in a row to one of J x J, with ones on the diagonal beyond.
 #[inline]
-pub(super) fn part<const J: usize, const N: usize>(y: &[f64; N], first: usize) -> [f64; J] {
-    std::array::from_fn(|i| y[first + i])
+pub(super) fn spread<const J: usize>(mass: &mut [[f64; J]; J], n: usize) {
+    if n == J {
+        return;
+    }
+    let flat = mass.as_flattened_mut();
+    for i in (0..n).rev() {
+        flat.copy_within(i * n..(i + 1) * n, i * J);
+        flat[i * J + n..(i + 1) * J].fill(0.0);
+    }
+    for (i, row) in mass.iter_mut().enumerate().skip(n) {
+        row.fill(0.0);
+        row[i] = 1.0;
+    }
+}
+
+/// The first n x n numbers of a J x J matrix in a row: the inverse of [`spread`].
+#[inline]
+pub(super) fn gather<const J: usize>(mass: &mut [[f64; J]; J], n: usize) {
+    if n == J {
+        return;
+    }
+    let flat = mass.as_flattened_mut();
+    for i in 1..n {
+        flat.copy_within(i * J..i * J + n, i * n);
+    }
+}
+
+impl<const J: usize> Mechanism<J> {
+    /// Motors' coordinates all over the limits, the middle among them or their corners: a grid where few
+    /// coordinates matter, else a Weyl sequence, which fills the box evenly.
+    fn poses(&self) -> Vec<[f64; J]> {
+        let n = self.joints();
+        let uniform = self.practice.as_ref().map(|practice| practice.uniform);
+        let matter: Vec<usize> = (0..n).filter(|i| Some(*i) != uniform).collect();
+        if matter.len() > GRIDDED {
+            return (0..POSES)
+                .map(|pose| {
+                    self.filled(|j| {
+                        let share = (pose as f64 * (0.5 + j as f64).sqrt()).fract();
+                        let (low, high) = self.travel(j);
+                        let middle = 0.5 * (low + high);
+                        middle + (share - if pose == 0 { 0.0 } else { 0.5 }) * (high - low)
+                    })
+                })
+                .collect();
+        }
+        let each = STEPS + 1;
+        (0..each.pow(matter.len() as u32))
+            .map(|pose| {
+                // the last coordinate runs fastest
+                let mut rest = pose;
+                let mut x = self.filled(|i| self.travel(i).0);
+                for &i in matter.iter().rev() {
+                    let (low, high) = self.travel(i);
+                    x[i] = low + (high - low) * (rest % each) as f64 / STEPS as f64;
+                    rest /= each;
+                }
+                x
+            })
+            .collect()
+    }
 }

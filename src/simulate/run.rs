@@ -4,10 +4,12 @@ use super::SimulateError;
 use super::controller::{Control, Controller};
 use super::effects::{Beginning, Effects};
 use super::integrate::DormandPrince;
-use super::plant::{Moving, Plant, part};
-use super::recording::{Ending, LimitEvent, Recording, Status};
+use super::mechanism::Mechanism;
+use super::moving::{Moving, part};
+use super::plant::Plant;
 use super::reference::{Frame, Reference, Target};
 use super::settings::{OnLimit, Settings};
+use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
 use super::volts::VoltSeries;
 
 /// What drives the motors.
@@ -32,23 +34,35 @@ pub enum Start<const J: usize> {
     State { position: [f64; J], speed: [f64; J] },
 }
 
-/// State sizes that the integrator is compiled for: the smallest that holds the plant and its effects
-/// is used.
-const LARGEST: usize = 64;
+/// State sizes that the integrator is compiled for with J joints: the smallest that holds the plant and its
+/// effects is used.
+const fn sizes(joints: usize) -> [usize; 4] {
+    if joints <= 8 {
+        [2, 8, 16, 64]
+    } else {
+        [32, 32, 64, 128]
+    }
+}
+
+/// Whether a state of that many numbers is one of [`sizes`] and has room for J joints.
+const fn compiled(joints: usize, size: usize) -> bool {
+    let [a, b, c, d] = sizes(joints);
+    (size == a || size == b || size == c || size == d) && size >= 2 * joints
+}
 
 /// Runs one experiment.
 ///
-/// Reaching a limit is no error: see [`Recording::limits`] and [`Recording::ending`].
+/// Reaching a limit is no error: see [`SimulatedRun::limits`] and [`SimulatedRun::ending`].
 ///
 /// # Errors
 /// [`SimulateError`] where the settings, reference or start cannot be used, or the motion diverges.
-pub fn run<P: Plant<J>, const J: usize>(
-    plant: &P,
+pub fn run<const J: usize>(
+    plant: &Plant<J>,
     effects: Effects,
     start: &Start<J>,
     drive: &Drive<J>,
     settings: &Settings<J>,
-) -> Result<Recording<J>, SimulateError> {
+) -> Result<SimulatedRun<J>, SimulateError> {
     settings.check()?;
     if let Drive::Follow { reference, control } = drive {
         reference.path.check()?;
@@ -59,16 +73,17 @@ pub fn run<P: Plant<J>, const J: usize>(
         effects,
         volts: [0.0; J],
     };
-    match 2 * J + moving.effects.states() {
-        0..=2 => march::<P, J, 2>(moving, start, drive, settings),
-        3..=8 => march::<P, J, 8>(moving, start, drive, settings),
-        9..=16 => march::<P, J, 16>(moving, start, drive, settings),
-        17..=LARGEST => march::<P, J, LARGEST>(moving, start, drive, settings),
-        states => Err(SimulateError::TooManyStates {
-            states: states - 2 * J,
-            most: LARGEST - 2 * J,
-        }),
+    let states = moving.effects.states();
+    macro_rules! march_with {
+        ($($size:literal)*) => {$(
+            if const { compiled(J, $size) } && 2 * J + states <= $size {
+                return march::<J, $size>(moving, start, drive, settings);
+            }
+        )*};
     }
+    march_with!(2 8 16 32 64 128);
+    let most = sizes(J)[3] - 2 * J;
+    Err(SimulateError::TooManyStates { states, most })
 }
 
 /// The drive with its memory.
@@ -77,21 +92,42 @@ enum Running<'a, const J: usize> {
     Volts(&'a VoltSeries<J>),
 }
 
-fn march<P: Plant<J>, const J: usize, const N: usize>(
-    mut moving: Moving<P, J>,
+impl<const J: usize> Running<'_, J> {
+    /// What is wanted of the motors that stand at `coordinates` and are seen at `seen`, and the volts that are
+    /// asked for.
+    fn at(
+        &mut self,
+        mechanism: &Mechanism<J>,
+        t: f64,
+        coordinates: &[f64; J],
+        seen: &[f64; J],
+    ) -> Result<([f64; J], [f64; J]), SimulateError> {
+        Ok(match self {
+            Self::Follow(reference, controller) => {
+                let target = wanted(mechanism, reference, t)?;
+                let volts = controller.volts(t, seen, &target.position, &target.velocity);
+                (target.position, volts)
+            }
+            Self::Volts(series) => (*coordinates, series.at(t)),
+        })
+    }
+}
+
+fn march<const J: usize, const N: usize>(
+    mut moving: Moving<J>,
     start: &Start<J>,
     drive: &Drive<J>,
     settings: &Settings<J>,
-) -> Result<Recording<J>, SimulateError> {
+) -> Result<SimulatedRun<J>, SimulateError> {
     let plant = moving.plant;
-    let resolution = plant.resolution();
+    let mechanism = &plant.mechanism;
     let samples = (settings.seconds * settings.rate_hz).round().max(1.0) as usize;
     let instants = settings
         .sensors
         .instants(samples, settings.rate_hz, settings.seed);
-    let mut recording = Recording::empty(plant, samples);
+    let mut recording = SimulatedRun::empty(mechanism, samples);
     let mut integrator = DormandPrince::new(settings.tolerance);
-    let mut y = initial_state::<P, J, N>(&mut moving, start, drive, settings)?;
+    let mut y = initial_state::<J, N>(&mut moving, start, drive, settings)?;
     let mut drive = match drive {
         Drive::Follow { reference, control } => {
             Running::Follow(reference, Controller::new(*control))
@@ -103,43 +139,34 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
         let (q, v) = (part::<J, N>(&y, 0), part::<J, N>(&y, J));
         let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
-        let coordinates = plant.coordinates(&motors);
-        let seen = settings.sensors.encoders(&coordinates, &resolution);
-        let (wanted, asked) = match &mut drive {
-            Running::Follow(reference, controller) => {
-                let target = wanted(plant, reference, t)?;
-                let volts = controller.volts(t, &seen, &target.position, &target.velocity);
-                (target.position, volts)
-            }
-            Running::Volts(series) => (coordinates, series.at(t)),
-        };
+        let coordinates = mechanism.coordinates(&motors);
+        let seen = settings
+            .sensors
+            .encoders(&coordinates, &mechanism.resolution);
+        let (wanted, asked) = drive.at(mechanism, t, &coordinates, &seen)?;
         let limit = settings.saturation;
         moving.volts = asked.map(|u| u.clamp(-limit, limit));
+        let measured = mechanism.pose(&seen).unwrap_or(motors);
         recording.t.push(t);
         recording.x.push(seen);
         recording.volts.push(moving.volts);
-        let measured = plant.joints(&seen).unwrap_or(motors);
         recording.q.push(measured);
         recording
             .torque
-            .push(plant.torque(&measured, &moving.volts));
-        recording.status.push(std::array::from_fn(|i| {
-            if beyond[i] {
-                Status::LimitReached
-            } else if asked[i].abs() >= limit {
-                Status::Saturated
-            } else {
-                Status::Running
-            }
-        }));
-        recording.actual.q.push(q);
-        recording.actual.v.push(v);
+            .push(mechanism.torque(&measured, &moving.volts));
         recording
-            .actual
-            .torque
-            .push(plant.torque(&motors, &moving.volts));
-        recording.actual.a.push(moving.acceleration(t, &y));
-        recording.actual.target.push(wanted);
+            .status
+            .push(std::array::from_fn(|i| match beyond[i] {
+                true => MotorStatus::LimitReached,
+                false if asked[i].abs() >= limit => MotorStatus::Saturated,
+                false => MotorStatus::Running,
+            }));
+        let actual = &mut recording.actual;
+        actual.q.push(q);
+        actual.v.push(v);
+        actual.torque.push(mechanism.torque(&motors, &moving.volts));
+        actual.a.push(moving.acceleration(t, &y));
+        actual.target.push(wanted);
         if beyond.contains(&true) && settings.on_limit == OnLimit::Stop {
             recording.ending = Ending::StoppedAtLimit;
             break;
@@ -149,13 +176,13 @@ fn march<P: Plant<J>, const J: usize, const N: usize>(
         }
     }
     recording.effort = integrator.effort();
-    recording.measure(plant, &moving.effects, &settings.sensors, settings.seed);
+    recording.measure(mechanism, &moving.effects, &settings.sensors, settings.seed);
     Ok(recording)
 }
 
 /// Target of a reference in motor coordinates.
-fn wanted<P: Plant<J>, const J: usize>(
-    plant: &P,
+fn wanted<const J: usize>(
+    mechanism: &Mechanism<J>,
     reference: &Reference<J>,
     t: f64,
 ) -> Result<Target<J>, SimulateError> {
@@ -163,24 +190,24 @@ fn wanted<P: Plant<J>, const J: usize>(
     Ok(match reference.frame {
         Frame::Motors => target,
         Frame::Joints => Target {
-            position: plant.coordinates(&target.position),
-            velocity: plant.coordinate_speeds(&target.position, &target.velocity),
+            position: mechanism.coordinates(&target.position),
+            velocity: mechanism.coordinate_speeds(&target.position, &target.velocity),
         },
     })
 }
 
 /// Marks the coordinates beyond their limits, notes the first time of each, and clamps if asked to.
-fn limits_reached<P: Plant<J>, const J: usize, const N: usize>(
-    moving: &Moving<P, J>,
+fn limits_reached<const J: usize, const N: usize>(
+    moving: &Moving<J>,
     on_limit: OnLimit,
     t: f64,
     y: &mut [f64; N],
-    recording: &mut Recording<J>,
+    recording: &mut SimulatedRun<J>,
 ) -> Result<[bool; J], SimulateError> {
-    let plant = moving.plant;
-    let (lower, upper) = plant.limits();
+    let mechanism = &moving.plant.mechanism;
+    let (lower, upper) = (&mechanism.lower, &mechanism.upper);
     let mut q = part::<J, N>(y, 0);
-    let mut x = plant.coordinates(&q);
+    let mut x = mechanism.coordinates(&q);
     let beyond: [bool; J] = std::array::from_fn(|i| !(lower[i]..=upper[i]).contains(&x[i]));
     if !beyond.contains(&true) {
         return Ok(beyond);
@@ -208,65 +235,77 @@ fn limits_reached<P: Plant<J>, const J: usize, const N: usize>(
     if on_limit == OnLimit::Stop {
         return Ok(beyond);
     }
-    q = plant.joints(&x)?;
+    q = mechanism.pose(&x)?;
     let mut v = part::<J, N>(y, J);
-    let (mass, _) = plant.dynamics(&q, &v);
+    stop_at(moving.plant, &q, &x, &mut v, &beyond);
+    y[..J].copy_from_slice(&q);
+    y[J..2 * J].copy_from_slice(&v);
+    Ok(beyond)
+}
+
+/// Takes the outward speeds away of the motors that stand at a limit, x, by inelastic stops.
+fn stop_at<const J: usize>(
+    plant: &Plant<J>,
+    q: &[f64; J],
+    x: &[f64; J],
+    v: &mut [f64; J],
+    beyond: &[bool; J],
+) {
+    let mechanism = &plant.mechanism;
+    let (mass, _) = plant.dynamics(q, v);
     // The stop pushes where the motor pushes: an impulse along motor i takes the outward speed away, and
     // what it does to the other coordinates follows from the inertia. Two rounds settle two stops.
     for i in (0..J).chain(0..J).filter(|&i| beyond[i]) {
-        let speed = plant.coordinate_speeds(&q, &v)[i];
-        let outward = if x[i] >= upper[i] {
+        let speed = mechanism.coordinate_speeds(q, v)[i];
+        let outward = if x[i] >= mechanism.upper[i] {
             speed > 0.0
         } else {
             speed < 0.0
         };
         let mut push = [0.0; J];
         push[i] = 1.0;
-        let Some(change) = plant.solve(&mass, &plant.torque(&q, &push)) else {
+        let Some(change) = plant.solve(&mass, &mechanism.torque(q, &push)) else {
             continue;
         };
-        let per_push = plant.coordinate_speeds(&q, &change)[i];
+        let per_push = mechanism.coordinate_speeds(q, &change)[i];
         if outward && per_push > 0.0 {
             for (v, change) in v.iter_mut().zip(change) {
                 *v -= speed / per_push * change;
             }
         }
     }
-    y[..J].copy_from_slice(&q);
-    y[J..2 * J].copy_from_slice(&v);
-    Ok(beyond)
 }
 
 /// Joint positions, speeds and effect states at t = 0.
-fn initial_state<P: Plant<J>, const J: usize, const N: usize>(
-    moving: &mut Moving<P, J>,
+fn initial_state<const J: usize, const N: usize>(
+    moving: &mut Moving<J>,
     start: &Start<J>,
     drive: &Drive<J>,
     settings: &Settings<J>,
 ) -> Result<[f64; N], SimulateError> {
-    let plant = moving.plant;
-    let (lower, upper) = plant.limits();
+    let mechanism = &moving.plant.mechanism;
+    let (lower, upper) = (&mechanism.lower, &mechanism.upper);
     let (x, q, v) = match (start, drive) {
         (Start::State { position, speed }, _) => {
-            let q = plant.joints(position)?;
-            (*position, q, plant.joint_speeds(&q, speed)?)
+            let q = mechanism.pose(position)?;
+            (*position, q, mechanism.joint_speeds(&q, speed)?)
         }
         (Start::Settled, Drive::Volts(_)) => {
             let middle = std::array::from_fn(|i| {
                 let middle = 0.5 * (lower[i] + upper[i]);
                 if middle.is_finite() { middle } else { 0.0 }
             });
-            (middle, plant.joints(&middle)?, [0.0; J])
+            (middle, mechanism.pose(&middle)?, [0.0; J])
         }
         (Start::Settled, Drive::Follow { reference, control }) => {
-            let target = wanted(plant, reference, 0.0)?;
+            let target = wanted(mechanism, reference, 0.0)?;
             settle(moving, &target, control)?
         }
     };
     for i in 0..J {
         if !(lower[i]..=upper[i]).contains(&x[i]) {
             return Err(SimulateError::LimitAtStart {
-                coordinate: plant.coordinate_names()[i].clone(),
+                coordinate: mechanism.robot.coordinate_names()[i].clone(),
                 value: x[i],
                 lower: lower[i],
                 upper: upper[i],
@@ -278,9 +317,10 @@ fn initial_state<P: Plant<J>, const J: usize, const N: usize>(
     y[J..2 * J].copy_from_slice(&v);
     if !moving.effects.is_empty() {
         let load = moving.load(0.0, &q, &v, &y[2 * J..]);
+        let n = mechanism.joints();
         let beginning = Beginning {
-            q: &q,
-            load: &load,
+            q: &q[..n],
+            load: &load[..n],
             seconds: settings.seconds,
             seed: settings.seed,
         };
@@ -298,20 +338,20 @@ fn initial_state<P: Plant<J>, const J: usize, const N: usize>(
 type Pose<const J: usize> = ([f64; J], [f64; J], [f64; J]);
 
 /// Pose beside the target from which the controller's volts carry the load: kp (x_d - x) = u(x).
-fn settle<P: Plant<J>, const J: usize>(
-    moving: &Moving<P, J>,
+fn settle<const J: usize>(
+    moving: &Moving<J>,
     target: &Target<J>,
     control: &Control<J>,
 ) -> Result<Pose<J>, SimulateError> {
-    let plant = moving.plant;
-    let (lower, upper) = plant.limits();
+    let mechanism = &moving.plant.mechanism;
+    let (lower, upper) = (&mechanism.lower, &mechanism.upper);
     let rest = vec![0.0; moving.effects.states()];
     let mut x = target.position;
-    let mut q = plant.joints(&x)?;
-    let mut v = plant.joint_speeds(&q, &target.velocity)?;
+    let mut q = mechanism.pose(&x)?;
+    let mut v = mechanism.joint_speeds(&q, &target.velocity)?;
     // The load changes little over the displacement: a few rounds converge to rounding.
     for _ in 0..8 {
-        let volts = plant.volts(&q, &moving.holding_torque(0.0, &q, &v, &rest))?;
+        let volts = mechanism.volts(&q, &moving.holding_torque(0.0, &q, &v, &rest))?;
         for i in 0..J {
             x[i] = target.position[i] - volts[i] / control.proportional[i];
             // A target inside the limits stays a start inside the limits.
@@ -319,8 +359,8 @@ fn settle<P: Plant<J>, const J: usize>(
                 x[i] = x[i].clamp(lower[i], upper[i]);
             }
         }
-        q = plant.joints(&x)?;
-        v = plant.joint_speeds(&q, &target.velocity)?;
+        q = mechanism.pose(&x)?;
+        v = mechanism.joint_speeds(&q, &target.velocity)?;
     }
     Ok((x, q, v))
 }

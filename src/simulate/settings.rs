@@ -10,7 +10,7 @@ pub enum OnLimit {
     /// The run ends at that sample.
     #[default]
     Stop,
-    /// The coordinate is held at the limit by an inelastic stop, looked at once per sample.
+    /// The coordinate stays at the limit by an inelastic stop, looked at once per sample.
     Clamp,
 }
 

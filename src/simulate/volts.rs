@@ -2,7 +2,7 @@
 
 use super::SimulateError;
 
-/// Volts over time, each row held until the next and the last for as long as the others on average;
+/// Volts over time, each row kept until the next (zero-order hold) and the last for as long as the others on average;
 /// zero before and after.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoltSeries<const J: usize> {

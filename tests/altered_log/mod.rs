@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::RobotFile;
 use cft_ident::config::model_file::{ModelFile, ModelProvenance};
-use cft_ident::simulate::{Motion, Order, simulate};
+use cft_ident::simulate::{Experiment, Order, simulate};
 use serde_json::Value;
 
 /// A log as columns.
@@ -22,23 +22,23 @@ pub struct Log {
 
 impl Log {
     /// The CFT robot, with what its robot file says of encoders and noise: joint channels alone.
-    pub fn simulated(motion: Motion, seconds: f64) -> Self {
+    pub fn simulated(experiment: Experiment, seconds: f64) -> Self {
         let joint = |name: &str| name.contains("q_") || name.contains("tau_");
-        Self::with(motion, seconds, &joint)
+        Self::with(experiment, seconds, &joint)
     }
 
     /// The same with its motors' positions and volts alone.
     pub fn simulated_raw(seconds: f64) -> Self {
         let raw = |name: &str| name.starts_with("x_c") || name.starts_with("u_");
-        Self::with(Motion::Usual, seconds, &raw)
+        Self::with(Experiment::Usual, seconds, &raw)
     }
 
-    fn with(motion: Motion, seconds: f64, wanted: &dyn Fn(&str) -> bool) -> Self {
+    fn with(experiment: Experiment, seconds: f64, wanted: &dyn Fn(&str) -> bool) -> Self {
         let robot = RobotFile::load(Path::new("configs/cft.toml")).unwrap();
         let log = simulate(&Order {
             robot: &robot,
             model: None,
-            motion,
+            experiment,
             seconds: Some(seconds),
             effects: Vec::new(),
             seed: 11,
@@ -108,7 +108,7 @@ pub fn write_model(path: &Path) {
     let truth = simulate(&Order {
         robot: &robot,
         model: None,
-        motion: Motion::Usual,
+        experiment: Experiment::Usual,
         seconds: Some(0.1),
         effects: Vec::new(),
         seed: 11,

@@ -1,17 +1,17 @@
 //! The integration with effects, whose torques bend and jump, against itself at tighter tolerances.
 
 use cft_ident::robot::cft::Setup;
-use cft_ident::simulate::cft_experiment::{OneJointMove, follow};
+use cft_ident::simulate::cft::{follow, mechanism};
 use cft_ident::simulate::integrate::Tolerance;
-use cft_ident::simulate::{CftTruth, Recording};
+use cft_ident::simulate::{CftTruth, OneJointMove, SimulatedRun};
 
 use super::missing::{perfect, specs};
 
 /// A ladder of q4 that turns at both ends, slow plateaus included.
-fn ladder(text: &str, tolerance: Tolerance) -> Recording<4> {
+fn ladder(text: &str, tolerance: Tolerance) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let reference = OneJointMove::new(2, 10.0, None)
-        .reference(truth.setup)
+        .reference(&mechanism(truth.setup).expect("four joints"))
         .expect("fits");
     let mut settings = perfect(10.0);
     settings.tolerance = tolerance;

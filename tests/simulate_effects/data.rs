@@ -1,19 +1,19 @@
 //! Faults that are put into a log: the plant does not know of them.
 
-use cft_ident::simulate::Recording;
+use cft_ident::simulate::SimulatedRun;
 
 use super::missing::noisy;
 
-fn torque(recording: &Recording<4>, joint: usize) -> Vec<f64> {
+fn torque(recording: &SimulatedRun<4>, joint: usize) -> Vec<f64> {
     recording.torque.iter().map(|row| row[joint]).collect()
 }
 
-fn position(recording: &Recording<4>, joint: usize) -> Vec<f64> {
+fn position(recording: &SimulatedRun<4>, joint: usize) -> Vec<f64> {
     recording.q.iter().map(|row| row[joint]).collect()
 }
 
 /// The sound log and the log with the fault; what the plant did is the same.
-fn pair(text: &str) -> (Recording<4>, Recording<4>) {
+fn pair(text: &str) -> (SimulatedRun<4>, SimulatedRun<4>) {
     let (sound, spoilt) = (noisy(&[], 3), noisy(&[text], 3));
     assert_eq!(sound.actual, spoilt.actual, "{text}");
     assert_eq!(
@@ -24,7 +24,7 @@ fn pair(text: &str) -> (Recording<4>, Recording<4>) {
 }
 
 /// The other joints' channels are untouched.
-fn assert_others(sound: &Recording<4>, spoilt: &Recording<4>, joint: usize) {
+fn assert_others(sound: &SimulatedRun<4>, spoilt: &SimulatedRun<4>, joint: usize) {
     for other in (0..4).filter(|other| *other != joint) {
         assert_eq!(torque(sound, other), torque(spoilt, other));
         assert_eq!(position(sound, other), position(spoilt, other));
@@ -58,7 +58,7 @@ fn a_stuck_channel_repeats_its_last_value_for_its_time() {
     ] {
         let (sound, spoilt) = pair(text);
         assert_others(&sound, &spoilt, 2);
-        let channels = |r: &Recording<4>| [torque(r, 2), position(r, 2)];
+        let channels = |r: &SimulatedRun<4>| [torque(r, 2), position(r, 2)];
         let ([t_a, q_a], [t_b, q_b]) = (channels(&sound), channels(&spoilt));
         let (a, b, same) = if is_torque {
             (t_a, t_b, q_a == q_b)
@@ -94,7 +94,7 @@ fn a_filter_lags_like_its_differential_equation() {
     ] {
         let (sound, spoilt) = pair(text);
         assert_others(&sound, &spoilt, 3);
-        let of = |r: &Recording<4>| {
+        let of = |r: &SimulatedRun<4>| {
             if is_torque {
                 torque(r, 3)
             } else {

@@ -2,7 +2,7 @@
 
 use cft_ident::robot::cft::Setup;
 use cft_ident::simulate::effects::Sites;
-use cft_ident::simulate::{CftTruth, Recording};
+use cft_ident::simulate::{CftTruth, SimulatedRun};
 
 use super::missing::{assert_missing, axis, friction, missing, pushed, rigid, row, table_3};
 
@@ -51,7 +51,7 @@ fn load_effects_on_one_joint_add_up() {
 }
 
 /// Rows that lie inside the play at least `margin` from either end, and outside it, with their speeds.
-fn play(recording: &Recording<4>, joint: usize, gap: f64) -> Vec<Option<bool>> {
+fn play(recording: &SimulatedRun<4>, joint: usize, gap: f64) -> Vec<Option<bool>> {
     let positions = recording.actual.q.iter().map(|q| q[joint]);
     let mut centre = recording.actual.q[0][joint];
     let inside = positions.map(|q| {
@@ -158,7 +158,8 @@ fn elastic_joints_deflect_by_what_the_link_needs() {
     let stiffness = 9000.0;
     let recording = table_3(&["elasticity:q5:stiffness=9000"]);
     let truth = CftTruth::synthetic(Setup::Tuedacs);
-    let sites = Sites::cft(&truth).expect("physical");
+    let plant = truth.plant().expect("a pose");
+    let sites = Sites::of(&plant).expect("physical");
     let site = &sites.joints[3];
     let rotor = (0.2 * site.inertia).min(0.3 * site.least_inertia);
     let damping = 2.0 * 0.025 * (stiffness * (site.inertia - rotor)).sqrt();
@@ -196,7 +197,7 @@ fn a_stiff_spring_gives_the_rigid_joint_back() {
     let soft = pushed(&axis(), &["elasticity:q1:stiffness=4e5"])
         .expect("runs")
         .0;
-    let apart = |other: &Recording<1>| {
+    let apart = |other: &SimulatedRun<1>| {
         let pairs = rigid.q.iter().zip(&other.q);
         pairs.fold(0.0_f64, |most, (a, b)| most.max((a[0] - b[0]).abs()))
     };

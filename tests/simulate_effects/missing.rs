@@ -3,11 +3,11 @@
 use cft_ident::robot::JointKind;
 use cft_ident::robot::cft::{Coefficients, Setup, dynamics};
 use cft_ident::robot::friction::ViscousCoulomb;
-use cft_ident::simulate::cft_experiment::{excitation, follow};
-use cft_ident::simulate::single_joint::{self, SingleJointFriction, SingleJointTruth};
+use cft_ident::simulate::cft::{excitation, follow};
+use cft_ident::simulate::single_joint::{self, SingleJointTruth};
 use cft_ident::simulate::{
-    CftTruth, Drive, EffectSpec, Noise, Recording, Sensors, Settings, SimulateError, Start,
-    VoltSeries, run,
+    CftTruth, Drive, EffectSpec, Noise, Sensors, Settings, SimulateError, SimulatedRun,
+    SmoothFriction, Start, VoltSeries, run,
 };
 
 pub fn specs(texts: &[&str]) -> Vec<EffectSpec> {
@@ -23,7 +23,7 @@ pub fn perfect<const J: usize>(seconds: f64) -> Settings<J> {
 }
 
 /// Table 3 on the synthetic robot: all joints move and turn round.
-pub fn table_3(texts: &[&str]) -> Recording<4> {
+pub fn table_3(texts: &[&str]) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     follow(
         &truth,
@@ -35,7 +35,7 @@ pub fn table_3(texts: &[&str]) -> Recording<4> {
 }
 
 /// The same with encoder counts and noise, and a seed.
-pub fn noisy(texts: &[&str], seed: u64) -> Recording<4> {
+pub fn noisy(texts: &[&str], seed: u64) -> SimulatedRun<4> {
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let mut settings = perfect(3.0);
     settings.seed = seed;
@@ -49,7 +49,7 @@ pub fn noisy(texts: &[&str], seed: u64) -> Recording<4> {
 /// State of one row: positions, speeds, accelerations.
 pub type Row = ([f64; 4], [f64; 4], [f64; 4]);
 
-pub fn row(recording: &Recording<4>, k: usize) -> Row {
+pub fn row(recording: &SimulatedRun<4>, k: usize) -> Row {
     let actual = &recording.actual;
     (actual.q[k], actual.v[k], actual.a[k])
 }
@@ -67,7 +67,7 @@ pub fn friction(v: &[f64; 4]) -> [f64; 4] {
 }
 
 /// Torque at row k that the declared model does not have.
-pub fn missing(recording: &Recording<4>, k: usize) -> [f64; 4] {
+pub fn missing(recording: &SimulatedRun<4>, k: usize) -> [f64; 4] {
     let state = row(recording, k);
     let (rigid, friction) = (rigid(&state), friction(&state.1));
     std::array::from_fn(|i| recording.actual.torque[k][i] - rigid[i] - friction[i])
@@ -115,7 +115,7 @@ pub fn axis() -> SingleJointTruth {
         name: "q1".to_owned(),
         kind: JointKind::Prismatic,
         inertia: 95.0,
-        friction: SingleJointFriction::viscous_coulomb(law, 95.0),
+        friction: SmoothFriction::viscous_coulomb(law, 95.0),
         offset: -3.0,
         gain: 35.0,
         resolution: 0.0,
@@ -127,7 +127,7 @@ pub fn axis() -> SingleJointTruth {
 pub fn pushed(
     truth: &SingleJointTruth,
     texts: &[&str],
-) -> Result<(Recording<1>, Vec<f64>), SimulateError> {
+) -> Result<(SimulatedRun<1>, Vec<f64>), SimulateError> {
     let (effects, _) = single_joint::effects(truth, &specs(texts))?;
     let times: Vec<f64> = (0..40).map(|k| 0.2 * f64::from(k)).collect();
     let volts: Vec<[f64; 1]> = times
@@ -139,7 +139,7 @@ pub fn pushed(
         speed: [0.0],
     };
     let drive = Drive::Volts(VoltSeries::new(times, volts).expect("a series"));
-    let recording = run(truth, effects, &start, &drive, &perfect(8.0))?;
+    let recording = run(&truth.plant()?, effects, &start, &drive, &perfect(8.0))?;
     let actual = &recording.actual;
     let missing = (0..recording.rows()).map(|k| {
         let (v, a) = (actual.v[k][0], actual.a[k][0]);

@@ -6,10 +6,10 @@ use std::path::Path;
 use cft_ident::config::model_file::{Effect, EffectParameter};
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::robot::cft::Setup;
-use cft_ident::simulate::cft_experiment::effects;
+use cft_ident::simulate::cft::effects;
 use cft_ident::simulate::effects::{KINDS, Places, Unit};
 use cft_ident::simulate::{
-    CftTruth, EffectSpec, Motion, Order, SimulateError, SimulatedLog, TruthFile, simulate,
+    CftTruth, EffectSpec, Experiment, Order, SimulateError, SimulatedLog, TruthFile, simulate,
 };
 
 use super::missing::{axis, pushed, specs, table_3};
@@ -22,7 +22,7 @@ fn ordered(robot: &RobotFile, texts: &[&str], seed: u64) -> SimulatedLog {
     let order = Order {
         robot,
         model: None,
-        motion: Motion::Usual,
+        experiment: Experiment::Usual,
         seconds: Some(1.5),
         effects: specs(texts),
         seed,
@@ -215,7 +215,10 @@ fn units_follow_the_joint() {
 fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
     ModelFile {
         robot: robot.clone(),
-        parameters: CftTruth::synthetic(Setup::Tuedacs).parameters(),
+        parameters: CftTruth::synthetic(Setup::Tuedacs)
+            .plant()
+            .expect("a pose")
+            .parameters(),
         covariance: None,
         residual_std: BTreeMap::new(),
         effects,
@@ -249,7 +252,7 @@ fn effects_of_a_model_run_as_those_of_the_command_line_do() {
         let order = Order {
             robot: &robot,
             model: Some(("m.toml", &model)),
-            motion: Motion::Usual,
+            experiment: Experiment::Usual,
             seconds: Some(1.0),
             effects: specs(texts),
             seed: 2,
@@ -303,7 +306,7 @@ fn faults_need_a_log_with_joint_channels() {
         simulate(&Order {
             robot: &raw,
             model: None,
-            motion: Motion::Usual,
+            experiment: Experiment::Usual,
             seconds: Some(0.5),
             effects: specs(texts),
             seed: 1,

@@ -6,10 +6,8 @@ use cft_ident::robot::Robot;
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::standard::{Body, STANDARD};
 use cft_ident::simulate::effects::{Kind, Places, Sites};
-use cft_ident::simulate::plant::Moving;
-use cft_ident::simulate::serial::SerialTruth;
-use cft_ident::simulate::single_joint::{SingleJointFriction, SingleJointTruth};
-use cft_ident::simulate::{Effects, SimulateError};
+use cft_ident::simulate::moving::Moving;
+use cft_ident::simulate::{Effects, Mechanism, Plant, SimulateError, SmoothFriction};
 
 use super::missing::specs;
 
@@ -70,32 +68,24 @@ fn standard(payload: [f64; STANDARD]) -> Vec<f64> {
 }
 
 /// The robot with its last link carrying the payload.
-fn truth(gravity: [f64; 3], payload: [f64; STANDARD]) -> SerialTruth<3> {
+fn truth(gravity: [f64; 3], payload: [f64; STANDARD]) -> Plant<3> {
     let robot = robot(gravity);
     let theta = robot.base_of(&standard(payload));
     let law = ViscousCoulomb {
         viscous: 2.0,
         coulomb: 1.0,
     };
-    let joints = std::array::from_fn(|j| SingleJointTruth {
-        name: robot.joint_names()[j].clone(),
-        kind: robot.joint_kind(j),
-        inertia: 1.0,
-        friction: SingleJointFriction::viscous_coulomb(law, 1.0),
-        offset: 0.0,
-        gain: 1.0,
-        resolution: 0.0,
-        limits: (-1.0, 1.0),
-    });
+    let mut mechanism = Mechanism::new(robot).expect("three joints");
+    (mechanism.lower, mechanism.upper) = ([-1.0; 3], [1.0; 3]);
     // as steep with a payload as without
-    let friction = |_, _| SingleJointFriction::viscous_coulomb(law, 1.0);
-    SerialTruth::new(robot.clone(), theta, joints, friction).expect("bodies")
+    let friction = |_, _| SmoothFriction::viscous_coulomb(law, 1.0);
+    let plant = Plant::new(mechanism, &theta, friction, [0.0; 3]).expect("bodies");
+    plant.check().expect("bodies");
+    plant
 }
 
-fn built(truth: &SerialTruth<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
-    let (robot, theta) = truth.rigid_body();
-    let sites = Sites::serial(robot, theta, truth.sites());
-    Ok(Effects::build(&specs(texts), &sites)?.0)
+fn built(truth: &Plant<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
+    Ok(Effects::build(&specs(texts), &Sites::of(truth)?)?.0)
 }
 
 /// Where a kind has a place, in the words of docs/effects.md.
@@ -115,7 +105,7 @@ pub fn places(kind: &Kind) -> &'static str {
 }
 
 /// Largest difference of the accelerations of two plants over states, and the largest acceleration.
-fn apart(one: &Moving<SerialTruth<3>, 3>, other: &Moving<SerialTruth<3>, 3>) -> (f64, f64) {
+fn apart(one: &Moving<3>, other: &Moving<3>) -> (f64, f64) {
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for k in 0..50 {
         let y: [f64; 6] =
@@ -129,7 +119,7 @@ fn apart(one: &Moving<SerialTruth<3>, 3>, other: &Moving<SerialTruth<3>, 3>) -> 
     (worst, largest)
 }
 
-fn moving<'a>(truth: &'a SerialTruth<3>, texts: &[&str]) -> Moving<'a, SerialTruth<3>, 3> {
+fn moving<'a>(truth: &'a Plant<3>, texts: &[&str]) -> Moving<'a, 3> {
     Moving {
         plant: truth,
         effects: built(truth, texts).expect("a place"),
@@ -172,7 +162,7 @@ fn what_a_serial_robot_cannot_carry_is_refused_with_the_way_out() {
 #[test]
 fn what_the_diagnosis_looks_for_on_a_serial_robot_the_simulator_can_build() {
     let truth = truth([0.0, 0.0, -9.81], [0.0; STANDARD]);
-    let (robot, _) = truth.rigid_body();
+    let robot = &truth.mechanism.robot;
     let laws = vec![cft_ident::robot::model::JointFriction::None; 3];
     let mut found = 0;
     for law in cft_ident::effect::LAWS {

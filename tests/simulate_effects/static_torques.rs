@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use cft_ident::robot::cft::links::{Link, PseudoInertia, base_parameters};
 use cft_ident::robot::cft::pantograph::references_of_joints;
 use cft_ident::robot::cft::{Setup, chain, regressor};
-use cft_ident::simulate::cft_experiment::effects;
+use cft_ident::simulate::CftTruth;
+use cft_ident::simulate::cft::effects;
 use cft_ident::simulate::effects::Effects;
-use cft_ident::simulate::plant::Moving;
-use cft_ident::simulate::{CftPlant, CftTruth};
+use cft_ident::simulate::moving::Moving;
 
 use super::missing::{Row, assert_missing, axis, pushed, specs, table_3};
 
@@ -283,7 +283,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
         };
         links.iter().zip(&frames).map(pull).sum()
     };
-    let plant = CftPlant::new(&truth);
+    let plant = truth.plant().expect("a pose");
     let load = |texts: &[&str], q: &[f64; 4]| {
         let (effects, _) = effects(&truth, &specs(texts)).expect("known");
         let moving = Moving {

@@ -13,14 +13,16 @@ use super::exit::Exit;
 use super::outcome::Outcome;
 use super::outputs::{write_picture, write_text};
 use super::{arguments, files, keep_what_there_is};
-use crate::config::{ModelFile, RobotFile, Trajectory};
+use crate::config::trajectory::Fourier;
+use crate::config::{RobotFile, Trajectory};
 use crate::excite::blend::Blend;
 use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
 use crate::excite::machine::Machine;
-use crate::excite::search::{Task, design};
+use crate::excite::search::{Found, Task, design};
+use crate::excite::series::Series;
 use crate::excite::{
-    Criterion, ExciteError, Given, Judgement, Judgements, LawForeseen, Motion, Prior, foresee,
-    machine, series_of, trajectory, usual_torque,
+    Criterion, ExciteError, Given, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
+    foresee, machine, series_of, trajectory, usual_torque,
 };
 use crate::log::{Provenance, escape};
 use crate::report::json::Document;
@@ -166,18 +168,9 @@ struct Bench<'a> {
     args: &'a Args,
     context: &'a Context,
     file: RobotFile,
-    model: Option<(String, ModelFile)>,
     machine: Machine,
     rate_hz: f64,
     inputs: Vec<Provenance>,
-}
-
-impl Bench<'_> {
-    fn model(&self) -> Option<(&str, &ModelFile)> {
-        self.model
-            .as_ref()
-            .map(|(name, model)| (name.as_str(), model))
-    }
 }
 
 /// Designs or checks.
@@ -217,7 +210,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context,
         rate_hz: args.rate.or(robot.value.control.rate_hz).unwrap_or(RATE_HZ),
         file: robot.value,
-        model,
         machine,
         inputs,
     };
@@ -281,14 +273,7 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     let args = bench.args;
     let given = files::trajectory(path)?;
     bench.inputs.push(given.provenance);
-    let motion = Motion::of_file(
-        &bench.machine,
-        &bench.file,
-        bench.model(),
-        &given.value,
-        args.seconds,
-        args.seed,
-    )?;
+    let motion = Motion::of_file(&bench.machine, &given.value, args.seconds, args.seed)?;
     let channels = bench.machine.channels.clone();
     let friction = match &given.value {
         Trajectory::SingleJoint(file)
@@ -317,10 +302,8 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     })
 }
 
-fn ladder_task<'a>(bench: &'a Bench, joint: &str) -> LadderTask<'a> {
+fn ladder_task(bench: &Bench, joint: &str) -> LadderTask {
     LadderTask {
-        robot: &bench.file,
-        model: bench.model(),
         joint: joint.to_owned(),
         seconds: bench.args.seconds,
         seed: bench.args.seed,
@@ -337,15 +320,7 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
     bench.context.check()?;
     let trajectory = Trajectory::SingleJoint(found.file);
     let args = bench.args;
-    let (model, seed) = (bench.model(), args.seed);
-    let motion = Motion::of_file(
-        &bench.machine,
-        &bench.file,
-        model,
-        &trajectory,
-        args.seconds,
-        seed,
-    )?;
+    let motion = Motion::of_file(&bench.machine, &trajectory, args.seconds, args.seed)?;
     let friction = LawForeseen {
         joint: joint.to_owned(),
         parameters: found.expected,
@@ -370,8 +345,7 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
 /// Designs one motion after the other, each with those before it given.
 fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let args = bench.args;
-    let criterion = criterion(bench)?;
-    let offsets = offsets(bench)?;
+    let mut task = task(bench)?;
     let mut given = Given::nothing(&bench.machine);
     let mut warnings = Vec::new();
     let mut any = false;
@@ -379,85 +353,39 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         given::add(bench, name, &mut given, &mut warnings)?;
         any = true;
     }
+    let weights = weights(&bench.machine, &task.criterion);
+    let period = 1.0 / args.frequency;
+    let rows = bench.rate_hz * period * f64::from(args.periods);
     let mut text = String::new();
     let mut all: Vec<Judgement> = Vec::new();
-    let mut stopped = None;
     keep_what_there_is();
     for names in names {
-        let period = 1.0 / args.frequency;
-        let rows = bench.rate_hz * period * f64::from(args.periods);
-        let weights = weights(&bench.machine, &criterion);
-        let task = Task {
-            criterion: criterion.clone(),
-            fundamental_hz: args.frequency,
-            harmonics: usize::from(args.harmonics),
-            offsets: offsets.clone(),
-            reserve: args.margin,
-            prior: any.then(|| Prior {
-                information: given.weighted(&weights),
-                rows,
-            }),
-            starts: usize::from(args.starts),
-            evaluations: args.evaluations,
-            seed: args.seed,
-        };
-        let bar = bench
-            .context
-            .progress("designing", Some(task.most_evaluations()));
-        let found = design(
-            &bench.machine,
-            &task,
-            &|steps| bar.advance(steps),
-            bench.context.stop_flag(),
-        );
-        drop(bar);
-        let found = match found {
-            Ok(found) => found,
-            Err(_) if bench.context.interrupted() => return Err(CliError::interrupted()),
-            Err(error) => return Err(error.into()),
-        };
-        let reserved: Vec<_> = bench
-            .machine
-            .channels
-            .iter()
-            .map(|c| c.reserved(args.margin))
-            .collect();
-        let blend = Blend::within(&bench.machine, &reserved, &found.series, args.periods)?;
-        let motion = Motion::Periodic {
-            series: found.series,
-            blend,
-        };
-        let channels = bench.machine.channels.clone();
-        let mut judged = judged(bench, &motion, &channels, any.then_some(&given), None)?;
+        task.prior = any.then(|| PriorInformation {
+            information: given.weighted(&weights),
+            rows,
+        });
+        let found = searched(bench, &task)?;
+        let (motion, fourier) = blended(bench, found.series)?;
+        let channels = &bench.machine.channels;
+        let mut judged = judged(bench, &motion, channels, any.then_some(&given), None)?;
         judged.evaluations = Some(found.evaluations);
         refuse_broken(&judged)?;
         let file = names.trajectory.clone().unwrap_or_default();
         let shown = file.display().to_string();
-        let Motion::Periodic { series, blend } = &motion else {
-            continue;
-        };
-        let mut fourier = trajectory(&bench.machine, series);
-        fourier.start_s = Some(blend.start);
-        fourier.blend_s = Some(blend.seconds);
-        fourier.periods = blend.periods;
-        let toml = Trajectory::Fourier(fourier).to_toml(&head(&judged));
         let mut report = written(bench, &motion, &judged, names, &shown)?;
-        write_text(&file, &toml)?;
+        write_text(&file, &Trajectory::Fourier(fourier).to_toml(&head(&judged)))?;
         report.terminal().line(&format!("written: {shown}"));
         text += &report.text();
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
+        if found.stopped {
+            let stopped = Stopped { file: shown };
+            return Err(CliError::from_room(Exit::Interrupted, &stopped));
+        }
         let (information, rows) =
             foresee::information(&bench.machine, &motion, bench.rate_hz, args.seconds)?;
         given.add_motion(&information, rows);
         any = true;
-        if found.stopped {
-            stopped = Some(shown);
-            break;
-        }
-    }
-    if let Some(file) = stopped {
-        return Err(CliError::from_room(Exit::Interrupted, &Stopped { file }));
     }
     let result = Judgements::of(all).ok_or_else(|| CliError::usage("no motion is asked for"))?;
     Ok(Outcome {
@@ -465,6 +393,53 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         document: Document::new("excite", &bench.inputs, &warnings, &result)?,
         missed: Vec::new(),
     })
+}
+
+/// What the command line asks for, with nothing known before.
+fn task(bench: &mut Bench) -> Result<Task, CliError> {
+    let args = bench.args;
+    Ok(Task {
+        criterion: criterion(bench)?,
+        fundamental_hz: args.frequency,
+        harmonics: usize::from(args.harmonics),
+        offsets: offsets(bench)?,
+        reserve: args.margin,
+        prior: None,
+        starts: usize::from(args.starts),
+        evaluations: args.evaluations,
+        seed: args.seed,
+    })
+}
+
+/// The search, with its bar.
+fn searched(bench: &Bench, task: &Task) -> Result<Found, CliError> {
+    let context = bench.context;
+    let bar = context.progress("designing", Some(task.most_evaluations()));
+    let found = design(
+        &bench.machine,
+        task,
+        &|steps| bar.advance(steps),
+        context.stop_flag(),
+    );
+    found.map_err(|error| match context.interrupted() {
+        true => CliError::interrupted(),
+        false => error.into(),
+    })
+}
+
+/// The motion from rest to rest, and as a file.
+fn blended(bench: &Bench, series: Series) -> Result<(Motion, Fourier), CliError> {
+    let (args, machine) = (bench.args, &bench.machine);
+    let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
+    let reserved: Vec<_> = reserved.collect();
+    let blend = Blend::within(machine, &reserved, &series, args.periods)?;
+    let fourier = Fourier {
+        start_s: Some(blend.start),
+        blend_s: Some(blend.seconds),
+        periods: blend.periods,
+        ..trajectory(machine, &series)
+    };
+    Ok((Motion::Periodic { series, blend }, fourier))
 }
 
 /// The report of a motion, after page, picture and samples were written where they are asked for;

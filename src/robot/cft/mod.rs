@@ -13,6 +13,7 @@
 //! | [`links`] | link masses to theta | Table 4, (5)-(9) |
 //! | [`linkage`] | the arm as a chain of general links | Table 2, (54), (56) |
 //! | [`actuation`] | volts, motor forces, counts, limits | (63)-(66), Tables 5 and 6 |
+//! | [`practice`] | how it is run, numbers of a synthetic one | Table 3 |
 
 pub mod actuation;
 pub mod bounds;
@@ -23,6 +24,7 @@ pub mod geometry;
 pub mod linkage;
 pub mod links;
 pub mod pantograph;
+pub mod practice;
 pub mod regressor;
 
 mod parameters;

@@ -30,24 +30,23 @@ pub const KIND: Kind = Kind {
 
 fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     let [gx, gy] = [values[0], values[1]];
-    match machine {
-        Machine::Cft(truth) => Built::plant(Tilt {
-            gx,
-            gy,
-            chain: Coefficients::from_theta22(&truth.theta),
-        }),
-        // The base's x lies along the axis; y is across it and does no work.
-        Machine::SingleJoint(truth) if truth.kind == JointKind::Prismatic => {
-            Built::plant(Constant {
-                force: -truth.inertia * gx,
-            })
-        }
-        Machine::Serial { robot, theta, .. } => Built::plant(Askew {
+    let Machine { robot, theta } = *machine;
+    if let Some(chain) = robot.coefficients(theta) {
+        return Built::plant(Tilt { gx, gy, chain });
+    }
+    if robot.knows_links() {
+        return Built::plant(Askew {
             chain: robot.tree().clone(),
             moments: moments(robot, theta),
             gravity: Vector3::new(gx, gy, 0.0),
+        });
+    }
+    match robot.joint_kind(0) {
+        // The base's x lies along the axis; y is across it and does no work.
+        JointKind::Prismatic => Built::plant(Constant {
+            force: -theta[0] * gx,
         }),
-        Machine::SingleJoint(_) => Err(site.refuse(
+        JointKind::Revolute => Err(site.refuse(
             KIND.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
              `ripple` with order 1",

@@ -39,26 +39,29 @@ fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateE
             rule: "must be above 0".to_owned(),
         });
     }
-    match machine {
-        Machine::Cft(_) => Built::plant(Carried {
+    let robot = machine.robot;
+    if !robot.knows_links() {
+        return Built::plant(Added {
+            inertia: match robot.joint_kind(0) {
+                JointKind::Prismatic => mass,
+                JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
+            },
+        });
+    }
+    if robot.tool_stays_level() {
+        return Built::plant(Carried {
             mass,
             outward: mx / mass,
             sideways: mz / mass,
             inertia,
-        }),
-        Machine::Serial { robot, .. } => Built::plant(Held {
-            chain: robot.tree().clone(),
-            mass,
-            centre: Vector3::new(mx, my, mz) / mass,
-            inertia,
-        }),
-        Machine::SingleJoint(truth) => Built::plant(Added {
-            inertia: match truth.kind {
-                JointKind::Prismatic => mass,
-                JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
-            },
-        }),
+        });
     }
+    Built::plant(Held {
+        chain: robot.tree().clone(),
+        mass,
+        centre: Vector3::new(mx, my, mz) / mass,
+        inertia,
+    })
 }
 
 #[derive(Debug)]

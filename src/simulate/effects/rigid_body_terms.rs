@@ -33,12 +33,12 @@ pub const KIND: Kind = Kind {
 };
 
 fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
-    let Machine::Cft(_) = machine else {
+    if machine.robot.coefficients(machine.theta).is_none() {
         return Err(site.refuse(
             KIND.name,
             "a single joint has one inertia and nothing that its structure drops",
         ));
-    };
+    }
     let mut theta = [0.0; 22];
     for (own, value) in theta[12..].iter_mut().zip(values) {
         *own = *value;

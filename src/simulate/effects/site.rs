@@ -1,18 +1,15 @@
 //! Where effects sit: the joints of a robot, the screws of the CFT robot, the robot as a whole, with the
 //! scales that default sizes are fractions of.
 
-use crate::robot::cft::dynamics::{Coefficients, inertia, solve_positive};
 use crate::robot::cft::geometry::L4;
-use crate::robot::cft::{JOINTS, Limits, pantograph};
+use crate::robot::cft::pantograph;
 use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
-use crate::simulate::cft::CftTruth;
-use crate::simulate::single_joint::{SingleJointFriction, SingleJointTruth};
+use crate::simulate::plant::Plant;
 
-/// Names of the pantograph's references, which two motors move through screws.
-const SCREWS: [&str; 2] = ["x_r", "y_r"];
-/// Middling speeds of q1 \[m/s\] and q2, q4, q5 \[rad/s\].
-const SPEEDS: [f64; 4] = [0.2, 0.5, 0.5, 0.5];
+/// Middling speeds of a joint that slides \[m/s\] and of one that turns \[rad/s\].
+const SLIDING_SPEED: f64 = 0.2;
+const TURNING_SPEED: f64 = 0.5;
 /// Middling speed of the screws' nuts \[m/s\].
 const SCREW_SPEED: f64 = 0.05;
 /// Rate at which a torque of [`Site::scale`] that changes sign with the speed brings the joint to rest
@@ -96,34 +93,21 @@ impl Site {
 
 /// The robot that effects are built for.
 #[derive(Debug, Clone, Copy)]
-pub enum Machine<'a> {
-    Cft(&'a CftTruth),
-    SingleJoint(&'a SingleJointTruth),
-    /// A serial robot, its parameters, and which of its joints turn, one bit each.
-    Serial {
-        robot: &'a Robot,
-        theta: &'a [f64],
-        turning: u8,
-    },
+pub struct Machine<'a> {
+    pub robot: &'a Robot,
+    /// Its inertial parameters.
+    pub theta: &'a [f64],
 }
 
 impl Machine<'_> {
     /// Number of joints.
     pub fn joints(&self) -> usize {
-        match self {
-            Self::Cft(_) => 4,
-            Self::SingleJoint(_) => 1,
-            Self::Serial { robot, .. } => robot.joints(),
-        }
+        self.robot.joints()
     }
 
     /// Whether the joint of that index turns.
     pub fn turns(&self, joint: usize) -> bool {
-        match self {
-            Self::Cft(_) => joint > 0,
-            Self::SingleJoint(truth) => truth.kind == JointKind::Revolute,
-            Self::Serial { turning, .. } => turning & (1 << joint) != 0,
-        }
+        self.robot.joint_kind(joint) == JointKind::Revolute
     }
 }
 
@@ -137,150 +121,180 @@ pub struct Sites<'a> {
 }
 
 impl<'a> Sites<'a> {
-    /// Places of a CFT robot. Scales are the friction of each joint at a middling speed and its inertia in
-    /// the middle of the limits.
+    /// The places of a plant.
     ///
     /// # Errors
     /// [`SimulateError::Robot`] where the middle of the limits is no pose, and
     /// [`SimulateError::NotPositiveDefinite`].
-    pub fn cft(truth: &'a CftTruth) -> Result<Self, SimulateError> {
-        let limits = truth.setup.limits();
-        let coefficients = Coefficients::from_theta22(&truth.theta);
-        let felt = |x: &[f64; 4], direction: [f64; 4]| {
-            let mass = inertia(&pantograph::joints(x)?, &coefficients);
-            let answer = solve_positive(&mass, &direction)
-                .ok_or_else(|| SimulateError::NotPositiveDefinite { x: x.to_vec() })?;
-            let speed: f64 = direction.iter().zip(answer).map(|(d, a)| d * a).sum();
-            Ok::<f64, SimulateError>(1.0 / speed)
+    pub fn of<const J: usize>(plant: &'a Plant<J>) -> Result<Self, SimulateError> {
+        let robot = &plant.mechanism.robot;
+        let joints = match Workspace::of(plant)? {
+            Some(workspace) => workspace.joints()?,
+            None => joints(plant),
         };
-        let middle = limits.middles();
-        let poses = poses(&limits);
-        let mut joints = Vec::with_capacity(4);
-        for (joint, name) in JOINTS.iter().enumerate() {
-            let law = &truth.friction[joint];
-            let mut direction = [0.0; 4];
-            direction[joint] = 1.0;
-            let mut least = f64::INFINITY;
-            let mut travel = (f64::INFINITY, f64::NEG_INFINITY);
-            for x in &poses {
-                least = least.min(felt(x, direction)?);
-                let q = pantograph::joints(x)?[joint];
-                travel = (travel.0.min(q), travel.1.max(q));
-            }
-            joints.push(Site {
-                place: Place::Joint(joint),
-                name: (*name).to_owned(),
-                turns: joint > 0,
-                scale: law.torque(SPEEDS[joint]).abs(),
-                speed: SPEEDS[joint],
-                inertia: felt(&middle, direction)?,
-                least_inertia: least,
-                travel,
-                coulomb: law.coulomb_1 + law.coulomb_2,
-                viscous: law.viscous,
-            });
-        }
-        let pose = pantograph::joints(&middle)?;
-        let jacobian = pantograph::reference_jacobian(&pose);
-        let mut screws = Vec::with_capacity(2);
-        for (row, name) in SCREWS.iter().enumerate() {
-            let [to_q4, to_q5] = jacobian[row];
-            screws.push(Site {
-                place: Place::Screw(row),
-                name: (*name).to_owned(),
-                turns: false,
-                // A force on the crank of length L4 that takes the torque of the joint.
-                scale: joints[3].scale / L4,
-                speed: SCREW_SPEED,
-                inertia: felt(&middle, [0.0, 0.0, to_q4, to_q5])?,
-                least_inertia: 0.0,
-                travel: (-2.0 * L4, 2.0 * L4),
-                coulomb: 0.0,
-                viscous: 0.0,
-            });
-        }
-        let whole = Site {
-            place: Place::Whole,
-            name: String::new(),
-            ..joints[0].clone()
-        };
-        Ok(Self {
-            machine: Machine::Cft(truth),
-            joints,
-            screws,
-            whole: vec![whole],
-        })
-    }
-
-    /// The places of a serial robot, one a joint.
-    pub fn serial(robot: &'a Robot, theta: &'a [f64], joints: Vec<Site>) -> Self {
-        let turning = joints.iter().enumerate();
-        let turning = turning.fold(0, |bits, (j, site)| bits | (u8::from(site.turns) << j));
+        let screws = screws(plant, &joints)?;
         let whole = joints.first().map(|first| Site {
             place: Place::Whole,
             name: String::new(),
             ..first.clone()
         });
-        Self {
-            machine: Machine::Serial {
+        Ok(Self {
+            machine: Machine {
                 robot,
-                theta,
-                turning,
+                theta: plant.theta(),
             },
             joints,
-            screws: Vec::new(),
+            screws,
             whole: whole.into_iter().collect(),
-        }
-    }
-
-    /// The places of a single joint, scaled with its friction at one m/s or rad/s.
-    pub fn single_joint(truth: &'a SingleJointTruth) -> Self {
-        let (low, high) = truth.limits;
-        let (coulomb, viscous) = match truth.friction {
-            SingleJointFriction::DoubleTanh(law) => (law.coulomb_1 + law.coulomb_2, law.viscous),
-            SingleJointFriction::ViscousCoulomb { law, .. } => (law.coulomb, law.viscous),
-        };
-        let joint = Site {
-            place: Place::Joint(0),
-            name: truth.name.clone(),
-            turns: truth.kind == JointKind::Revolute,
-            scale: truth.friction.torque(1.0).abs(),
-            speed: 0.2,
-            inertia: truth.inertia,
-            least_inertia: truth.inertia,
-            travel: if low.is_finite() && high.is_finite() {
-                (low, high)
-            } else {
-                (-1.0, 1.0)
-            },
-            coulomb,
-            viscous,
-        };
-        let whole = Site {
-            place: Place::Whole,
-            name: String::new(),
-            ..joint.clone()
-        };
-        Self {
-            machine: Machine::SingleJoint(truth),
-            joints: vec![joint],
-            screws: Vec::new(),
-            whole: vec![whole],
-        }
+        })
     }
 }
 
-/// Motor coordinates all over the limits, corners and middles included; the travel x_c4 changes nothing.
-fn poses(limits: &Limits) -> Vec<[f64; 4]> {
-    const STEPS: usize = 4;
-    const EACH: usize = STEPS + 1;
-    let share = |i: usize, k: usize| limits.lower[i] + limits.spans()[i] * k as f64 / STEPS as f64;
-    let mut poses = Vec::with_capacity(2 * EACH.pow(3));
-    for k in 0..EACH.pow(3) {
-        let (i, j, l) = (k % EACH, k / EACH % EACH, k / (EACH * EACH));
-        for x_c4 in [limits.lower[3], limits.upper[3]] {
-            poses.push([share(0, i), share(1, j), share(2, l), x_c4]);
+/// The joints of a robot whose workspace only its file knows: scales are the friction at a middling speed and
+/// the inertia in the middle of the travel.
+fn joints<const J: usize>(plant: &Plant<J>) -> Vec<Site> {
+    let m = &plant.mechanism;
+    // one joint alone has its inertia in every pose
+    let (least, at, speed) = match m.joints() {
+        1 => (1.0, 1.0, 0.2),
+        _ => (0.3, 0.5, 0.5),
+    };
+    let names = m.robot.joint_names().iter().enumerate();
+    names
+        .map(|(j, name)| {
+            let [coulomb, viscous] = plant.laws[j].levels();
+            Site {
+                place: Place::Joint(j),
+                name: name.clone(),
+                turns: m.robot.joint_kind(j) == JointKind::Revolute,
+                scale: plant.laws[j].torque(at).abs(),
+                speed,
+                inertia: plant.inertia[j],
+                least_inertia: least * plant.inertia[j],
+                travel: m.travel(j),
+                coulomb,
+                viscous,
+            }
+        })
+        .collect()
+}
+
+/// Inertia that a motor feels that pushes along a direction of the joints at the motors' coordinates x, while
+/// the others are free to move.
+fn felt<const J: usize>(
+    plant: &Plant<J>,
+    x: &[f64; J],
+    direction: &[f64; J],
+) -> Result<f64, SimulateError> {
+    let (mass, _) = plant.rigid(&plant.mechanism.pose(x)?, &[0.0; J]);
+    let answer = plant
+        .solve(&mass, direction)
+        .ok_or_else(|| SimulateError::NotPositiveDefinite { x: x.to_vec() })?;
+    let speed: f64 = direction.iter().zip(answer).map(|(d, a)| d * a).sum();
+    Ok(1.0 / speed)
+}
+
+/// A robot whose workspace is known.
+struct Workspace<'a, const J: usize> {
+    plant: &'a Plant<J>,
+    middle: [f64; J],
+    /// Motors' coordinates all over the limits, corners and middles included; the others stay at both ends.
+    poses: Vec<[f64; J]>,
+}
+
+impl<'a, const J: usize> Workspace<'a, J> {
+    fn of(plant: &'a Plant<J>) -> Result<Option<Self>, SimulateError> {
+        const STEPS: usize = 4;
+        const EACH: usize = STEPS + 1;
+        let m = &plant.mechanism;
+        let limits = m.robot.transmission().limits();
+        let (Some(limits), Some(practice)) = (limits, &m.practice) else {
+            return Ok(None);
+        };
+        let spans = limits.spans();
+        let share = |i: usize, k: usize| limits.lower[i] + spans[i] * k as f64 / STEPS as f64;
+        let matter: Vec<usize> = (0..m.joints()).filter(|i| *i != practice.uniform).collect();
+        let mut poses = Vec::with_capacity(2 * EACH.pow(matter.len() as u32));
+        for k in 0..EACH.pow(matter.len() as u32) {
+            for end in [0, STEPS] {
+                let (mut x, mut rest) = (m.filled(|i| share(i, end)), k);
+                for &i in &matter {
+                    x[i] = share(i, rest % EACH);
+                    rest /= EACH;
+                }
+                poses.push(x);
+            }
         }
+        Ok(Some(Self {
+            plant,
+            middle: m.filled(|i| limits.middles()[i]),
+            poses,
+        }))
     }
-    poses
+
+    /// Scales are the friction of each joint at a middling speed and its inertia in the middle of the limits.
+    fn joints(&self) -> Result<Vec<Site>, SimulateError> {
+        let m = &self.plant.mechanism;
+        let mut joints = Vec::with_capacity(m.joints());
+        for (j, name) in m.robot.joint_names().iter().enumerate() {
+            let law = &self.plant.laws[j];
+            let mut direction = [0.0; J];
+            direction[j] = 1.0;
+            let mut least = f64::INFINITY;
+            let mut travel = (f64::INFINITY, f64::NEG_INFINITY);
+            for x in &self.poses {
+                least = least.min(felt(self.plant, x, &direction)?);
+                let q = m.pose(x)?[j];
+                travel = (travel.0.min(q), travel.1.max(q));
+            }
+            let [coulomb, viscous] = law.levels();
+            let turns = m.robot.joint_kind(j) == JointKind::Revolute;
+            let speed = if turns { TURNING_SPEED } else { SLIDING_SPEED };
+            joints.push(Site {
+                place: Place::Joint(j),
+                name: name.clone(),
+                turns,
+                scale: law.torque(speed).abs(),
+                speed,
+                inertia: felt(self.plant, &self.middle, &direction)?,
+                least_inertia: least,
+                travel,
+                coulomb,
+                viscous,
+            });
+        }
+        Ok(joints)
+    }
+}
+
+/// The screws of the pantograph.
+fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>, SimulateError> {
+    let m = &plant.mechanism;
+    let mut screws = Vec::new();
+    let Some(limits) = m.robot.transmission().limits() else {
+        return Ok(screws);
+    };
+    let middle = m.filled(|i| limits.middles()[i]);
+    let pose = m.pose(&middle)?;
+    let Some(jacobian) = pose.first_chunk().map(pantograph::reference_jacobian) else {
+        return Ok(screws);
+    };
+    for (row, name) in m.robot.transmission().screws().iter().enumerate() {
+        let mut direction = [0.0; J];
+        direction[2..4].copy_from_slice(&jacobian[row]);
+        screws.push(Site {
+            place: Place::Screw(row),
+            name: (*name).to_owned(),
+            turns: false,
+            // A force on the crank of length L4 that takes the torque of the joint.
+            scale: joints[3].scale / L4,
+            speed: SCREW_SPEED,
+            inertia: felt(plant, &middle, &direction)?,
+            least_inertia: 0.0,
+            travel: (-2.0 * L4, 2.0 * L4),
+            coulomb: 0.0,
+            viscous: 0.0,
+        });
+    }
+    Ok(screws)
 }

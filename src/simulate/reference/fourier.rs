@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 
 use super::{Clock, Target};
+use crate::robot::cft::{Setup, practice};
+use crate::robot::practice::Excitation;
 use crate::simulate::SimulateError;
 use crate::simulate::chance::{Purpose, stream};
 
@@ -32,33 +34,30 @@ pub struct Fourier<const J: usize> {
 }
 
 impl Fourier<4> {
-    /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3, N = 4, at
-    /// 2 pi 0.4 rad/s, with the printed offsets. It lies inside Table 5 on TUeDACS; on dSPACE x_c4 needs
-    /// another offset.
+    /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3 with the printed offsets.
     pub fn table_3() -> Self {
-        Self {
-            offset: [-0.1343, 0.2766, 2.4, 0.0869],
-            a: vec![
-                [-0.1102, 0.1629, 1.9698, 0.0002],
-                [0.0042, -0.0118, 0.0014, -0.0302],
-                [-0.0014, 0.1438, -0.0267, 0.0021],
-                [-0.0173, -0.0043, 0.0021, -0.0800],
-            ],
-            b: vec![
-                [0.0037, 0.0188, 0.0011, -0.0347],
-                [0.0009, -0.0257, 0.0005, 0.0273],
-                [0.0005, 0.0033, -0.0060, 0.0294],
-                [-0.0168, -0.0277, 0.0024, 0.0447],
-            ],
-            fundamental: TAU * 0.4,
-            start: 0.0,
-            blend: 2.0,
-            periods: None,
-        }
+        Self::of(&practice::of(Setup::Tuedacs).excitation)
     }
 }
 
 impl<const J: usize> Fourier<J> {
+    /// Time within which a series reaches full speed, where nothing says otherwise \[s\].
+    pub const BLEND: f64 = 2.0;
+
+    /// The series of an excitation, without an end.
+    pub fn of(excitation: &Excitation) -> Self {
+        let widened = |row: &Vec<f64>| std::array::from_fn(|i| row.get(i).copied().unwrap_or(0.0));
+        Self {
+            offset: widened(&excitation.offset),
+            a: excitation.a.iter().map(widened).collect(),
+            b: excitation.b.iter().map(widened).collect(),
+            fundamental: TAU * excitation.fundamental_hz,
+            start: 0.0,
+            blend: Self::BLEND,
+            periods: None,
+        }
+    }
+
     /// The same series, begun anywhere in its period.
     pub fn at_random_phase(mut self, seed: u64) -> Self {
         let mut chance = stream(seed, Purpose::Reference);

@@ -36,7 +36,7 @@ pub enum Frame {
 /// Motion over time, in one of the two frames.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Path<const J: usize> {
-    /// One pose, held.
+    /// One pose, stationary.
     Hold([f64; J]),
     /// Finite Fourier series, eq. (43).
     Fourier(Fourier<J>),

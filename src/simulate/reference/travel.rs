@@ -1,7 +1,7 @@
 //! How far and how fast one joint can move alone.
 
 use crate::simulate::SimulateError;
-use crate::simulate::plant::Plant;
+use crate::simulate::mechanism::Mechanism;
 
 /// Room of one joint around a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,17 +23,16 @@ const FARTHEST: f64 = 20.0;
 ///
 /// # Errors
 /// [`SimulateError::LimitAtStart`] when the pose itself lies within the margin of a limit.
-pub fn travel<P: Plant<J>, const J: usize>(
-    plant: &P,
+pub fn travel<const J: usize>(
+    mechanism: &Mechanism<J>,
     pose: &[f64; J],
     moving: usize,
     margin: f64,
     motor_speeds: &[f64; J],
 ) -> Result<Travel, SimulateError> {
-    let (lower, upper) = plant.limits();
-    let names = plant.coordinate_names();
+    let (lower, upper) = (mechanism.lower, mechanism.upper);
     let outside = |q: &[f64; J]| {
-        let x = plant.coordinates(q);
+        let x = mechanism.coordinates(q);
         (0..J).find(|&i| {
             let gap = margin * (upper[i] - lower[i]);
             let gap = if gap.is_finite() { gap } else { 0.0 };
@@ -42,8 +41,8 @@ pub fn travel<P: Plant<J>, const J: usize>(
     };
     if let Some(i) = outside(pose) {
         return Err(SimulateError::LimitAtStart {
-            coordinate: names[i].clone(),
-            value: plant.coordinates(pose)[i],
+            coordinate: mechanism.robot.coordinate_names()[i].clone(),
+            value: mechanism.coordinates(pose)[i],
             lower: lower[i],
             upper: upper[i],
         });
@@ -81,7 +80,7 @@ pub fn travel<P: Plant<J>, const J: usize>(
     let mut top_speed = f64::INFINITY;
     for k in 0..=POSES {
         let q = at(low + (high - low) * k as f64 / POSES as f64);
-        let speeds = plant.coordinate_speeds(&q, &unit);
+        let speeds = mechanism.coordinate_speeds(&q, &unit);
         for (speed, motor) in speeds.iter().zip(motor_speeds) {
             top_speed = top_speed.min(motor / speed.abs());
         }

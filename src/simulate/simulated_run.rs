@@ -6,12 +6,12 @@ use serde::Serialize;
 use super::chance::Purpose;
 use super::effects::{Effects, Log};
 use super::integrate::Effort;
-use super::plant::Plant;
+use super::mechanism::Mechanism;
 use super::sensors::{Sensors, disturb};
 
 /// State of one motor channel at a sample (the status output of the report's Figure 9).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Status {
+pub enum MotorStatus {
     #[default]
     Running,
     /// The amplifier gives its largest voltage.
@@ -20,7 +20,7 @@ pub enum Status {
     LimitReached,
 }
 
-impl Status {
+impl MotorStatus {
     /// 0 running, 1 saturated, 2 limit reached.
     pub fn code(self) -> u8 {
         self as u8
@@ -66,20 +66,20 @@ pub struct Actual<const J: usize> {
 
 /// A simulated log, one entry per row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recording<const J: usize> {
-    pub joints: [String; J],
-    pub coordinates: [String; J],
+pub struct SimulatedRun<const J: usize> {
+    pub joints: Vec<String>,
+    pub coordinates: Vec<String>,
     /// Time \[s\].
     pub t: Vec<f64>,
     /// Motor coordinates by the encoders, m or rad.
     pub x: Vec<[f64; J]>,
-    /// Volts after saturation, held until the next sample, with the noise of their measurement \[V\].
+    /// Volts after saturation, kept until the next sample, with the noise of their measurement \[V\].
     pub volts: Vec<[f64; J]>,
     /// Joint positions by the encoders, m or rad.
     pub q: Vec<[f64; J]>,
     /// Joint torques of the logged volts at the logged pose, eq. (66), with their own noise, N or N m.
     pub torque: Vec<[f64; J]>,
-    pub status: Vec<[Status; J]>,
+    pub status: Vec<[MotorStatus; J]>,
     pub actual: Actual<J>,
     /// The first time that each coordinate reached a limit.
     pub limits: Vec<LimitEvent>,
@@ -92,11 +92,11 @@ pub struct Recording<const J: usize> {
     pub effort: Effort,
 }
 
-impl<const J: usize> Recording<J> {
-    pub(super) fn empty<P: Plant<J>>(plant: &P, rows: usize) -> Self {
+impl<const J: usize> SimulatedRun<J> {
+    pub(super) fn empty(mechanism: &Mechanism<J>, rows: usize) -> Self {
         Self {
-            joints: plant.joint_names(),
-            coordinates: plant.coordinate_names(),
+            joints: mechanism.robot.joint_names().to_vec(),
+            coordinates: mechanism.robot.coordinate_names(),
             t: Vec::with_capacity(rows),
             x: Vec::with_capacity(rows),
             volts: Vec::with_capacity(rows),
@@ -125,9 +125,9 @@ impl<const J: usize> Recording<J> {
 
     /// Turns the clean rows into what is logged: noise on volts, torques by (66), noise on torques, faults of
     /// the data, lost rows.
-    pub(super) fn measure<P: Plant<J>>(
+    pub(super) fn measure(
         &mut self,
-        plant: &P,
+        mechanism: &Mechanism<J>,
         effects: &Effects,
         sensors: &Sensors<J>,
         seed: u64,
@@ -137,7 +137,7 @@ impl<const J: usize> Recording<J> {
         self.torque_noise = sensors.torque_noise.deviation(&self.torque);
         disturb(&mut self.volts, &self.volt_noise, seed, Purpose::Volts);
         for ((torque, q), volts) in self.torque.iter_mut().zip(&self.q).zip(&self.volts) {
-            *torque = plant.torque(q, volts);
+            *torque = mechanism.torque(q, volts);
         }
         effects.spoil(&mut self.joint_channels(), true);
         disturb(&mut self.torque, &self.torque_noise, seed, Purpose::Torque);
@@ -181,22 +181,24 @@ impl<const J: usize> Recording<J> {
         names.extend(self.joints.iter().map(|joint| format!("tau_{joint}")));
         if raw {
             names.extend(self.coordinates.iter().cloned());
-            names.extend((1..=J).map(|i| format!("u_{i}")));
-            names.extend((1..=J).map(|i| format!("status_{i}")));
+            let motors = 1..=self.coordinates.len();
+            names.extend(motors.clone().map(|i| format!("u_{i}")));
+            names.extend(motors.map(|i| format!("status_{i}")));
         }
         names
     }
 
     /// Writes row k into `out`, in the order of [`Self::header`].
     pub fn row(&self, k: usize, raw: bool, out: &mut Vec<f64>) {
+        let n = self.joints.len();
         out.clear();
         out.push(self.t[k]);
-        out.extend(self.q[k]);
-        out.extend(self.torque[k]);
+        out.extend(&self.q[k][..n]);
+        out.extend(&self.torque[k][..n]);
         if raw {
-            out.extend(self.x[k]);
-            out.extend(self.volts[k]);
-            out.extend(self.status[k].map(|s| f64::from(s.code())));
+            out.extend(&self.x[k][..n]);
+            out.extend(&self.volts[k][..n]);
+            out.extend(self.status[k][..n].iter().map(|s| f64::from(s.code())));
         }
     }
 }

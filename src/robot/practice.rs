@@ -1,0 +1,67 @@
+//! What is known of a robot beside its file: numbers that stand for it, and how it is run.
+
+use super::Robot;
+use super::cft::practice;
+use super::friction::DoubleTanh;
+
+/// Numbers that stand for a robot that no model is given for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nominal {
+    /// Inertial parameters, in the order of the regressor's columns.
+    pub theta: Vec<f64>,
+    /// Friction of each joint.
+    pub friction: Vec<DoubleTanh>,
+}
+
+/// How a robot is run where nothing says otherwise; motors in the order of their coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Practice {
+    /// Largest voltage of the amplifiers \[V\].
+    pub volts: f64,
+    /// Top speed of each motor's coordinate \[m/s or rad/s\].
+    pub speeds: Vec<f64>,
+    /// Proportional gains \[V/m, V/rad\] and derivative ones \[V s/m, V s/rad\] of each motor's coordinate.
+    pub control: [Vec<f64>; 2],
+    /// Slowest plateau \[m/s, rad/s\] and acceleration \[m/s^2, rad/s^2\] of one-joint experiments.
+    pub joint_ladders: Vec<[f64; 2]>,
+    /// The same where a motor's coordinate runs the ladder.
+    pub coordinate_ladders: Vec<[f64; 2]>,
+    /// Excitation of all motors.
+    pub excitation: Excitation,
+    /// Least clearance of a designed motion, see [`super::Transmission::clearance`], and the joint on which
+    /// it depends.
+    pub clearance: (usize, f64),
+    /// Coordinate on whose position no torque depends.
+    pub uniform: usize,
+}
+
+/// A finite Fourier series of eq. (43), one row for each harmonic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    /// Middle of each coordinate \[m or rad\].
+    pub offset: Vec<f64>,
+    /// Amplitudes of the velocity \[m/s or rad/s\].
+    pub a: Vec<Vec<f64>>,
+    pub b: Vec<Vec<f64>>,
+    /// Fundamental \[Hz\].
+    pub fundamental_hz: f64,
+}
+
+impl Robot {
+    /// Numbers that stand for the robot where no model is given; none for a robot that only its file
+    /// describes.
+    pub fn nominal(&self) -> Option<Nominal> {
+        self.transmission().setup()?;
+        let mut theta = practice::INERTIA.to_vec();
+        theta.resize(self.parameters().len(), 0.0);
+        Some(Nominal {
+            theta,
+            friction: DoubleTanh::cft_joints(&practice::FRICTION).to_vec(),
+        })
+    }
+
+    /// How the robot is run, where more is known of that than its file says.
+    pub fn practice(&self) -> Option<Practice> {
+        self.transmission().setup().map(practice::of)
+    }
+}

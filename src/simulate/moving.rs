@@ -1,0 +1,232 @@
+//! A plant with its effects in motion: the differential equation that is integrated.
+//!
+//! Its state is (q, v, z): z are the states of the effects.
+
+use super::effects::{Effects, Motion};
+use super::integrate::System;
+use super::plant::{Plant, gather, spread};
+
+/// A plant with its effects, its volts those of the last control sample (zero-order hold).
+///
+/// N is at least 2 J plus the number of the effects' states.
+#[derive(Debug)]
+pub struct Moving<'a, const J: usize> {
+    pub plant: &'a Plant<J>,
+    pub effects: Effects,
+    pub volts: [f64; J],
+}
+
+/// The motor's side of the joints and what the balance of torques came to.
+struct Balance<const J: usize> {
+    q: [f64; J],
+    v: [f64; J],
+    friction: [f64; J],
+    /// Motor torque that acts, less friction and added torques.
+    net: [f64; J],
+    acceleration: [f64; J],
+}
+
+impl<const J: usize> Moving<'_, J> {
+    /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
+    /// the deflections of elastic joints.
+    pub fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
+        let (mut q, mut v) = (*q, *v);
+        for twist in self.effects.twists(z) {
+            q[twist.joint] += twist.deflection;
+            v[twist.joint] += twist.rate;
+        }
+        (q, v)
+    }
+
+    /// Acceleration of the joints at the state y under the volts; NaN where M is not invertible.
+    #[inline]
+    pub fn acceleration<const N: usize>(&self, t: f64, y: &[f64; N]) -> [f64; J] {
+        let (q, v) = (part::<J, N>(y, 0), part::<J, N>(y, J));
+        if self.effects.is_empty() {
+            let torque = self.plant.mechanism.torque(&q, &self.volts);
+            let (mass, bias) = self.plant.dynamics(&q, &v);
+            let load = std::array::from_fn(|i| torque[i] - bias[i]);
+            return self.plant.solve(&mass, &load).unwrap_or([f64::NAN; J]);
+        }
+        self.balance(t, &q, &v, &y[2 * J..]).acceleration
+    }
+
+    /// The balance with effects: what the motors give, friction and added torques take; what is left is the
+    /// load tau_l with what depends on it, and where a joint is elastic the load is what the spring passes on.
+    fn balance(&self, t: f64, link: &[f64; J], speed: &[f64; J], z: &[f64]) -> Balance<J> {
+        let (q, v) = self.motor_side(link, speed, z);
+        let friction = self.plant.friction(&v);
+        let n = self.plant.joints();
+        let motion = Motion {
+            t,
+            q: &q[..n],
+            v: &v[..n],
+            z,
+            friction: &friction[..n],
+            ..Motion::default()
+        };
+        let mut acting = [1.0; J];
+        self.effects.drive(&mut acting);
+        let mut added = self.plant.offset;
+        self.effects.torque(&motion, &mut added);
+        let mut share = [[0.0; 2]; J];
+        self.effects.load(&motion, &mut share);
+        let torque = self.plant.mechanism.torque(&q, &self.volts);
+        let mut net: [f64; J] =
+            std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i]);
+        // tau_l (1 + share) = net is linear on each side of zero.
+        let mut load: [f64; J] = std::array::from_fn(|i| {
+            let [positive, negative] = share[i];
+            net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
+        });
+        for twist in self.effects.twists(z) {
+            let [positive, negative] = share[twist.joint];
+            load[twist.joint] = twist.torque;
+            net[twist.joint] -= twist.torque
+                * if twist.torque > 0.0 {
+                    positive
+                } else {
+                    negative
+                };
+        }
+        let (mass, bias) = self.body(t, link, speed, z);
+        for i in 0..J {
+            load[i] -= bias[i];
+        }
+        let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
+        let solved = if symmetric {
+            self.plant.solve(&mass, &load)
+        } else {
+            eliminate(mass, load)
+        };
+        Balance {
+            q,
+            v,
+            friction,
+            net,
+            acceleration: solved.unwrap_or([f64::NAN; J]),
+        }
+    }
+
+    /// Rigid-body torque C v + G with what effects add to it, at no acceleration.
+    pub fn load(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
+        self.body(t, q, v, z).1
+    }
+
+    /// Inertia matrix and C v + G of the links, with what effects add to them.
+    fn body(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([[f64; J]; J], [f64; J]) {
+        let n = self.plant.joints();
+        let (mut mass, mut bias) = self.plant.rigid(q, v);
+        let motion = Motion {
+            t,
+            q: &q[..n],
+            v: &v[..n],
+            z,
+            ..Motion::default()
+        };
+        gather(&mut mass, n);
+        let flat = &mut mass.as_flattened_mut()[..n * n];
+        self.effects.inertia(&motion, flat, &mut bias[..n]);
+        spread(&mut mass, n);
+        (mass, bias)
+    }
+
+    /// Logged joint torque that keeps the state without acceleration: C v + G + F + E.
+    pub fn holding_torque(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> [f64; J] {
+        let load = self.load(t, q, v, z);
+        let n = self.plant.joints();
+        let friction = self.plant.friction(v);
+        let motion = Motion {
+            t,
+            q: &q[..n],
+            v: &v[..n],
+            z,
+            friction: &friction[..n],
+            ..Motion::default()
+        };
+        let mut torque = self.plant.offset;
+        self.effects.torque(&motion, &mut torque);
+        let mut share = [[0.0; 2]; J];
+        self.effects.load(&motion, &mut share);
+        let mut acting = [1.0; J];
+        self.effects.drive(&mut acting);
+        std::array::from_fn(|i| {
+            let [positive, negative] = share[i];
+            let beside = load[i] * if load[i] > 0.0 { positive } else { negative };
+            (load[i] + beside + friction[i] + torque[i]) / acting[i]
+        })
+    }
+}
+
+impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
+    #[inline]
+    fn rates(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
+        dydt[..J].copy_from_slice(&y[J..2 * J]);
+        if N == 2 * J {
+            dydt[J..2 * J].copy_from_slice(&self.acceleration(t, y));
+            return;
+        }
+        let z = &y[2 * J..];
+        let balance = self.balance(t, &part::<J, N>(y, 0), &part::<J, N>(y, J), z);
+        dydt[J..2 * J].copy_from_slice(&balance.acceleration);
+        dydt[2 * J..].fill(0.0);
+        let n = self.plant.joints();
+        let motion = Motion {
+            t,
+            q: &balance.q[..n],
+            v: &balance.v[..n],
+            z,
+            friction: &balance.friction[..n],
+            a: &balance.acceleration[..n],
+            net: &balance.net[..n],
+        };
+        self.effects.rates(&motion, &mut dydt[2 * J..]);
+    }
+
+    fn accepted(&mut self, t: f64, y: &[f64; N]) -> bool {
+        if self.effects.is_empty() {
+            return false;
+        }
+        let z = &y[2 * J..];
+        let n = self.plant.joints();
+        let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
+        self.effects.moved(&Motion {
+            t,
+            q: &q[..n],
+            v: &v[..n],
+            z,
+            ..Motion::default()
+        })
+    }
+}
+
+/// x with M x = b for any invertible M, by elimination with row exchange; `None` where M is not invertible.
+fn eliminate<const J: usize>(mut m: [[f64; J]; J], mut b: [f64; J]) -> Option<[f64; J]> {
+    for k in 0..J {
+        let largest = (k..J).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
+        m.swap(k, largest);
+        b.swap(k, largest);
+        let pivot = m[k];
+        if pivot[k] == 0.0 || !pivot[k].is_finite() {
+            return None;
+        }
+        for i in k + 1..J {
+            let share = m[i][k] / pivot[k];
+            for (own, from) in m[i].iter_mut().zip(pivot).skip(k) {
+                *own -= share * from;
+            }
+            b[i] -= share * b[k];
+        }
+    }
+    for k in (0..J).rev() {
+        let known: f64 = (k + 1..J).map(|j| m[k][j] * b[j]).sum();
+        b[k] = (b[k] - known) / m[k][k];
+    }
+    Some(b)
+}
+
+/// J numbers of the state from index `first` on.
+#[inline]
+pub(super) fn part<const J: usize, const N: usize>(y: &[f64; N], first: usize) -> [f64; J] {
+    std::array::from_fn(|i| y[first + i])
+}
