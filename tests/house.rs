@@ -84,11 +84,7 @@ const DOORS: &[(&str, &str)] = &[
 const KNOWN_CIRCLES: &[&str] = &[
     "cli: compare, diagnose, diagnose_text, friction, pages, validate",
     "diagnose: candidates, run, selection, uncertainty, unexplained",
-    "excite: blend, usage",
     "identify: estimate, passes",
-    "inertia: covariance, solve",
-    "inspect: judge, lag, shape, together, verdicts",
-    "motion: cutter, run",
     "simulate: cft, effects, plant, single_joint",
     "simulate: order, serial_experiment",
 ];

@@ -6,11 +6,7 @@
 
 use crate::simulate::reference::Clock;
 
-use super::ExciteError;
-use super::limits::Channel;
-use super::machine::Machine;
 use super::series::{Kinematics, Series};
-use super::usage::{along_blend, worst};
 
 /// A series from rest to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,11 +18,6 @@ pub struct Blend {
     /// Whole periods at full rate; without a number the motion does not end by itself.
     pub periods: Option<u32>,
 }
-
-/// Durations that are tried, in periods.
-const DURATIONS: [f64; 10] = [0.4, 0.5, 0.64, 0.8, 1.0, 1.2, 1.6, 2.0, 3.2, 6.4];
-/// Points of the period at which the motion may begin.
-const STARTS: u32 = 16;
 
 impl Blend {
     /// Duration of the whole motion \[s\]; of the first blend and period where it does not end.
@@ -52,43 +43,6 @@ impl Blend {
             k.xd[i] *= rate;
         }
         k
-    }
-
-    /// The shortest blend of those tried along which every channel holds, begun where it stays
-    /// farthest from them.
-    ///
-    /// # Errors
-    /// [`ExciteError::NoBlend`] where even the longest breaks one.
-    pub fn within(
-        machine: &Machine,
-        channels: &[Channel],
-        series: &Series,
-        periods: u32,
-    ) -> Result<Self, ExciteError> {
-        let period = series.period();
-        let mut last = f64::INFINITY;
-        for duration in DURATIONS {
-            let tried = (0..STARTS).map(|k| {
-                let blend = Self {
-                    start: period * f64::from(k) / f64::from(STARTS),
-                    seconds: duration * period,
-                    periods: Some(periods),
-                };
-                let share = worst(&along_blend(machine, channels, series, &blend));
-                (share, blend)
-            });
-            let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((share, blend)) = best {
-                if share <= 1.0 {
-                    return Ok(blend);
-                }
-                last = share;
-            }
-        }
-        Err(ExciteError::NoBlend {
-            seconds: DURATIONS[DURATIONS.len() - 1] * period,
-            share: last,
-        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::ExciteError;
 use super::blend::Blend;
 use super::limits::{Channel, Quantity};
 use super::machine::{Machine, State};
@@ -122,6 +123,50 @@ pub fn along_blend(
         .zip(out)
         .map(|(a, b)| a.joined(b))
         .collect()
+}
+
+/// Durations that are tried, in periods.
+const DURATIONS: [f64; 10] = [0.4, 0.5, 0.64, 0.8, 1.0, 1.2, 1.6, 2.0, 3.2, 6.4];
+/// Points of the period at which the motion may begin.
+const STARTS: u32 = 16;
+
+impl Blend {
+    /// The shortest blend of those tried along which every channel holds, begun where it stays
+    /// farthest from them.
+    ///
+    /// # Errors
+    /// [`ExciteError::NoBlend`] where even the longest breaks one.
+    pub fn within(
+        machine: &Machine,
+        channels: &[Channel],
+        series: &Series,
+        periods: u32,
+    ) -> Result<Self, ExciteError> {
+        let period = series.period();
+        let mut last = f64::INFINITY;
+        for duration in DURATIONS {
+            let tried = (0..STARTS).map(|k| {
+                let blend = Self {
+                    start: period * f64::from(k) / f64::from(STARTS),
+                    seconds: duration * period,
+                    periods: Some(periods),
+                };
+                let share = worst(&along_blend(machine, channels, series, &blend));
+                (share, blend)
+            });
+            let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((share, blend)) = best {
+                if share <= 1.0 {
+                    return Ok(blend);
+                }
+                last = share;
+            }
+        }
+        Err(ExciteError::NoBlend {
+            seconds: DURATIONS[DURATIONS.len() - 1] * period,
+            share: last,
+        })
+    }
 }
 
 impl Use {

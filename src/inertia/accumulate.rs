@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::columns::RegressorColumns;
+use super::columns::{GRADIENT, RegressorColumns};
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
@@ -225,6 +225,29 @@ impl BlockFactors {
             self.blocks.iter().map(|b| &b.r[j]),
             self.columns.row_width(j),
         )
+    }
+}
+
+impl BlockFactors {
+    /// Restriction of the global unknowns to those of joint j.
+    pub(super) fn own_unknowns(&self, theta: &DVector<f64>, j: usize) -> DVector<f64> {
+        let columns = &self.columns;
+        DVector::from_fn(columns.shared + columns.own[j].len(), |c, _| {
+            theta[columns.unknown(j, c)]
+        })
+    }
+
+    /// The columns of joint j's triangle `r` by what stands in them.
+    pub(super) fn parts<'a>(&self, r: &'a DMatrix<f64>, j: usize) -> JointFactor<'a> {
+        JointFactor {
+            r,
+            unknowns: self.columns.shared + self.columns.own[j].len(),
+            gradient: if self.columns.known[j].is_some() {
+                GRADIENT
+            } else {
+                0
+            },
+        }
     }
 }
 

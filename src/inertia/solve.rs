@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::accumulate::{BlockFactors, JointFactor};
-use super::columns::GRADIENT;
+use super::accumulate::BlockFactors;
+use super::covariance::covariance;
 use crate::math::rank;
 use crate::math::rfactor::RFactor;
 
@@ -206,8 +206,19 @@ fn finish(
             .collect();
         solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
     }
-    let (covariance, textbook, sensitivity) =
-        super::covariance::covariance(factors, joints, &solution, inputs, &residual);
+    let known = inputs.prior.map_or(DMatrix::zeros(u, u), |prior| {
+        let rows = prior.rows.columns(0, u);
+        rows.tr_mul(&rows) * prior.variance
+    });
+    let (covariance, textbook, sensitivity) = covariance(
+        factors,
+        joints,
+        &solution.theta,
+        &solution.inverse,
+        weights,
+        known,
+        &residual,
+    );
     let rows = factors.rows as f64;
     let torque_rms: Vec<f64> = factors
         .torque_square
@@ -253,12 +264,12 @@ fn finish(
 }
 
 /// Weighted solution with the directions that the data leave open fixed at zero.
-pub(super) struct WeightedSolution {
-    pub theta: DVector<f64>,
+struct WeightedSolution {
+    theta: DVector<f64>,
     /// Inverse of the weighted normal matrix on the directions that are open to the data.
-    pub inverse: DMatrix<f64>,
-    pub determined: Vec<bool>,
-    pub confounded: Vec<Confounded>,
+    inverse: DMatrix<f64>,
+    determined: Vec<bool>,
+    confounded: Vec<Confounded>,
 }
 
 /// R factor of all joints' rows, unknowns and target, each joint times its weight, and of a prior.
@@ -373,33 +384,13 @@ fn solve(
     })
 }
 
-/// Restriction of the global unknowns to those of joint j.
-pub(super) fn own_unknowns(factors: &BlockFactors, theta: &DVector<f64>, j: usize) -> DVector<f64> {
-    let columns = &factors.columns;
-    DVector::from_fn(columns.shared + columns.own[j].len(), |c, _| {
-        theta[columns.unknown(j, c)]
-    })
-}
-
-pub(super) fn parts<'a>(factors: &BlockFactors, r: &'a DMatrix<f64>, j: usize) -> JointFactor<'a> {
-    JointFactor {
-        r,
-        unknowns: factors.columns.shared + factors.columns.own[j].len(),
-        gradient: if factors.columns.known[j].is_some() {
-            GRADIENT
-        } else {
-            0
-        },
-    }
-}
-
 fn residual_std(factors: &BlockFactors, joints: &[DMatrix<f64>], theta: &DVector<f64>) -> Vec<f64> {
     joints
         .iter()
         .enumerate()
         .map(|(j, r)| {
-            let own = own_unknowns(factors, theta, j);
-            (parts(factors, r, j).residual_square(&own) / factors.rows as f64).sqrt()
+            let own = factors.own_unknowns(theta, j);
+            (factors.parts(r, j).residual_square(&own) / factors.rows as f64).sqrt()
         })
         .collect()
 }

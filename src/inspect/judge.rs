@@ -5,11 +5,9 @@ use super::clock::{self, Clock, Step};
 use super::copies::Copies;
 use super::excitation::Excitation;
 use super::fault::Episodes;
-use super::findings::Findings;
 use super::flat::Flat;
 use super::repeats::Repeats;
 use super::spike::Spikes;
-use super::verdicts::conclude;
 use super::windows::Windows;
 
 /// A joint moves where it travels further than this share of what the farthest joint does.
@@ -82,7 +80,7 @@ impl Track {
         (self.scatter / self.rows.max(1) as f64).sqrt()
     }
 
-    fn part(&mut self) {
+    pub(super) fn part(&mut self) {
         self.flat.part();
         self.spikes.part();
         if let Some(excitation) = &mut self.excitation {
@@ -288,13 +286,5 @@ impl Judge {
         let farthest = travels.fold(0.0, f64::max);
         let step = track.flat.steps.quantile_not_zero(0.05);
         track.travel() > (30.0 * step).max(TRAVELS * farthest)
-    }
-
-    /// What there is to say about the log.
-    pub fn finish(mut self) -> Findings {
-        for track in &mut self.tracks {
-            track.part();
-        }
-        conclude(&self)
     }
 }

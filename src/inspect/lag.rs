@@ -2,9 +2,9 @@
 
 use super::channel::Role;
 use super::clock::ClockFacts;
+use super::draft::{Draft, seconds};
 use super::fault::{Kind, Severity};
 use super::judge::Judge;
-use super::verdicts::{Draft, seconds};
 use super::windows::Window;
 use crate::log::Delay;
 

@@ -13,6 +13,7 @@
 mod channel;
 mod clock;
 mod copies;
+mod draft;
 mod excitation;
 mod fault;
 mod findings;

@@ -4,9 +4,9 @@
 //! once more with each joint turned, and each two joints exchanged, in the positions, in the torques
 //! and in both. Where one such change explains what was not explained without it, it is told.
 
+use super::draft::seconds;
 use super::fault::{Fault, Kind, Severity};
 use super::lag;
-use super::verdicts::seconds;
 use crate::log::escape;
 
 /// A model that is off by less, as a share of the torque's power, is not doubted.

@@ -3,11 +3,11 @@
 
 use super::channel::Role;
 use super::clock::ClockFacts;
+use super::draft::{Draft, rows_text};
 use super::fault::{Episodes, Kind, Severity};
 use super::flat::{Levels, Run};
 use super::grain;
 use super::judge::{Depth, Judge, Track};
-use super::verdicts::{Draft, rows_text};
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;

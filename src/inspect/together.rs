@@ -2,11 +2,11 @@
 
 use super::channel::Role;
 use super::clock::ClockFacts;
+use super::draft::{Draft, seconds};
 use super::fault::{Kind, Severity};
 use super::grain;
 use super::judge::{Depth, Judge, Track};
 use super::velocity;
-use super::verdicts::{Draft, seconds};
 
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;

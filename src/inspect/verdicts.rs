@@ -2,7 +2,8 @@
 
 use super::channel::Role;
 use super::clock::ClockFacts;
-use super::fault::{Episodes, Fault, Kind, Severity};
+use super::draft::{Draft, rows_text, seconds};
+use super::fault::{Episodes, Kind, Severity};
 use super::findings::{ChannelFacts, Findings, Gap, joined};
 use super::judge::{Depth, Judge, Track};
 use super::{grain, shape, together};
@@ -12,90 +13,20 @@ const UNEVEN: f64 = 0.05;
 /// Jitter from which it is worth knowing.
 const JITTER: f64 = 0.02;
 
-/// Faults under construction, and what is to be cut out.
-pub(super) struct Draft {
-    pub(super) faults: Vec<Fault>,
-    pub(super) cuts: Vec<[f64; 2]>,
-    first: f64,
-    last: f64,
-}
-
-impl Draft {
-    /// Adds a fault of the whole log.
-    pub(super) fn whole(
-        &mut self,
-        kind: Kind,
-        severity: Severity,
-        channel: Option<&str>,
-        rows: u64,
-        (effect, remedy): (String, &str),
-    ) {
-        self.faults.push(Fault {
-            kind,
-            severity,
-            channel: channel.map(str::to_owned),
-            from_s: 0.0,
-            to_s: self.last - self.first,
-            rows,
-            effect,
-            remedy: remedy.to_owned(),
-            cut: false,
-        });
-    }
-
-    /// Adds a fault for each stretch, or one for all of them where they are many; `effect` is
-    /// given the rows and the number of stretches.
-    pub(super) fn stretches(
-        &mut self,
-        kind: Kind,
-        severity: Severity,
-        channel: Option<&str>,
-        episodes: &Episodes,
-        (effect, remedy): (&dyn Fn(u64, usize) -> String, &str),
-    ) {
-        for (episode, count) in episodes.told() {
-            self.faults.push(Fault {
-                kind,
-                severity,
-                channel: channel.map(str::to_owned),
-                from_s: episode.from - self.first,
-                to_s: episode.to - self.first,
-                rows: episode.rows,
-                effect: effect(episode.rows, count),
-                remedy: remedy.to_owned(),
-                cut: false,
-            });
+impl Judge {
+    /// What there is to say about the log.
+    pub fn finish(mut self) -> Findings {
+        for track in &mut self.tracks {
+            track.part();
         }
-    }
-
-    /// Leaves the rows of some stretches out, which were told as this fault of this channel.
-    pub(super) fn cut(&mut self, kind: Kind, channel: &str, episodes: &Episodes) {
-        for fault in &mut self.faults {
-            fault.cut |= fault.kind == kind && fault.channel.as_deref() == Some(channel);
-        }
-        self.cuts.extend(episodes.iter().map(|e| [e.from, e.to]));
+        conclude(&self)
     }
 }
 
-/// `1 row`, `7 rows`, `7 rows in 3 stretches`.
-pub(super) fn rows_text(rows: u64, stretches: usize) -> String {
-    match (rows, stretches) {
-        (1, _) => "1 row".to_owned(),
-        (rows, 0 | 1) => format!("{rows} rows"),
-        (rows, many) => format!("{rows} rows in {many} stretches"),
-    }
-}
-
-/// Everything there is to say.
-pub(super) fn conclude(judge: &Judge) -> Findings {
+fn conclude(judge: &Judge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
-    let mut draft = Draft {
-        faults: Vec::new(),
-        cuts: Vec::new(),
-        first,
-        last: first + judge.clock.duration().max(0.0),
-    };
+    let mut draft = Draft::new(first, judge.clock.duration().max(0.0));
     time_faults(judge, &clock, &mut draft);
     for track in &judge.tracks {
         number_faults(track, &mut draft);
@@ -272,15 +203,6 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
             seen.rows,
             (effect, remedy),
         );
-    }
-}
-
-/// A time for a person: `1.000 ms`.
-pub(super) fn seconds(s: f64) -> String {
-    match s.abs() {
-        x if x >= 1.0 => format!("{s:.3} s"),
-        x if x >= 1e-3 => format!("{:.3} ms", s * 1e3),
-        _ => format!("{:.3} us", s * 1e6),
     }
 }
 

@@ -2,13 +2,23 @@
 
 use std::sync::Arc;
 
-use super::run::Skipped;
 use super::settings::FilterChain;
 use super::time_base::Event;
 use super::window::FilterWindow;
 
 /// Spans of skipped stretches that are listed; more are only counted.
 const LISTED: usize = 20;
+
+/// Stretches of a log that were too short to filter.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Skipped {
+    /// How many.
+    pub segments: usize,
+    /// Their samples together.
+    pub samples: u64,
+    /// First and last time (s) of the first 20 of them.
+    pub spans_s: Vec<[f64; 2]>,
+}
 
 /// Cuts the segments of a log into windows.
 pub(super) struct WindowCutter {

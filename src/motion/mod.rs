@@ -38,8 +38,9 @@ pub mod time_base;
 mod window;
 pub mod zero_order_hold;
 
+pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};
-pub use run::{RunError, Skipped, Summary, run};
+pub use run::{RunError, Summary, run};
 pub use settings::{Differences, FilterSettings, ParallelFilter, TorqueTiming};
 pub use stretch::{Parallel, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::cutter::WindowCutter;
+use super::cutter::{Skipped, WindowCutter};
 use super::settings::{FilterChain, FilterSettings};
 use super::time_base::TimeBase;
 use super::window::FilterWindow;
@@ -56,17 +56,6 @@ pub struct Summary {
     /// Cut-off of the position filter (Hz); none where raw positions were differentiated.
     #[serde(rename = "position_cutoff_hz")]
     pub q_cutoff_hz: Option<f64>,
-}
-
-/// Stretches of a log that were too short to filter.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Skipped {
-    /// How many.
-    pub segments: usize,
-    /// Their samples together.
-    pub samples: u64,
-    /// First and last time (s) of the first 20 of them.
-    pub spans_s: Vec<[f64; 2]>,
 }
 
 /// Runs a log through: reads blocks from `source` until it returns false, computes `channels`
