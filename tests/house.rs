@@ -85,8 +85,7 @@ const KNOWN_CIRCLES: &[&str] = &[
     "cli: compare, diagnose, diagnose_text, friction, pages, validate",
     "diagnose: candidates, run, selection, uncertainty, unexplained",
     "identify: estimate, passes",
-    "simulate: cft, effects, plant, single_joint",
-    "simulate: order, serial_experiment",
+    "robot: cft, practice",
 ];
 
 #[test]
