@@ -40,11 +40,13 @@ pub struct Overall {
 }
 
 /// One reconstructed log.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Validation {
     pub joints: Vec<JointError>,
     pub overall: Overall,
+    #[serde(rename = "processing")]
     pub summary: Summary,
+    #[serde(skip)]
     pub traces: TorqueTraces,
 }
 

@@ -45,8 +45,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "report",
         &[
-            "log", "verdict", "number", "config", "motion", "friction", "inertia", "validate",
-            "inspect", "excite",
+            "math", "verdict", "number", "robot", "log", "config", "motion", "effect", "friction",
+            "inertia", "diagnose", "validate", "inspect", "excite", "compare", "identify",
         ],
     ),
     (

@@ -4,6 +4,10 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
+use crate::config::campaign::EstimatorKind;
 use crate::output::LogForm;
 
 /// Where a document goes: `-` is standard output.
@@ -110,6 +114,27 @@ fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
     match path.extension() {
         Some(found) if found.eq_ignore_ascii_case(ending) => Ok(path),
         _ => Err(format!("must end in .{ending}")),
+    }
+}
+
+impl ValueEnum for EstimatorKind {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Wls, Self::Ols, Self::Irls, Self::Iv, Self::Oe]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Self::Wls => "Rows weighted by each joint's noise, in two steps",
+            Self::Ols => "All rows alike",
+            Self::Irls => {
+                "Rows with large residuals count less: Huber's loss, then Tukey's bisquare"
+            }
+            Self::Iv => {
+                "Instrumental variables: the regressor along simulated positions, blind to their noise"
+            }
+            Self::Oe => "All parameters at once, the slopes of the friction law among them",
+        };
+        Some(PossibleValue::new(self.name()).help(help))
     }
 }
 

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use super::diagnose_fault as fault;
 use super::diagnose_text::text;
-use super::lsq::processing;
 use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pages};
 use crate::diagnose::{self, Candidate, Errors, LogRole};
 use crate::identify::{self, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, LoggedRobot};
@@ -176,7 +175,7 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
         "candidates": candidates,
         "set_aside": set_aside,
         "episodes": episodes,
-        "processing": processing(&found.held.summary),
+        "processing": found.held.summary,
     })
 }
 

@@ -5,10 +5,9 @@ use std::str::FromStr;
 
 use serde_json::{Value, json};
 
-use super::pages::{self, Look, held_for_pictures};
 use super::{
-    CliError, Context, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, friction,
-    logs_of, lsq, validate,
+    CliError, Context, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, logs_of,
+    names_of, pages, pictures, validate,
 };
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
@@ -18,7 +17,7 @@ use crate::identify::{
 use crate::log::LogSpec;
 use crate::output::write_whole;
 use crate::report::json::Document;
-use crate::report::summary;
+use crate::report::{Report, stages, summary};
 use crate::simulate::TruthFile;
 use crate::verdict::Verdict;
 
@@ -121,7 +120,7 @@ fn execute(
     let one_joint = logs(base, &roles.friction)?;
     let mut training = logs(base, &roles.identification)?;
     let unseen = logs(base, &roles.validation)?;
-    let title = names_of(&unseen);
+    let title = names_of(&unseen).join(", ");
     let role_logs = RoleLogs {
         friction: logs_of(&one_joint),
         identification: logs_of(&training),
@@ -177,28 +176,29 @@ fn execute(
     };
     let errors = match &validated {
         None => "no validation log: the errors on unseen data are not known\n".to_owned(),
-        Some(found) => validate::text(
-            &machine,
-            &found.validation,
-            &format!("torque on unseen data ({title})"),
-        ),
+        Some(found) => {
+            let mut report = Report::new("");
+            let caption = format!("torque on unseen data ({title})");
+            stages::validate::told(&mut report.terminal(), &found.validation, &caption);
+            report.text()
+        }
     };
     let latest = refined.as_ref().unwrap_or(&model);
     let parameters = parameters(latest, truth.as_ref());
-    let quality = lsq::quality(&machine, &dynamics);
+    let mut report = Report::new("");
+    stages::lsq::fit_quality(&mut report.terminal(), &dynamics);
+    let quality = report.text();
     let text = format!("{parameters}{quality}\n{errors}\n{lacking}");
     let truth_json = match &truth {
         None => Value::Null,
         Some(truth) => comparison(latest, truth),
     };
     let held = match diagnosed {
-        None if !unseen.is_empty() => held_for_pictures(&machine, &role_logs.validation, context)?,
+        None if !unseen.is_empty() => {
+            pictures::in_memory(&machine, &role_logs.validation, context)?
+        }
         _ => None,
     };
-    let look = held.as_ref().map(|held| {
-        let names = unseen.iter().map(LogSpec::name);
-        Look::new(&machine, held, names)
-    });
     let campaign_text = toml::to_string(campaign).unwrap_or_default();
     let page = pages::Identify {
         machine: &machine,
@@ -211,7 +211,7 @@ fn execute(
         validated: validated.as_ref(),
         diagnosed: diagnosed.as_deref(),
         fault: at_fault.as_ref(),
-        look: look.transpose()?,
+        look: pictures::look(&machine, held.as_ref(), &names_of(&unseen))?,
         unseen: &unseen,
         logs: one_joint.iter().chain(&training).chain(&unseen).collect(),
         truth: &|p| true_value(truth.as_ref(), p),
@@ -233,9 +233,9 @@ fn execute(
     write(folder, "summary.txt", &text, &mut files)?;
     files.push("result.json".into());
     let result = json!({
-        "friction": of_joints.map(|found| friction::json(&machine, found)),
-        "lsq": lsq::json(&machine, &dynamics),
-        "validate": validated.as_ref().map(|v| validate::json(&machine, &v.validation)),
+        "friction": of_joints,
+        "lsq": dynamics,
+        "validate": validated,
         "diagnose": diagnose_json,
         "truth": truth_json,
         "files": files,
@@ -254,11 +254,6 @@ fn execute(
     })
 }
 
-fn names_of(logs: &[LogSpec]) -> String {
-    let names: Vec<String> = logs.iter().map(LogSpec::name).collect();
-    names.join(", ")
-}
-
 /// Writes what a stage leaves; `unseen` names the validation logs.
 fn keep(
     end: StageEnd,
@@ -270,12 +265,12 @@ fn keep(
     match end {
         StageEnd::Friction(found, model) => {
             write(folder, "friction.toml", &model.to_toml()?, files)?;
-            let figure = friction::figure(machine, found).svg();
+            let figure = stages::friction::figure(machine, found).svg();
             write(folder, "friction.svg", &figure, files)
         }
         StageEnd::Dynamics(_, model) => write(folder, "model.toml", &model.to_toml()?, files),
         StageEnd::Validated(found) => {
-            let figure = validate::figure(machine, &found.validation, unseen).svg();
+            let figure = stages::validate::figure(&found.validation, unseen).svg();
             write(folder, "validation.svg", &figure, files)
         }
         StageEnd::Refined(model) => write(folder, "refined.toml", &model.to_toml()?, files),

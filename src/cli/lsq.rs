@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-pub use super::fitted::{json, processing, quality, text};
-use super::pages::{self, Look, held_for_pictures};
-use super::{CliError, Context, Outcome, arguments, files, logs_of};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
 use crate::config::campaign::EstimatorKind;
 use crate::identify::{self, LoggedRobot, LsqSettings, refined};
 use crate::log::LogSpec;
 use crate::report::json::Document;
+use crate::report::stages;
 
 const EXAMPLE: &str = "\
 Example:
@@ -80,36 +79,40 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let logs = logs_of(&args.logs);
     let found = identify::lsq(&machine, &logs, &settings, context.control())?;
     let model = found.model(&machine, known.map(|k| k.1));
-    let document = Document::new(
-        "lsq",
-        &found.inputs,
-        &found.warnings,
-        &json(&machine, &found),
-    )?;
-    let mut text = text(&machine, &found);
+    let document = Document::new("lsq", &found.inputs, &found.warnings, &found)?;
+    let names = names_of(&args.logs);
+    let of = stages::lsq::Lsq {
+        machine: &machine,
+        found: &found,
+        file: &model,
+        logs: &names,
+    };
+    let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let held = held_for_pictures(&machine, &logs, context)?;
-        let held = held.as_ref();
-        let page = pages::Lsq {
-            machine: &machine,
-            found: &found,
-            file: &model,
-            model: &refined(&model, &args.output.to_string_lossy())?,
-            logs: &args.logs,
-            given,
-            look: held
-                .map(|held| Look::new(&machine, held, args.logs.iter().map(LogSpec::name)))
-                .transpose()?,
-        };
-        let page = pages::lsq(&page, context)?;
+        let held = pictures::in_memory(&machine, &logs, context)?;
+        let look = pictures::look(&machine, held.as_ref(), &names)?;
+        let numbers = refined(&model, &args.output.to_string_lossy())?;
+        let quality = pictures::inspected(&args.logs, &machine, context)?;
+        stages::lsq::pictures(
+            &mut report.page(),
+            &of,
+            &numbers,
+            look.as_ref(),
+            &given,
+            &quality,
+            context.command(),
+        )
+        .map_err(CliError::input)?;
         context.check()?;
-        super::outputs::write_text(path, &page)?;
+        outputs::write_text(path, &report.html())?;
     }
     context.check()?;
-    super::outputs::write_text(&args.output, &model.to_toml()?)?;
-    text += &format!("written: {}\n", args.output.display());
+    outputs::write_text(&args.output, &model.to_toml()?)?;
+    report
+        .terminal()
+        .line(&format!("written: {}", args.output.display()));
     Ok(Outcome {
-        text,
+        text: report.text(),
         document,
         missed: Vec::new(),
     })

@@ -28,14 +28,12 @@ mod arguments;
 mod columns;
 mod context;
 mod error;
-mod estimate;
 mod exit;
-mod feasible;
 mod files;
-mod fitted;
 mod outcome;
 mod outputs;
 mod pages;
+mod pictures;
 mod typed;
 
 use std::ffi::OsString;
@@ -57,6 +55,11 @@ pub use context::{Context, Progress};
 pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;
+
+/// Names of logs, as they are told.
+fn names_of(specs: &[LogSpec]) -> Vec<String> {
+    specs.iter().map(LogSpec::name).collect()
+}
 
 /// Files as logs of the library.
 fn logs_of(specs: &[LogSpec]) -> Vec<Log> {

@@ -2,19 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
-
-use super::lsq::processing;
-use super::pages::{self, Look, held_for_pictures};
-use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
 use crate::identify::{self, LoggedRobot, refined};
 use crate::log::LogSpec;
 use crate::number;
 use crate::output::LogWriter;
-use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::json::Document;
-use crate::report::summary;
-use crate::report::table::{hanging, unbroken};
+use crate::report::stages;
 use crate::validate::{Reconstructed, Validation};
 
 const EXAMPLE: &str = "\
@@ -46,102 +40,6 @@ pub struct Args {
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
-}
-
-/// The JSON fields of the command.
-pub fn json(machine: &LoggedRobot, validation: &Validation) -> Value {
-    let joints: Vec<Value> = validation
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(j, e)| {
-            let mut joint = json!(e);
-            joint["unit"] = machine.file.torque_unit(j).into();
-            joint
-        })
-        .collect();
-    json!({
-        "joints": joints,
-        "overall": validation.overall,
-        "processing": processing(&validation.summary),
-    })
-}
-
-/// The table for a person.
-pub fn text(machine: &LoggedRobot, validation: &Validation, caption: &str) -> String {
-    let rows: Vec<summary::TorqueError> = validation
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(j, e)| summary::TorqueError {
-            joint: &e.joint,
-            unit: machine.file.torque_unit(j),
-            relative_error: e.relative_error,
-            rmse: e.rmse,
-            max_abs: e.max_abs,
-            r2: e.r2,
-            samples: e.samples,
-        })
-        .collect();
-    let raw: Vec<String> = validation
-        .joints
-        .iter()
-        .map(|e| {
-            unbroken(&format!(
-                "{} {}",
-                e.joint,
-                number::percent(e.relative_error_raw)
-            ))
-        })
-        .collect();
-    let overall = format!(
-        "over joints {}; before the parallel filter: {}",
-        number::percent(validation.overall.mean_relative_error),
-        raw.join(", ")
-    );
-    format!(
-        "{}\n{}",
-        summary::torque_errors(caption, &rows),
-        hanging("", &overall, 2)
-    )
-}
-
-/// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
-pub fn figure(machine: &LoggedRobot, validation: &Validation, title: &str) -> TorqueFigure {
-    let traces = &validation.traces;
-    let n = validation.joints.len();
-    let joints = validation
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(j, e)| {
-            let mut joint = JointTorque {
-                joint: e.joint.clone(),
-                unit: machine.file.torque_unit(j).to_owned(),
-                t: Vec::with_capacity(traces.t.len()),
-                measured: Vec::with_capacity(traces.t.len()),
-                reconstructed: Vec::with_capacity(traces.t.len()),
-                relative_error: e.relative_error,
-                rmse: e.rmse,
-            };
-            for (k, t) in traces.t.iter().enumerate() {
-                if k > 0 && traces.breaks.contains(&k) {
-                    // a row that is not finite parts the lines at a gap
-                    joint.t.push(*t);
-                    joint.measured.push(f64::NAN);
-                    joint.reconstructed.push(f64::NAN);
-                }
-                joint.t.push(*t);
-                joint.measured.push(traces.measured[k * n + j]);
-                joint.reconstructed.push(traces.reconstructed[k * n + j]);
-            }
-            joint
-        })
-        .collect();
-    TorqueFigure {
-        title: title.to_owned(),
-        joints,
-    }
 }
 
 /// Joints that miss a limit on the relative error.
@@ -223,58 +121,40 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(error) = failed {
         return Err(error.into());
     }
-    let validation = &found.validation;
-    let title = args
-        .logs
-        .iter()
-        .map(LogSpec::name)
-        .collect::<Vec<_>>()
-        .join(", ");
-    let document = Document::new(
-        "validate",
-        &found.inputs,
-        &found.warnings,
-        &json(&machine, validation),
-    )?;
-    let text = text(
-        &machine,
-        validation,
-        &format!("torque of {title} by {name}"),
-    );
-    let page = match &args.report {
-        None => None,
-        Some(path) => {
-            let held = held_for_pictures(&machine, &logs, context)?;
-            let held = held.as_ref();
-            let look = held
-                .map(|held| Look::new(&machine, held, args.logs.iter().map(LogSpec::name)))
-                .transpose()?;
-            let of = pages::Validate {
-                machine: &machine,
-                file: &file,
-                model: &model,
-                logs: &args.logs,
-                found: &found,
-                limit: args.max_relative_error,
-                given: given.provenance,
-                look,
-            };
-            Some((path, pages::validate(&of, context)?))
-        }
+    let names = names_of(&args.logs);
+    let document = Document::new("validate", &found.inputs, &found.warnings, &found)?;
+    let of = stages::validate::Validate {
+        machine: &machine,
+        file: &file,
+        model: &model,
+        logs: &names,
+        found: &found,
+        limit: args.max_relative_error,
+        given: &given.provenance,
     };
+    let mut report = stages::validate::validate(&of);
+    if args.report.is_some() {
+        let held = pictures::in_memory(&machine, &logs, context)?;
+        let look = pictures::look(&machine, held.as_ref(), &names)?;
+        let quality = pictures::inspected(&args.logs, &machine, context)?;
+        let mut page = report.page();
+        stages::validate::pictures(&mut page, &of, look.as_ref(), &quality, context.command())
+            .map_err(CliError::input)?;
+    }
     context.check()?;
-    if let Some((path, page)) = &page {
-        outputs::write_text(path, page)?;
+    if let Some(path) = &args.report {
+        outputs::write_text(path, &report.html())?;
     }
     for path in &args.plot {
-        outputs::write_picture(path, &figure(&machine, validation, &title).svg())?;
+        let figure = stages::validate::figure(&found.validation, &names.join(", "));
+        outputs::write_picture(path, &figure.svg())?;
     }
     if let Some(file) = residual {
         file.commit()?;
     }
     Ok(Outcome {
-        text,
+        text: report.text(),
         document,
-        missed: missed(validation, args.max_relative_error),
+        missed: missed(&found.validation, args.max_relative_error),
     })
 }

@@ -85,34 +85,51 @@ impl Nis {
 }
 
 /// Friction of one joint with all that belongs to it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JointEstimate {
+    /// How the search ended.
+    pub ending: Ending,
+    /// Starting points of the search.
+    pub starts: usize,
     /// The law at the maximum of the likelihood.
+    #[serde(skip)]
     pub law: DoubleTanh,
     /// Bv, Bf1, Bf2, w1, w2 with verdicts; a slope with a bound holds the bound.
+    #[serde(skip)]
     pub values: [EstimatedValue; FRICTION],
     /// Covariance of the five parameters in SI units.
+    #[serde(skip)]
     pub covariance: [[f64; FRICTION]; FRICTION],
+    /// What was estimated along, and is no friction.
     pub nuisance: Vec<Nuisance>,
+    #[serde(flatten)]
     pub speeds: Speeds,
+    /// The law over the speeds covered: 50 equal steps in each direction.
     pub curve: Vec<FrictionCurvePoint>,
+    /// Mean torques at constant speed, which took no part in the fit.
     pub plateaus: Vec<Plateau>,
     pub nis: Nis,
-    /// Torque residual along the measured motion [N or Nm], and relative to the torque.
-    pub rmse: f64,
-    pub relative_error: f64,
-    pub samples: usize,
-    pub starts: usize,
-    pub ending: Ending,
+    pub noise: FilterNoise,
     /// Factor by which coloured innovations widened the covariance.
     pub widening: f64,
-    /// Standard deviation of the torque noise that the filter settled on [N or Nm].
-    pub torque_noise: f64,
-    /// Factor on the encoder's variance that it settled on.
-    pub position_factor: f64,
+    /// Torque residual along the measured motion [N or Nm].
+    pub rmse: f64,
+    /// The same relative to the torque.
+    pub relative_error: f64,
+    pub samples: usize,
     /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where they came in
     /// as the position filter leaves them.
+    #[serde(skip)]
     pub cutoffs: Vec<f64>,
+}
+
+/// Noise levels that the filter settled on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct FilterNoise {
+    /// Standard deviation of the torque noise [N or Nm].
+    pub torque_std: f64,
+    /// Factor on the encoder's variance.
+    pub position_variance_factor: f64,
 }
 
 /// Points of the curve in each direction.
@@ -282,8 +299,10 @@ fn assemble(
         starts: maximum.starts,
         ending: maximum.ending,
         widening: maximum.widening,
-        torque_noise: maximum.noise.torque,
-        position_factor: maximum.noise.position_factor,
+        noise: FilterNoise {
+            torque_std: maximum.noise.torque,
+            position_variance_factor: maximum.noise.position_factor,
+        },
         cutoffs: Vec::new(),
     }
 }
@@ -452,7 +471,7 @@ mod tests {
         );
         assert!(e.nis.consistent(), "{:?}", e.nis);
         assert!((0.95..1.05).contains(&e.nis.per_sample), "{:?}", e.nis);
-        assert!((e.torque_noise / trial.noise - 1.0).abs() < 0.3);
+        assert!((e.noise.torque_std / trial.noise - 1.0).abs() < 0.3);
     }
 
     #[test]

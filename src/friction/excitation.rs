@@ -1,5 +1,8 @@
 //! Which joint a log moves, and whether its motion can show friction at all.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::prepare::{SmoothedMotion, rms};
 
 /// Why a log cannot give a joint's friction. Each message says what motion is missing.
@@ -93,9 +96,10 @@ pub fn moving_joint(
 }
 
 /// Speeds that the moving joint reached.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Speeds {
     /// Smallest and largest speed with data in either direction [1/s].
+    #[serde(rename = "speeds_covered")]
     pub covered: [f64; 2],
 }
 

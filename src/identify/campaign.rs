@@ -87,7 +87,7 @@ pub fn identify<E: From<IdentifyError>>(
         some => {
             let found = friction(machine, some, &FrictionSettings::default(), control)?;
             let mut model = new_model(machine, "identify", &found.inputs);
-            found.write_into(machine, &mut model);
+            found.write_into(&mut model);
             ended(StageEnd::Friction(&found, &model))?;
             keep(&found.inputs, &found.warnings);
             Some((found, model))

@@ -1,25 +1,65 @@
 //! Physically consistent links: parameters of bodies that can exist, and by how much the fit suffers.
 
-use std::collections::BTreeMap;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::error::IdentifyError;
 use super::estimate::Estimated;
 use super::logged_robot::LoggedRobot;
+use super::residual::RelativeError;
 use crate::config::ModelFile;
 use crate::config::model_file::LinkBody;
-use crate::inertia::feasible::{ConsistencyProblem, Feasible, feasible};
+use crate::inertia::feasible::{ConsistencyProblem, PRIOR_WEIGHT, feasible};
 use crate::inertia::solve::{factor, residual_of, weights_of};
 use crate::math::descent::Ending;
-use crate::robot::bodies::StandardMap;
-use crate::robot::standard::{Body, pseudo_inertia};
+use crate::robot::standard::{Body, STANDARD, pseudo_inertia};
 
 /// Physically consistent links, and what they cost.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ConsistentLinks {
-    pub map: StandardMap,
-    pub found: Feasible,
-    /// Relative residual per joint of the free fit and of the feasible one.
-    pub before: Vec<f64>,
-    pub after: Vec<f64>,
+    pub links: Vec<ConsistentLink>,
+    pub drives: Vec<DriveInertia>,
+    /// Residual of the free fit.
+    pub relative_error_before: Vec<RelativeError>,
+    /// Residual of the consistent one.
+    pub relative_error_after: Vec<RelativeError>,
+    /// Weight of the prior beside the rows.
+    pub prior_weight: f64,
+    pub iterations: usize,
+    pub status: Ending,
+}
+
+/// A link that can exist.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ConsistentLink {
+    pub name: String,
+    /// \[kg\]
+    pub mass: f64,
+    /// Centre of gravity in the link's frame \[m\].
+    pub centre: [f64; 3],
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
+    pub inertia: [f64; 6],
+    /// Of the pseudo-inertia; positive for a body that can exist.
+    pub smallest_eigenvalue: f64,
+    pub prior: LinkPrior,
+}
+
+/// What fills in where torques tell nothing of a link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LinkPrior {
+    /// Its `inertial` in the robot file.
+    RobotFile,
+    /// A plain body of 2 kg.
+    PlainBody,
+}
+
+/// Inertia of a drive at its joint.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct DriveInertia {
+    pub joint: String,
+    /// \[kg m^2 or kg\]
+    pub inertia: f64,
 }
 
 /// Puts the feasible parameters that are nearest in torque in place of the free ones. The
@@ -63,75 +103,70 @@ pub(super) fn consistent(
         fit.relative_error[j] *= growth;
     }
     fit.theta = &found.theta + &basis.shift;
+    let links = map.links.iter().zip(&found.links).zip(&found.given);
+    let link = |((name, s), given): ((&String, &[f64; STANDARD]), &bool)| {
+        let body = Body::of(s);
+        ConsistentLink {
+            name: name.clone(),
+            mass: body.mass,
+            centre: body.centre,
+            inertia: body.inertia,
+            smallest_eigenvalue: pseudo_inertia(s).symmetric_eigenvalues().min(),
+            prior: match given {
+                true => LinkPrior::RobotFile,
+                false => LinkPrior::PlainBody,
+            },
+        }
+    };
+    let joints = machine.robot.joint_names();
+    let drives = map.drives.iter().zip(&found.drives);
+    let drive = |(j, inertia): (&usize, &f64)| DriveInertia {
+        joint: joints.get(*j).cloned().unwrap_or_default(),
+        inertia: *inertia,
+    };
     Ok(ConsistentLinks {
-        map,
-        found,
-        before,
-        after: fit.relative_error.clone(),
+        links: links.map(link).collect(),
+        drives: drives.map(drive).collect(),
+        relative_error_before: RelativeError::each(machine, &before),
+        relative_error_after: RelativeError::each(machine, &fit.relative_error),
+        prior_weight: PRIOR_WEIGHT,
+        iterations: found.iterations,
+        status: found.ending,
     })
 }
 
 impl ConsistentLinks {
-    /// Name of a joint.
-    pub fn joint(machine: &LoggedRobot, j: usize) -> &str {
-        machine
-            .robot
-            .joint_names()
-            .get(j)
-            .map_or("", String::as_str)
-    }
-
-    /// Names of the drives with their inertias.
-    pub fn drives<'a>(
-        &'a self,
-        machine: &'a LoggedRobot,
-    ) -> impl Iterator<Item = (&'a str, f64)> + 'a {
-        let drives = self.map.drives.iter().zip(&self.found.drives);
-        drives.map(|(j, inertia)| (Self::joint(machine, *j), *inertia))
-    }
-
-    /// Name, body and smallest eigenvalue of the pseudo-inertia of every link.
-    pub fn bodies(&self) -> impl Iterator<Item = (&String, Body, f64)> + '_ {
-        self.map
-            .links
-            .iter()
-            .zip(&self.found.links)
-            .map(|(name, s)| {
-                let least = pseudo_inertia(s).symmetric_eigenvalues().min();
-                (name, Body::of(s), least)
-            })
-    }
-
     /// What did not come as it should, as warnings.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let given = self.links.iter();
+        let given = given.filter(|l| l.prior == LinkPrior::RobotFile).count();
         let mut out = vec![format!(
             "parameters are those of links that can exist; standard deviations are those of the free fit, and what torques do not tell of the links is filled by {}",
-            match self.found.given.iter().filter(|g| **g).count() {
+            match given {
                 0 => "a plain body each (2 kg, radius of gyration 0.1 m)".to_owned(),
-                n if n == self.found.given.len() => "the robot file's `inertial`".to_owned(),
+                n if n == self.links.len() => "the robot file's `inertial`".to_owned(),
                 n => format!(
                     "the robot file's `inertial` of {n} links and a plain body for the others"
                 ),
             }
         )];
-        if self.found.ending == Ending::IterationLimit {
+        if self.status == Ending::IterationLimit {
             out.push("the search for feasible links did not settle; its last result stands".into());
         }
         out
     }
 
     /// Writes the links into a model.
-    pub(super) fn write_into(&self, machine: &LoggedRobot, model: &mut ModelFile) {
-        model.links = self
-            .bodies()
-            .map(|(name, body, _)| LinkBody {
-                name: name.clone(),
-                mass: body.mass,
-                centre: body.centre,
-                inertia: body.inertia,
-            })
-            .collect();
-        let drives = self.drives(machine).map(|(joint, x)| (joint.to_owned(), x));
-        model.drive_inertia = drives.collect::<BTreeMap<_, _>>();
+    pub(super) fn write_into(&self, model: &mut ModelFile) {
+        let body = |link: &ConsistentLink| LinkBody {
+            name: link.name.clone(),
+            mass: link.mass,
+            centre: link.centre,
+            inertia: link.inertia,
+        };
+        model.links = self.links.iter().map(body).collect();
+        let drives = self.drives.iter();
+        let drives = drives.map(|drive| (drive.joint.clone(), drive.inertia));
+        model.drive_inertia = drives.collect();
     }
 }

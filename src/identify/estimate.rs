@@ -1,9 +1,11 @@
 //! The estimators of `lsq` on logs that are read once per pass.
 
 use nalgebra::DVector;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::error::IdentifyError;
-use super::logged_robot::narrowed;
+use super::logged_robot::{LoggedRobot, narrowed};
 use super::passes::Passes;
 use crate::config::campaign::EstimatorKind;
 use crate::inertia::accumulate::BlockFactors;
@@ -20,29 +22,55 @@ use crate::math::descent::Ending;
 use crate::motion::FilterSettings;
 
 /// What an estimator says of its own work.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Account {
+    #[serde(rename = "name")]
     pub estimator: EstimatorKind,
     /// The estimator that was asked for cannot do without the refinement of the friction law.
     pub law_refined: bool,
     pub status: Ending,
     /// Passes over the logs; 1 for least squares.
     pub iterations: usize,
-    /// Per joint: scale of the residual [N or Nm] and share of rows of less than half weight.
-    pub down_weighted: Option<Vec<(f64, f64)>>,
-    /// Relative residual per joint before a refinement.
-    pub before: Option<Vec<f64>>,
+    /// Joint by joint; nothing for least squares.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<JointAccount>,
     /// The loop that was simulated.
+    #[serde(flatten)]
     pub simulated: Option<Simulated>,
 }
 
+/// The same of one joint, as far as the estimator has it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct JointAccount {
+    pub joint: String,
+    /// Scale of the residual [N or Nm].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// Share of the rows of less than half weight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub down_weighted: Option<f64>,
+    /// Gain on the position in the loop that was simulated [N/m or Nm/rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional: Option<f64>,
+    /// Gain on the velocity [N s/m or Nm s/rad].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derivative: Option<f64>,
+    /// Relative residual before a refinement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error_before: Option<f64>,
+}
+
 /// The loop by which instruments were simulated.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Simulated {
-    pub gains: Gains,
+    /// Where the reference comes from.
     pub reference: ReferenceSource,
+    /// Natural frequency [rad/s].
+    pub loop_frequency: f64,
     /// Share of the steps at which the simulation failed a joint.
-    pub indefinite: f64,
+    pub failed_steps_share: f64,
+    #[serde(skip)]
+    pub gains: Gains,
 }
 
 impl Account {
@@ -52,10 +80,20 @@ impl Account {
             law_refined: false,
             status: Ending::Converged,
             iterations: 1,
-            down_weighted: None,
-            before: None,
+            joints: Vec::new(),
             simulated: None,
         }
+    }
+
+    /// Says something of every joint.
+    fn tell(&mut self, machine: &LoggedRobot, of: impl Fn(usize) -> JointAccount) {
+        let names = machine.robot.joint_names().iter().enumerate();
+        self.joints = names
+            .map(|(j, joint)| JointAccount {
+                joint: joint.clone(),
+                ..of(j)
+            })
+            .collect();
     }
 }
 
@@ -179,7 +217,10 @@ fn refined(
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
     account.status = refined.ending;
     account.iterations = refined.iterations;
-    account.before = Some(refined.before.clone());
+    account.tell(passes.machine, |j| JointAccount {
+        relative_error_before: Some(refined.before[j]),
+        ..JointAccount::default()
+    });
     let sums = refined.factors.in_one_block();
     Ok((
         refined.fit.clone(),
@@ -207,7 +248,11 @@ fn robust_regression(
     } = robust::irls(&mut |weigher| passes.read(settings, columns, weigher))?;
     account.status = status;
     account.iterations = iterations;
-    account.down_weighted = Some(scale.into_iter().zip(down_weighted).collect());
+    account.tell(passes.machine, |j| JointAccount {
+        scale: Some(scale[j]),
+        down_weighted: Some(down_weighted[j]),
+        ..JointAccount::default()
+    });
     Ok((fit, sums.in_one_block(), Solver::Robust(Box::new(weigher))))
 }
 
@@ -235,6 +280,13 @@ fn instrumental(
         account.simulated = Some(simulated);
         Ok::<_, IdentifyError>(sums)
     })?;
+    if let Some(Simulated { gains, .. }) = account.simulated.clone() {
+        account.tell(passes.machine, |j| JointAccount {
+            proportional: gains.proportional.get(j).copied(),
+            derivative: gains.derivative.get(j).copied(),
+            ..JointAccount::default()
+        });
+    }
     account.status = status;
     account.iterations = iterations;
     let solver = Solver::Instrumental(Box::new((fit.clone(), simulate_by)));

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
@@ -31,11 +33,94 @@ pub struct FrictionSettings {
 }
 
 /// Friction of every joint that the logs move.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct IdentifiedFriction {
-    /// Joint index and estimate, in joint order.
-    pub joints: Vec<(usize, JointEstimate)>,
+    /// In joint order.
+    pub joints: Vec<FrictionOfJoint>,
+    #[serde(skip)]
     pub inputs: Vec<Provenance>,
+    #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+/// Friction of one joint.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct FrictionOfJoint {
+    pub joint: String,
+    /// Place of the joint in the robot.
+    #[serde(skip)]
+    pub index: usize,
+    pub converged: bool,
+    pub parameters: LawParameters,
+    #[serde(flatten)]
+    pub estimate: JointEstimate,
+}
+
+/// Parameters of the double-tanh law (18); slope_1 is the steeper one.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LawParameters {
+    pub viscous: LawParameter,
+    pub coulomb_1: LawParameter,
+    pub coulomb_2: LawParameter,
+    pub slope_1: LawParameter,
+    pub slope_2: LawParameter,
+}
+
+/// One parameter of a law.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LawParameter {
+    /// Estimate \[unit\]; a lower bound where the verdict says so, null where nothing determines it.
+    pub value: Option<f64>,
+    /// Its standard deviation \[unit\].
+    pub std: Option<f64>,
+    pub unit: String,
+    /// Number in the report's Table 4, where it has one.
+    pub theta: Option<u32>,
+    pub verdict: Verdict,
+}
+
+impl LawParameters {
+    /// Names and parameters, in the order of the law.
+    pub fn each(&self) -> [(&'static str, &LawParameter); 5] {
+        let all = [
+            &self.viscous,
+            &self.coulomb_1,
+            &self.coulomb_2,
+            &self.slope_1,
+            &self.slope_2,
+        ];
+        std::array::from_fn(|k| (DoubleTanh::NAMES[k], all[k]))
+    }
+}
+
+impl FrictionOfJoint {
+    fn of(machine: &LoggedRobot, index: usize, estimate: JointEstimate) -> Self {
+        let parameter = |k: usize| {
+            let v = &estimate.values[k];
+            let known = v.verdict != Verdict::NotIdentifiable;
+            let (name, torque) = (DoubleTanh::NAMES[k], machine.file.torque_unit(index));
+            LawParameter {
+                value: known.then_some(v.value),
+                std: known.then_some(v.std),
+                unit: friction_unit(&machine.robot, index, name, torque),
+                theta: machine.robot.friction_theta(index, k),
+                verdict: v.verdict,
+            }
+        };
+        FrictionOfJoint {
+            joint: machine.robot.joint_names()[index].clone(),
+            index,
+            converged: estimate.ending == Ending::Converged,
+            parameters: LawParameters {
+                viscous: parameter(0),
+                coulomb_1: parameter(1),
+                coulomb_2: parameter(2),
+                slope_1: parameter(3),
+                slope_2: parameter(4),
+            },
+            estimate,
+        }
+    }
 }
 
 /// Estimates the friction from one-joint logs; several logs of one joint are used together.
@@ -48,25 +133,23 @@ pub fn friction(
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
-    let names = machine.robot.joint_names();
     let (groups, inputs, mut warnings) = by_joint(machine, logs, settings, control)?;
     let work = control.begin("friction filter", Some(groups.len() as u64));
     let parameters = machine.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();
     // joints do not know of one another: they run in parallel, and are collected in joint order
-    let found: Vec<Result<(usize, JointEstimate), IdentifyError>> = groups
+    let found: Vec<Result<FrictionOfJoint, IdentifyError>> = groups
         .into_par_iter()
         .map(|(j, group)| {
             control.check()?;
             let estimate = one_joint(machine, j, &group, &parameter_names)?;
             work.advance(1);
-            Ok((j, estimate))
+            Ok(FrictionOfJoint::of(machine, j, estimate))
         })
         .collect();
     let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
     control.check()?;
-    let of_joints = joints.iter();
-    warnings.extend(of_joints.flat_map(|(j, e)| joint_warnings(&names[*j], e)));
+    warnings.extend(joints.iter().flat_map(joint_warnings));
     Ok(IdentifiedFriction {
         joints,
         inputs,
@@ -195,7 +278,8 @@ fn start_of(machine: &LoggedRobot, joint: &str) -> Option<DoubleTanh> {
 }
 
 /// What a reader of the estimate should know.
-fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
+fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
+    let (joint, e) = (&found.joint, &found.estimate);
     let mut out = Vec::new();
     if e.ending != Ending::Converged {
         out.push(format!(
@@ -243,43 +327,41 @@ fn joint_warnings(joint: &str, e: &JointEstimate) -> Vec<String> {
 
 /// The parameters of one joint as a model file holds them. A slope with a bound keeps the value of
 /// highest likelihood, which the torque is computed with; its meaning names the bound.
-fn file_parameters(machine: &LoggedRobot, j: usize, e: &JointEstimate) -> Vec<Parameter> {
-    let joint = &machine.robot.joint_names()[j];
-    let torque_unit = machine.file.torque_unit(j);
+fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
+    let e = &found.estimate;
     let law = e.law.parameters();
-    (0..5)
-        .map(|k| {
-            let name = DoubleTanh::NAMES[k];
-            let v = &e.values[k];
-            let mut meaning = friction_meaning(name).to_owned();
-            if v.verdict == Verdict::LowerBound {
-                meaning += &format!("; only known to be above {:e} (95 %)", v.value);
-            }
-            Parameter {
-                name: name.to_owned(),
-                theta: machine.robot.friction_theta(j, k),
-                joint: Some(joint.clone()),
-                value: law[k],
-                std: (v.std.is_finite()).then_some(v.std),
-                unit: friction_unit(&machine.robot, j, name, torque_unit),
-                meaning,
-                verdict: Some(v.verdict),
-            }
-        })
-        .collect()
+    let each = found.parameters.each().into_iter().enumerate();
+    each.map(|(k, (name, p))| {
+        let v = &e.values[k];
+        let mut meaning = friction_meaning(name).to_owned();
+        if v.verdict == Verdict::LowerBound {
+            meaning += &format!("; only known to be above {:e} (95 %)", v.value);
+        }
+        Parameter {
+            name: name.to_owned(),
+            theta: p.theta,
+            joint: Some(found.joint.clone()),
+            value: law[k],
+            std: v.std.is_finite().then_some(v.std),
+            unit: p.unit.clone(),
+            meaning,
+            verdict: Some(v.verdict),
+        }
+    })
+    .collect()
 }
 
 impl IdentifiedFriction {
     /// Writes the estimates into a model, in place of what it has of these joints.
-    pub fn write_into(&self, machine: &LoggedRobot, model: &mut ModelFile) {
-        for (j, e) in &self.joints {
-            let joint = &machine.robot.joint_names()[*j];
-            model.replace_joint(joint, file_parameters(machine, *j, e));
+    pub fn write_into(&self, model: &mut ModelFile) {
+        for found in &self.joints {
+            let joint = &found.joint;
+            model.replace_joint(joint, file_parameters(found));
             let keys: Vec<String> = DoubleTanh::NAMES
                 .iter()
                 .map(|n| format!("{n}:{joint}"))
                 .collect();
-            model.replace_covariance(&keys, &|a, b| e.covariance[a][b]);
+            model.replace_covariance(&keys, &|a, b| found.estimate.covariance[a][b]);
         }
     }
 }

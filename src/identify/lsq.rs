@@ -1,5 +1,8 @@
 //! The inertial parameters by linear least squares, and friction with them where it is not known.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::consistent::{ConsistentLinks, consistent};
 use super::control::Control;
 use super::error::IdentifyError;
@@ -8,6 +11,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::new_model;
 use super::passes::Passes;
+use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
@@ -16,7 +20,7 @@ use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::essential::{Essential, essential};
 use crate::inertia::instruments::ReferenceSource;
-use crate::inertia::solve::{Confounded, Fit, factor, residual_of, weights_of};
+use crate::inertia::solve::{ConditionNumbers, Confounded, Fit, factor, residual_of, weights_of};
 use crate::log::Provenance;
 use crate::math::descent::Ending;
 use crate::motion::Summary;
@@ -37,21 +41,44 @@ pub struct LsqSettings<'a> {
 }
 
 /// What `lsq` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct IdentifiedDynamics {
-    pub columns: RegressorColumns,
-    pub fit: Fit,
-    /// What the estimator did.
-    pub account: Account,
-    /// Physically consistent links, where they were asked for.
-    pub physical: Option<ConsistentLinks>,
-    /// Which unknowns the data are really about.
-    pub essential: Essential,
-    /// Relative residual per joint with those alone.
-    pub essential_error: Vec<f64>,
+    #[serde(rename = "parameters")]
     pub unknowns: Vec<Unknown>,
+    pub essential: EssentialFit,
+    /// Physically consistent links, where they were asked for.
+    #[serde(rename = "feasible")]
+    pub consistent: Option<ConsistentLinks>,
+    pub condition: ConditionNumbers,
+    /// Directions of the parameters that the rows tell of.
+    pub rank: usize,
+    /// Rows of all joints.
+    pub samples: u64,
+    /// Independent rows that they are worth, of all joints.
+    pub effective_samples: f64,
+    /// Residual of the fit.
+    pub joints: Vec<JointResidual>,
+    #[serde(rename = "estimator")]
+    pub account: Account,
+    #[serde(rename = "processing")]
     pub summary: Summary,
+    #[serde(skip)]
+    pub columns: RegressorColumns,
+    #[serde(skip)]
+    pub fit: Fit,
+    #[serde(skip)]
     pub inputs: Vec<Provenance>,
+    #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+/// The unknowns that the data are really about.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct EssentialFit {
+    /// How many they are.
+    pub count: usize,
+    /// Residual of the fit with those alone.
+    pub joints: Vec<RelativeError>,
 }
 
 /// Fits the inertial parameters.
@@ -80,7 +107,7 @@ pub fn lsq(
     let linear = columns(machine, friction)?;
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
     let (essential, essential_error) = essentials(&estimated)?;
-    let physical = match settings.consistent {
+    let consistent = match settings.consistent {
         true => Some(consistent(machine, &mut estimated)?),
         false => None,
     };
@@ -90,7 +117,7 @@ pub fn lsq(
         account,
         ..
     } = estimated;
-    let mut warnings: Vec<String> = physical
+    let mut warnings: Vec<String> = consistent
         .iter()
         .flat_map(ConsistentLinks::warnings)
         .collect();
@@ -101,7 +128,7 @@ pub fn lsq(
     warnings.append(&mut passes.warnings);
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
     let inputs = std::mem::take(&mut passes.inputs);
-    let unknowns = unknowns(machine, &columns, &fit);
+    let unknowns = unknowns(machine, &columns, &fit, &essential);
     warnings.extend(confounded(&fit, &unknowns));
     if unknowns
         .iter()
@@ -109,13 +136,27 @@ pub fn lsq(
     {
         return Err(IdentifyError::NothingDetermined);
     }
+    let names = machine.robot.joint_names().iter().enumerate();
+    let joints = names.map(|(j, joint)| JointResidual {
+        joint: joint.clone(),
+        unit: machine.file.torque_unit(j),
+        rmse: fit.residual_std[j],
+        relative_error: fit.relative_error[j],
+    });
     Ok(IdentifiedDynamics {
+        essential: EssentialFit {
+            count: essential.essential.iter().filter(|e| **e).count(),
+            joints: RelativeError::each(machine, &essential_error),
+        },
+        condition: fit.condition,
+        rank: fit.rank,
+        samples: fit.rows * machine.robot.joints() as u64,
+        effective_samples: fit.effective_rows * machine.robot.joints() as f64,
+        joints: joints.collect(),
         columns,
         fit,
         account,
-        physical,
-        essential,
-        essential_error,
+        consistent,
         unknowns,
         summary,
         inputs,
@@ -145,10 +186,10 @@ impl Account {
             if simulated.reference == ReferenceSource::Smoothed {
                 out.push("iv: no log channel is named as the reference, so the measured position, smoothed to half the cut-off, stands for it; a part of its noise stays in the instruments. Name the channel: `reference = \"COLUMN\"` in [log.joint.NAME]".to_owned());
             }
-            if simulated.indefinite > 0.0 {
+            if simulated.failed_steps_share > 0.0 {
                 out.push(format!(
                     "iv: at {} of the simulated steps the motion could not be computed or went astray, and joints were moved by themselves or put back; instruments are poorer for it",
-                    number::percent(simulated.indefinite)
+                    number::percent(simulated.failed_steps_share)
                 ));
             }
         }
@@ -167,9 +208,9 @@ impl Account {
 fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
     let sentence = |c: &Confounded| {
         let most = || c.terms.iter().take(6);
-        let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].name.as_str()).collect();
+        let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].key.as_str()).collect();
         let words: Vec<String> = most()
-            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].name))
+            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].key))
             .collect();
         format!(
             "these data cannot tell apart what {} share: their combination {} (columns scaled to norm 1) changes nothing",
@@ -254,8 +295,8 @@ impl IdentifiedDynamics {
         for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
             model.residual_std.insert(joint.clone(), *std);
         }
-        if let Some(physical) = &self.physical {
-            physical.write_into(machine, &mut model);
+        if let Some(consistent) = &self.consistent {
+            consistent.write_into(&mut model);
         }
         model
     }

@@ -32,24 +32,28 @@ mod open_log;
 mod passes;
 mod prior;
 mod reference;
+mod residual;
 mod torque;
 mod unknowns;
 mod validate;
 
 pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
 pub use compare::{Compared, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
-pub use consistent::ConsistentLinks;
+pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
 pub use control::{Control, Progress};
 pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
 pub use error::{ErrorKind, IdentifyError, ReadError};
-pub use estimate::{Account, Simulated};
-pub use friction::{FrictionSettings, IdentifiedFriction, friction};
+pub use estimate::{Account, JointAccount, Simulated};
+pub use friction::{
+    FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
+};
 pub use in_memory::{InMemory, read_whole};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
-pub use lsq::{IdentifiedDynamics, LsqSettings, lsq};
+pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use open_log::{OpenLog, summary_warnings};
+pub use residual::{JointResidual, RelativeError};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};

@@ -113,15 +113,17 @@ impl<'a> Passes<'a> {
             match &mut total {
                 None => {
                     let simulated = Simulated {
-                        gains: read.gains,
                         reference,
-                        indefinite: read.indefinite,
+                        loop_frequency: read.gains.frequency,
+                        failed_steps_share: read.indefinite,
+                        gains: read.gains,
                     };
                     total = Some((read.factors, simulated));
                 }
                 Some((sums, simulated)) => {
                     sums.merge(read.factors);
-                    simulated.indefinite = simulated.indefinite.max(read.indefinite);
+                    simulated.failed_steps_share =
+                        simulated.failed_steps_share.max(read.indefinite);
                 }
             }
             self.work.advance(1);

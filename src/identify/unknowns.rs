@@ -1,48 +1,69 @@
 //! The unknowns of a fit: which columns the rows have, and what the data say about each.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
 use crate::inertia::columns::{KnownFriction, Own, RegressorColumns};
+use crate::inertia::essential::Essential;
 use crate::inertia::solve::Fit;
 use crate::inertia::verdict::verdict;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::Verdict;
 
 /// One unknown of the fit with what the data say about it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Unknown {
-    /// Short name, that of the model file.
+    /// The combination of standard parameters that it stands for, else its short name.
     pub name: String,
-    /// The combination of standard parameters that it stands for, where that is its name.
-    pub grouping: Option<String>,
+    /// Short name, that of the model file.
+    pub key: String,
+    /// Number in the report's Table 4, where it has one.
     pub theta: Option<u32>,
+    /// Joint that it belongs to alone.
     pub joint: Option<String>,
+    /// Estimate \[unit\]; null where the data do not determine it.
+    pub value: Option<f64>,
+    /// Its standard deviation \[unit\].
+    pub std: Option<f64>,
+    /// Standard deviation over the size of the value.
+    pub relative_std: Option<f64>,
     pub unit: String,
-    pub meaning: String,
-    pub value: f64,
-    pub std: f64,
     pub verdict: Verdict,
+    /// Its torque is not worth mentioning: it is identified though uncertain.
     pub negligible: bool,
+    /// The data are really about it.
+    pub essential: bool,
+    /// What it is, in words.
+    #[serde(skip)]
+    pub meaning: String,
+    /// Fitted value \[unit\], also where the data do not determine it: the torque is computed with all
+    /// of them together.
+    #[serde(skip)]
+    pub fitted: f64,
+    /// Standard deviation of that \[unit\].
+    #[serde(skip)]
+    pub fitted_std: f64,
 }
 
 impl Unknown {
-    /// Standard deviation over the size of the value.
-    pub fn relative_std(&self) -> f64 {
-        self.std / self.value.abs()
+    /// Standard deviation of the fitted value over its size.
+    pub fn fitted_relative_std(&self) -> f64 {
+        self.fitted_std / self.fitted.abs()
     }
 
-    /// The parameter as a model file holds it: the value is kept even where the data do not
-    /// determine it, for the torque is computed with all of them together.
+    /// The parameter as a model file holds it.
     pub(super) fn parameter(&self) -> Parameter {
         Parameter {
-            name: self.name.clone(),
+            name: self.key.clone(),
             theta: self.theta,
             joint: self.joint.clone(),
-            value: self.value,
-            std: self.std.is_finite().then_some(self.std),
+            value: self.fitted,
+            std: self.fitted_std.is_finite().then_some(self.fitted_std),
             unit: self.unit.clone(),
             meaning: self.meaning.clone(),
             verdict: Some(self.verdict),
@@ -91,52 +112,53 @@ pub(super) fn unknowns(
     machine: &LoggedRobot,
     columns: &RegressorColumns,
     fit: &Fit,
+    essential: &Essential,
 ) -> Vec<Unknown> {
     let robot = &machine.robot;
-    let rate = |i: usize, value: f64| {
+    // of the unknown in column i
+    let rated = |i: usize, key: &str, unit: String, meaning: &str| {
+        let fitted = fit.theta[i];
         let std = fit.covariance[(i, i)].max(0.0).sqrt();
         let share = (0..columns.joints)
             .filter(|j| fit.torque_rms[*j] > 0.0)
             .map(|j| 2.0 * std * fit.column_rms[(j, i)] / fit.torque_rms[j])
             .fold(0.0, f64::max);
-        let (verdict, negligible) = verdict(value, std, fit.determined[i], share);
-        (std, verdict, negligible)
+        let (verdict, negligible) = verdict(fitted, std, fit.determined[i], share);
+        let known = verdict != Verdict::NotIdentifiable;
+        Unknown {
+            name: key.to_owned(),
+            key: key.to_owned(),
+            theta: None,
+            joint: None,
+            value: known.then_some(fitted),
+            std: known.then_some(std),
+            relative_std: known.then(|| std / fitted.abs()),
+            unit,
+            verdict,
+            negligible,
+            essential: essential.essential[i],
+            meaning: meaning.to_owned(),
+            fitted,
+            fitted_std: std,
+        }
     };
     let mut out = Vec::with_capacity(columns.unknowns());
     for (i, info) in robot.parameters().iter().enumerate() {
-        let value = fit.theta[i];
-        let (std, verdict, negligible) = rate(i, value);
-        let grouped = i < robot.groupings().len();
-        out.push(Unknown {
-            name: info.name.to_string(),
-            grouping: grouped.then(|| info.meaning.to_string()),
-            theta: info.theta,
-            joint: None,
-            unit: inertia_unit(robot, &info.unit, machine.file.torque_unit(0)),
-            meaning: info.meaning.to_string(),
-            value,
-            std,
-            verdict,
-            negligible,
-        });
+        let unit = inertia_unit(robot, &info.unit, machine.file.torque_unit(0));
+        let mut unknown = rated(i, &info.name, unit, &info.meaning);
+        if i < robot.groupings().len() {
+            unknown.name.clone_from(&unknown.meaning);
+        }
+        unknown.theta = info.theta;
+        out.push(unknown);
     }
     for (j, joint) in robot.joint_names().iter().enumerate() {
         for own in &columns.own[j] {
-            let i = out.len();
-            let value = fit.theta[i];
-            let (std, verdict, negligible) = rate(i, value);
-            out.push(Unknown {
-                name: own.name().to_owned(),
-                grouping: None,
-                theta: None,
-                joint: Some(joint.clone()),
-                unit: friction_unit(robot, j, own.name(), machine.file.torque_unit(j)),
-                meaning: friction_meaning(own.name()).to_owned(),
-                value,
-                std,
-                verdict,
-                negligible,
-            });
+            let name = own.name();
+            let unit = friction_unit(robot, j, name, machine.file.torque_unit(j));
+            let mut unknown = rated(out.len(), name, unit, friction_meaning(name));
+            unknown.joint = Some(joint.clone());
+            out.push(unknown);
         }
     }
     out

@@ -1,5 +1,8 @@
 //! The torque of logs that were not used, reconstructed by a model.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::control::Control;
 use super::error::IdentifyError;
 use super::in_memory::read_whole;
@@ -11,9 +14,13 @@ use crate::log::{Instant, Provenance};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
 
 /// What `validate` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Validated {
+    #[serde(flatten)]
     pub validation: Validation,
+    #[serde(skip)]
     pub inputs: Vec<Provenance>,
+    #[serde(skip)]
     pub warnings: Vec<String>,
 }
 
@@ -64,8 +71,12 @@ pub fn validate(
         work.advance(1);
     }
     let summary = last.ok_or(IdentifyError::NoLog)?;
+    let mut validation = all.finish(summary);
+    for (j, error) in validation.joints.iter_mut().enumerate() {
+        error.unit = machine.file.torque_unit(j);
+    }
     Ok(Validated {
-        validation: all.finish(summary),
+        validation,
         inputs,
         warnings,
     })

@@ -8,6 +8,8 @@
 //! A log is read twice at once: a first pass smooths the reference and simulates, a second one
 //! computes X from the measured and Z from the simulated positions, filtered alike.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::sync::mpsc::sync_channel;
 
 use nalgebra::{DMatrix, DVector};
@@ -38,7 +40,8 @@ const WAITING: usize = 4;
 const OPEN: f64 = 1e-11;
 
 /// Where the reference comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum ReferenceSource {
     /// The log: positions of the blocks hold n measured ones and n of the reference.
     Logged,

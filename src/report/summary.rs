@@ -2,6 +2,7 @@
 
 use super::table::{Align, Table};
 use crate::number::{self, ABSENT};
+use crate::validate::JointError;
 
 /// One estimated parameter, as a table shows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,27 +69,8 @@ pub fn parameters(caption: &str, rows: &[Parameter]) -> Table {
     table
 }
 
-/// How well one joint's torque is reconstructed, as a table shows it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TorqueError<'a> {
-    /// Name of the joint.
-    pub joint: &'a str,
-    /// Unit of its torque, `N` or `Nm`.
-    pub unit: &'a str,
-    /// norm(residual) / norm(measured), a fraction.
-    pub relative_error: f64,
-    /// Root mean square of the residual [unit].
-    pub rmse: f64,
-    /// Largest residual [unit].
-    pub max_abs: f64,
-    /// Coefficient of determination; not finite where unknown.
-    pub r2: f64,
-    /// Samples that it was computed from.
-    pub samples: u64,
-}
-
 /// The errors as a table.
-pub fn torque_errors(caption: &str, rows: &[TorqueError]) -> Table {
+pub fn torque_errors(caption: &str, rows: &[JointError]) -> Table {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("relative error", Align::Decimal),
@@ -105,7 +87,7 @@ pub fn torque_errors(caption: &str, rows: &[TorqueError]) -> Table {
             false => ABSENT.into(),
         };
         table.row([
-            row.joint,
+            row.joint.as_str(),
             &number::percent(row.relative_error),
             &number::significant(row.rmse, 3),
             &number::significant(row.max_abs, 3),
@@ -165,10 +147,11 @@ q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
 
     #[test]
     fn torque_errors_carry_their_unit() {
-        let row = TorqueError {
-            joint: "q4",
+        let row = JointError {
+            joint: "q4".into(),
             unit: "Nm",
             relative_error: 0.0052,
+            relative_error_raw: 0.0052,
             rmse: 0.0123,
             max_abs: 0.09,
             r2: 0.99993,

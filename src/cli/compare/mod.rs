@@ -8,14 +8,15 @@ pub use tables::{apart_table, error_table, parameter_table};
 
 use serde_json::{Value, json};
 
-use super::lsq::processing;
-use super::pages::{self, Look, curve, speeds};
-use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs};
+use super::{
+    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pages, pictures,
+};
 use crate::identify::{self, Compared, Curves, DIFFERENT, GivenModel, Tried};
 use crate::log::{LogSpec, escape};
 use crate::number;
 use crate::report::figure::{CurvePoint, OverlayFigure, OverlayPanel};
 use crate::report::json::Document;
+use crate::report::sections::friction::{curve, speeds};
 
 const EXAMPLE: &str = "\
 Example:
@@ -223,7 +224,7 @@ fn json_of_logs(of: &Compared, tried: &Tried) -> Value {
             "difference": overall.difference,
             "interval_95": overall.interval_95,
         },
-        "processing": processing(&tried.held.summary),
+        "processing": tried.held.summary,
     })
 }
 
@@ -266,18 +267,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let page = match &args.report {
         None => None,
         Some(path) => {
-            let logs = args.logs.iter().map(LogSpec::name);
-            let look = of
-                .tried
-                .as_ref()
-                .map(|t| Look::new(&of.machine, &t.held, logs));
+            let held = of.tried.as_ref().map(|t| &t.held);
             let specs: Vec<&LogSpec> = args.logs.iter().collect();
             let page = pages::Compare {
                 of: &of,
                 logs: &specs,
                 title: &title,
                 read: &read,
-                look: look.transpose()?,
+                look: pictures::look(&of.machine, held, &names_of(&args.logs))?,
             };
             Some((path, pages::compare(&page, context)?))
         }

@@ -2,12 +2,11 @@
 
 use super::super::compare::{apart_table, error_table, parameter_table};
 use super::super::{CliError, Context};
-use super::look::Look;
-use super::torque::Drawn;
-use super::{quality, torque};
+use crate::cli::pictures::inspected;
 use crate::identify::Compared;
 use crate::log::{LogSpec, Provenance, escape};
-use crate::report::sections::provenance;
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{Look, provenance, quality, torque};
 use crate::report::{Report, TraceStyle, Writer};
 
 /// What the page is made from.
@@ -63,8 +62,9 @@ pub fn compare(page: &Compare, context: &Context) -> Result<String, CliError> {
             },
         ];
         let all: Vec<usize> = (0..logs.len()).collect();
-        torque::section(&mut out, look, &all, &models, page.title)?;
-        quality::section(&mut out, &of.machine, logs, &[], context)?;
+        torque::section(&mut out, look, &all, &models, page.title).map_err(CliError::input)?;
+        let found = inspected(logs.iter().copied(), &of.machine, context)?;
+        quality::section(&mut out, &found, &[]);
     }
     let summary = of.tried.as_ref().map(|tried| &tried.held.summary);
     let mut made_from: Vec<Provenance> = Vec::new();

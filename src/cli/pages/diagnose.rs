@@ -3,16 +3,17 @@
 use super::super::diagnose::in_words;
 use super::super::diagnose_text::{doubts, nothing_missing};
 use super::super::{CliError, Context};
-use super::look::Look;
-use super::torque::Drawn;
-use super::{fit, friction, parameters, quality, residual, torque};
+use crate::cli::pictures::inspected;
 use crate::config::ModelFile;
 use crate::diagnose::{Candidate, Errors, Pair};
 use crate::identify::{DataFault, Diagnosed, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
 use crate::report::figure::ResidualFigure;
-use crate::report::sections::provenance;
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{
+    Look, fit, friction, parameters, provenance, quality, residual, torque,
+};
 use crate::report::{Report, TraceStyle, Writer};
 
 /// Candidates that are told.
@@ -33,11 +34,11 @@ pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure
     let look = look(machine, found)?;
     let fitted = found.diagnosis.fitted_logs;
     let after = &found.diagnosis.model;
-    residual::figure(&look, &|log| log < fitted, &found.given, Some(after))
+    residual::figure(&look, &|log| log < fitted, &found.given, Some(after)).map_err(CliError::input)
 }
 
 fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, CliError> {
-    Look::new(machine, &found.held, found.logs.iter().cloned())
+    Look::new(machine, &found.held, found.logs.iter().cloned()).map_err(CliError::input)
 }
 
 /// The verdict in words, and whether nothing calls for attention.
@@ -102,7 +103,8 @@ pub fn diagnose(
     );
     page.heading("What the model hardly tells apart");
     fit::pairs(&mut page, &refined);
-    quality::section(&mut page, machine, &of.logs, &found.held.warnings, context)?;
+    let quality = inspected(of.logs.iter().copied(), machine, context)?;
+    quality::section(&mut page, &quality, &found.held.warnings);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(found.held.inputs.iter().cloned());
     let summary = Some(&found.held.summary);
@@ -154,7 +156,7 @@ pub fn sections(
         true => vec![Drawn::only(&found.given)],
         false => vec![before, after],
     };
-    torque::section(page, &look, shown, &models, &names.join(", "))?;
+    torque::section(page, &look, shown, &models, &names.join(", ")).map_err(CliError::input)?;
     residual::section(page, figure);
     candidates(page, machine, found);
     Ok(())
@@ -207,7 +209,8 @@ pub fn data_fault(of: &Diagnose, fault: &DataFault, context: &Context) -> Result
         false,
     );
     page.paragraph(&format!("What to do: {}.", fault.remedy));
-    quality::section(&mut page, of.machine, &of.logs, &[], context)?;
+    let quality = inspected(of.logs.iter().copied(), of.machine, context)?;
+    quality::section(&mut page, &quality, &[]);
     let inputs = [of.given.clone()];
     let made_from = &of.file.provenance.inputs;
     provenance::section(

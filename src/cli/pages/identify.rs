@@ -1,9 +1,8 @@
 //! The page of `identify`: the whole campaign.
 
-use super::super::{CliError, Context, friction};
-use super::look::Look;
-use super::torque::Drawn;
-use super::{diagnose, fit, parameters, quality, residual, torque, validate};
+use super::super::{CliError, Context};
+use super::diagnose;
+use crate::cli::pictures::inspected;
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::effect::AugmentedModel;
@@ -12,7 +11,11 @@ use crate::identify::{
 };
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
-use crate::report::sections::provenance;
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{
+    Look, fit, friction, parameters, provenance, quality, residual, torque,
+};
+use crate::report::stages::{self, validate};
 use crate::report::{Report, Writer};
 
 /// What the page is made from.
@@ -93,9 +96,9 @@ pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<Str
         (Some(found), _) => diagnose::errors(&mut page, machine, found),
         (None, Some(validated)) => {
             let caption = "errors of the reconstructed torque on unseen data";
-            validate::errors(&mut page, machine, &validated.validation, caption);
+            validate::errors(&mut page, &validated.validation, caption);
         }
-        (None, None) => super::lsq::residuals(&mut page, machine, of.fitted),
+        (None, None) => stages::lsq::residuals(&mut page, of.fitted),
     }
     parameters::section(&mut page, of.model(), of.truth);
     if let Some(found) = of.friction {
@@ -105,10 +108,10 @@ pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<Str
              speeds that the logs cover, and the mean torque of their plateaus, which took no part \
              in the fit.",
         );
-        page.figure(&friction::figure(machine, found).svg());
+        page.figure(&stages::friction::figure(machine, found).svg());
     } else if let Some(look) = &of.look {
-        let figure = super::friction::figure(look, of.declared, of.numbers);
-        super::friction::section(&mut page, &figure);
+        let figure = friction::figure(look, of.declared, of.numbers);
+        friction::section(&mut page, &figure);
     }
     if let Some(found) = of.diagnosed {
         diagnose::sections(&mut page, machine, found, residuals)?;
@@ -120,12 +123,15 @@ pub fn identify(of: &Identify, residuals: &str, context: &Context) -> Result<Str
             &logs,
             &[Drawn::only(of.numbers)],
             &of.title(),
-        )?;
-        let figure = residual::figure(look, &|_| true, of.numbers, None)?;
+        )
+        .map_err(CliError::input)?;
+        let figure =
+            residual::figure(look, &|_| true, of.numbers, None).map_err(CliError::input)?;
         residual::section(&mut page, &figure.svg());
     }
     fit::section(&mut page, of.fitted, of.model());
-    quality::section(&mut page, machine, &of.logs, of.warnings, context)?;
+    let quality = inspected(of.logs.iter().copied(), machine, context)?;
+    quality::section(&mut page, &quality, of.warnings);
     let summary = Some(&of.fitted.summary);
     provenance::section(
         &mut page,

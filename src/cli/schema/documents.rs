@@ -94,91 +94,6 @@ fn errors() -> Vec<(&'static str, Value)> {
     vec![("joints", list(joint)), ("overall", overall)]
 }
 
-fn friction() -> Vec<(&'static str, Value)> {
-    let joint = object(&[
-        ("joint", text()),
-        ("converged", truth()),
-        ("starts", count()),
-        (
-            "parameters",
-            table(object(&[
-                ("value", number()),
-                ("std", number()),
-                ("unit", text()),
-                ("theta", number()),
-                ("verdict", verdict()),
-            ])),
-        ),
-        (
-            "nuisance",
-            list(object(&[
-                ("name", text()),
-                ("value", number()),
-                ("std", number()),
-                ("unit", text()),
-            ])),
-        ),
-        ("speeds_covered", list(number())),
-        (
-            "curve",
-            list(object(&[
-                ("v", number()),
-                ("torque", number()),
-                ("std", number()),
-            ])),
-        ),
-        (
-            "nis",
-            object(&[
-                ("mean", number()),
-                ("lower_95", number()),
-                ("upper_95", number()),
-                ("share_inside", number()),
-            ]),
-        ),
-        ("rmse", number()),
-        ("relative_error", number()),
-        ("samples", count()),
-    ]);
-    vec![("joints", list(joint))]
-}
-
-fn lsq() -> Vec<(&'static str, Value)> {
-    let parameter = object(&[
-        ("name", text()),
-        ("theta", number()),
-        ("value", number()),
-        ("std", number()),
-        ("relative_std", number()),
-        ("unit", text()),
-        ("verdict", verdict()),
-        ("negligible", truth()),
-    ]);
-    let joint = object(&[
-        ("joint", text()),
-        ("rmse", number()),
-        ("relative_error", number()),
-    ]);
-    vec![
-        ("parameters", list(parameter)),
-        (
-            "condition",
-            object(&[("raw", number()), ("normalised", number())]),
-        ),
-        ("rank", count()),
-        ("samples", count()),
-        ("effective_samples", number()),
-        ("joints", list(joint)),
-        ("processing", processing()),
-    ]
-}
-
-fn validate() -> Vec<(&'static str, Value)> {
-    let mut fields = errors();
-    fields.push(("processing", processing()));
-    fields
-}
-
 fn diagnose() -> Vec<(&'static str, Value)> {
     let step = object(&[
         ("effect", text()),
@@ -335,9 +250,6 @@ fn compare() -> Vec<(&'static str, Value)> {
 fn fields(kind: Kind) -> (&'static str, Vec<(&'static str, Value)>) {
     let part = || json!({"type": ["object", "null"]});
     match kind {
-        Kind::Friction => ("friction", friction()),
-        Kind::Lsq => ("lsq", lsq()),
-        Kind::Validate => ("validate", validate()),
         Kind::Diagnose => ("diagnose", diagnose()),
         Kind::Compare => ("compare", compare()),
         Kind::Identify => (

@@ -9,7 +9,7 @@ use super::{CliError, Context, Outcome};
 use crate::cli::{convert, export, new, simulate};
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
-use crate::identify::TorqueAlong;
+use crate::identify::{IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated};
 use crate::inspect::Inspection;
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -80,6 +80,9 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Campaign => campaign(),
         Kind::Trajectory => trajectory(),
         Kind::Truth => serde_json::Value::from(schemars::schema_for!(TruthFile)),
+        Kind::Friction => json::schema::<IdentifiedFriction>("friction"),
+        Kind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
+        Kind::Validate => json::schema::<Validated>("validate"),
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
         Kind::Inspect => json::schema::<Inspection>("inspect"),

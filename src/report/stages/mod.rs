@@ -2,4 +2,7 @@
 //! follows; where it came from ends the page.
 
 pub mod excite;
+pub mod friction;
 pub mod inspect;
+pub mod lsq;
+pub mod validate;

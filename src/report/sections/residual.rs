@@ -1,10 +1,10 @@
 //! What the residual depends on: over position, velocity, load and time, and its spectra.
 
-use super::super::CliError;
 use super::look::Look;
 use crate::diagnose::JointEvidence;
 use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
+use crate::motion::MotionError;
 use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 
@@ -17,7 +17,7 @@ pub fn figure(
     wanted: &dyn Fn(usize) -> bool,
     before: &AugmentedModel,
     after: Option<&AugmentedModel>,
-) -> Result<ResidualFigure, CliError> {
+) -> Result<ResidualFigure, MotionError> {
     let names = look.names.iter().enumerate();
     let names: Vec<&str> = names
         .filter(|(log, _)| wanted(*log))

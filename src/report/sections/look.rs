@@ -1,28 +1,10 @@
 //! Logs held in memory beside the models that are looked at on them.
 
-use super::super::{CliError, Context};
 use crate::diagnose::{JointEvidence, evidence};
 use crate::effect::AugmentedModel;
-use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
+use crate::identify::{InMemory, LoggedRobot};
 use crate::log::escape;
-use crate::motion::{Parallel, Stretch};
-
-/// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
-/// is no reason to lose the report.
-///
-/// # Errors
-/// Those of [`identify::read_whole`].
-pub fn held_for_pictures(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    context: &Context,
-) -> Result<Option<InMemory>, CliError> {
-    match identify::read_whole(machine, logs, context.control()) {
-        Ok(held) => Ok(Some(held)),
-        Err(IdentifyError::TooManySamples { .. } | IdentifyError::SampledUnlike { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
-}
+use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Logs with the processing of a model.
 pub struct Look<'a> {
@@ -43,9 +25,9 @@ impl<'a> Look<'a> {
         machine: &'a LoggedRobot,
         held: &'a InMemory,
         logs: impl Iterator<Item = String>,
-    ) -> Result<Self, CliError> {
+    ) -> Result<Self, MotionError> {
         let settings = machine.settings();
-        let parallel = Parallel::design(&settings, held.summary.dt).map_err(CliError::input)?;
+        let parallel = Parallel::design(&settings, held.summary.dt)?;
         Ok(Look {
             machine,
             stretches: &held.stretches,
@@ -68,9 +50,9 @@ impl<'a> Look<'a> {
         &self,
         model: &AugmentedModel,
         wanted: &dyn Fn(usize) -> bool,
-    ) -> Result<Vec<JointEvidence>, CliError> {
+    ) -> Result<Vec<JointEvidence>, MotionError> {
         let stretches: Vec<&Stretch> = self.stretches.iter().filter(|s| wanted(s.log)).collect();
-        evidence(model, &stretches, &self.parallel, self.cutoff_hz).map_err(CliError::input)
+        evidence(model, &stretches, &self.parallel, self.cutoff_hz)
     }
 
     /// Lowest and highest velocity of a joint over all logs [m/s or rad/s].

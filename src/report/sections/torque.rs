@@ -1,10 +1,9 @@
 //! Measured and reconstructed torque over time, and how far they are apart.
 
-use super::super::CliError;
 use super::look::Look;
 use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
-use crate::motion::Stretch;
+use crate::motion::{MotionError, Stretch};
 use crate::number;
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
@@ -32,7 +31,7 @@ impl<'a> Drawn<'a> {
 ///
 /// # Errors
 /// Stretches that are too short for the filter.
-pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, CliError> {
+pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, MotionError> {
     let (mut filtered, mut raw) = (Vec::new(), Vec::new());
     for &log in logs {
         let name = look.names.get(log).cloned().unwrap_or_default();
@@ -54,7 +53,7 @@ pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, C
                 .map(Vec::as_slice)
                 .collect();
             plain.add(&stretch.t, &channels);
-            let rows = look.parallel.run(&channels).map_err(CliError::input)?;
+            let rows = look.parallel.run(&channels)?;
             let times = sampled(look, stretch);
             let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
             smooth.add(&times, &rows);
@@ -202,7 +201,7 @@ pub fn section(
     logs: &[usize],
     models: &[Drawn],
     title: &str,
-) -> Result<(), CliError> {
+) -> Result<(), MotionError> {
     let traces = traces(look, logs, models)?;
     page.heading("Torque, measured and reconstructed");
     let first = traces.traces.first();

@@ -70,7 +70,7 @@ fn weakest(page: &mut Writer, found: &IdentifiedDynamics) {
         .map(|(i, x)| {
             let unknown = &found.unknowns[*i];
             vec![
-                unknown.name.clone(),
+                unknown.key.clone(),
                 unknown.joint.clone().unwrap_or_default(),
                 format!("{:+.2}", sign * x),
             ]

@@ -1,36 +1,31 @@
 //! What the logs hold and what is wrong with them.
 
-use super::super::{CliError, Context, Exit, inspect};
-use crate::identify::LoggedRobot;
-use crate::inspect::Severity;
-use crate::log::{LogSpec, escape};
+use crate::inspect::{Findings, Severity};
+use crate::log::escape;
 use crate::number;
 use crate::report::Writer;
 
 /// Faults that are told; a log with more of them has one cause.
 const MOST: usize = 30;
 
+/// A log as it was found, or why it could not be inspected.
+pub struct Inspected {
+    /// Name of the log.
+    pub name: String,
+    pub found: Result<Findings, String>,
+}
+
 /// The section: every log once, and its faults, the worst first.
-///
-/// # Errors
-/// Interruption.
-pub fn section(
-    page: &mut Writer,
-    machine: &LoggedRobot,
-    logs: &[&LogSpec],
-    warnings: &[String],
-    context: &Context,
-) -> Result<(), CliError> {
+pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
     page.heading("Data quality");
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     let mut hidden = 0;
-    for spec in logs {
-        let name = escape(&spec.name());
-        let found = match inspect::findings(spec, machine, context) {
+    for log in logs {
+        let name = escape(&log.name);
+        let found = match &log.found {
             Ok(found) => found,
-            Err(error) if error.exit() == Exit::Interrupted => return Err(error),
-            Err(error) => {
-                page.paragraph(&format!("{name} was not inspected: {}", error.message()));
+            Err(reason) => {
+                page.paragraph(&format!("{name} was not inspected: {reason}"));
                 continue;
             }
         };
@@ -101,5 +96,4 @@ pub fn section(
         page.paragraph("Warnings of this run:");
         page.list(warnings);
     }
-    Ok(())
 }

@@ -1,0 +1,57 @@
+//! What the page of a command needs besides its result: the logs in memory, and what is wrong with them.
+
+use super::{CliError, Context, Exit, inspect};
+use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
+use crate::log::LogSpec;
+use crate::report::sections::Look;
+use crate::report::sections::quality::Inspected;
+
+/// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
+/// is no reason to lose the report.
+///
+/// # Errors
+/// Those of [`identify::read_whole`].
+pub(super) fn in_memory(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    context: &Context,
+) -> Result<Option<InMemory>, CliError> {
+    match identify::read_whole(machine, logs, context.control()) {
+        Ok(held) => Ok(Some(held)),
+        Err(IdentifyError::TooManySamples { .. } | IdentifyError::SampledUnlike { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// These logs with the processing of their robot file.
+///
+/// # Errors
+/// Settings that the sampling rate does not carry.
+pub(super) fn look<'a>(
+    machine: &'a LoggedRobot,
+    held: Option<&'a InMemory>,
+    names: &[String],
+) -> Result<Option<Look<'a>>, CliError> {
+    let look = held.map(|held| Look::new(machine, held, names.iter().cloned()));
+    look.transpose().map_err(CliError::input)
+}
+
+/// What is wrong with logs, by the robot file.
+///
+/// # Errors
+/// Interruption.
+pub(super) fn inspected<'a>(
+    logs: impl IntoIterator<Item = &'a LogSpec>,
+    machine: &LoggedRobot,
+    context: &Context,
+) -> Result<Vec<Inspected>, CliError> {
+    let inspected = |spec: &LogSpec| {
+        let found = match inspect::findings(spec, machine, context) {
+            Err(error) if error.exit() == Exit::Interrupted => return Err(error),
+            found => found.map_err(|error| error.message().to_owned()),
+        };
+        let name = spec.name();
+        Ok(Inspected { name, found })
+    };
+    logs.into_iter().map(inspected).collect()
+}

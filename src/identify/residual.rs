@@ -1,0 +1,37 @@
+//! What a fit leaves of each joint's torque.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::logged_robot::LoggedRobot;
+
+/// A joint's residual relative to its torque, a fraction.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct RelativeError {
+    pub joint: String,
+    pub relative_error: f64,
+}
+
+impl RelativeError {
+    /// The errors of a robot's joints.
+    pub(super) fn each(machine: &LoggedRobot, errors: &[f64]) -> Vec<Self> {
+        let joints = machine.robot.joint_names().iter().zip(errors);
+        let of = |(joint, relative_error): (&String, &f64)| RelativeError {
+            joint: joint.clone(),
+            relative_error: *relative_error,
+        };
+        joints.map(of).collect()
+    }
+}
+
+/// A joint's residual.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct JointResidual {
+    pub joint: String,
+    /// Unit of its torque.
+    pub unit: &'static str,
+    /// Root mean square \[unit\].
+    pub rmse: f64,
+    /// The same over that of the torque, a fraction.
+    pub relative_error: f64,
+}

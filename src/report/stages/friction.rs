@@ -1,0 +1,217 @@
+//! The report of `friction`.
+
+use crate::config::ModelFile;
+use crate::friction::estimate::curve_std;
+use crate::identify::{FrictionOfJoint, IdentifiedFriction, LoggedRobot};
+use crate::log::{Provenance, escape};
+use crate::number;
+use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::{fit, parameters, provenance};
+use crate::report::table::Table;
+use crate::report::{Report, Writer, summary};
+
+/// What the report is made from.
+pub struct Friction<'a> {
+    pub machine: &'a LoggedRobot,
+    pub found: &'a IdentifiedFriction,
+    /// The model that was written.
+    pub file: &'a ModelFile,
+    /// Names of the logs.
+    pub logs: &'a [String],
+}
+
+/// The laws, and the verdict on them.
+pub fn friction(of: &Friction) -> Report {
+    let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
+    let mut report = Report::new(&format!("Friction from {}", names.join(", ")));
+    for joint in &of.found.joints {
+        report.terminal().table(law(of.machine, joint));
+        report.terminal().line("");
+    }
+    let mut page = report.page();
+    let (text, good) = words(of);
+    page.verdict(&text, good);
+    filter(&mut page, of);
+    report
+}
+
+/// What a page has room for besides; `given` are the robot file and the model whose other joints are
+/// kept.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Friction,
+    given: &[Provenance],
+    quality: &[Inspected],
+    command: &str,
+) {
+    page.heading("Friction");
+    page.figure(&figure(of.machine, of.found).svg());
+    parameters::section(page, of.file, &|_| None);
+    nuisance(page, of.found);
+    page.heading("What the model hardly tells apart");
+    fit::pairs(page, of.file);
+    quality::section(page, quality, &of.found.warnings);
+    let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
+    provenance::section(page, &of.machine.file, &inputs, &[], None, command);
+}
+
+/// The parameters of one joint's law.
+fn law(machine: &LoggedRobot, found: &FrictionOfJoint) -> Table {
+    let e = &found.estimate;
+    let parameters = found.parameters.each();
+    let rows: Vec<summary::Parameter> = parameters
+        .iter()
+        .map(|(name, p)| summary::Parameter {
+            joint: &found.joint,
+            name,
+            theta: p.theta,
+            value: p.value.unwrap_or(f64::NAN),
+            std: p.std.unwrap_or(f64::NAN),
+            unit: &p.unit,
+            verdict: p.verdict.word(),
+            truth: None,
+        })
+        .collect();
+    let caption = format!(
+        "friction of {}: speeds {} to {} {}/s, residual {} ({} {}, NIS {:.2})",
+        found.joint,
+        number::significant(e.speeds.covered[0], 2),
+        number::significant(e.speeds.covered[1], 3),
+        machine.robot.joint_kind(found.index).position_unit(),
+        number::percent(e.relative_error),
+        number::significant(e.rmse, 3),
+        machine.file.torque_unit(found.index),
+        e.nis.mean
+    );
+    summary::parameters(&caption, &rows)
+}
+
+/// The verdict in words, and whether nothing calls for attention.
+fn words(of: &Friction) -> (String, bool) {
+    let (mut text, mut good) = parameters::tally(of.file);
+    text.push('.');
+    for found in &of.found.joints {
+        if !found.converged {
+            good = false;
+            text += &format!(" The search for {} ended without converging.", found.joint);
+        }
+        let nis = &found.estimate.nis;
+        if nis.mean > nis.upper_95 {
+            good = false;
+            text += &format!(
+                " Something acts on {} that the friction law lacks.",
+                found.joint
+            );
+        }
+    }
+    (text, good)
+}
+
+/// How the filter went, joint by joint.
+fn filter(page: &mut Writer, of: &Friction) {
+    let row = |found: &FrictionOfJoint| {
+        let e = &found.estimate;
+        let unit = of.machine.file.torque_unit(found.index);
+        let speed = of.machine.robot.joint_kind(found.index).position_unit();
+        let [low, high] = e.speeds.covered;
+        vec![
+            found.joint.clone(),
+            number::percent(e.relative_error),
+            format!("{} {unit}", number::significant(e.rmse, 3)),
+            format!(
+                "{} to {} {speed}/s",
+                number::significant(low, 2),
+                number::significant(high, 3)
+            ),
+            number::significant(e.nis.mean, 3),
+            format!(
+                "{} to {}",
+                number::significant(e.nis.lower_95, 3),
+                number::significant(e.nis.upper_95, 3)
+            ),
+            e.samples.to_string(),
+        ]
+    };
+    page.rows(
+        "the filter, joint by joint (NIS: normalised innovations squared, 1 where all is modelled)",
+        &[
+            "joint",
+            "relative error",
+            "residual rms",
+            "speeds covered",
+            "NIS",
+            "its 95 % bounds",
+            "samples",
+        ],
+        of.found.joints.iter().map(row).collect(),
+    );
+}
+
+/// What was estimated along, and is no friction.
+fn nuisance(page: &mut Writer, found: &IdentifiedFriction) {
+    let of_joint = |found: &FrictionOfJoint| {
+        let joint = found.joint.clone();
+        let each = found.estimate.nuisance.iter();
+        let rows = each.map(move |n| {
+            let (value, std) = number::value_and_std(n.value, n.std);
+            vec![n.name.clone(), joint.clone(), value, std, n.unit.clone()]
+        });
+        rows.collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = found.joints.iter().flat_map(of_joint).collect();
+    if !rows.is_empty() {
+        page.heading("Estimated along");
+        page.paragraph(
+            "Inertia, gravity and what the other joints' motion adds; not part of the model.",
+        );
+        let head = ["quantity", "joint", "value", "std", "unit"];
+        page.rows("nuisance quantities", &head, rows);
+    }
+}
+
+/// Velocities at which a curve is drawn, from the most negative to the most positive: in equal
+/// ratios, for the law bends close to 0, and in equal steps.
+fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    const POINTS: usize = 80;
+    let slowest = (0.1 * low).max(1e-4 * high);
+    let share = |k: usize| k as f64 / (POINTS - 1) as f64;
+    let ratios = (0..POINTS).map(|k| slowest * (high / slowest).powf(share(k)));
+    let steps = (0..POINTS).map(|k| low + (high - low) * share(k));
+    let mut speeds: Vec<f64> = ratios.chain(steps).collect();
+    speeds.sort_by(f64::total_cmp);
+    let down: Vec<f64> = speeds.iter().rev().map(|v| -v).collect();
+    down.into_iter().chain([0.0]).chain(speeds)
+}
+
+/// The friction curves with their bands and the plateau map.
+pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigure {
+    let panel = |found: &FrictionOfJoint| {
+        let (j, e) = (found.index, &found.estimate);
+        let [low, high] = e.speeds.covered;
+        let curve = speeds_to_draw([low, high]).map(|v| CurvePoint {
+            v,
+            torque: e.law.torque(v),
+            std: curve_std(&e.law, &e.covariance, v),
+        });
+        let plateaus = e.plateaus.iter().map(|p| CurvePoint {
+            v: p.v,
+            torque: p.torque,
+            std: p.std,
+        });
+        FrictionPanel {
+            joint: found.joint.clone(),
+            note: format!("NIS {:.2}", e.nis.mean),
+            speed_unit: format!("{}/s", machine.robot.joint_kind(j).position_unit()),
+            torque_unit: machine.file.torque_unit(j).to_owned(),
+            curve: curve.collect(),
+            covered: vec![[-high, -low], [low, high]],
+            plateaus: plateaus.collect(),
+            truth: Vec::new(),
+        }
+    };
+    FrictionFigure {
+        title: "Friction by the Kalman filter".into(),
+        panels: found.joints.iter().map(panel).collect(),
+    }
+}

@@ -1,0 +1,265 @@
+//! The report of `lsq`.
+
+use crate::config::ModelFile;
+use crate::effect::AugmentedModel;
+use crate::identify::{Account, ConsistentLinks, IdentifiedDynamics, JointAccount, LoggedRobot};
+use crate::log::{Provenance, escape};
+use crate::math::descent::Ending;
+use crate::motion::MotionError;
+use crate::number;
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::table::{Align, Table, unbroken};
+use crate::report::{Report, Writer, summary};
+use crate::verdict::{IDENTIFIED, Verdict, WEAK};
+
+/// What the report is made from.
+pub struct Lsq<'a> {
+    pub machine: &'a LoggedRobot,
+    pub found: &'a IdentifiedDynamics,
+    /// The model that was fitted.
+    pub file: &'a ModelFile,
+    /// Names of the logs.
+    pub logs: &'a [String],
+}
+
+/// The parameters, the quality of the fit, and the verdict.
+pub fn lsq(of: &Lsq) -> Report {
+    let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
+    let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
+    let mut terminal = report.terminal();
+    fitted(&mut terminal, of.found);
+    groupings(&mut terminal, of.found);
+    terminal.line("");
+    fit_quality(&mut terminal, of.found);
+    if let Some(links) = &of.found.consistent {
+        consistent(&mut terminal, links);
+    }
+    let mut page = report.page();
+    let (text, good) = parameters::tally(of.file);
+    page.verdict(&format!("{text}."), good);
+    residuals(&mut page, of.found);
+    page.paragraph(
+        "These errors are those of the data that were fitted; `validate` gives those of others.",
+    );
+    report
+}
+
+/// What a page has room for besides; `given` are the robot file and the model that gave the friction,
+/// `look` is absent where the logs are too long to be held.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Lsq,
+    model: &AugmentedModel,
+    look: Option<&Look>,
+    given: &[Provenance],
+    quality: &[Inspected],
+    command: &str,
+) -> Result<(), MotionError> {
+    parameters::section(page, of.file, &|_| None);
+    if let Some(look) = look {
+        friction::section(page, &friction::figure(look, of.file, model));
+        let logs: Vec<usize> = (0..of.logs.len()).collect();
+        let title = look.names.join(", ");
+        torque::section(page, look, &logs, &[Drawn::only(model)], &title)?;
+        let figure = residual::figure(look, &|_| true, model, None)?;
+        residual::section(page, &figure.svg());
+    }
+    fit::section(page, of.found, of.file);
+    quality::section(page, quality, &of.found.warnings);
+    let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
+    let (file, summary) = (&of.machine.file, Some(&of.found.summary));
+    provenance::section(page, file, &inputs, &[], summary, command);
+    Ok(())
+}
+
+/// The residual of the fit, joint by joint.
+pub fn residuals(page: &mut Writer, found: &IdentifiedDynamics) {
+    let rows = found.joints.iter().zip(&found.fit.torque_rms);
+    let rows = rows.map(|(joint, rms)| {
+        let torque = |v: f64| format!("{} {}", number::significant(v, 3), joint.unit);
+        vec![
+            joint.joint.clone(),
+            number::percent(joint.relative_error),
+            torque(joint.rmse),
+            torque(*rms),
+        ]
+    });
+    page.rows(
+        "residual of the fit, on the logs that were fitted",
+        &["joint", "relative error", "residual rms", "torque rms"],
+        rows.collect(),
+    );
+}
+
+/// The parameters for a terminal.
+fn fitted(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let rows: Vec<summary::Parameter> = found
+        .unknowns
+        .iter()
+        .map(|u| summary::Parameter {
+            joint: u.joint.as_deref().unwrap_or(""),
+            name: &u.key,
+            theta: None,
+            value: u.value.unwrap_or(f64::NAN),
+            std: u.std.unwrap_or(f64::NAN),
+            unit: &u.unit,
+            verdict: if u.negligible && u.fitted_relative_std() > IDENTIFIED {
+                "negligible"
+            } else {
+                u.verdict.word()
+            },
+            truth: None,
+        })
+        .collect();
+    terminal.table(summary::parameters("parameters", &rows));
+}
+
+/// What the short names of base parameters stand for; nothing where they are names already.
+fn groupings(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let grouped = || found.unknowns.iter().filter(|u| u.name != u.key);
+    if grouped().next().is_some() {
+        terminal.line("");
+        terminal.line("parameters that stand for combinations");
+        terminal.list(grouped().map(|u| &u.name));
+    }
+}
+
+/// Condition, rank, effective sample size and residual of the fit, and what is essential.
+pub fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let fit = &found.fit;
+    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
+    terminal.paragraph(&format!(
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones",
+        condition(fit.condition.raw),
+        condition(fit.condition.normalised),
+        fit.rank,
+        found.unknowns.len(),
+        fit.rows,
+        fit.effective_rows,
+    ));
+    open_directions(terminal, found);
+    let errors = found.joints.iter().map(|e| {
+        let (error, rmse) = (
+            number::percent(e.relative_error),
+            number::significant(e.rmse, 3),
+        );
+        unbroken(&format!("{} {error} ({rmse} {})", e.joint, e.unit))
+    });
+    let errors: Vec<String> = errors.collect();
+    terminal.paragraph(&format!("residual of the fit: {}", errors.join(", ")));
+    account(terminal, &found.account);
+    let alone = found.essential.joints.iter();
+    let alone = alone.map(|e| {
+        unbroken(&format!(
+            "{} {}",
+            e.joint,
+            number::percent(e.relative_error)
+        ))
+    });
+    terminal.paragraph(&format!(
+        "{} of {} parameters are essential; residual with them alone: {}",
+        found.essential.count,
+        found.unknowns.len(),
+        alone.collect::<Vec<_>>().join(", ")
+    ));
+}
+
+/// What rank and verdicts say together, where a parameter is called not identifiable: that no torque
+/// tells of it, or that what tells of it drowns in the noise.
+fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let unknowns = found.unknowns.iter();
+    let open = unknowns.filter(|u| u.verdict == Verdict::NotIdentifiable);
+    let all = open.count();
+    if all == 0 {
+        return;
+    }
+    let missing = found.unknowns.len().saturating_sub(found.fit.rank);
+    let noise = format!(
+        "a standard deviation above {:.0} % of the value",
+        100.0 * WEAK
+    );
+    terminal.paragraph(&match missing {
+        0 => format!(
+            "the torques tell of every combination; {all} not-identifiable are so for their noise, with {noise}"
+        ),
+        _ => format!(
+            "the torques tell nothing of {missing} combinations; the {all} not-identifiable are in these, or have \
+             {noise}"
+        ),
+    });
+}
+
+/// How the estimator went; nothing for least squares.
+fn account(terminal: &mut Writer, account: &Account) {
+    let ended = match account.status {
+        Ending::Converged => "converged",
+        Ending::IterationLimit => "stopped at the limit of iterations",
+        Ending::Diverged => "diverged",
+    };
+    if account.iterations > 1 {
+        terminal.line(&format!(
+            "{}: {ended} after {} passes over the logs",
+            account.estimator.name(),
+            account.iterations
+        ));
+    }
+    let each = |told: &dyn Fn(&JointAccount) -> Option<String>| {
+        let joints = account.joints.iter();
+        let words = joints.filter_map(|of| Some(format!("{} {}", of.joint, told(of)?)));
+        Some(words.collect::<Vec<_>>().join(", ")).filter(|words| !words.is_empty())
+    };
+    if let Some(shares) = each(&|of| of.down_weighted.map(number::percent)) {
+        terminal.line(&format!("rows of less than half weight: {shares}"));
+    }
+    if let Some(simulated) = &account.simulated {
+        let gains = each(&|of| {
+            let [k, d] = [of.proportional?, of.derivative?].map(|x| number::significant(x, 3));
+            Some(format!("{k} and {d}"))
+        });
+        terminal.line(&format!(
+            "simulated in closed loop at {} rad/s, gains on position and velocity: {}",
+            number::significant(simulated.loop_frequency, 3),
+            gains.unwrap_or_default()
+        ));
+    }
+    if let Some(errors) = each(&|of| of.relative_error_before.map(number::percent)) {
+        terminal.line(&format!("residual before the refinement: {errors}"));
+    }
+}
+
+/// Links that can exist, and by how much the fit suffers.
+fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
+    let numbers = ["mass", "x", "y", "z", "Ixx", "Iyy", "Izz"].map(|name| (name, Align::Decimal));
+    let mut columns = vec![("link", Align::Left)];
+    columns.extend(numbers);
+    let mut table = Table::new(&columns)
+        .caption("links that can exist: kg, centre of gravity in m, moments about it in kg m^2");
+    for link in &found.links {
+        let [xx, _, _, yy, _, zz] = link.inertia;
+        let mut row = vec![link.name.clone(), number::significant(link.mass, 4)];
+        row.extend(link.centre.map(|x| number::significant(x, 3)));
+        row.extend([xx, yy, zz].map(|x| number::significant(x, 3)));
+        table.row(row);
+    }
+    terminal.table(table);
+    let drives = found.drives.iter();
+    let drives: Vec<String> = drives
+        .map(|drive| format!("{} {}", drive.joint, number::significant(drive.inertia, 3)))
+        .collect();
+    if !drives.is_empty() {
+        terminal.line(&format!("drive inertias: {}", drives.join(", ")));
+    }
+    let both = found.relative_error_before.iter();
+    let both = both.zip(&found.relative_error_after);
+    let change = both.map(|(before, after)| {
+        let [from, to] = [before, after].map(|e| number::percent(e.relative_error));
+        unbroken(&format!("{} {from} to {to}", before.joint))
+    });
+    let change: Vec<String> = change.collect();
+    terminal.paragraph(&format!("the fit suffers: {}", change.join(", ")));
+}

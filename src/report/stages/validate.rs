@@ -1,0 +1,254 @@
+//! The report of `validate`.
+
+use crate::config::ModelFile;
+use crate::effect::AugmentedModel;
+use crate::identify::{LoggedRobot, Validated};
+use crate::log::{Provenance, escape};
+use crate::motion::MotionError;
+use crate::number;
+use crate::report::figure::{JointTorque, TorqueFigure};
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::table::unbroken;
+use crate::report::{Report, Writer, summary};
+use crate::validate::Validation;
+
+/// What the report is made from.
+pub struct Validate<'a> {
+    pub machine: &'a LoggedRobot,
+    pub file: &'a ModelFile,
+    pub model: &'a AugmentedModel,
+    /// Names of the logs.
+    pub logs: &'a [String],
+    pub found: &'a Validated,
+    /// Limit that the user set on every joint's relative error.
+    pub limit: Option<f64>,
+    /// The model file.
+    pub given: &'a Provenance,
+}
+
+/// The errors, and the verdict on them.
+pub fn validate(of: &Validate) -> Report {
+    let validation = &of.found.validation;
+    let title = escaped(of.logs);
+    let mut report = Report::new(&format!(
+        "Validation of {} on {title}",
+        escape(&of.given.name)
+    ));
+    let logs = of.logs.join(", ");
+    let caption = format!("torque of {logs} by {}", of.machine.name);
+    told(&mut report.terminal(), validation, &caption);
+    let mut page = report.page();
+    let (text, good) = words(validation, of.limit, &title);
+    page.verdict(&text, good);
+    used_before(&mut page, of.file, &of.found.inputs);
+    errors(&mut page, validation, "errors of the reconstructed torque");
+    report
+}
+
+/// What a page has room for besides; `look` is absent where the logs are too long to be held.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Validate,
+    look: Option<&Look>,
+    quality: &[Inspected],
+    command: &str,
+) -> Result<(), MotionError> {
+    let validation = &of.found.validation;
+    let title = escaped(of.logs);
+    parameters::section(page, of.file, &|_| None);
+    match look {
+        Some(look) => {
+            friction::section(page, &friction::figure(look, of.file, of.model));
+            let logs: Vec<usize> = (0..of.logs.len()).collect();
+            torque::section(page, look, &logs, &[Drawn::only(of.model)], &title)?;
+            let figure = residual::figure(look, &|_| true, of.model, None)?;
+            residual::section(page, &figure.svg());
+        }
+        None => {
+            page.heading("Torque, measured and reconstructed");
+            page.paragraph(
+                "These logs are too long to be held in memory, so this picture shows extremes only; \
+                 choose spans of them, as in LOG@0..20%, for pictures that can be zoomed.",
+            );
+            page.figure(&figure(validation, &title).svg());
+        }
+    }
+    page.heading("What the model hardly tells apart");
+    fit::pairs(page, of.file);
+    quality::section(page, quality, &of.found.warnings);
+    let mut inputs = vec![of.given.clone()];
+    inputs.extend(of.found.inputs.iter().cloned());
+    let (file, made_from) = (&of.machine.file, &of.file.provenance.inputs);
+    let summary = Some(&validation.summary);
+    provenance::section(page, file, &inputs, made_from, summary, command);
+    Ok(())
+}
+
+/// Names as a page shows them.
+fn escaped(names: &[String]) -> String {
+    let names: Vec<String> = names.iter().map(|name| escape(name)).collect();
+    names.join(", ")
+}
+
+/// The errors for a terminal.
+pub fn told(terminal: &mut Writer, validation: &Validation, caption: &str) {
+    let joints = &validation.joints;
+    terminal.table(summary::torque_errors(caption, joints));
+    terminal.line("");
+    let raw = joints.iter().map(|e| {
+        let error = number::percent(e.relative_error_raw);
+        unbroken(&format!("{} {error}", e.joint))
+    });
+    terminal.paragraph(&format!(
+        "over joints {}; before the parallel filter: {}",
+        number::percent(validation.overall.mean_relative_error),
+        raw.collect::<Vec<_>>().join(", ")
+    ));
+}
+
+/// The verdict in words, and whether nothing calls for attention.
+pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (String, bool) {
+    let mut text = format!(
+        "The model gives the torque of {title} to within {}, as the mean over the joints.",
+        number::percent(validation.overall.mean_relative_error)
+    );
+    let joints = validation.joints.iter();
+    if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
+        && validation.joints.len() > 1
+    {
+        text += &format!(
+            " The worst joint is {} with {}.",
+            worst.joint,
+            number::percent(worst.relative_error)
+        );
+    }
+    let Some(limit) = limit else {
+        return (text, true);
+    };
+    let beyond: Vec<&str> = validation
+        .joints
+        .iter()
+        .filter(|e| e.relative_error.is_nan() || e.relative_error > limit)
+        .map(|e| e.joint.as_str())
+        .collect();
+    match beyond.as_slice() {
+        [] => {
+            text += &format!(
+                " Every joint keeps the limit of {}.",
+                number::percent(limit)
+            )
+        }
+        some => {
+            text += &format!(
+                " The limit of {} is missed by {}.",
+                number::percent(limit),
+                some.join(", ")
+            );
+        }
+    }
+    (text, beyond.is_empty())
+}
+
+/// The errors of every joint.
+pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
+    let rows: Vec<Vec<String>> = validation
+        .joints
+        .iter()
+        .map(|e| {
+            let torque = |v: f64| format!("{} {}", number::significant(v, 3), e.unit);
+            vec![
+                e.joint.clone(),
+                number::percent(e.relative_error),
+                torque(e.rmse),
+                torque(e.max_abs),
+                match e.r2.is_finite() {
+                    true => format!("{:.5}", e.r2),
+                    false => number::ABSENT.to_owned(),
+                },
+                number::percent(e.relative_error_raw),
+                e.samples.to_string(),
+            ]
+        })
+        .collect();
+    page.rows(
+        caption,
+        &[
+            "joint",
+            "relative error",
+            "rms error",
+            "largest",
+            "R\u{b2}",
+            "relative error before the filter",
+            "rows",
+        ],
+        rows,
+    );
+}
+
+/// Logs that the model was made from are no test of it.
+fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
+    let made_from = &file.provenance.inputs;
+    let known = |i: &&Provenance| {
+        made_from
+            .iter()
+            .any(|m| m.sha256 == i.sha256 && m.samples > 0)
+    };
+    let names: Vec<String> = inputs
+        .iter()
+        .filter(known)
+        .map(|i| escape(&i.name))
+        .collect();
+    if !names.is_empty() {
+        page.verdict(
+            &format!(
+                "{} was used to make this model (the checksum is the same), unless the spans are \
+                 apart: its error is no test of it.",
+                names.join(", ")
+            ),
+            false,
+        );
+    }
+}
+
+/// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
+pub fn figure(validation: &Validation, title: &str) -> TorqueFigure {
+    let traces = &validation.traces;
+    let n = validation.joints.len();
+    let joints = validation
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, e)| {
+            let mut joint = JointTorque {
+                joint: e.joint.clone(),
+                unit: e.unit.to_owned(),
+                t: Vec::with_capacity(traces.t.len()),
+                measured: Vec::with_capacity(traces.t.len()),
+                reconstructed: Vec::with_capacity(traces.t.len()),
+                relative_error: e.relative_error,
+                rmse: e.rmse,
+            };
+            for (k, t) in traces.t.iter().enumerate() {
+                if k > 0 && traces.breaks.contains(&k) {
+                    // a row that is not finite parts the lines at a gap
+                    joint.t.push(*t);
+                    joint.measured.push(f64::NAN);
+                    joint.reconstructed.push(f64::NAN);
+                }
+                joint.t.push(*t);
+                joint.measured.push(traces.measured[k * n + j]);
+                joint.reconstructed.push(traces.reconstructed[k * n + j]);
+            }
+            joint
+        })
+        .collect();
+    TorqueFigure {
+        title: title.to_owned(),
+        joints,
+    }
+}
