@@ -96,49 +96,43 @@ struct Common {
     threads: Option<u16>,
 }
 
-/// The commands.
-#[derive(Debug, Subcommand)]
-enum Command {
-    Identify(identify::Args),
-    Inspect(inspect::Args),
-    Convert(convert::Args),
-    Friction(friction::Args),
-    Lsq(lsq::Args),
-    Validate(validate::Args),
-    Diagnose(diagnose::Args),
-    Compare(compare::Args),
-    Torque(torque::Args),
-    Simulate(simulate::Args),
-    Excite(excite::Args),
-    Export(export::Args),
-    New(new::Args),
-    Schema(schema::Args),
-    Completions(completions::Args),
-    #[command(hide = true)]
-    Man(man::Args),
+/// Makes the enum of the commands: of each its name and the module with its `Args` and its `run`.
+macro_rules! commands {
+    ($($(#[$how:meta])* $name:ident: $module:ident,)+) => {
+        /// The commands, in the order of the help.
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$how])* $name($module::Args),)+
+        }
+
+        impl Command {
+            fn run(&self, context: &Context) -> Result<Outcome, CliError> {
+                match self {
+                    $(Self::$name(args) => $module::run(args, context),)+
+                }
+            }
+        }
+    };
 }
 
-impl Command {
-    fn run(&self, context: &Context) -> Result<Outcome, CliError> {
-        match self {
-            Command::Identify(args) => identify::run(args, context),
-            Command::Inspect(args) => inspect::run(args, context),
-            Command::Convert(args) => convert::run(args, context),
-            Command::Friction(args) => friction::run(args, context),
-            Command::Lsq(args) => lsq::run(args, context),
-            Command::Validate(args) => validate::run(args, context),
-            Command::Diagnose(args) => diagnose::run(args, context),
-            Command::Compare(args) => compare::run(args, context),
-            Command::Torque(args) => torque::run(args, context),
-            Command::Simulate(args) => simulate::run(args, context),
-            Command::Excite(args) => excite::run(args, context),
-            Command::Export(args) => export::run(args, context),
-            Command::New(args) => new::run(args, context),
-            Command::Schema(args) => schema::run(args, context),
-            Command::Completions(args) => completions::run(args, context),
-            Command::Man(args) => man::run(args, context),
-        }
-    }
+commands! {
+    Identify: identify,
+    Inspect: inspect,
+    Convert: convert,
+    Friction: friction,
+    Lsq: lsq,
+    Validate: validate,
+    Diagnose: diagnose,
+    Compare: compare,
+    Torque: torque,
+    Simulate: simulate,
+    Excite: excite,
+    Export: export,
+    New: new,
+    Schema: schema,
+    Completions: completions,
+    #[command(hide = true)]
+    Man: man,
 }
 
 /// The process: reads its arguments, runs, and returns the status for the shell.
@@ -246,7 +240,7 @@ fn execute(
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
+    use clap::{CommandFactory, Parser};
 
     /// One command's arguments on a parser of their own.
     #[derive(Debug, Parser)]
@@ -292,36 +286,12 @@ mod tests {
         assert_eq!((args.seed, args.seconds), (3, Some(20.0)));
     }
 
-    /// The help of one command's arguments, as the command will show it.
-    fn help<T: clap::Args>() -> String {
-        use clap::CommandFactory;
-        Alone::<T>::command()
-            .max_term_width(80)
-            .render_long_help()
-            .to_string()
-    }
-
     #[test]
     fn every_help_fits_80_columns_and_has_an_example() {
-        use super::{
-            completions, convert, export, friction, identify, inspect, lsq, new, schema, simulate,
-            torque, validate,
-        };
-        let texts = [
-            help::<friction::Args>(),
-            help::<lsq::Args>(),
-            help::<validate::Args>(),
-            help::<torque::Args>(),
-            help::<simulate::Args>(),
-            help::<identify::Args>(),
-            help::<inspect::Args>(),
-            help::<convert::Args>(),
-            help::<export::Args>(),
-            help::<new::Args>(),
-            help::<schema::Args>(),
-            help::<completions::Args>(),
-        ];
-        for text in texts {
+        let all = super::Cli::command();
+        for command in all.get_subcommands().filter(|c| !c.is_hide_set()) {
+            let mut alone = command.clone().max_term_width(80);
+            let text = alone.render_long_help().to_string();
             assert!(text.contains("Example:\n  cft-ident "), "{text}");
             let long = text.lines().find(|line| line.chars().count() > 80);
             assert_eq!(long, None);

@@ -87,7 +87,7 @@ pub struct Effect {
     pub parameters: BTreeMap<String, EffectParameter>,
 }
 
-/// Mass properties of a link that can exist, as `lsq --feasible` finds them: keys as in `inertial` of
+/// Mass properties of a physically consistent link, as `lsq --feasible` finds them: keys as in `inertial` of
 /// a robot file's link.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -132,7 +132,7 @@ pub struct ModelFile {
     pub residual_std: BTreeMap<String, f64>,
     /// Effects added to the declared model.
     pub effects: Vec<Effect>,
-    /// Links that can exist and give these parameters, where they were asked for.
+    /// Physically consistent links that give these parameters, where they were asked for.
     pub links: Vec<LinkBody>,
     /// Inertia of the drives beside them, by joint [kg m^2 or kg].
     pub drive_inertia: BTreeMap<String, f64>,
