@@ -3,7 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use cft_ident::diagnose::{Candidate, Case, Diagnosis, Limits, LogRole, Open, Prior, diagnose};
+use cft_ident::diagnose::{
+    Candidate, Case, Diagnosis, FreeParameters, LogRole, ParameterPrior, SelectionLimits, diagnose,
+};
 use cft_ident::effect::{self, Added, AugmentedModel};
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
@@ -54,12 +56,12 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
         true => setting.put.iter().map(|p| p.kind.name.to_owned()).collect(),
         false => Vec::new(),
     };
-    let nothing = Limits {
+    let nothing = SelectionLimits {
         steps: 0,
         deviations: aloud,
-        ..Limits::default()
+        ..SelectionLimits::default()
     };
-    let run = |given: AugmentedModel, limits: Limits, without: Vec<String>| {
+    let run = |given: AugmentedModel, limits: SelectionLimits, without: Vec<String>| {
         let case = campaign.case(&lab, given, limits, without);
         diagnose(
             &case,
@@ -71,7 +73,11 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
             &|| false,
         )
     };
-    let result = match run(campaign.declared.clone(), Limits::default(), without) {
+    let result = match run(
+        campaign.declared.clone(),
+        SelectionLimits::default(),
+        without,
+    ) {
         Ok(result) => result,
         Err(error) => return refused(setting, seed, &put, &error.to_string()),
     };
@@ -95,7 +101,7 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
             .map(|j| {
                 let plain = result.refitted.joints[j].rmse.powi(2);
                 let known = oracle.after.train.joints[j].rmse.powi(2);
-                (plain - known) * oracle.left[j].over_floor.unwrap_or(0.0) / known
+                (plain - known) * oracle.unexplained[j].over_floor.unwrap_or(0.0) / known
             })
             .fold(0.0, f64::max)
     });
@@ -114,13 +120,13 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
         "seed": seed,
         "put": put,
         "steps": steps,
-        "cut": result.episodes.iter().map(|e| json!({
+        "cut": result.disturbances.iter().map(|e| json!({
             "place": robot.joint_names()[e.joint], "from_s": e.from_s, "to_s": e.to_s,
         })).collect::<Vec<_>>(),
         "structured": result.structured(),
         "remainder": result.remainder().map(|c| c.effect.title(robot)).collect::<Vec<_>>(),
         // structure left per joint: over what was there before, power over the noise's, share of the torque's
-        "left": result.left.iter().zip(&result.part_left).map(|(left, part)| {
+        "left": result.unexplained.iter().zip(&result.part_unexplained).map(|(left, part)| {
             [Some(*part), left.over_floor, Some(left.share)]
         }).collect::<Vec<_>>(),
         "shown": shown,
@@ -324,7 +330,7 @@ fn show(robot: &Robot, result: &Diagnosis) {
         );
     }
     let over: Vec<String> = result
-        .left
+        .unexplained
         .iter()
         .map(|l| format!("{:.2}", l.over_floor.unwrap_or(f64::NAN)))
         .collect();
@@ -463,7 +469,7 @@ fn arm(index: usize, log: &Block) -> Vec<Stretch> {
 /// The logs of a campaign and the declared model, as a lab has them.
 pub struct Campaign {
     pub declared: AugmentedModel,
-    pub prior: Prior,
+    pub prior: ParameterPrior,
     pub stretches: Vec<Stretch>,
     pub roles: Vec<LogRole>,
     pub keep: bool,
@@ -547,7 +553,7 @@ impl Campaign {
                 );
             }
         }
-        let prior = Prior {
+        let prior = ParameterPrior {
             centre: declared.clone(),
             information,
             rows_per_independent: 5.0,
@@ -561,12 +567,18 @@ impl Campaign {
         }
     }
 
-    fn case(&self, lab: &Lab, given: AugmentedModel, limits: Limits, without: Vec<String>) -> Case {
+    fn case(
+        &self,
+        lab: &Lab,
+        given: AugmentedModel,
+        limits: SelectionLimits,
+        without: Vec<String>,
+    ) -> Case {
         let joints = lab.robot.joints();
         Case {
             prior: self.prior.clone(),
             given,
-            open: Open {
+            open: FreeParameters {
                 offset: vec![false; joints],
                 friction: vec![vec![true; 5]; joints],
             },

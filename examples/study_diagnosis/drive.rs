@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use cft_ident::diagnose::{LogRole, Prior};
+use cft_ident::diagnose::{LogRole, ParameterPrior};
 use cft_ident::effect::AugmentedModel;
 use cft_ident::inertia::accumulate;
 use cft_ident::inertia::columns::{Own, RegressorColumns};
@@ -137,7 +137,7 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
     let unseen = log(truth, specs, NOISE, 10 * seed + 1);
     stretches.extend(held(1, 1, &settings(), &unseen));
     Campaign {
-        prior: Prior {
+        prior: ParameterPrior {
             centre: declared.clone(),
             information: DMatrix::zeros(4, 4),
             rows_per_independent: 5.0,

@@ -121,14 +121,14 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
             })
         })
         .collect();
-    let pair = |p: &diagnose::Pair| {
+    let pair = |p: &diagnose::SplitErrors| {
         json!({
             "train": errors_json(&p.train),
             "holdout": p.holdout.as_ref().map(errors_json),
         })
     };
     let unexplained: Vec<Value> = d
-        .left
+        .unexplained
         .iter()
         .zip(robot.joint_names())
         .map(|(l, joint)| json!({"joint": joint, "share": l.share, "over_floor": l.over_floor}))
@@ -152,7 +152,7 @@ pub fn json(machine: &LoggedRobot, found: &Diagnosed) -> Value {
         })
         .collect();
     let episodes: Vec<Value> = d
-        .episodes
+        .disturbances
         .iter()
         .map(|e| {
             json!({

@@ -2,7 +2,7 @@
 
 use super::diagnose::in_words;
 use super::typed;
-use crate::diagnose::{Candidate, Diagnosis, Errors, Pair};
+use crate::diagnose::{Candidate, Diagnosis, Errors, SplitErrors};
 use crate::effect::Added;
 use crate::identify::{Diagnosed, LoggedRobot};
 use crate::number;
@@ -80,7 +80,7 @@ pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
     for told in doubts(machine, found) {
         out += &hanging("  ", &told, 4);
     }
-    for e in &d.episodes {
+    for e in &d.disturbances {
         let told = format!(
             "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
              residual)",
@@ -106,7 +106,7 @@ pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
     let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
     for (j, joint) in robot.joint_names().iter().enumerate() {
         let of = |errors: &Errors| errors.joints[j].relative_error;
-        let unseen = |p: &Pair| p.holdout.as_ref().map(of);
+        let unseen = |p: &SplitErrors| p.holdout.as_ref().map(of);
         let interval = d.after.holdout.as_ref().map(|e| {
             let [low, high] = e.joints[j].interval_95;
             format!("{}..{}", hundred(low), hundred(high))
@@ -118,7 +118,7 @@ pub fn text(machine: &LoggedRobot, found: &Diagnosed, name: &str) -> String {
             &known(unseen(&d.before)),
             &known(unseen(&d.after)),
             interval.as_deref().unwrap_or(number::ABSENT),
-            &hundred(d.left[j].share),
+            &hundred(d.unexplained[j].share),
         ]);
     }
     out += &format!("{table}");
@@ -143,7 +143,7 @@ pub fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let robot = &machine.robot;
     let open: Vec<String> = d
         .structured_joints()
-        .map(|j| match d.left[j].over_floor {
+        .map(|j| match d.unexplained[j].over_floor {
             Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
             None => robot.joint_names()[j].clone(),
         })

@@ -1,31 +1,44 @@
 //! From a residual to the effect that the model lacks.
 //!
 //! ```text
-//! logs -> stretches -> plan (fit, folds, veto, holdout)
-//!      fit -> orders -> search (candidates) -> choose -> add -> fit ..  -> removal -> measure
+//! logs -> stretches -> data split (fit, folds, veto, holdout)
+//!      fit -> orders -> search (candidates) -> accept, choose, add -> fit ..  -> removal -> errors
 //! ```
 //!
 //! Every candidate is tested beside everything that is declared, with its columns projected off it:
 //! a share of its own, an F test that correlated residuals do not break, a criterion with the
-//! effective number of rows, cross-validation over blocks with gaps, and data set aside that may
+//! effective sample size, cross-validation over blocks with gaps, and data set aside that may
 //! veto. All must agree. The holdout decides nothing.
+//!
+//! | room | what |
+//! |---|---|
+//! | `problem` | which rows do what, the unknowns, and their joint fit |
+//! | `faults` | torque channels and disturbances, before any physics |
+//! | `candidates` | every effect at every place, its shape and its significance |
+//! | `selection` | which one is added, and which one goes again |
+//! | `unexplained` | errors, the noise floor, and what is above it |
+//! | `uncertainty` | covariance, bias, and the profile of shapes |
+//! | `run` | the loop over all of these |
 
 mod candidates;
 mod faults;
+mod outcome;
 mod problem;
 mod run;
 mod selection;
 mod uncertainty;
 mod unexplained;
 
-pub use candidates::score::Score;
+pub use candidates::candidate::Candidate;
+pub use candidates::score::CandidateScore;
 pub use faults::channels::Suspicion;
-pub use faults::episode::Episode;
-pub use problem::fit::Prior;
-pub use problem::plan::{LogRole, SetAside};
-pub use problem::unknowns::{Open, Unknown};
-pub use run::{Case, DiagnoseError, Diagnosis, Pair, Step, diagnose};
-pub use selection::accept::{Candidate, Limits};
+pub use faults::disturbance::Disturbance;
+pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors};
+pub use problem::case::{Case, SelectionLimits};
+pub use problem::data_split::{LogRole, SetAside};
+pub use problem::prior::ParameterPrior;
+pub use problem::unknowns::{FreeParameters, Unknown};
+pub use run::{DiagnoseError, diagnose};
 pub use unexplained::errors::{Errors, JointErrors, OverallErrors};
 pub use unexplained::evidence::{JointEvidence, evidence};
-pub use unexplained::{Left, STRUCTURED};
+pub use unexplained::{STRUCTURED, Unexplained};

@@ -10,7 +10,7 @@ use super::prior::{information, moved_alone, open};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, Limits, LogRole, Prior, Suspicion, Unknown,
+    self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion, Unknown,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::motion::Parallel;
@@ -35,7 +35,7 @@ pub struct DiagnoseSettings {
     /// The given model stays within its covariance: finds payload, gain and tilt.
     pub keep: bool,
     /// What an effect must keep to be accepted.
-    pub limits: Limits,
+    pub limits: SelectionLimits,
 }
 
 /// What the stage ends with.
@@ -162,7 +162,7 @@ fn case(
     let open = open(machine, file, &given);
     let rate = 1.0 / (held.summary.dt * parallel.decimation as f64);
     let alone = moved_alone(&given, &held.stretches, &roles);
-    let prior = Prior {
+    let prior = ParameterPrior {
         information: information(file, &given, &open, settings.keep, &alone),
         centre: given.clone(),
         rows_per_independent: (rate / (2.0 * processing.cutoff_hz)).max(1.0),

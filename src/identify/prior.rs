@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
-use crate::diagnose::{LogRole, Open};
+use crate::diagnose::{FreeParameters, LogRole};
 use crate::effect::{AugmentedModel, stationary_joints};
 use crate::motion::Stretch;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -12,7 +12,7 @@ use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
 /// Which parameters the fit may move: all but those that the friction stage left open.
-pub(super) fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> Open {
+pub(super) fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> FreeParameters {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()
@@ -42,7 +42,7 @@ pub(super) fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedMod
             open
         })
         .collect();
-    Open {
+    FreeParameters {
         offset: joints
             .iter()
             .map(|joint| file.find("offset", Some(joint)).is_some())
@@ -80,7 +80,7 @@ const FRICTION_DOUBT: f64 = 3.0;
 pub(super) fn information(
     file: &ModelFile,
     given: &AugmentedModel,
-    open: &Open,
+    open: &FreeParameters,
     keep: bool,
     alone: &[bool],
 ) -> DMatrix<f64> {

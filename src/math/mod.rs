@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`rfactor`] | triangular factor of a stacked matrix that never exists as a whole | none |
 //! | [`rank`] | singular values, rank, condition number | `faer` |
+//! | [`rank_revealing`] | inverse of a normal matrix with redundant columns | none |
 //! | [`jacobi`] | one-sided Jacobi singular values: fallback and test oracle | none |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
@@ -16,6 +17,7 @@ pub mod jacobi;
 pub mod long_run;
 pub mod minimise;
 pub mod rank;
+pub mod rank_revealing;
 pub mod rfactor;
 pub mod sos;
 pub mod zero_phase;

@@ -5,7 +5,7 @@ use super::super::diagnose_text::{doubts, nothing_missing};
 use super::super::{CliError, Context};
 use crate::cli::pictures::inspected;
 use crate::config::ModelFile;
-use crate::diagnose::{Candidate, Errors, Pair};
+use crate::diagnose::{Candidate, Errors, SplitErrors};
 use crate::identify::{DataFault, Diagnosed, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::number;
@@ -235,7 +235,7 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
         .enumerate()
         .map(|(j, joint)| {
             let relative = |e: &Errors| e.joints[j].relative_error;
-            let unseen = |p: &Pair| p.holdout.as_ref().map(relative);
+            let unseen = |p: &SplitErrors| p.holdout.as_ref().map(relative);
             let interval = d.after.holdout.as_ref().map_or("-".to_owned(), |e| {
                 let [low, high] = e.joints[j].interval_95;
                 format!("{} to {}", number::percent(low), number::percent(high))
@@ -253,7 +253,7 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
                     number::significant(rms, 3),
                     machine.file.torque_unit(j)
                 ),
-                number::percent(d.left[j].share),
+                number::percent(d.unexplained[j].share),
             ]
         })
         .collect();

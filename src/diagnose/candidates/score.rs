@@ -7,17 +7,16 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use crate::diagnose::problem::fit::{Fitted, Ground, Inverse};
-use crate::diagnose::problem::plan::Role;
-use crate::diagnose::problem::rows::{Total, dot};
+use super::columns::CandidateColumns;
+use crate::diagnose::problem::data_split::{Piece, RowRole};
+use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::normal_equations::{NormalEquations, dot};
 use crate::math::long_run::long_run;
-
-/// A candidate's filtered columns: `[stretch][joint][column][row]`; no columns where the joint is
-/// not touched.
-pub type Columns = Vec<Vec<Vec<Vec<f64>>>>;
+use crate::math::rank_revealing::RankRevealingInverse;
 
 /// Sums of a candidate over one piece.
-struct Cross {
+struct CrossProducts {
     /// X'WC over all unknowns.
     with_base: DMatrix<f64>,
     /// C'WC.
@@ -26,23 +25,23 @@ struct Cross {
     score: DVector<f64>,
 }
 
-impl Cross {
+impl CrossProducts {
     fn none(u: usize, k: usize) -> Self {
-        Cross {
+        CrossProducts {
             with_base: DMatrix::zeros(u, k),
             own: DMatrix::zeros(k, k),
             score: DVector::zeros(k),
         }
     }
 
-    fn add(&mut self, other: &Cross) {
+    fn add(&mut self, other: &CrossProducts) {
         self.with_base += &other.with_base;
         self.own += &other.own;
         self.score += &other.score;
     }
 
-    fn without(&self, other: &Cross) -> Cross {
-        Cross {
+    fn without(&self, other: &CrossProducts) -> CrossProducts {
+        CrossProducts {
             with_base: &self.with_base - &other.with_base,
             own: &self.own - &other.own,
             score: &self.score - &other.score,
@@ -52,7 +51,7 @@ impl Cross {
 
 /// What the data say of a candidate.
 #[derive(Debug, Clone)]
-pub struct Score {
+pub struct CandidateScore {
     /// Coefficients of its columns.
     pub beta: Vec<f64>,
     /// Fraction of the weighted squared residual that it removes in the fit.
@@ -74,13 +73,13 @@ pub struct Score {
 }
 
 /// The fitted model, prepared for many candidates.
-pub struct Judge<'a> {
+pub struct CandidateTest<'a> {
     at: &'a Fitted,
-    ground: &'a Ground<'a>,
-    inverse: Inverse,
+    problem: &'a FitProblem<'a>,
+    inverse: RankRevealingInverse,
     folds: Vec<Fold>,
     /// Sums of each piece that may veto.
-    of_vetoes: Vec<Total>,
+    of_vetoes: Vec<NormalEquations>,
     /// Squared error of each fold left out, without a candidate.
     pub base_folds: Vec<f64>,
     /// Squared error of each piece that may veto.
@@ -89,42 +88,43 @@ pub struct Judge<'a> {
 
 /// One fold left out.
 struct Fold {
-    inverse: Inverse,
+    inverse: RankRevealingInverse,
     score: DVector<f64>,
-    held_out: Total,
+    held_out: NormalEquations,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> CandidateTest<'a> {
     /// Prepares the folds.
-    pub fn new(at: &'a Fitted, ground: &'a Ground<'a>) -> Self {
-        let sum = |wanted: &dyn Fn(Role) -> bool| at.base.total(&ground.plan, &at.weights, wanted);
-        let all = sum(&Role::fitted);
+    pub fn new(at: &'a Fitted, problem: &'a FitProblem<'a>) -> Self {
+        let sum =
+            |wanted: &dyn Fn(RowRole) -> bool| at.base.total(&problem.split, &at.weights, wanted);
+        let all = sum(&RowRole::fitted);
         let prior_pull = &at.pull - &all.score;
-        let in_folds = sum(&|r| matches!(r, Role::Fold(_)));
-        let folds: Vec<Fold> = (0..ground.plan.folds)
+        let in_folds = sum(&|r| matches!(r, RowRole::Fold(_)));
+        let folds: Vec<Fold> = (0..problem.split.folds)
             .map(|f| {
-                let held_out = sum(&|r| r == Role::Fold(f));
+                let held_out = sum(&|r| r == RowRole::Fold(f));
                 let normal = &in_folds.normal - &held_out.normal + &at.information;
                 Fold {
-                    inverse: Inverse::of(&normal),
+                    inverse: RankRevealingInverse::of(&normal),
                     score: &in_folds.score - &held_out.score + &prior_pull,
                     held_out,
                 }
             })
             .collect();
-        let inverse = Inverse::of(&at.normal);
+        let inverse = RankRevealingInverse::of(&at.normal);
         let rest = inverse.solve(&at.pull);
         let of_vetoes = at
             .base
-            .each(&ground.plan, &at.weights, &|r| r == Role::Veto);
+            .each(&problem.split, &at.weights, &|r| r == RowRole::Veto);
         let base_folds = folds
             .iter()
             .map(|f| square_after(&f.held_out, &f.inverse.solve(&f.score)))
             .collect();
         let base_vetoes = of_vetoes.iter().map(|v| square_after(v, &rest)).collect();
-        Judge {
+        CandidateTest {
             at,
-            ground,
+            problem,
             inverse,
             folds,
             of_vetoes,
@@ -134,11 +134,11 @@ impl<'a> Judge<'a> {
     }
 
     /// Sums of a candidate over every piece.
-    fn cross(&self, columns: &Columns, k: usize) -> Vec<Cross> {
+    fn cross(&self, columns: &CandidateColumns, k: usize) -> Vec<CrossProducts> {
         let base = &self.at.base;
         let u = base.unknowns.len();
-        let piece = |piece: &crate::diagnose::problem::plan::Piece| {
-            let mut cross = Cross::none(u, k);
+        let piece = |piece: &Piece| {
+            let mut cross = CrossProducts::none(u, k);
             let rows = &base.stretches[piece.stretch];
             for (j, own) in columns[piece.stretch].iter().enumerate() {
                 if own.is_empty() {
@@ -163,12 +163,17 @@ impl<'a> Judge<'a> {
             }
             cross
         };
-        self.ground.plan.pieces.iter().map(piece).collect()
+        self.problem.split.pieces.iter().map(piece).collect()
     }
 
-    fn over(&self, cross: &[Cross], k: usize, wanted: &dyn Fn(Role) -> bool) -> Cross {
-        let mut total = Cross::none(self.at.base.unknowns.len(), k);
-        for (piece, c) in self.ground.plan.pieces.iter().zip(cross) {
+    fn over(
+        &self,
+        cross: &[CrossProducts],
+        k: usize,
+        wanted: &dyn Fn(RowRole) -> bool,
+    ) -> CrossProducts {
+        let mut total = CrossProducts::none(self.at.base.unknowns.len(), k);
+        for (piece, c) in self.problem.split.pieces.iter().zip(cross) {
             if wanted(piece.role) {
                 total.add(c);
             }
@@ -178,16 +183,21 @@ impl<'a> Judge<'a> {
 
     /// Fraction of the weighted squared residual that a candidate removes: all that a search over
     /// shapes needs.
-    pub fn gain(&self, columns: &Columns, k: usize) -> f64 {
-        let total = self.over(&self.cross(columns, k), k, &Role::fitted);
+    pub fn gain(&self, columns: &CandidateColumns, k: usize) -> f64 {
+        let total = self.over(&self.cross(columns, k), k, &RowRole::fitted);
         let (solution, _) = partial(&total, &self.inverse, &self.at.pull, SHARE);
         solution.map_or(0.0, |s| s.removed / self.at.square.max(f64::MIN_POSITIVE))
     }
 
     /// Everything; none where no column has a part of its own.
-    pub fn score(&self, columns: &Columns, k: usize, shapes: usize) -> Option<Score> {
+    pub fn score(
+        &self,
+        columns: &CandidateColumns,
+        k: usize,
+        shapes: usize,
+    ) -> Option<CandidateScore> {
         let cross = self.cross(columns, k);
-        let total = self.over(&cross, k, &Role::fitted);
+        let total = self.over(&cross, k, &RowRole::fitted);
         let (solution, share) = partial(&total, &self.inverse, &self.at.pull, SHARE);
         let solution = solution?;
         let (p_value, effective_rows) = self.significance(&cross, &total, &solution, columns);
@@ -196,10 +206,10 @@ impl<'a> Judge<'a> {
         let free = (solution.kept.len() + shapes) as f64;
         let delta_bic = effective * (before / after).ln() - free * effective.max(2.0).ln();
 
-        let in_folds = self.over(&cross, k, &|r| matches!(r, Role::Fold(_)));
+        let in_folds = self.over(&cross, k, &|r| matches!(r, RowRole::Fold(_)));
         let mut folds = Vec::with_capacity(self.folds.len());
         for (f, fold) in self.folds.iter().enumerate() {
-            let held_out = self.over(&cross, k, &|r| r == Role::Fold(f));
+            let held_out = self.over(&cross, k, &|r| r == RowRole::Fold(f));
             let train = in_folds.without(&held_out);
             let (solved, _) = partial(&train, &fold.inverse, &fold.score, 0.0);
             folds.push(match solved {
@@ -210,7 +220,7 @@ impl<'a> Judge<'a> {
         let base: f64 = self.base_folds.iter().sum();
         let with: f64 = folds.iter().sum();
         let vetoes = [self.base_vetoes.clone(), self.vetoes(&cross, &solution)];
-        Some(Score {
+        Some(CandidateScore {
             beta: solution.beta.iter().copied().collect(),
             gain: solution.removed / self.at.square.max(f64::MIN_POSITIVE),
             unique_share: share,
@@ -225,9 +235,9 @@ impl<'a> Judge<'a> {
     }
 
     /// Squared error on each piece that may veto, with a candidate.
-    fn vetoes(&self, cross: &[Cross], solution: &Solution) -> Vec<f64> {
-        let pieces = self.ground.plan.pieces.iter().zip(cross);
-        let vetoing = pieces.filter(|(p, _)| p.role == Role::Veto);
+    fn vetoes(&self, cross: &[CrossProducts], solution: &CandidateSolution) -> Vec<f64> {
+        let pieces = self.problem.split.pieces.iter().zip(cross);
+        let vetoing = pieces.filter(|(p, _)| p.role == RowRole::Veto);
         vetoing
             .zip(&self.of_vetoes)
             .map(|((_, cross), total)| square_with(total, cross, solution))
@@ -236,15 +246,20 @@ impl<'a> Judge<'a> {
 
     /// Weighted squared residual of the joints that a candidate touches, without and with it, and their
     /// rows. Other joints gain too where parameters that they share were bent by the effect's absence.
-    fn touched(&self, columns: &Columns, s: &Solution, total: &Cross) -> (f64, f64, f64) {
+    fn touched(
+        &self,
+        columns: &CandidateColumns,
+        s: &CandidateSolution,
+        total: &CrossProducts,
+    ) -> (f64, f64, f64) {
         let (mut before, mut after, mut rows) = (0.0, 0.0, 0.0);
         let unknowns = &self.at.base.unknowns.columns;
-        for (piece, sums) in self.ground.plan.pieces.iter().zip(&self.at.base.sums) {
+        for (piece, sums) in self.problem.split.pieces.iter().zip(&self.at.base.sums) {
             if !piece.role.fitted() {
                 continue;
             }
             for (j, own) in columns[piece.stretch].iter().enumerate() {
-                if own.is_empty() || self.ground.plan.holds(piece.stretch, j) {
+                if own.is_empty() || self.problem.split.ignores(piece.stretch, j) {
                     continue;
                 }
                 let w = self.at.weights[j].powi(2);
@@ -264,19 +279,25 @@ impl<'a> Judge<'a> {
     }
 
     /// F test of the coefficients with a covariance that correlation from piece to piece does not
-    /// break (Newey and West 1987, Bartlett's weights), and the rows that independent ones of the
-    /// same certainty would number.
+    /// break (Newey and West 1987, Bartlett's weights), and the effective sample size.
     fn significance(
         &self,
-        cross: &[Cross],
-        total: &Cross,
-        s: &Solution,
-        columns: &Columns,
+        cross: &[CrossProducts],
+        total: &CrossProducts,
+        s: &CandidateSolution,
+        columns: &CandidateColumns,
     ) -> (f64, f64) {
         let k = s.beta.len();
         let mut scores: Vec<(usize, DVector<f64>)> = Vec::new();
         let at = self.at;
-        for ((piece, c), sums) in self.ground.plan.pieces.iter().zip(cross).zip(&at.base.sums) {
+        for ((piece, c), sums) in self
+            .problem
+            .split
+            .pieces
+            .iter()
+            .zip(cross)
+            .zip(&at.base.sums)
+        {
             if !piece.role.fitted() {
                 continue;
             }
@@ -301,7 +322,7 @@ impl<'a> Judge<'a> {
         // as if rows were independent: weighted residuals have variance 1 by construction
         let (_, after, rows) = self.touched(columns, s, total);
         let variance = after / rows.max(1.0);
-        // columns at rest are not tested
+        // redundant columns are not tested
         middle = middle.select_rows(&s.kept).select_columns(&s.kept);
         let tested = s.kept.len() as f64;
         let mut ratio = 0.0;
@@ -313,7 +334,7 @@ impl<'a> Judge<'a> {
         // correlation only takes certainty away
         let inflation = ratio.max(1.0);
         let score = (&s.own * &s.beta).select_rows(&s.kept);
-        let wald = score.dot(&Inverse::of(&middle).solve(&score)) / tested;
+        let wald = score.dot(&RankRevealingInverse::of(&middle).solve(&score)) / tested;
         let freedom = (count / (lag + 1) as f64 - tested).max(3.0);
         let p = match FisherSnedecor::new(tested, freedom) {
             Ok(f) if wald.is_finite() && wald > 0.0 => f.sf(wald),
@@ -329,7 +350,7 @@ pub const LAG: usize = 2;
 const SHARE: f64 = 0.001;
 
 /// Coefficients of a candidate and the base step that goes with them.
-struct Solution {
+struct CandidateSolution {
     beta: DVector<f64>,
     delta: DVector<f64>,
     /// A^-1 X'WC.
@@ -338,18 +359,18 @@ struct Solution {
     own: DMatrix<f64>,
     /// Weighted squares removed.
     removed: f64,
-    /// Columns with a part of their own; the others stay at rest.
+    /// Columns with a part of their own; the others are redundant.
     kept: Vec<usize>,
 }
 
 /// Solves for a candidate beside the base; the second result is its share of its own. None where
 /// no column keeps a share above `least`.
 fn partial(
-    total: &Cross,
-    inverse: &Inverse,
+    total: &CrossProducts,
+    inverse: &RankRevealingInverse,
     score: &DVector<f64>,
     least: f64,
-) -> (Option<Solution>, f64) {
+) -> (Option<CandidateSolution>, f64) {
     let projection = inverse.times(&total.with_base);
     let own = &total.own - total.with_base.tr_mul(&projection);
     let k = own.nrows();
@@ -358,17 +379,17 @@ fn partial(
     if largest <= least || !largest.is_finite() {
         return (None, largest.max(0.0));
     }
-    // columns that are absorbed, or that stand for one another, stay at rest
+    // columns that are absorbed, or that stand for one another, are redundant
     let right = &total.score - projection.tr_mul(score);
     let inverse_own = absorbed(&own, &total.own, least.max(1e-6));
-    let kept = (0..k).filter(|i| !inverse_own.at_rest(*i)).collect();
+    let kept = (0..k).filter(|i| !inverse_own.redundant(*i)).collect();
     let beta = inverse_own.solve(&right);
     let delta = inverse.solve(score) - &projection * &beta;
     let removed = beta.dot(&right);
     let whole = (beta.transpose() * &total.own * &beta)[(0, 0)];
     let unique = (beta.transpose() * &own * &beta)[(0, 0)];
     let share = if whole > 0.0 { unique / whole } else { 0.0 };
-    let solution = Solution {
+    let solution = CandidateSolution {
         beta,
         delta,
         projection,
@@ -380,7 +401,7 @@ fn partial(
 }
 
 /// Inverse of S on its columns with a share above `least`; the others get none.
-fn absorbed(own: &DMatrix<f64>, whole: &DMatrix<f64>, least: f64) -> Inverse {
+fn absorbed(own: &DMatrix<f64>, whole: &DMatrix<f64>, least: f64) -> RankRevealingInverse {
     let k = own.nrows();
     let mut cleared = own.clone();
     for i in 0..k {
@@ -391,16 +412,16 @@ fn absorbed(own: &DMatrix<f64>, whole: &DMatrix<f64>, least: f64) -> Inverse {
             }
         }
     }
-    Inverse::of(&cleared)
+    RankRevealingInverse::of(&cleared)
 }
 
 /// |e - X delta|^2 from sums.
-fn square_after(total: &Total, delta: &DVector<f64>) -> f64 {
+fn square_after(total: &NormalEquations, delta: &DVector<f64>) -> f64 {
     total.square - 2.0 * delta.dot(&total.score) + delta.dot(&(&total.normal * delta))
 }
 
 /// |e - X delta - C beta|^2 from sums.
-fn square_with(total: &Total, cross: &Cross, s: &Solution) -> f64 {
+fn square_with(total: &NormalEquations, cross: &CrossProducts, s: &CandidateSolution) -> f64 {
     square_after(total, &s.delta) - 2.0 * s.beta.dot(&cross.score)
         + 2.0 * s.delta.dot(&(&cross.with_base * &s.beta))
         + s.beta.dot(&(&cross.own * &s.beta))

@@ -2,43 +2,44 @@
 
 use rayon::prelude::*;
 
+use super::baseline::Baseline;
+use super::candidate::Candidate;
+use super::columns::{CandidateColumns, columns, kept_by_filter};
 use super::orders::SCANNED;
-use super::score::{Columns, Judge, spread};
-use crate::diagnose::problem::fit::{Fitted, Ground};
-use crate::diagnose::problem::rows::{clear, scene, standing};
-use crate::diagnose::run::Case;
-use crate::diagnose::selection::accept::{Candidate, Worth, decide};
-use crate::effect::{
-    Added, AugmentedModel, LAWS, Law, Place, Role, Search, Torques, order_is_whole, shifted,
-};
+use super::score::CandidateTest;
+use crate::diagnose::problem::case::Case;
+use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::effect::{Added, LAWS, Law, Place, Role, Search, Torques, order_is_whole};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
 
-/// What an effect's size is measured by, per joint.
-#[derive(Debug, Clone, Copy)]
-pub struct Bar<'a> {
-    /// Squared residual of the declared model over the fitted rows.
-    pub declared: &'a [f64],
-    /// Variance of the noise in the filtered residual.
-    pub noise: &'a [f64],
-}
-
 /// Most evaluations of a shape's refinement, per shape parameter.
 const REFINEMENTS: u64 = 24;
+/// A shape is refined where the best start removes at least this share of what it must.
+const HOPELESS: f64 = 0.2;
+/// Least part of a periodic column's power that the parallel filter must keep.
+const LEAST_KEPT: f64 = 0.2;
 
-/// Tries everything once.
+/// Tries everything once; the candidates, not yet decided on, and how many shapes were tried.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn search(
     at: &Fitted,
-    ground: &Ground,
+    problem: &FitProblem,
     case: &Case,
-    bar: &Bar,
+    baseline: &Baseline,
     torques: &[Torques],
     stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Candidate>, MotionError> {
-    let judge = Judge::new(at, ground);
+) -> Result<(Vec<Candidate>, usize), MotionError> {
+    let round = Round {
+        at,
+        problem,
+        test: CandidateTest::new(at, problem),
+        torques,
+        keep: case.keep,
+    };
     let robot = &at.model.model.robot;
     let laws = &at.model.model.friction;
     let places: Vec<(&'static Law, Place)> = LAWS
@@ -50,230 +51,195 @@ pub fn search(
         .par_iter()
         .map(|&(law, place)| {
             if stop() {
-                return Ok((refused(law, place, "interrupted".into()), 0));
+                return Ok((Candidate::refused(law, place, "interrupted"), 0));
             }
-            let least = floor_of(at, ground, bar, place) * case.limits.over_noise / at.square;
-            one(
-                at,
-                ground,
-                &judge,
-                torques,
-                (law, place),
-                case.keep,
-                HOPELESS * least,
-            )
+            let noise = baseline.noise_square(at, &problem.split, place);
+            let least = noise * case.limits.over_noise / at.square;
+            round.tried(law, place, HOPELESS * least)
         })
         .collect::<Result<_, MotionError>>()?;
-    let shapes: usize = tried.iter().map(|(_, shapes)| shapes).sum();
-    let mut found: Vec<Candidate> = tried.into_iter().map(|(c, _)| c).collect();
-    for candidate in &mut found {
-        let over = |of: &dyn Fn(usize) -> f64| -> f64 {
-            (0..robot.joints())
-                .filter(|j| candidate.effect.place.touches(*j))
-                .map(|j| at.weights[j].powi(2) * of(j))
-                .sum()
-        };
-        let whole = over(&|j| bar.declared[j]).max(f64::MIN_POSITIVE);
-        let floor = floor_of(at, ground, bar, candidate.effect.place);
-        let worth = |gain: f64| Worth {
-            of_declared: gain * at.square / whole,
-            of_noise: gain * at.square / floor,
-        };
-        decide(candidate, shapes.max(1), &case.limits, &worth);
-    }
-    Ok(found)
+    let shapes = tried.iter().map(|(_, shapes)| shapes).sum();
+    Ok((tried.into_iter().map(|(c, _)| c).collect(), shapes))
 }
 
-/// A shape is refined where the best start removes at least this share of what it must.
-const HOPELESS: f64 = 0.2;
-
-/// Weighted square of the noise on the joints of a place, over the fitted rows.
-fn floor_of(at: &Fitted, ground: &Ground, bar: &Bar, place: Place) -> f64 {
-    let joints = (0..bar.noise.len()).filter(|j| place.touches(*j));
-    let of_joint = |j: usize| {
-        let rows = ground.plan.fitted_rows_of(j) as f64;
-        // where the noise is overrated, what is left counts
-        rows * (at.weights[j].powi(2) * bar.noise[j]).min(1.0)
-    };
-    joints.map(of_joint).sum::<f64>().max(f64::MIN_POSITIVE)
+/// What every candidate of a round is tried against.
+struct Round<'a> {
+    at: &'a Fitted,
+    problem: &'a FitProblem<'a>,
+    test: CandidateTest<'a>,
+    torques: &'a [Torques],
+    /// The given model is kept within its covariance.
+    keep: bool,
 }
 
-/// A candidate that was not tried.
-fn refused(law: &'static Law, place: Place, reason: String) -> Candidate {
-    Candidate {
-        effect: Added {
+impl Round<'_> {
+    /// One effect at one place: the best of its shapes, refined where it removes more than `least`; and how many
+    /// shapes were tried.
+    fn tried(
+        &self,
+        law: &'static Law,
+        place: Place,
+        least: f64,
+    ) -> Result<(Candidate, usize), MotionError> {
+        let refused = |reason: &str, tried| Ok((Candidate::refused(law, place, reason), tried));
+        if let Some(reason) = self.refusal(law, place) {
+            return refused(reason, 0);
+        }
+        let starts = match (law.starts)(&self.problem.cover, place) {
+            Ok(starts) => starts,
+            Err(lacking) => return refused(&lacking, 0),
+        };
+        // a peak was picked out of all orders that were looked at
+        let tried = match law.entry.search {
+            Search::Orders => SCANNED,
+            _ => starts.len(),
+        };
+        let mut effect = Added {
             law,
             place,
-            shape: vec![f64::NAN; law.shape.len()],
+            shape: Vec::new(),
             linear: vec![0.0; law.linear.len()],
-        },
-        score: None,
-        accepted: false,
-        significant: false,
-        reason,
-    }
-}
-
-/// One effect at one place: the best of its shapes, refined; and how many shapes were tried.
-fn one(
-    at: &Fitted,
-    ground: &Ground,
-    judge: &Judge,
-    torques: &[Torques],
-    (law, place): (&'static Law, Place),
-    keep: bool,
-    least: f64,
-) -> Result<(Candidate, usize), MotionError> {
-    let joints = 0..at.weights.len();
-    if joints
-        .filter(|j| place.touches(*j))
-        .all(|j| ground.cover.joints[j].held)
-    {
-        let reason = "the joint is held in these logs: move it to see what it does";
-        return Ok((refused(law, place, reason.into()), 0));
-    }
-    if law.entry.role == Role::Kept && !keep {
-        let reason = "a fit that is free while carrying it absorbs it; give the model of logs \
-                      without it, and --keep";
-        return Ok((refused(law, place, reason.into()), 0));
-    }
-    let there = |e: &Added| e.name() == law.entry.name && e.place == place;
-    let again = at.model.effects.iter().any(there);
-    let periodic = law.entry.search == Search::Orders;
-    // only waves come more than once, each with an order of its own
-    if again && !periodic {
-        return Ok((refused(law, place, "it is in the model".into()), 0));
-    }
-    let starts = match (law.starts)(&ground.cover, place) {
-        Ok(starts) => starts,
-        Err(lacking) => return Ok((refused(law, place, lacking), 0)),
-    };
-    let k = law.linear.len();
-    let mut effect = Added {
-        law,
-        place,
-        shape: Vec::new(),
-        linear: vec![0.0; k],
-    };
-    let mut best = (f64::NEG_INFINITY, Vec::new());
-    // a peak was picked out of all orders that were looked at
-    let count = if periodic { SCANNED } else { starts.len() };
-    for shape in starts {
-        effect.shape = shape;
-        if periodic && kept_by_filter(at, ground, torques, &effect)? < LEAST_KEPT {
-            continue;
+        };
+        let Some(gain) = self.best_start(&mut effect, starts)? else {
+            let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
+                          [filter] to look for them";
+            return refused(reason, tried);
+        };
+        if gain > least {
+            self.refine(&mut effect)?;
         }
-        let gain = judge.gain(&columns(&at.model, ground, torques, &effect)?, k);
-        if gain > best.0 {
-            best = (gain, effect.shape.clone());
+        if self
+            .added(law, place)
+            .any(|e| near(&e.shape, &effect.shape))
+        {
+            return refused("it is in the model", tried);
         }
-    }
-    if best.0 == f64::NEG_INFINITY {
-        let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
-                      [filter] to look for them";
-        return Ok((refused(law, place, reason.into()), count));
-    }
-    effect.shape = best.1;
-    // a shape worth refining: positive, so that steps are ratios
-    let limits = (law.limits)(&ground.cover, place);
-    let free = !effect.shape.is_empty()
-        && law.entry.search.refines()
-        && limits.iter().all(|[low, high]| low < high)
-        && best.0 > least;
-    if free {
-        let scale: Vec<f64> = effect.shape.iter().map(|s| s.abs().max(1e-9)).collect();
-        let mut failed = None;
-        let start = vec![0.0; scale.len()];
-        // an order's peak is as narrow as one wave over the travel
-        let steps: Vec<f64> = effect
-            .shape
-            .iter()
-            .map(|s| match periodic {
-                true => 0.15 / (s.abs() * ground.cover.travel(place)).max(0.5),
-                false => 0.2,
-            })
-            .collect();
-        let centre = effect.shape.clone();
-        let mut cost = |x: &[f64]| {
-            let mut moved = effect.clone();
-            for (i, s) in moved.shape.iter_mut().enumerate() {
-                *s = (centre[i] + scale[i] * x[i]).clamp(limits[i][0], limits[i][1]);
+        if law.entry.search == Search::Orders {
+            let order = effect.shape[0];
+            if !order_is_whole(&self.problem.cover, place, order) {
+                let reason = format!(
+                    "{order:.3} waves a turn: after a full turn the joint is where it was, and orders are whole"
+                );
+                return refused(&reason, tried);
             }
-            match columns(&at.model, ground, torques, &moved) {
-                Ok(c) => -judge.gain(&c, k),
-                Err(e) => {
-                    failed = Some(e);
-                    f64::INFINITY
-                }
+        }
+        let columns = self.columns(&effect)?;
+        let score = (self.test).score(&columns, effect.linear.len(), effect.shape.len());
+        let reason = match &score {
+            None => "nothing of it is its own: what is declared stands in for it",
+            Some(s) => {
+                effect.linear.clone_from(&s.beta);
+                ""
             }
         };
-        let budget = REFINEMENTS * scale.len() as u64;
+        Ok((Candidate::open(effect, score, reason), tried))
+    }
+
+    /// Effects of this law that the model has at this place.
+    fn added(&self, law: &'static Law, place: Place) -> impl Iterator<Item = &Added> {
+        let effects = self.at.model.effects.iter();
+        effects.filter(move |e| e.name() == law.entry.name && e.place == place)
+    }
+
+    /// Why an effect is not tried at a place.
+    fn refusal(&self, law: &'static Law, place: Place) -> Option<&'static str> {
+        let mut touched = (0..self.at.weights.len()).filter(|j| place.touches(*j));
+        if touched.all(|j| self.problem.cover.joints[j].held) {
+            return Some("the joint is held in these logs: move it to see what it does");
+        }
+        if law.entry.role == Role::Kept && !self.keep {
+            return Some(
+                "a fit that is free while carrying it absorbs it; give the model of logs \
+                 without it, and --keep",
+            );
+        }
+        // only waves come more than once, each with an order of its own
+        let once = law.entry.search != Search::Orders;
+        (once && self.added(law, place).next().is_some()).then_some("it is in the model")
+    }
+
+    fn columns(&self, effect: &Added) -> Result<CandidateColumns, MotionError> {
+        columns(&self.at.model, self.problem, self.torques, effect)
+    }
+
+    /// What an effect removes with its shape.
+    fn gain(&self, effect: &Added) -> Result<f64, MotionError> {
+        let columns = self.columns(effect)?;
+        Ok(self.test.gain(&columns, effect.linear.len()))
+    }
+
+    /// Gives the effect the best of the shapes to start from, and says what it removes; none where the filter
+    /// takes all of them.
+    fn best_start(
+        &self,
+        effect: &mut Added,
+        starts: Vec<Vec<f64>>,
+    ) -> Result<Option<f64>, MotionError> {
+        let mut best = (f64::NEG_INFINITY, Vec::new());
+        for shape in starts {
+            effect.shape = shape;
+            if effect.law.entry.search == Search::Orders {
+                let kept = kept_by_filter(&self.at.model, self.problem, self.torques, effect)?;
+                if kept < LEAST_KEPT {
+                    continue;
+                }
+            }
+            let gain = self.gain(effect)?;
+            if gain > best.0 {
+                best = (gain, effect.shape.clone());
+            }
+        }
+        effect.shape = best.1;
+        Ok((best.0 > f64::NEG_INFINITY).then_some(best.0))
+    }
+
+    /// Refines a shape that is free, in ratios to where it starts.
+    fn refine(&self, effect: &mut Added) -> Result<(), MotionError> {
+        let (law, cover) = (effect.law, &self.problem.cover);
+        let limits = (law.limits)(cover, effect.place);
+        let free = limits.iter().all(|[low, high]| low < high);
+        if effect.shape.is_empty() || !law.entry.search.refines() || !free {
+            return Ok(());
+        }
+        let centre = effect.shape.clone();
+        let shape_at = |x: &[f64]| -> Vec<f64> {
+            let parts = centre.iter().zip(x).zip(&limits);
+            let of = |((c, x), [low, high]): ((&f64, &f64), &[f64; 2])| {
+                (c + c.abs().max(1e-9) * x).clamp(*low, *high)
+            };
+            parts.map(of).collect()
+        };
+        // an order's peak is as narrow as one wave over the travel
+        let step = |order: &f64| match law.entry.search {
+            Search::Orders => 0.15 / (order.abs() * cover.travel(effect.place)).max(0.5),
+            _ => 0.2,
+        };
+        let steps: Vec<f64> = centre.iter().map(step).collect();
+        let mut failed = None;
+        let mut cost = |x: &[f64]| {
+            let moved = Added {
+                shape: shape_at(x),
+                ..effect.clone()
+            };
+            self.gain(&moved).map_or_else(
+                |error| {
+                    failed = Some(error);
+                    f64::INFINITY
+                },
+                |gain| -gain,
+            )
+        };
+        let budget = REFINEMENTS * centre.len() as u64;
+        let start = vec![0.0; centre.len()];
         let found = nelder_mead(&mut cost, &start, &steps, 1e-6, budget);
-        if let Some(error) = failed {
-            return Err(error);
-        }
-        for (i, s) in effect.shape.iter_mut().enumerate() {
-            *s = (centre[i] + scale[i] * found.x[i]).clamp(limits[i][0], limits[i][1]);
-        }
-    }
-    if again
-        && at
-            .model
-            .effects
-            .iter()
-            .any(|e| there(e) && near(&e.shape, &effect.shape))
-    {
-        return Ok((refused(law, place, "it is in the model".into()), count));
-    }
-    if periodic && !order_is_whole(&ground.cover, place, effect.shape[0]) {
-        let reason = format!(
-            "{:.3} waves a turn: after a full turn the joint is where it was, and orders are whole",
-            effect.shape[0]
-        );
-        return Ok((refused(law, place, reason), count));
-    }
-    let columns = columns(&at.model, ground, torques, &effect)?;
-    let score = judge.score(&columns, k, effect.shape.len());
-    let reason = match &score {
-        None => "nothing of it is its own: what is declared stands in for it".to_owned(),
-        Some(s) => {
-            effect.linear.clone_from(&s.beta);
-            String::new()
-        }
-    };
-    let candidate = Candidate {
-        effect,
-        score,
-        accepted: false,
-        significant: false,
-        reason,
-    };
-    Ok((candidate, count))
-}
-
-/// Least part of a periodic column's power that the parallel filter must keep.
-const LEAST_KEPT: f64 = 0.2;
-
-/// Part of the columns' power that the parallel filter keeps, over the fitted stretches.
-fn kept_by_filter(
-    at: &Fitted,
-    ground: &Ground,
-    torques: &[Torques],
-    effect: &Added,
-) -> Result<f64, MotionError> {
-    let Some(j) = effect.place.joint() else {
-        return Ok(1.0);
-    };
-    let (mut before, mut after) = (0.0, 0.0);
-    for (stretch, torques) in ground.stretches.iter().zip(torques) {
-        let scene = scene(&at.model, stretch, torques);
-        for mut column in effect.columns(&scene, j) {
-            before += column.iter().map(|x| x * x).sum::<f64>();
-            ground.parallel.smooth(&mut column)?;
-            after += column.iter().map(|x| x * x).sum::<f64>();
+        match failed {
+            Some(error) => Err(error),
+            None => {
+                effect.shape = shape_at(&found.x);
+                Ok(())
+            }
         }
     }
-    Ok(after / before.max(f64::MIN_POSITIVE))
 }
 
 /// Whether two shapes are one and the same effect.
@@ -281,76 +247,4 @@ fn near(a: &[f64], b: &[f64]) -> bool {
     a.iter()
         .zip(b)
         .all(|(a, b)| (a - b).abs() <= 0.05 * a.abs().max(b.abs()))
-}
-
-/// Filtered columns of an effect over every stretch.
-///
-/// # Errors
-/// [`MotionError`] of the filter.
-pub fn columns(
-    model: &AugmentedModel,
-    ground: &Ground,
-    torques: &[Torques],
-    effect: &Added,
-) -> Result<Columns, MotionError> {
-    let joints = model.model.robot.joints();
-    let mut out = Vec::with_capacity(torques.len());
-    for (i, (stretch, torques)) in ground.stretches.iter().zip(torques).enumerate() {
-        let scene = scene(model, stretch, torques);
-        let mut of_stretch = Vec::with_capacity(joints);
-        for j in 0..joints {
-            if !effect.place.touches(j) || ground.plan.holds(i, j) {
-                of_stretch.push(Vec::new());
-                continue;
-            }
-            let mut raw = effect.columns(&scene, j);
-            for column in &mut raw {
-                shifted(column, model.shift(j) / stretch.dt);
-            }
-            let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
-            let mut rows = ground.parallel.run(&channels)?;
-            let still = standing(model, stretch, ground.parallel, j);
-            rows.iter_mut().for_each(|column| clear(column, &still));
-            of_stretch.push(rows);
-        }
-        out.push(of_stretch);
-    }
-    Ok(out)
-}
-
-/// Of accepted candidates the one to add, and those that the data do not separate from it: within
-/// one standard error over the folds. Among these the one with the fewest parameters is taken, then
-/// the first in the order of [`LAWS`].
-pub fn choose(found: &[Candidate], skip: &[usize]) -> Option<(usize, Vec<usize>)> {
-    let scored = |i: usize| found[i].score.as_ref();
-    let open: Vec<usize> = (0..found.len())
-        .filter(|i| found[*i].accepted && !skip.contains(i) && scored(*i).is_some())
-        .collect();
-    let gain = |i: usize| scored(i).map_or(f64::NEG_INFINITY, |s| s.cv_gain);
-    let best = open
-        .iter()
-        .copied()
-        .max_by(|a, b| gain(*a).total_cmp(&gain(*b)))?;
-    let top = &scored(best)?.folds;
-    let near: Vec<usize> = open
-        .iter()
-        .copied()
-        .filter(|&i| {
-            scored(i).is_some_and(|s| {
-                let worse: f64 = s.folds.iter().sum::<f64>() - top.iter().sum::<f64>();
-                i == best || worse <= spread(&s.folds, top)
-            })
-        })
-        .collect();
-    let order = |i: usize| {
-        LAWS.iter()
-            .position(|k| k.entry.name == found[i].effect.name())
-    };
-    let chosen = near
-        .iter()
-        .copied()
-        .min_by_key(|&i| (found[i].effect.parameters(), order(i), i))?;
-    let mut others: Vec<usize> = near.into_iter().filter(|i| *i != chosen).collect();
-    others.sort_by(|a, b| gain(*b).total_cmp(&gain(*a)));
-    Some((chosen, others))
 }

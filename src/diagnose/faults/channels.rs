@@ -1,7 +1,8 @@
 //! Torque channels that are another's, or have the other sign: told before any physics is tried,
 //! by the model that is given.
 
-use crate::diagnose::problem::plan::{Plan, Role};
+use crate::diagnose::problem::data_split::{DataSplit, Piece, RowRole};
+use crate::diagnose::problem::normal_equations::dot;
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 
@@ -28,31 +29,27 @@ pub fn suspicion(
     model: &AugmentedModel,
     stretches: &[Stretch],
     parallel: &Parallel,
-    plan: &Plan,
+    split: &DataSplit,
 ) -> Result<Option<Suspicion>, MotionError> {
     let n = model.model.robot.joints();
     // products of measured (first n) and reconstructed torques over the fitted rows
     let mut products = vec![vec![0.0; 2 * n]; 2 * n];
     for (index, stretch) in stretches.iter().enumerate() {
-        if plan.idle(index) {
+        if split.idle(index) {
             continue;
         }
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
-        let own =
-            |p: &&crate::diagnose::problem::plan::Piece| p.stretch == index && Role::fitted(p.role);
-        for piece in plan.pieces.iter().filter(own) {
+        let own = |p: &&Piece| p.stretch == index && RowRole::fitted(p.role);
+        for piece in split.pieces.iter().filter(own) {
             for (a, products) in products.iter_mut().enumerate() {
                 for (b, sum) in products.iter_mut().enumerate() {
-                    if plan.holds(index, a % n) || plan.holds(index, b % n) {
+                    if split.ignores(index, a % n) || split.ignores(index, b % n) {
                         continue;
                     }
                     let range = piece.rows.clone();
-                    *sum += crate::diagnose::problem::rows::dot(
-                        &rows[a][range.clone()],
-                        &rows[b][range],
-                    );
+                    *sum += dot(&rows[a][range.clone()], &rows[b][range]);
                 }
             }
         }

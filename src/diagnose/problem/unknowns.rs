@@ -28,7 +28,7 @@ pub struct Unknowns {
 
 /// Which parameters of the declared model are open to the fit.
 #[derive(Debug, Clone)]
-pub struct Open {
+pub struct FreeParameters {
     /// Constant torque per joint.
     pub offset: Vec<bool>,
     /// Friction parameters per joint: false where the friction stage found none or only a bound.
@@ -37,7 +37,7 @@ pub struct Open {
 
 impl Unknowns {
     /// The unknowns of a model.
-    pub fn of(model: &AugmentedModel, open: &Open, cover: &Cover) -> Self {
+    pub fn of(model: &AugmentedModel, open: &FreeParameters, cover: &Cover) -> Self {
         let plain = &model.model;
         let n = plain.robot.joints();
         let mut list: Vec<Unknown> = (0..plain.theta.len()).map(Unknown::Theta).collect();

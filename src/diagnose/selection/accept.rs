@@ -1,53 +1,16 @@
 //! What a candidate must pass to be added: all tests must agree.
 
-use crate::diagnose::candidates::score::{Score, spread};
-use crate::effect::Added;
+use crate::diagnose::candidates::baseline::Baseline;
+use crate::diagnose::candidates::candidate::Candidate;
+use crate::diagnose::candidates::score::spread;
+use crate::diagnose::problem::case::SelectionLimits;
+use crate::diagnose::problem::data_split::DataSplit;
+use crate::diagnose::problem::fit::Fitted;
 
 /// Standard errors by which the error on the veto pieces may grow by chance.
 const VETO_CHANCE: f64 = 1.0;
 
-/// Limits that a candidate must keep. All tests must agree.
-#[derive(Debug, Clone, Copy)]
-pub struct Limits {
-    /// Chance of one false effect or more among all candidates of a round.
-    pub false_alarm: f64,
-    /// Least share of the effect's torque that nothing declared can stand in for.
-    pub unique_share: f64,
-    /// Least fraction of cross-validated squared error removed.
-    pub cv_gain: f64,
-    /// Least cross-validated gain in its own standard errors.
-    pub cv_certainty: f64,
-    /// Largest squared error on the veto pieces, over that without the effect; a standard error of their
-    /// difference comes on top.
-    pub veto_ratio: f64,
-    /// Least part of the declared model's squared residual, on the joints concerned, that it
-    /// removes: below it an effect may be there and does not matter.
-    pub worth: f64,
-    /// Least power that it removes, over that of the noise.
-    pub over_noise: f64,
-    /// Most effects that are added; with none the given model is fitted and nothing is looked for.
-    pub steps: usize,
-    /// Whether standard deviations are worked out, which takes several fits; without them they are not a number.
-    pub deviations: bool,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits {
-            false_alarm: 0.005,
-            unique_share: 0.001,
-            cv_gain: 0.003,
-            cv_certainty: 1.0,
-            veto_ratio: 1.002,
-            worth: 0.01,
-            over_noise: 0.1,
-            steps: 8,
-            deviations: true,
-        }
-    }
-}
-
-impl Limits {
+impl SelectionLimits {
     /// Whether the squared errors on the pieces that may veto grow by more than the limit, and by more than
     /// chance makes of them.
     pub fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
@@ -60,33 +23,34 @@ impl Limits {
     }
 }
 
-/// One candidate with what became of it.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    pub effect: Added,
-    /// None where the data lack what it needs, or where nothing of it is its own.
-    pub score: Option<Score>,
-    pub accepted: bool,
-    /// Whether the data tell it from chance; it is accepted where it also matters.
-    pub significant: bool,
-    /// Why not; empty where accepted.
-    pub reason: String,
-}
-
 /// How much a candidate removes, over what there is.
 #[derive(Debug, Clone, Copy)]
-pub struct Worth {
-    pub of_declared: f64,
-    pub of_noise: f64,
+struct Worth {
+    of_declared: f64,
+    of_noise: f64,
+}
+
+/// Decides on all candidates of a round, in which so many shapes were tried.
+pub fn accept(
+    found: &mut [Candidate],
+    shapes: usize,
+    limits: &SelectionLimits,
+    (at, split): (&Fitted, &DataSplit),
+    baseline: &Baseline,
+) {
+    for candidate in found {
+        let removed = candidate.score.as_ref().map_or(0.0, |s| s.gain) * at.square;
+        let place = candidate.effect.place;
+        let worth = Worth {
+            of_declared: removed / baseline.declared_square(at, place),
+            of_noise: removed / baseline.noise_square(at, split, place),
+        };
+        decide(candidate, shapes.max(1), limits, worth);
+    }
 }
 
 /// Puts a candidate to every test.
-pub fn decide(
-    candidate: &mut Candidate,
-    tried: usize,
-    limits: &Limits,
-    worth: &dyn Fn(f64) -> Worth,
-) {
+fn decide(candidate: &mut Candidate, tried: usize, limits: &SelectionLimits, worth: Worth) {
     let Some(s) = &candidate.score else { return };
     let corrected = s.p_value * tried as f64;
     let refusal = if !s.beta.iter().all(|b| b.is_finite()) {
@@ -110,14 +74,13 @@ pub fn decide(
     } else {
         None
     };
-    let small = (worth(s.gain).of_declared < limits.worth
-        || worth(s.gain).of_noise < limits.over_noise)
-        .then(|| {
+    let small =
+        (worth.of_declared < limits.worth || worth.of_noise < limits.over_noise).then(|| {
             format!(
                 "too small to matter: {:.2} % of the declared model's squared residual, {:.2} of \
                  the noise's power",
-                100.0 * worth(s.gain).of_declared,
-                worth(s.gain).of_noise
+                100.0 * worth.of_declared,
+                worth.of_noise
             )
         });
     let doubt = if s.delta_bic <= 0.0 {
@@ -152,10 +115,11 @@ pub fn decide(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::Place;
+    use crate::diagnose::candidates::score::CandidateScore;
+    use crate::effect::{Added, Place};
 
-    fn decided(change: impl Fn(&mut Score), worth: Worth) -> Candidate {
-        let mut score = Score {
+    fn decided(change: impl Fn(&mut CandidateScore), worth: Worth) -> Candidate {
+        let mut score = CandidateScore {
             beta: vec![1.0],
             gain: 0.2,
             unique_share: 0.5,
@@ -183,7 +147,7 @@ mod tests {
             significant: false,
             reason: String::new(),
         };
-        decide(&mut candidate, 100, &Limits::default(), &|_| worth);
+        decide(&mut candidate, 100, &SelectionLimits::default(), worth);
         candidate
     }
 
@@ -203,7 +167,7 @@ mod tests {
         assert!(!found.accepted && found.significant);
         assert!(found.reason.starts_with("too small"), "{}", found.reason);
         // what fails another test too is no remainder, whichever reason is told
-        type Change = fn(&mut Score);
+        type Change = fn(&mut CandidateScore);
         let failures: [(Change, &str); 6] = [
             (|s| s.unique_share = 1e-4, "only 0.01 %"),
             (|s| s.p_value = 1e-3, "chance"),

@@ -1,3 +1,5 @@
-//! Which candidate is added: all tests must agree.
+//! Which candidate is added, and which effect goes again: all tests must agree.
 
 pub mod accept;
+pub mod choose;
+pub mod removal;

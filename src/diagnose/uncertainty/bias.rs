@@ -1,10 +1,14 @@
-//! How far estimates have been moved by what no covariance of the residual tells: the filter and the noise of the
-//! positions, judged by doing either once more, and friction at rest, of which the law says too much.
+//! Bias of the estimates, of which no covariance of the residual tells: by the filter of the positions, judged by
+//! smoothing twice, by their noise, judged by adding noise (SIMEX), and by friction at rest, of which the law says
+//! too much.
 
 use nalgebra::DVector;
 
-use crate::diagnose::problem::fit::{Fitted, Ground, Inverse, inertial_of, refit, value};
-use crate::diagnose::problem::rows::near_rests;
+use crate::diagnose::problem::fit::{Fitted, refit};
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::prior::value;
+use crate::diagnose::problem::rests::near_rests;
+use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
 
 /// How far the unknowns move where the motion goes through the position filter once more: to leading order
@@ -12,20 +16,20 @@ use crate::motion::{MotionError, Stretch};
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionError> {
+pub fn from_smoothing(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
     let none = DVector::zeros(at.base.unknowns.len());
-    let mut again = Vec::with_capacity(ground.stretches.len());
-    for (i, stretch) in ground.stretches.iter().enumerate() {
-        if ground.plan.idle(i) {
+    let mut again = Vec::with_capacity(problem.stretches.len());
+    for (i, stretch) in problem.stretches.iter().enumerate() {
+        if problem.split.idle(i) {
             again.push(stretch.clone());
             continue;
         }
-        match ground.parallel.smoothed_twice(stretch)? {
+        match problem.parallel.smoothed_twice(stretch)? {
             Some(stretch) => again.push(stretch),
             None => return Ok(none),
         }
     }
-    refitted(at, &along(at, ground, &again)?)
+    refitted(at, &problem.along(&at.model.model.robot, &again)?)
 }
 
 /// How far the unknowns move in a fit where the positions get noise of their own level once more: to leading order
@@ -34,16 +38,16 @@ pub fn by_smoothing(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, Motion
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn by_noise(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionError> {
+pub fn from_noise(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
     let mut sum = DVector::zeros(at.base.unknowns.len());
     for sign in [1.0, -1.0] {
-        let noisier = |(i, stretch): (usize, &Stretch)| match ground.plan.idle(i) {
+        let noisier = |(i, stretch): (usize, &Stretch)| match problem.split.idle(i) {
             true => Ok(stretch.clone()),
-            false => ground.parallel.with_added_noise(stretch, i as u64, sign),
+            false => problem.parallel.with_added_noise(stretch, i as u64, sign),
         };
-        let stretches = ground.stretches.iter().enumerate().map(noisier);
+        let stretches = problem.stretches.iter().enumerate().map(noisier);
         let stretches = stretches.collect::<Result<Vec<_>, MotionError>>()?;
-        sum += refitted(at, &along(at, ground, &stretches)?)?;
+        sum += refitted(at, &problem.along(&at.model.model.robot, &stretches)?)?;
     }
     Ok(0.5 * sum)
 }
@@ -52,14 +56,14 @@ pub fn by_noise(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionErro
 /// friction at rest takes any torque up to its limit, and where the speed is nearly none the law says too much.
 /// As the unknowns rest where all rows together pull them nowhere, it is what those rows pull against the others;
 /// where there are next to no others, nothing tells.
-pub fn by_rests(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> DVector<f64> {
+pub fn from_rests(at: &Fitted, problem: &FitProblem, cutoff_hz: f64) -> DVector<f64> {
     let unknowns = &at.base.unknowns;
     let mut pull = DVector::zeros(unknowns.len());
-    for (i, (stretch, rows)) in ground.stretches.iter().zip(&at.base.stretches).enumerate() {
-        for j in (0..stretch.joints()).filter(|j| !ground.plan.holds(i, *j)) {
-            let near = near_rests(&at.model, stretch, ground.parallel, cutoff_hz, j);
+    for (i, (stretch, rows)) in problem.stretches.iter().zip(&at.base.stretches).enumerate() {
+        for j in (0..stretch.joints()).filter(|j| !problem.split.ignores(i, *j)) {
+            let near = near_rests(&at.model, stretch, problem.parallel, cutoff_hz, j);
             let weight = at.weights[j] * at.weights[j];
-            let pieces = ground.plan.pieces.iter();
+            let pieces = problem.split.pieces.iter();
             let fitted = pieces.filter(|p| p.stretch == i && p.role.fitted());
             for row in fitted.flat_map(|p| p.rows.clone()).filter(|row| near[*row]) {
                 let e = weight * rows.residual[j][row];
@@ -69,32 +73,12 @@ pub fn by_rests(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> DVector<f64> {
             }
         }
     }
-    Inverse::of(&at.normal).solve(&pull)
+    RankRevealingInverse::of(&at.normal).solve(&pull)
 }
 
-/// The same ground with other stretches.
-fn along<'a>(
-    at: &Fitted,
-    ground: &Ground<'a>,
-    stretches: &'a [Stretch],
-) -> Result<Ground<'a>, MotionError> {
-    Ok(Ground {
-        inertial: inertial_of(
-            &at.model.model.robot,
-            stretches,
-            ground.parallel,
-            &ground.plan,
-        )?,
-        stretches,
-        plan: ground.plan.clone(),
-        cover: ground.cover.clone(),
-        ..*ground
-    })
-}
-
-/// How far a fit on other ground moves the unknowns.
-fn refitted(at: &Fitted, ground: &Ground) -> Result<DVector<f64>, MotionError> {
-    let other = refit(at, ground)?.model;
+/// How far a fit of another problem moves the unknowns.
+fn refitted(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+    let other = refit(at, problem)?.model;
     let list = at.base.unknowns.list.iter();
     let moved = list.map(|u| value(&other, *u) - value(&at.model, *u));
     Ok(DVector::from_iterator(at.base.unknowns.len(), moved))
@@ -107,9 +91,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::diagnose::problem::fit::{Prior, fit};
-    use crate::diagnose::problem::plan::{LogRole, Plan};
-    use crate::diagnose::problem::unknowns::Open;
+    use crate::diagnose::problem::data_split::{DataSplit, LogRole};
+    use crate::diagnose::problem::fit::fit;
+    use crate::diagnose::problem::fit_problem::inertial_of;
+    use crate::diagnose::problem::prior::ParameterPrior;
+    use crate::diagnose::problem::unknowns::FreeParameters;
     use crate::effect::{AugmentedModel, Cover};
     use crate::motion::{FilterSettings, Parallel};
     use crate::robot::friction::ViscousCoulomb;
@@ -159,7 +145,7 @@ mod tests {
     /// What `told` says of a fit of the mass along a stretch, and the fit's own value.
     fn of_mass(
         stretch: Stretch,
-        told: impl Fn(&Fitted, &Ground) -> DVector<f64>,
+        told: impl Fn(&Fitted, &FitProblem) -> DVector<f64>,
     ) -> (f64, DVector<f64>) {
         let robot = Robot::single_joint("slide", JointKind::Prismatic);
         let law = ViscousCoulomb {
@@ -174,35 +160,41 @@ mod tests {
         });
         let parallel = Parallel::design(&settings(), DT).unwrap();
         let stretches = [stretch];
-        let mut plan = Plan::of(&stretches, &[LogRole::Train], &parallel, 30.0);
-        plan.held = vec![vec![false]];
-        plan.rest = vec![vec![false]];
-        let open = Open {
+        let mut split = DataSplit::of(&stretches, &[LogRole::Train], &parallel, 30.0);
+        split.ignored = vec![vec![false]];
+        split.stationary = vec![vec![false]];
+        let open = FreeParameters {
             offset: vec![false],
             friction: vec![vec![true; 2]],
         };
-        let prior = Prior {
+        let prior = ParameterPrior {
             centre: start.clone(),
             information: DMatrix::zeros(4, 4),
             rows_per_independent: 1.0,
         };
-        let ground = Ground {
-            inertial: inertial_of(&robot, &stretches, &parallel, &plan).unwrap(),
+        let problem = FitProblem {
+            inertial: inertial_of(&robot, &stretches, &parallel, &split).unwrap(),
             cover: Cover::of(&robot, &stretches, 30.0),
             stretches: &stretches,
             parallel: &parallel,
-            plan,
+            split,
             open: &open,
             prior: &prior,
         };
-        let at = fit(&start, &ground).unwrap();
-        (at.model.model.theta[0], told(&at, &ground))
+        let at = fit(&start, &problem).unwrap();
+        (at.model.model.theta[0], told(&at, &problem))
     }
 
     #[test]
-    fn the_same_ground_moves_nothing() {
-        let (mass, moved) = of_mass(slide(0.0), |at, ground| {
-            refitted(at, &along(at, ground, ground.stretches).unwrap()).unwrap()
+    fn the_same_problem_moves_nothing() {
+        let (mass, moved) = of_mass(slide(0.0), |at, problem| {
+            refitted(
+                at,
+                &problem
+                    .along(&at.model.model.robot, problem.stretches)
+                    .unwrap(),
+            )
+            .unwrap()
         });
         assert!((mass / MASS - 1.0).abs() < 0.01, "{mass}");
         assert!(moved.amax() < 1e-9, "{moved}");
@@ -210,10 +202,10 @@ mod tests {
 
     /// Noise of the acceleration makes the mass too small, by its power over the acceleration's.
     #[test]
-    fn noise_once_more_moves_a_mass_as_far_as_noise_has_moved_it() {
-        let (clean, none) = of_mass(slide(0.0), |at, ground| by_noise(at, ground).unwrap());
+    fn added_noise_biases_a_mass_as_much_as_noise_has_biased_it() {
+        let (clean, none) = of_mass(slide(0.0), |at, problem| from_noise(at, problem).unwrap());
         assert!(none[0].abs() < 1e-3 * MASS, "{}", none[0]);
-        let (noisy, moved) = of_mass(slide(5e-4), |at, ground| by_noise(at, ground).unwrap());
+        let (noisy, moved) = of_mass(slide(5e-4), |at, problem| from_noise(at, problem).unwrap());
         let bias = noisy - clean;
         assert!(bias < -0.01 * MASS, "{noisy} {clean}");
         let ratio = moved[0] / bias;
@@ -222,7 +214,7 @@ mod tests {
 
     #[test]
     fn rests_pull_where_friction_there_is_not_what_the_law_says() {
-        let pulled = |at: &Fitted, ground: &Ground| by_rests(at, ground, 30.0);
+        let pulled = |at: &Fitted, problem: &FitProblem| from_rests(at, problem, 30.0);
         let (_, honest) = of_mass(slide(0.0), pulled);
         // friction sticks for some time after every reversal
         let mut sticking = slide(0.0);

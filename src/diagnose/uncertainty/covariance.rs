@@ -6,10 +6,12 @@ use rayon::prelude::*;
 
 use super::{bias, profile};
 use crate::diagnose::candidates::score::LAG;
-use crate::diagnose::problem::fit::{Fitted, Ground, Inverse};
-use crate::diagnose::problem::plan::{Piece, Role};
-use crate::diagnose::problem::rows::{PieceSums, Total};
+use crate::diagnose::problem::data_split::{Piece, RowRole};
+use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::normal_equations::{NormalEquations, PieceSums};
 use crate::math::long_run::long_run;
+use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::MotionError;
 
 /// Covariance of all unknowns. What these data do not determine beside the others has an infinite variance.
@@ -18,36 +20,36 @@ use crate::motion::MotionError;
 /// [`MotionError`] of the filters.
 pub fn covariance(
     at: &Fitted,
-    ground: &Ground,
+    problem: &FitProblem,
     cutoff_hz: f64,
 ) -> Result<DMatrix<f64>, MotionError> {
-    let mut covariance = of_residual(at, ground);
-    for moved in [
-        bias::by_smoothing(at, ground)?,
-        bias::by_noise(at, ground)?,
-        bias::by_rests(at, ground, cutoff_hz),
+    let mut covariance = of_residual(at, problem);
+    for bias in [
+        bias::from_smoothing(at, problem)?,
+        bias::from_noise(at, problem)?,
+        bias::from_rests(at, problem, cutoff_hz),
     ] {
-        covariance += &moved * moved.transpose();
+        covariance += &bias * bias.transpose();
     }
-    profile::widen(at, ground, &mut covariance)?;
+    profile::widen(at, problem, &mut covariance)?;
     Ok(covariance)
 }
 
 /// What correlated residuals leave open: the sandwich over pieces (Newey and West 1987), at least that of
 /// independent rows.
-fn of_residual(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
+fn of_residual(at: &Fitted, problem: &FitProblem) -> DMatrix<f64> {
     let base = &at.base;
     let u = base.unknowns.len();
-    let inverse = Inverse::of(&at.normal);
+    let inverse = RankRevealingInverse::of(&at.normal);
     let jackknife = Jackknife::of(&at.normal, &inverse);
-    let pieces = ground.plan.pieces.par_iter().zip(&base.sums);
+    let pieces = problem.split.pieces.par_iter().zip(&base.sums);
     let fitted = pieces.filter(|(piece, _)| piece.role.fitted());
     let of_piece = |(piece, sums): (&Piece, &Vec<PieceSums>)| {
         let own = base.sum_of(sums, &at.weights);
         let score = jackknife
             .as_ref()
             .and_then(|jackknife| jackknife.score(&own));
-        let moving = (0..sums.len()).filter(|j| !ground.plan.holds(piece.stretch, *j));
+        let moving = (0..sums.len()).filter(|j| !problem.split.ignores(piece.stretch, *j));
         let rows = moving.count() * piece.rows.len();
         (rows, (piece.stretch, score.unwrap_or(own.score)))
     };
@@ -56,8 +58,8 @@ fn of_residual(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
     let scores: Vec<(usize, DVector<f64>)> = found.into_iter().map(|(_, score)| score).collect();
     let mut middle = long_run(&scores, u, LAG);
     // the prior is data too
-    middle += &at.information * ground.prior.rows_per_independent.max(1.0);
-    let total = base.total(&ground.plan, &at.weights, &Role::fitted);
+    middle += &at.information * problem.prior.rows_per_independent.max(1.0);
+    let total = base.total(&problem.split, &at.weights, &RowRole::fitted);
     let variance = total.square / rows.max(1.0);
     for i in 0..u {
         let least = variance * total.normal[(i, i)];
@@ -66,7 +68,7 @@ fn of_residual(at: &Fitted, ground: &Ground) -> DMatrix<f64> {
         }
     }
     let mut covariance = inverse.times(&(middle * inverse.matrix()));
-    for i in (0..u).filter(|i| inverse.at_rest(*i)) {
+    for i in (0..u).filter(|i| inverse.redundant(*i)) {
         covariance[(i, i)] = f64::INFINITY;
     }
     covariance
@@ -91,9 +93,9 @@ const TURNS: usize = 10_000;
 
 impl Jackknife {
     /// None where the normal matrix has no Cholesky factor.
-    fn of(normal: &DMatrix<f64>, inverse: &Inverse) -> Option<Self> {
+    fn of(normal: &DMatrix<f64>, inverse: &RankRevealingInverse) -> Option<Self> {
         let kept: Vec<usize> = (0..normal.nrows())
-            .filter(|i| !inverse.at_rest(*i))
+            .filter(|i| !inverse.redundant(*i))
             .collect();
         let scale =
             DVector::from_iterator(kept.len(), kept.iter().map(|i| normal[(*i, *i)].sqrt()));
@@ -106,7 +108,7 @@ impl Jackknife {
     }
 
     /// N (N - N_i)^-1 g_i by the eigenvalues of N_i in N, each at most 1 - [`LEAST_OTHERS`].
-    fn score(&self, own: &Total) -> Option<DVector<f64>> {
+    fn score(&self, own: &NormalEquations) -> Option<DVector<f64>> {
         let half =
             self.factor
                 .solve_lower_triangular(&scaled(&own.normal, &self.kept, &self.scale))?;
@@ -145,7 +147,7 @@ mod tests {
     use super::*;
 
     /// Pieces of rows of two columns, and what they pull where all together are fitted.
-    fn pieces(of: &[&[[f64; 3]]]) -> Vec<Total> {
+    fn pieces(of: &[&[[f64; 3]]]) -> Vec<NormalEquations> {
         let whole = of.iter().copied().flatten();
         let (normal, right) = whole.fold(
             (DMatrix::zeros(2, 2), DVector::zeros(2)),
@@ -156,7 +158,7 @@ mod tests {
         );
         let fitted = normal.try_inverse().unwrap() * right;
         let piece = |rows: &&[[f64; 3]]| {
-            let mut total = Total {
+            let mut total = NormalEquations {
                 normal: DMatrix::zeros(2, 2),
                 score: DVector::zeros(2),
                 square: 0.0,
@@ -198,8 +200,8 @@ mod tests {
         assert!((moved - told).amax() < 1e-12);
     }
 
-    fn score(normal: &DMatrix<f64>, own: &Total) -> DVector<f64> {
-        let jackknife = Jackknife::of(normal, &Inverse::of(normal)).unwrap();
+    fn score(normal: &DMatrix<f64>, own: &NormalEquations) -> DVector<f64> {
+        let jackknife = Jackknife::of(normal, &RankRevealingInverse::of(normal)).unwrap();
         jackknife.score(own).unwrap()
     }
 

@@ -9,8 +9,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::diagnose::problem::fit::{Fitted, Ground, Inverse, least_with_held};
+use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::unknowns::Unknown;
+use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::MotionError;
 
 /// Standard deviations at which the promise is looked at.
@@ -28,11 +30,11 @@ const FIRST: f64 = 1e-4;
 /// [`MotionError`] of the filter.
 pub fn widen(
     at: &Fitted,
-    ground: &Ground,
+    problem: &FitProblem,
     covariance: &mut DMatrix<f64>,
 ) -> Result<(), MotionError> {
-    let least = Inverse::of(&at.normal);
-    let lowest = least_with_held(at, ground, None);
+    let least = RankRevealingInverse::of(&at.normal);
+    let lowest = at.least_with_fixed(problem, None);
     // how much correlation in time makes of a variance
     let ratio = |i: usize| covariance[(i, i)] / least.matrix()[(i, i)];
     let known = (0..covariance.nrows()).map(ratio);
@@ -48,9 +50,9 @@ pub fn widen(
         };
         let added = &at.model.effects[effect];
         let value = added.shape[k];
-        let [low, high] = (added.law.limits)(&ground.cover, added.place)[k];
+        let [low, high] = (added.law.limits)(&problem.cover, added.place)[k];
         let std = before[(i, i)].sqrt();
-        let linear = std.is_finite() && std > 0.0 && !least.at_rest(i);
+        let linear = std.is_finite() && std > 0.0 && !least.redundant(i);
         let (first, inflation) = match linear {
             true => (REACH * std, before[(i, i)] / least.matrix()[(i, i)]),
             false => (FIRST * value.abs(), usual),
@@ -62,7 +64,8 @@ pub fn widen(
         let risen = |x: f64| -> Result<f64, MotionError> {
             let mut model = at.model.clone();
             model.effects[effect].shape[k] = x;
-            Ok(least_with_held(&at.with(model, ground)?, ground, Some(i)) - lowest)
+            let moved = at.with(model, problem)?;
+            Ok(moved.least_with_fixed(problem, Some(i)) - lowest)
         };
         let mut farthest = first;
         for side in [-1.0, 1.0] {

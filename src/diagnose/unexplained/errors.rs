@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::diagnose::problem::plan::{Plan, Role};
-use crate::diagnose::problem::rows::standing;
+use crate::diagnose::problem::data_split::{DataSplit, RowRole};
+use crate::diagnose::problem::rests::standing;
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, Parallel, Stretch};
 
@@ -46,7 +46,7 @@ pub struct Errors {
 
 /// Sums of one joint over one piece.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct PieceErrors {
     error: f64,
     torque: f64,
     mean: f64,
@@ -77,13 +77,13 @@ pub fn errors(
     units: &[String],
     stretches: &[Stretch],
     parallel: &Parallel,
-    plan: &Plan,
-    (wanted, counted): (&dyn Fn(Role) -> bool, Counted),
+    split: &DataSplit,
+    (wanted, counted): (&dyn Fn(RowRole) -> bool, Counted),
 ) -> Result<Option<Errors>, MotionError> {
     let n = model.model.robot.joints();
-    let mut pieces: Vec<Vec<Sums>> = Vec::new();
+    let mut pieces: Vec<Vec<PieceErrors>> = Vec::new();
     for (index, stretch) in stretches.iter().enumerate() {
-        let own = plan
+        let own = split
             .pieces
             .iter()
             .filter(|p| p.stretch == index && wanted(p.role));
@@ -104,8 +104,8 @@ pub fn errors(
         }
         for piece in own {
             let joint = |j: usize| {
-                let mut s = Sums::default();
-                if plan.rests(index, j) {
+                let mut s = PieceErrors::default();
+                if split.is_stationary(index, j) {
                     return s;
                 }
                 for i in piece.rows.clone().filter(|i| !still[j][*i]) {
@@ -134,13 +134,14 @@ pub fn errors(
     Ok(Some(summed(model, units, &pieces)))
 }
 
-fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<Sums>]) -> Errors {
+fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>]) -> Errors {
     let n = units.len();
     let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
     let relative = |picked: &[usize]| -> Vec<f64> {
         (0..n)
             .map(|j| {
-                let sum = |of: fn(&Sums) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
+                let sum =
+                    |of: fn(&PieceErrors) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
                 ratio(sum(|s| s.error), sum(|s| s.torque))
             })
             .collect()
@@ -175,7 +176,7 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<Sums>]) -> Err
     };
     let joints: Vec<JointErrors> = (0..n)
         .map(|j| {
-            let sum = |of: fn(&Sums) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
+            let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
             let rows = sum(|s| s.rows);
             let scatter = sum(|s| s.torque) - sum(|s| s.mean).powi(2) / rows.max(1.0);
             JointErrors {
@@ -196,7 +197,7 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<Sums>]) -> Err
         })
         .collect();
     let one_unit = units.iter().all(|u| *u == units[0]);
-    let total = |of: fn(&Sums) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
+    let total = |of: fn(&PieceErrors) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
     Errors {
         overall: OverallErrors {
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),

@@ -36,7 +36,7 @@ const ROWS: usize = 4000;
 
 /// Rows of one joint.
 #[derive(Default)]
-struct Rows {
+struct ResidualRows {
     t: Vec<f64>,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -56,7 +56,7 @@ pub fn evidence(
 ) -> Result<Vec<JointEvidence>, MotionError> {
     let robot = &model.model.robot;
     let n = robot.joints();
-    let mut all: Vec<Rows> = (0..n).map(|_| Rows::default()).collect();
+    let mut all: Vec<ResidualRows> = (0..n).map(|_| ResidualRows::default()).collect();
     for stretch in stretches {
         let load = model.torques(stretch).load;
         let hat = model.reconstruct(stretch);
@@ -117,7 +117,7 @@ pub fn evidence(
         .collect())
 }
 
-impl Rows {
+impl ResidualRows {
     fn push(&mut self, [t, q, v, load, e]: [f64; 5]) {
         self.t.push(t);
         self.q.push(q);

@@ -1,4 +1,4 @@
-//! What is left of the torque's residual above its noise, before and after.
+//! What of the torque's residual is above its noise, before and after.
 
 pub mod errors;
 pub mod evidence;
@@ -7,13 +7,13 @@ mod period;
 
 use self::errors::Errors;
 use self::noise_floor::floor;
-use crate::diagnose::run::Case;
+use crate::diagnose::problem::case::Case;
 use crate::effect::stationary_joints;
 use crate::motion::{MotionError, Stretch};
 
-/// What is left at the end on one joint, on fitted or on unseen logs, whichever is more.
+/// What stays unexplained on one joint, on fitted or on unseen logs, whichever is more.
 #[derive(Debug, Clone, Copy)]
-pub struct Left {
+pub struct Unexplained {
     /// Fraction of the torque's power that is residual above the noise floor.
     pub share: f64,
     /// Power of the residual over that of the floor; none where the torque was filtered before it was logged,
@@ -46,7 +46,7 @@ pub fn noise(
 }
 
 /// How much of each joint's residual is above the noise floor.
-fn above(noise: &[f64], found: &Errors) -> Vec<Left> {
+fn above(noise: &[f64], found: &Errors) -> Vec<Unexplained> {
     found
         .joints
         .iter()
@@ -54,7 +54,7 @@ fn above(noise: &[f64], found: &Errors) -> Vec<Left> {
         .map(|(e, noise)| {
             let residual = e.rmse * e.rmse;
             let torque = residual / (e.relative_error * e.relative_error);
-            Left {
+            Unexplained {
                 share: ((residual - noise) / torque).max(0.0),
                 over_floor: (*noise > NO_NOISE * torque).then(|| residual / noise),
             }
@@ -62,16 +62,20 @@ fn above(noise: &[f64], found: &Errors) -> Vec<Left> {
         .collect()
 }
 
-/// What is left on fitted logs, or on unseen ones with their own noise where that is more: what fits the one and
+/// What is unexplained on fitted logs, or on unseen ones with their own noise where that is more: what fits the one and
 /// not the other is structure too.
-pub fn left(train: &Errors, noise: &[f64], unseen: Option<(&Errors, Vec<f64>)>) -> Vec<Left> {
+pub fn unexplained(
+    train: &Errors,
+    noise: &[f64],
+    unseen: Option<(&Errors, Vec<f64>)>,
+) -> Vec<Unexplained> {
     let train = above(noise, train);
     let Some((holdout, noise)) = unseen else {
         return train;
     };
     let pairs = train.into_iter().zip(above(&noise, holdout)).zip(&noise);
     // a joint that rests there has no floor
-    let more = |((train, unseen), noise): ((Left, Left), &f64)| {
+    let more = |((train, unseen), noise): ((Unexplained, Unexplained), &f64)| {
         if unseen.share > train.share && *noise > 0.0 {
             unseen
         } else {
@@ -82,8 +86,10 @@ pub fn left(train: &Errors, noise: &[f64], unseen: Option<(&Errors, Vec<f64>)>) 
 }
 
 /// Structure after over structure before, per joint.
-pub fn part_left(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
+pub fn part_unexplained(noise: &[f64], before: &Errors, after: &Errors) -> Vec<f64> {
     let shares = above(noise, before).into_iter().zip(above(noise, after));
-    let part = |(before, after): (Left, Left)| after.share / before.share.max(f64::MIN_POSITIVE);
+    let part = |(before, after): (Unexplained, Unexplained)| {
+        after.share / before.share.max(f64::MIN_POSITIVE)
+    };
     shares.map(part).collect()
 }

@@ -19,7 +19,7 @@ use crate::motion::{MotionError, Parallel, Stretch};
 const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 
 /// Variance of the filtered noise per joint, from raw residuals `[stretch][joint][sample]`. `averaged`
-/// where each torque is the mean of two rows, as of commands that are held.
+/// where each torque is the mean of two rows, as by a zero-order hold.
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
@@ -29,7 +29,7 @@ pub fn floor(
     parallel: &Parallel,
     cutoff_hz: f64,
     averaged: bool,
-    held: &[Vec<bool>],
+    stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
     let joints = stretches.first().map_or(0, Stretch::joints);
     let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
@@ -79,10 +79,10 @@ pub fn floor(
     let mut floor = Vec::with_capacity(joints);
     for j in 0..joints {
         // friction at rest is no noise; a joint that never moves has nothing else
-        let always = held.iter().all(|h| h[j]);
-        let logs = residuals.iter().zip(held).zip(&periods);
+        let always = stationary.iter().all(|s| s[j]);
+        let logs = residuals.iter().zip(stationary).zip(&periods);
         let mut seen_of = Vec::with_capacity(stretches.len());
-        for ((residual, _), period) in logs.filter(|((_, h), _)| always || !h[j]) {
+        for ((residual, _), period) in logs.filter(|((_, s), _)| always || !s[j]) {
             let edge = parallel.trim.min(residual[j].len() / 4);
             if residual[j].len() < 2 * edge + block {
                 continue;
@@ -105,7 +105,7 @@ pub fn floor(
                 }
                 None => None,
             };
-            seen_of.push(Seen {
+            seen_of.push(StretchNoise {
                 weight: residual[j].len() as f64,
                 near: banded
                     .each_ref()
@@ -120,7 +120,7 @@ pub fn floor(
 }
 
 /// What one stretch shows of a joint's noise.
-struct Seen {
+struct StretchNoise {
     /// Its rows.
     weight: f64,
     /// Power in the two bands.
@@ -133,13 +133,14 @@ struct Seen {
 
 /// Variance of the noise in the band that is kept, over all stretches by their rows; 0 of none. Bands are taken
 /// together before anything is solved for, so that their errors average out.
-fn together(stretches: &[Seen], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
+fn together(stretches: &[StretchNoise], seen: [[f64; 2]; 2], kept: [f64; 2]) -> f64 {
     let rows: f64 = stretches.iter().map(|s| s.weight).sum();
     if rows <= 0.0 {
         return 0.0;
     }
-    let mean =
-        |of: &dyn Fn(&Seen) -> f64| stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows;
+    let mean = |of: &dyn Fn(&StretchNoise) -> f64| {
+        stretches.iter().map(|s| s.weight * of(s)).sum::<f64>() / rows
+    };
     let near = [0, 1].map(|band: usize| Middle {
         value: mean(&|s| s.near[band].value),
         error: (mean(&|s| s.weight * s.near[band].error.powi(2)) / rows).sqrt(),
@@ -287,8 +288,8 @@ mod tests {
                 ..Stretch::default()
             };
             let stretches = vec![stretch; parts];
-            let held = vec![vec![false]; parts];
-            floor(&pieces, &stretches, &parallel, 10.0, false, &held).unwrap()[0]
+            let stationary = vec![vec![false]; parts];
+            floor(&pieces, &stretches, &parallel, 10.0, false, &stationary).unwrap()[0]
         };
         let (whole, four) = (of(1), of(4));
         assert!((whole / wanted - 1.0).abs() < 0.3, "{whole} {wanted}");

@@ -20,7 +20,7 @@ pub fn period(q: &[Vec<f64>]) -> Option<usize> {
         .map(|q| (q, variance(q)))
         .filter(|(_, v)| *v > 0.0)
         .collect();
-    // a held joint's play is no motion
+    // a stationary joint's play is no motion
     let least = 1e-4 * moving.iter().map(|(_, v)| *v).fold(0.0, f64::max);
     let moving: Vec<(&Vec<f64>, f64)> = moving.into_iter().filter(|(_, v)| *v > least).collect();
     if moving.is_empty() {

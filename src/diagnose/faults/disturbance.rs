@@ -2,14 +2,15 @@
 //! who pushes. What depends on the motion comes again with the motion; an episode does not. It is cut
 //! out, and said so: no law is fitted to it.
 
-use crate::diagnose::problem::fit::{Fitted, Ground};
-use crate::diagnose::problem::plan::{Plan, Role};
-use crate::diagnose::problem::rows::near_rests;
+use crate::diagnose::problem::data_split::{DataSplit, RowRole};
+use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::rests::near_rests;
 use crate::motion::{Parallel, Stretch};
 
 /// An episode that was cut out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Episode {
+pub struct Disturbance {
     pub log: usize,
     /// The joint on which it stands out most.
     pub joint: usize,
@@ -31,23 +32,23 @@ const LEAST: usize = 20;
 /// Most runs of neighbouring pieces.
 const RUNS: usize = 3;
 
-/// Pieces that stand out, with joint and by how much: index in the plan. What friction at rest does alone, of
+/// Pieces that stand out, with joint and by how much: index in the split. What friction at rest does alone, of
 /// which a law that jumps says too much, is no episode.
-pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, f64)> {
-    let (base, plan) = (&at.base, &ground.plan);
+pub fn find(at: &Fitted, problem: &FitProblem, cutoff_hz: f64) -> Vec<(usize, usize, f64)> {
+    let (base, split) = (&at.base, &problem.split);
     let joints = base.unknowns.columns.len();
     let mut found: Vec<(usize, usize, f64)> = Vec::new();
     for j in 0..joints {
-        let near = |stretch| near_rests(&at.model, stretch, ground.parallel, cutoff_hz, j);
-        let near: Vec<Vec<bool>> = ground.stretches.iter().map(near).collect();
+        let near = |stretch| near_rests(&at.model, stretch, problem.parallel, cutoff_hz, j);
+        let near: Vec<Vec<bool>> = problem.stretches.iter().map(near).collect();
         // an episode among the rows that may veto would veto what is right
         let looked_at = |i: &usize| {
-            let piece = &plan.pieces[*i];
-            let used = piece.role.fitted() || piece.role == Role::Veto;
-            used && !plan.holds(piece.stretch, j)
+            let piece = &split.pieces[*i];
+            let used = piece.role.fitted() || piece.role == RowRole::Veto;
+            used && !split.ignores(piece.stretch, j)
         };
-        let pieces: Vec<usize> = (0..plan.pieces.len()).filter(looked_at).collect();
-        let mean = |i: usize| base.sums[i][j].square / plan.pieces[i].rows.len().max(1) as f64;
+        let pieces: Vec<usize> = (0..split.pieces.len()).filter(looked_at).collect();
+        let mean = |i: usize| base.sums[i][j].square / split.pieces[i].rows.len().max(1) as f64;
         let mut all: Vec<f64> = pieces.iter().map(|i| mean(*i)).collect();
         all.sort_by(f64::total_cmp);
         let middle = all.get(all.len() / 2).copied().unwrap_or(0.0);
@@ -59,12 +60,16 @@ pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, 
             .copied()
             .filter(|i| mean(*i) > REST * middle)
             .collect();
-        let rows = |of: &[usize]| of.iter().map(|i| plan.pieces[*i].rows.len()).sum::<usize>();
+        let rows = |of: &[usize]| {
+            of.iter()
+                .map(|i| split.pieces[*i].rows.len())
+                .sum::<usize>()
+        };
         let runs = 1 + out.windows(2).filter(|w| w[1] > w[0] + 1).count();
         let few = rows(&out) as f64 <= MOST * rows(&pieces) as f64 && runs <= RUNS;
         // one piece at least must stand out by rows of its own that are near no rest
         let moving = |i: usize| {
-            let piece = &plan.pieces[i];
+            let piece = &split.pieces[i];
             let near = &near[piece.stretch];
             let residual = &base.stretches[piece.stretch].residual[j];
             let rows = piece.rows.clone().filter(|row| !near[*row]);
@@ -84,17 +89,17 @@ pub fn find(at: &Fitted, ground: &Ground, cutoff_hz: f64) -> Vec<(usize, usize, 
     found
 }
 
-/// Takes the pieces, and their neighbours into which the filter carries them, out of the plan.
+/// Takes the pieces, and their neighbours into which the filter carries them, out of the split.
 pub fn cut(
     found: &[(usize, usize, f64)],
-    plan: &mut Plan,
+    split: &mut DataSplit,
     stretches: &[Stretch],
     parallel: &Parallel,
-) -> Vec<Episode> {
-    let mut episodes: Vec<Episode> = Vec::new();
+) -> Vec<Disturbance> {
+    let mut episodes: Vec<Disturbance> = Vec::new();
     let mut last = None;
     for &(i, joint, over) in found {
-        let piece = plan.pieces[i].clone();
+        let piece = split.pieces[i].clone();
         let stretch = &stretches[piece.stretch];
         let time = |row: usize| stretch.began + stretch.dt * parallel.sample_of(row) as f64;
         let (from_s, to_s) = (time(piece.rows.start), time(piece.rows.end));
@@ -103,7 +108,7 @@ pub fn cut(
                 e.to_s = to_s;
                 e.over = e.over.max(over);
             }
-            _ => episodes.push(Episode {
+            _ => episodes.push(Disturbance {
                 log: stretch.log,
                 joint,
                 from_s,
@@ -112,10 +117,10 @@ pub fn cut(
             }),
         }
         last = Some((i + 1, joint));
-        for k in i.saturating_sub(1)..=(i + 1).min(plan.pieces.len() - 1) {
-            let near = &mut plan.pieces[k];
-            if near.stretch == piece.stretch && near.role != Role::Holdout {
-                near.role = Role::Cut;
+        for k in i.saturating_sub(1)..=(i + 1).min(split.pieces.len() - 1) {
+            let near = &mut split.pieces[k];
+            if near.stretch == piece.stretch && near.role != RowRole::Holdout {
+                near.role = RowRole::Cut;
             }
         }
     }

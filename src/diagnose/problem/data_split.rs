@@ -18,7 +18,7 @@ pub enum LogRole {
 
 /// What the rows of a piece are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum RowRole {
     /// Fitted, and left out in turn in cross-validation: the fold.
     Fold(usize),
     /// Fitted, but in no fold: it parts two of them.
@@ -29,10 +29,10 @@ pub enum Role {
     Cut,
 }
 
-impl Role {
+impl RowRole {
     /// Whether the rows are fitted.
     pub fn fitted(self) -> bool {
-        matches!(self, Role::Fold(_) | Role::Between)
+        matches!(self, RowRole::Fold(_) | RowRole::Between)
     }
 }
 
@@ -42,7 +42,7 @@ pub struct Piece {
     pub stretch: usize,
     /// Rows of the stretch after filter and decimation.
     pub rows: Range<usize>,
-    pub role: Role,
+    pub role: RowRole,
 }
 
 /// A span of time that was set aside, for the report.
@@ -56,16 +56,16 @@ pub struct SetAside {
 
 /// All pieces.
 #[derive(Debug, Clone, Default)]
-pub struct Plan {
+pub struct DataSplit {
     pub pieces: Vec<Piece>,
     pub folds: usize,
     pub set_aside: Vec<SetAside>,
-    /// Whether each joint is held along each stretch, `[stretch][joint]`: such rows say nothing of
-    /// its friction and are not fitted.
-    pub held: Vec<Vec<bool>>,
-    /// The same along every stretch, those that decide nothing too: what is at rest has no error that a
+    /// Whether the rows of each joint count for nothing along each stretch, `[stretch][joint]`: of a stationary
+    /// joint, which say nothing of its friction, and of all where the log decides nothing.
+    pub ignored: Vec<Vec<bool>>,
+    /// Whether each joint is stationary along each stretch, whatever the stretch is for: it has no error that a
     /// law of motion answers for.
-    pub rest: Vec<Vec<bool>>,
+    pub stationary: Vec<Vec<bool>>,
 }
 
 /// Folds of the cross-validation, about.
@@ -81,7 +81,7 @@ const PIECE_PERIODS: f64 = 2.5;
 /// Rows that part pieces of different use, in periods of the cut-off.
 const GAP_PERIODS: f64 = 1.0;
 
-impl Plan {
+impl DataSplit {
     /// Divides stretches; `roles` by log.
     pub fn of(
         stretches: &[Stretch],
@@ -89,7 +89,7 @@ impl Plan {
         parallel: &Parallel,
         cutoff_hz: f64,
     ) -> Self {
-        let mut plan = Plan::default();
+        let mut split = DataSplit::default();
         let dt = stretches.first().map_or(1.0, |s| s.dt) * parallel.decimation as f64;
         let piece = ((PIECE_PERIODS / cutoff_hz / dt).ceil() as usize).max(4);
         let gap = ((GAP_PERIODS / cutoff_hz / dt).ceil() as usize).max(1);
@@ -102,23 +102,24 @@ impl Plan {
             .sum();
         for (index, stretch) in stretches.iter().enumerate() {
             let rows = rows_of(stretch);
-            let cut = |plan: &mut Plan, range: Range<usize>, role: &dyn Fn(usize) -> Role| {
-                let count = (range.len() / piece).max(1);
-                for i in 0..count {
-                    let from = range.start + i * range.len() / count;
-                    let to = range.start + (i + 1) * range.len() / count;
-                    if from < to {
-                        plan.pieces.push(Piece {
-                            stretch: index,
-                            rows: from..to,
-                            role: role(from),
-                        });
+            let cut =
+                |split: &mut DataSplit, range: Range<usize>, role: &dyn Fn(usize) -> RowRole| {
+                    let count = (range.len() / piece).max(1);
+                    for i in 0..count {
+                        let from = range.start + i * range.len() / count;
+                        let to = range.start + (i + 1) * range.len() / count;
+                        if from < to {
+                            split.pieces.push(Piece {
+                                stretch: index,
+                                rows: from..to,
+                                role: role(from),
+                            });
+                        }
                     }
-                }
-            };
+                };
             match roles[stretch.log] {
-                LogRole::Veto => cut(&mut plan, 0..rows, &|_| Role::Veto),
-                LogRole::Holdout => cut(&mut plan, 0..rows, &|_| Role::Holdout),
+                LogRole::Veto => cut(&mut split, 0..rows, &|_| RowRole::Veto),
+                LogRole::Holdout => cut(&mut split, 0..rows, &|_| RowRole::Holdout),
                 LogRole::Train => {
                     let share = rows as f64 / total.max(1) as f64;
                     let aside =
@@ -129,14 +130,14 @@ impl Plan {
                         fitted.push(start..range.start.saturating_sub(gap).max(start));
                         start = (range.end + gap).min(rows);
                         let kind = match role {
-                            LogRole::Veto => Role::Veto,
-                            _ => Role::Holdout,
+                            LogRole::Veto => RowRole::Veto,
+                            _ => RowRole::Holdout,
                         };
-                        cut(&mut plan, range.clone(), &|_| kind);
+                        cut(&mut split, range.clone(), &|_| kind);
                         let time = |row: usize| {
                             stretch.began + stretch.dt * parallel.sample_of(row) as f64
                         };
-                        plan.set_aside.push(SetAside {
+                        split.set_aside.push(SetAside {
                             log: stretch.log,
                             role: *role,
                             from_s: time(range.start),
@@ -146,11 +147,11 @@ impl Plan {
                     fitted.push(start..rows);
                     fitted.retain(|r| r.len() > 2 * gap);
                     let folds = ((FOLDS as f64 * share).round() as usize).max(1);
-                    plan.folds(index, &fitted, folds, gap, piece);
+                    split.folds(index, &fitted, folds, gap, piece);
                 }
             }
         }
-        plan
+        split
     }
 
     /// Divides the fitted ranges of one stretch into contiguous folds with gaps between.
@@ -184,14 +185,14 @@ impl Plan {
                         });
                     }
                 };
-                push(from..first, Role::Between);
+                push(from..first, RowRole::Between);
                 let pieces = ((last - first) / piece).max(1);
                 for k in 0..pieces {
                     let a = first + k * (last - first) / pieces;
                     let b = first + (k + 1) * (last - first) / pieces;
-                    push(a..b, Role::Fold(self.folds));
+                    push(a..b, RowRole::Fold(self.folds));
                 }
-                push(last..to, Role::Between);
+                push(last..to, RowRole::Between);
                 self.folds += 1;
             }
         }
@@ -199,35 +200,35 @@ impl Plan {
 
     /// Rows that are fitted.
     pub fn fitted_rows(&self) -> usize {
-        self.rows_where(Role::fitted)
+        self.rows_where(RowRole::fitted)
     }
 
-    /// Whether joint `j` is held along a stretch.
-    pub fn holds(&self, stretch: usize, j: usize) -> bool {
-        self.held.get(stretch).is_some_and(|held| held[j])
+    /// Whether the rows of joint `j` along a stretch count for nothing.
+    pub fn ignores(&self, stretch: usize, j: usize) -> bool {
+        self.ignored.get(stretch).is_some_and(|joints| joints[j])
     }
 
-    /// Whether joint `j` rests along a stretch, whatever the stretch is for.
-    pub fn rests(&self, stretch: usize, j: usize) -> bool {
-        self.rest.get(stretch).is_some_and(|rest| rest[j])
+    /// Whether joint `j` is stationary along a stretch, whatever the stretch is for.
+    pub fn is_stationary(&self, stretch: usize, j: usize) -> bool {
+        self.stationary.get(stretch).is_some_and(|joints| joints[j])
     }
 
     /// Whether nothing of a stretch is fitted or may veto.
     pub fn idle(&self, stretch: usize) -> bool {
-        self.held
+        self.ignored
             .get(stretch)
-            .is_some_and(|held| held.iter().all(|h| *h))
+            .is_some_and(|joints| joints.iter().all(|i| *i))
     }
 
     /// Rows that are fitted to joint `j`.
     pub fn fitted_rows_of(&self, j: usize) -> usize {
         let pieces = self.pieces.iter().filter(|p| p.role.fitted());
-        let moving = pieces.filter(|p| !self.holds(p.stretch, j));
+        let moving = pieces.filter(|p| !self.ignores(p.stretch, j));
         moving.map(|p| p.rows.len()).sum()
     }
 
     /// Rows of the pieces whose role is asked for.
-    pub fn rows_where(&self, wanted: impl Fn(Role) -> bool) -> usize {
+    pub fn rows_where(&self, wanted: impl Fn(RowRole) -> bool) -> usize {
         let pieces = self.pieces.iter().filter(|p| wanted(p.role));
         pieces.map(|p| p.rows.len()).sum()
     }
@@ -271,10 +272,10 @@ mod tests {
         }
     }
 
-    fn plan(roles: &[LogRole]) -> Plan {
+    fn split(roles: &[LogRole]) -> DataSplit {
         let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let stretches: Vec<Stretch> = (0..roles.len()).map(|l| stretch(l, 30.0)).collect();
-        Plan::of(&stretches, roles, &parallel, 10.0)
+        DataSplit::of(&stretches, roles, &parallel, 10.0)
     }
 
     #[test]
@@ -284,9 +285,9 @@ mod tests {
             vec![LogRole::Train, LogRole::Train, LogRole::Holdout],
             vec![LogRole::Train, LogRole::Veto, LogRole::Holdout],
         ] {
-            let plan = plan(&roles);
-            for (i, a) in plan.pieces.iter().enumerate() {
-                for b in plan.pieces[i + 1..]
+            let split = split(&roles);
+            for (i, a) in split.pieces.iter().enumerate() {
+                for b in split.pieces[i + 1..]
                     .iter()
                     .filter(|b| b.stretch == a.stretch)
                 {
@@ -304,17 +305,18 @@ mod tests {
                     }
                 }
             }
-            assert!((8..=14).contains(&plan.folds), "{}", plan.folds);
+            assert!((8..=14).contains(&split.folds), "{}", split.folds);
         }
     }
 
     #[test]
     fn logs_that_are_given_for_a_use_leave_the_training_logs_whole() {
-        let plan = plan(&[LogRole::Train, LogRole::Veto, LogRole::Holdout]);
-        assert!(plan.set_aside.is_empty());
-        let fitted = plan.fitted_rows();
+        let split = split(&[LogRole::Train, LogRole::Veto, LogRole::Holdout]);
+        assert!(split.set_aside.is_empty());
+        let fitted = split.fitted_rows();
         assert!(
-            plan.pieces
+            split
+                .pieces
                 .iter()
                 .all(|p| p.role.fitted() == (p.stretch == 0))
         );

@@ -1,0 +1,48 @@
+//! One candidate effect with what became of it.
+
+use super::score::CandidateScore;
+use crate::effect::{Added, Law, Place};
+
+/// An effect at a place.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    pub effect: Added,
+    /// None where the data lack what it needs, or where nothing of it is its own.
+    pub score: Option<CandidateScore>,
+    pub accepted: bool,
+    /// Whether the data tell it from chance; it is accepted where it also matters.
+    pub significant: bool,
+    /// Why not; empty where accepted.
+    pub reason: String,
+}
+
+impl Candidate {
+    /// One that is not decided on.
+    pub fn open(effect: Added, score: Option<CandidateScore>, reason: &str) -> Self {
+        Candidate {
+            effect,
+            score,
+            accepted: false,
+            significant: false,
+            reason: reason.to_owned(),
+        }
+    }
+
+    /// One that was not tried.
+    pub fn refused(law: &'static Law, place: Place, reason: &str) -> Self {
+        let effect = Added {
+            law,
+            place,
+            shape: vec![f64::NAN; law.shape.len()],
+            linear: vec![0.0; law.linear.len()],
+        };
+        Candidate::open(effect, None, reason)
+    }
+
+    /// Takes back what it was accepted for.
+    pub fn reject(&mut self, reason: &str) {
+        self.accepted = false;
+        self.significant = false;
+        reason.clone_into(&mut self.reason);
+    }
+}

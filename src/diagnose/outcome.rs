@@ -1,0 +1,127 @@
+//! What a diagnosis finds.
+
+use nalgebra::DMatrix;
+
+use super::candidates::candidate::Candidate;
+use super::faults::disturbance::Disturbance;
+use super::problem::data_split::SetAside;
+use super::problem::unknowns::Unknown;
+use super::unexplained::errors::Errors;
+use super::unexplained::{NEGLIGIBLE, STRUCTURED, Unexplained};
+use crate::effect::{Added, AugmentedModel};
+
+/// Part of a joint's structure that may be left where effects are named for the rest of it.
+const NAMED: f64 = 0.1;
+
+/// One accepted effect.
+#[derive(Debug, Clone)]
+pub struct AcceptedEffect {
+    /// Its place in the final model's effects.
+    pub effect: usize,
+    pub candidate: Candidate,
+    /// Candidates that these data do not separate from it, best first.
+    pub alternatives: Vec<Candidate>,
+    /// Mean relative error on the holdout before and after the step.
+    pub holdout: Option<[f64; 2]>,
+}
+
+/// Errors before or after.
+#[derive(Debug, Clone)]
+pub struct SplitErrors {
+    pub train: Errors,
+    pub holdout: Option<Errors>,
+}
+
+/// The outcome.
+pub struct Diagnosis {
+    /// The model with what was added.
+    pub model: AugmentedModel,
+    /// Unknowns of the final fit and their covariance.
+    pub unknowns: Vec<Unknown>,
+    pub covariance: DMatrix<f64>,
+    pub steps: Vec<AcceptedEffect>,
+    /// Candidates of the last round, in which none was accepted.
+    pub candidates: Vec<Candidate>,
+    pub before: SplitErrors,
+    /// The declared model refitted to these logs, with nothing added.
+    pub refitted: Errors,
+    pub after: SplitErrors,
+    pub unexplained: Vec<Unexplained>,
+    /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
+    pub part_unexplained: Vec<f64>,
+    pub set_aside: Vec<SetAside>,
+    /// Disturbances that were cut out of the logs.
+    pub disturbances: Vec<Disturbance>,
+    /// Root mean square of the filtered residual per joint.
+    pub residual_std: Vec<f64>,
+    /// Logs that were fitted: the first ones.
+    pub fitted_logs: usize,
+}
+
+impl Diagnosis {
+    /// Whether some joint's residual still holds structure.
+    pub fn structured(&self) -> bool {
+        self.structured_joints().next().is_some()
+    }
+
+    /// Joints whose residual still holds structure.
+    pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
+        let joints = self.unexplained.iter().enumerate();
+        joints
+            .filter(|(_, l)| {
+                l.over_floor.is_none_or(|over| over > STRUCTURED) && l.share > NEGLIGIBLE
+            })
+            .map(|(j, _)| j)
+    }
+
+    /// Candidates of the last round that the data tell from chance, and that were not added, for they are too
+    /// small to matter or came after the last that is looked for: what was added is then not all that is there,
+    /// or not quite what is there.
+    pub fn remainder(&self) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter().filter(|c| c.significant)
+    }
+
+    /// Whether what was added leaves nothing that is told from noise on any joint. Otherwise it lowers the
+    /// error and may stand in for an effect that the catalogue does not have: joints share inertial
+    /// parameters, and what is missing on one forges effects on the others.
+    pub fn assured(&self) -> bool {
+        !self.structured() && self.remainder().next().is_none()
+    }
+
+    /// Whether what was added leaves at most a small part of the structure on the joints that a step's effect
+    /// touches, so that there is something to its name.
+    pub fn explained(&self, step: &AcceptedEffect) -> bool {
+        let place = self.model.effects[step.effect].place;
+        let mut open = self.structured_joints().filter(|j| place.touches(*j));
+        open.all(|j| self.part_unexplained[j] <= NAMED)
+    }
+
+    /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.
+    pub fn covariance_of(&self, effect: usize) -> Vec<f64> {
+        let added: &Added = &self.model.effects[effect];
+        let k = added.parameters();
+        let shapes = added.shape.len();
+        let place = |wanted: Unknown| self.unknowns.iter().position(|u| *u == wanted);
+        let places: Vec<Option<usize>> = (0..k)
+            .map(|i| {
+                if i < shapes {
+                    place(Unknown::Shape { effect, k: i })
+                } else {
+                    place(Unknown::Linear {
+                        effect,
+                        k: i - shapes,
+                    })
+                }
+            })
+            .collect();
+        let mut out = vec![0.0; k * k];
+        for (a, pa) in places.iter().enumerate() {
+            for (b, pb) in places.iter().enumerate() {
+                if let (Some(pa), Some(pb)) = (pa, pb) {
+                    out[a * k + b] = self.covariance[(*pa, *pb)];
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,64 @@
+//! Everything that a fit works on.
+
+use rayon::prelude::*;
+
+use super::data_split::DataSplit;
+use super::prior::ParameterPrior;
+use super::rows::{Inertial, inertial};
+use super::unknowns::FreeParameters;
+use crate::effect::{AugmentedModel, Cover, Torques};
+use crate::motion::{MotionError, Parallel, Stretch};
+use crate::robot::Robot;
+
+/// Data, which of their rows do what, and what is known and open beforehand.
+pub struct FitProblem<'a> {
+    pub stretches: &'a [Stretch],
+    /// What the inertial parameters do along each of them.
+    pub inertial: Vec<Inertial>,
+    pub parallel: &'a Parallel,
+    pub split: DataSplit,
+    pub open: &'a FreeParameters,
+    pub prior: &'a ParameterPrior,
+    pub cover: Cover,
+}
+
+/// The filtered regressors of all stretches.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn inertial_of(
+    robot: &Robot,
+    stretches: &[Stretch],
+    parallel: &Parallel,
+    split: &DataSplit,
+) -> Result<Vec<Inertial>, MotionError> {
+    let all = stretches.par_iter().enumerate();
+    all.map(|(i, stretch)| inertial(robot, stretch, parallel, &|j| split.ignores(i, j)))
+        .collect()
+}
+
+impl<'a> FitProblem<'a> {
+    /// The same along other stretches.
+    ///
+    /// # Errors
+    /// [`MotionError`] of the filter.
+    pub fn along(&self, robot: &Robot, stretches: &'a [Stretch]) -> Result<Self, MotionError> {
+        Ok(FitProblem {
+            inertial: inertial_of(robot, stretches, self.parallel, &self.split)?,
+            stretches,
+            split: self.split.clone(),
+            cover: self.cover.clone(),
+            ..*self
+        })
+    }
+
+    /// Torques of a model along every stretch; none along those that decide nothing.
+    pub fn torques(&self, model: &AugmentedModel) -> Vec<Torques> {
+        let stretches = self.stretches.par_iter().enumerate();
+        let of = |(i, stretch): (usize, &Stretch)| match self.split.idle(i) {
+            true => Torques::default(),
+            false => model.torques(stretch),
+        };
+        stretches.map(of).collect()
+    }
+}
