@@ -9,7 +9,7 @@ use super::inputs::Inputs;
 use super::passes::{GivenNoise, Maximum, add_choices, bands, maximise};
 use super::plateau::{Plateau, plateaus};
 use super::prepare::Prepared;
-use super::problem::FRICTION;
+use super::problem::{FRICTION, FrictionProblem};
 use super::slope::{open_above, profile_slope};
 use super::start::{FrictionStart, constant_inertia, from_log};
 use crate::math::descent::Ending;
@@ -206,80 +206,21 @@ pub fn estimate(
 fn assemble(
     names: &[String],
     prepared: &Prepared,
-    mut maximum: Maximum,
+    maximum: Maximum,
     speeds: Speeds,
 ) -> JointEstimate {
     let problem = &prepared.problem;
-    let np = problem.parameters();
-    // slope_1 is the steeper one: a swap of the two tanh terms is the same law
-    if maximum.parameters[3] < maximum.parameters[4] {
-        let mut order: Vec<usize> = (0..np).collect();
-        order.swap(1, 2);
-        order.swap(3, 4);
-        let p = maximum.parameters.clone();
-        let c = maximum.covariance.clone();
-        for i in 0..np {
-            maximum.parameters[i] = p[order[i]];
-            for j in 0..np {
-                maximum.covariance[(i, j)] = c[(order[i], order[j])];
-            }
-        }
-        maximum.at_limit.swap(0, 1);
-    }
+    let maximum = steeper_first(maximum);
     let p = &maximum.parameters;
     let law = problem.friction(p);
-    let jacobian = problem.jacobian(p);
-    let mut covariance = [[0.0; FRICTION]; FRICTION];
-    for (i, row) in covariance.iter_mut().enumerate() {
-        for (j, c) in row.iter_mut().enumerate() {
-            *c = jacobian[i] * jacobian[j] * maximum.covariance[(i, j)];
-        }
-    }
-    let si = law.parameters();
-    let std = |i: usize| covariance[i][i].max(0.0).sqrt();
-    let values = std::array::from_fn(|i| {
-        let verdict = verdict_of(si[i], std(i));
-        let plain = EstimatedValue {
-            value: si[i],
-            std: std(i),
-            verdict,
-        };
-        if i < 3 {
-            return plain;
-        }
-        // a slope is open where its term is: two terms that the data cannot part are one
-        let height = verdict_of(si[i - 2], std(i - 2));
-        let open = maximum.at_limit[i - 3]
-            || verdict == Verdict::NotIdentifiable
-            || height == Verdict::NotIdentifiable
-            || (verdict == Verdict::Weak && open_above(problem, &maximum, i));
-        if !open {
-            return plain;
-        }
-        // the steeper one has a bound as long as there is Coulomb friction at all; the other only
-        // where its own term is there
-        let term = i == 3 || height != Verdict::NotIdentifiable;
-        match profile_slope(problem, &maximum, i).filter(|_| term) {
-            Some(bound) => EstimatedValue {
-                value: bound,
-                std: f64::NAN,
-                verdict: Verdict::LowerBound,
-            },
-            None => EstimatedValue {
-                verdict: Verdict::NotIdentifiable,
-                ..plain
-            },
-        }
-    });
-
+    let covariance = covariance(problem, &maximum);
     let curve = curve(&law, &covariance, speeds.covered);
     let (rmse, relative_error) = residual(prepared, p, &law);
-    let samples = problem.samples();
     let s = &maximum.score;
     let half = 1.96 * (2.0 / s.windows.max(1) as f64).sqrt();
     JointEstimate {
+        values: std::array::from_fn(|i| value(problem, &maximum, &law, &covariance, i)),
         law,
-        values,
         covariance,
         nuisance: nuisance(names, prepared, &maximum),
         speeds,
@@ -295,7 +236,7 @@ fn assemble(
         },
         rmse,
         relative_error,
-        samples,
+        samples: problem.samples(),
         starts: maximum.starts,
         ending: maximum.ending,
         widening: maximum.widening,
@@ -304,6 +245,73 @@ fn assemble(
             position_variance_factor: maximum.noise.position_factor,
         },
         cutoffs: Vec::new(),
+    }
+}
+
+/// The same maximum with slope_1 the steeper one: a swap of the two tanh terms is the same law.
+fn steeper_first(mut maximum: Maximum) -> Maximum {
+    if maximum.parameters[3] < maximum.parameters[4] {
+        let mut order: Vec<usize> = (0..maximum.parameters.len()).collect();
+        order.swap(1, 2);
+        order.swap(3, 4);
+        maximum.parameters.swap(1, 2);
+        maximum.parameters.swap(3, 4);
+        let c = &maximum.covariance;
+        maximum.covariance = c.select_rows(&order).select_columns(&order);
+        maximum.at_limit.swap(0, 1);
+    }
+    maximum
+}
+
+/// Covariance of the law's parameters in SI units.
+fn covariance(problem: &FrictionProblem, maximum: &Maximum) -> [[f64; FRICTION]; FRICTION] {
+    let jacobian = problem.jacobian(&maximum.parameters);
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| jacobian[i] * jacobian[j] * maximum.covariance[(i, j)])
+    })
+}
+
+/// Parameter i of the law with its verdict; a slope that is open has a bound from below, where the log gives one.
+fn value(
+    problem: &FrictionProblem,
+    maximum: &Maximum,
+    law: &DoubleTanh,
+    covariance: &[[f64; FRICTION]; FRICTION],
+    i: usize,
+) -> EstimatedValue {
+    let si = law.parameters();
+    let std = |i: usize| covariance[i][i].max(0.0).sqrt();
+    let verdict = verdict_of(si[i], std(i));
+    let plain = EstimatedValue {
+        value: si[i],
+        std: std(i),
+        verdict,
+    };
+    if i < 3 {
+        return plain;
+    }
+    // a slope is open where its term is: two terms that the data cannot part are one
+    let height = verdict_of(si[i - 2], std(i - 2));
+    let open = maximum.at_limit[i - 3]
+        || verdict == Verdict::NotIdentifiable
+        || height == Verdict::NotIdentifiable
+        || (verdict == Verdict::Weak && open_above(problem, maximum, i));
+    if !open {
+        return plain;
+    }
+    // the steeper one has a bound as long as there is Coulomb friction at all; the other only
+    // where its own term is there
+    let term = i == 3 || height != Verdict::NotIdentifiable;
+    match profile_slope(problem, maximum, i).filter(|_| term) {
+        Some(bound) => EstimatedValue {
+            value: bound,
+            std: f64::NAN,
+            verdict: Verdict::LowerBound,
+        },
+        None => EstimatedValue {
+            verdict: Verdict::NotIdentifiable,
+            ..plain
+        },
     }
 }
 

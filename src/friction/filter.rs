@@ -75,13 +75,7 @@ impl ExtendedKalmanFilter {
                 record.r[0] * noise.position_factor,
             );
             for k in 0..record.tau.len() {
-                let e = problem.nuisance;
-                let interval = Interval {
-                    dt: record.t[k + 1] - record.t[k],
-                    tau: record.tau[k],
-                    m: &record.m[k * e..(k + 1) * e],
-                    h: &record.h[k * e..(k + 1) * e],
-                };
+                let interval = Interval::of(record, k, problem.nuisance);
                 self.predict(problem, &interval, noise);
                 let r = record.r[k + 1] * noise.position_factor;
                 let (innovation, s) = self.update(record.y[k + 1], r);

@@ -71,88 +71,27 @@ pub fn prepare(
     sensors: &SensorModel,
 ) -> Option<Prepared> {
     let n = robot.joints();
-    let p = robot.parameters().len();
-    let columns = p + 1;
-    let torque_scale = rms(motions
-        .iter()
-        .flat_map(|m| m.tau.iter().skip(joint).step_by(n).copied()));
-    let velocity_scale = rms(motions
-        .iter()
-        .flat_map(|m| m.v.iter().skip(joint).step_by(n).copied()));
+    let of_joint = |channel: fn(&SmoothedMotion) -> &Vec<f64>| {
+        let all = motions.iter().map(channel);
+        all.flat_map(move |x| x.iter().skip(joint).step_by(n).copied())
+    };
+    let torque_scale = rms(of_joint(|m| &m.tau));
+    let velocity_scale = rms(of_joint(|m| &m.v));
     // as measured: smoothing leaves rounding errors in what stands still
-    let mut measured = motions
-        .iter()
-        .flat_map(|m| m.measured.iter().skip(joint).step_by(n));
+    let mut measured = of_joint(|m| &m.measured);
     let first = measured.next();
     let moves = measured.any(|q| Some(q) != first);
     if !(moves && torque_scale > 0.0 && velocity_scale > 0.0) {
         return None;
     }
-
-    let mut y = vec![0.0; n * p];
-    let mut square = vec![0.0; columns];
-    let mut count = 0usize;
-    for motion in motions {
-        for k in 0..motion.t.len() {
-            let at = k * n..(k + 1) * n;
-            robot.regressor(
-                &motion.q[at.clone()],
-                &motion.v[at.clone()],
-                &motion.a[at],
-                &mut y,
-            );
-            for (s, x) in square.iter_mut().zip(&y[joint * p..(joint + 1) * p]) {
-                *s += x * x;
-            }
-            count += 1;
-        }
-    }
-    square[p] = count as f64;
-    let scale: Vec<f64> = square
-        .iter()
-        .map(|s| {
-            let size = (s / count as f64).sqrt();
-            if size > 1e-12 * torque_scale {
-                torque_scale / size
-            } else {
-                0.0
-            }
-        })
-        .collect();
-
-    // singular directions of the scaled columns
-    let mut factor = RFactor::new(columns);
-    let mut row = vec![0.0; columns];
-    for motion in motions {
-        for k in (0..motion.t.len()).step_by(4) {
-            let at = k * n..(k + 1) * n;
-            robot.regressor(
-                &motion.q[at.clone()],
-                &motion.v[at.clone()],
-                &motion.a[at],
-                &mut y,
-            );
-            for (j, x) in y[joint * p..(joint + 1) * p].iter().enumerate() {
-                row[j] = x * scale[j] / torque_scale;
-            }
-            row[p] = scale[p] / torque_scale;
-            factor.fold(&row);
-        }
-    }
-    let svd = rank::svd(&factor.r()).ok()?;
-    let kept: Vec<usize> = (0..columns)
-        .filter(|&j| svd.s[j] > DIRECTION_TOLERANCE * svd.s[0])
-        .collect();
-    let e = kept.len();
-    let back = DMatrix::from_fn(columns, e, |i, j| scale[i] * svd.v[(i, kept[j])]);
-
+    let back = excited_directions(robot, joint, motions, torque_scale)?;
     let built = build(robot, joint, motions, sensors, &back)?;
     let acceleration_scale = rms(built.acceleration.iter().copied()).max(f64::MIN_POSITIVE);
     let step = median_step(&built.records);
     Some(Prepared {
         problem: FrictionProblem {
             records: built.records,
-            nuisance: e,
+            nuisance: back.ncols(),
             torque_scale,
             velocity_scale,
             slope_range: slope_range(&built.velocity, acceleration_scale, step),
@@ -162,6 +101,67 @@ pub fn prepare(
         velocity: built.velocity,
         acceleration: built.acceleration,
     })
+}
+
+/// Gives every `every`-th row of a joint's regressor along the motions, a column of ones after it.
+fn regressor_rows(
+    robot: &Robot,
+    joint: usize,
+    motions: &[SmoothedMotion],
+    every: usize,
+    take: &mut dyn FnMut(&[f64]),
+) {
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let mut y = vec![0.0; n * p];
+    let mut row = vec![1.0; p + 1];
+    for motion in motions {
+        for k in (0..motion.t.len()).step_by(every) {
+            let at = k * n..(k + 1) * n;
+            let (q, v, a) = (&motion.q[at.clone()], &motion.v[at.clone()], &motion.a[at]);
+            robot.regressor(q, v, a, &mut y);
+            row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
+            take(&row);
+        }
+    }
+}
+
+/// Combinations of the robot's parameters (and the offset, last) that the motion excites, one a column, each scaled
+/// to the torque: singular directions of the scaled regressor.
+fn excited_directions(
+    robot: &Robot,
+    joint: usize,
+    motions: &[SmoothedMotion],
+    torque_scale: f64,
+) -> Option<DMatrix<f64>> {
+    let columns = robot.parameters().len() + 1;
+    let mut square = vec![0.0; columns];
+    let mut count = 0usize;
+    regressor_rows(robot, joint, motions, 1, &mut |row| {
+        for (s, x) in square.iter_mut().zip(row) {
+            *s += x * x;
+        }
+        count += 1;
+    });
+    let scale = |s: &f64| match (s / count as f64).sqrt() {
+        size if size > 1e-12 * torque_scale => torque_scale / size,
+        _ => 0.0,
+    };
+    let scale: Vec<f64> = square.iter().map(scale).collect();
+    let mut factor = RFactor::new(columns);
+    let mut scaled = vec![0.0; columns];
+    regressor_rows(robot, joint, motions, 4, &mut |row| {
+        for ((x, y), s) in scaled.iter_mut().zip(row).zip(&scale) {
+            *x = y * s / torque_scale;
+        }
+        factor.fold(&scaled);
+    });
+    let svd = rank::svd(&factor.r()).ok()?;
+    let kept: Vec<usize> = (0..columns)
+        .filter(|&j| svd.s[j] > DIRECTION_TOLERANCE * svd.s[0])
+        .collect();
+    Some(DMatrix::from_fn(columns, kept.len(), |i, j| {
+        scale[i] * svd.v[(i, kept[j])]
+    }))
 }
 
 /// The same problem, its known inputs from motions that were smoothed otherwise: unknowns and
@@ -195,83 +195,99 @@ fn build(
     back: &DMatrix<f64>,
 ) -> Option<BuiltRecords> {
     let n = robot.joints();
-    let p = robot.parameters().len();
-    let columns = p + 1;
-    let e = back.ncols();
-    let mut y = vec![0.0; n * p];
-    let mut moved = vec![0.0; n * p];
-    let mut records = Vec::with_capacity(motions.len());
-    let mut velocity = Vec::new();
-    let mut acceleration = Vec::new();
+    let long = motions.iter().filter(|m| m.t.len() >= 3);
+    let of_joint =
+        |x: &Vec<f64>| -> Vec<f64> { x.iter().skip(joint).step_by(n).copied().collect() };
+    let built = BuiltRecords {
+        records: long
+            .clone()
+            .map(|m| record(robot, joint, m, sensors, back))
+            .collect(),
+        velocity: long.clone().flat_map(|m| of_joint(&m.v)).collect(),
+        acceleration: long.flat_map(|m| of_joint(&m.a)).collect(),
+    };
+    (!built.records.is_empty()).then_some(built)
+}
+
+/// The record of one motion.
+fn record(
+    robot: &Robot,
+    joint: usize,
+    motion: &SmoothedMotion,
+    sensors: &SensorModel,
+    back: &DMatrix<f64>,
+) -> Record {
+    let (n, e) = (robot.joints(), back.ncols());
+    let samples = motion.t.len();
+    let mut record = Record {
+        t: motion.t.clone(),
+        v0: motion.v[joint],
+        ..Record::default()
+    };
+    for k in 0..samples {
+        let pose = &motion.measured[k * n..(k + 1) * n];
+        record.y.push(pose[joint]);
+        record.r.push((sensors.variance)(pose));
+    }
+    let (m, h) = coefficients(robot, joint, motion, back);
+    let mut torque = vec![0.0; n];
+    // intervals: mean of their ends; the torque as it is timed
+    for k in 0..samples - 1 {
+        let row = |x: &'_ [f64], k: usize| -> Vec<f64> { x[k * n..(k + 1) * n].to_vec() };
+        record.tau.push(if sensors.zero_order_hold {
+            // the motor's force is constant; as a joint torque it is that of the middle pose
+            let (here, next) = (row(&motion.q, k), row(&motion.q, k + 1));
+            let middle: Vec<f64> = here.iter().zip(&next).map(|(a, b)| 0.5 * (a + b)).collect();
+            robot
+                .transmission()
+                .carry_torque(&here, &middle, &row(&motion.tau, k), &mut torque);
+            torque[joint]
+        } else {
+            0.5 * (motion.tau[k * n + joint] + motion.tau[(k + 1) * n + joint])
+        });
+        for j in 0..e {
+            record.m.push(0.5 * (m[k * e + j] + m[(k + 1) * e + j]));
+            record.h.push(0.5 * (h[k * e + j] + h[(k + 1) * e + j]));
+        }
+    }
+    record
+}
+
+/// Coefficients of the nuisance at every sample, row-major: of the joint's own acceleration, and of what acts
+/// beside it.
+fn coefficients(
+    robot: &Robot,
+    joint: usize,
+    motion: &SmoothedMotion,
+    back: &DMatrix<f64>,
+) -> (Vec<f64>, Vec<f64>) {
+    let (n, p, e) = (robot.joints(), robot.parameters().len(), back.ncols());
+    let samples = motion.t.len();
+    let (mut y, mut moved) = (vec![0.0; n * p], vec![0.0; n * p]);
     let mut a = vec![0.0; n];
-    let (mut raw_m, mut raw_h) = (vec![0.0; columns], vec![0.0; columns]);
-    for motion in motions {
-        let samples = motion.t.len();
-        if samples < 3 {
-            continue;
+    let (mut raw_m, mut raw_h) = (vec![0.0; p + 1], vec![0.0; p + 1]);
+    let (mut m, mut h) = (vec![0.0; samples * e], vec![0.0; samples * e]);
+    for k in 0..samples {
+        let at = k * n..(k + 1) * n;
+        let (q, v) = (&motion.q[at.clone()], &motion.v[at.clone()]);
+        a.copy_from_slice(&motion.a[at]);
+        a[joint] = 0.0;
+        robot.regressor(q, v, &a, &mut y);
+        a[joint] = 1.0;
+        robot.regressor(q, v, &a, &mut moved);
+        for j in 0..p {
+            raw_h[j] = y[joint * p + j];
+            raw_m[j] = moved[joint * p + j] - raw_h[j];
         }
-        let mut record = Record {
-            t: motion.t.clone(),
-            v0: motion.v[joint],
-            ..Record::default()
-        };
-        let (mut m, mut h) = (vec![0.0; samples * e], vec![0.0; samples * e]);
-        for k in 0..samples {
-            let at = k * n..(k + 1) * n;
-            let (q, v) = (&motion.q[at.clone()], &motion.v[at.clone()]);
-            a.copy_from_slice(&motion.a[at.clone()]);
-            a[joint] = 0.0;
-            robot.regressor(q, v, &a, &mut y);
-            a[joint] = 1.0;
-            robot.regressor(q, v, &a, &mut moved);
-            for j in 0..p {
-                raw_h[j] = y[joint * p + j];
-                raw_m[j] = moved[joint * p + j] - raw_h[j];
-            }
-            raw_h[p] = 1.0;
-            for (j, (mm, hh)) in m[k * e..(k + 1) * e]
-                .iter_mut()
-                .zip(&mut h[k * e..(k + 1) * e])
-                .enumerate()
-            {
-                let column = back.column(j);
-                *mm = raw_m.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
-                *hh = raw_h.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
-            }
-            record.y.push(motion.measured[k * n + joint]);
-            record.r.push((sensors.variance)(&motion.measured[at]));
-            velocity.push(motion.v[k * n + joint]);
-            acceleration.push(motion.a[k * n + joint]);
+        raw_h[p] = 1.0;
+        let row = k * e..(k + 1) * e;
+        for (j, (m, h)) in m[row.clone()].iter_mut().zip(&mut h[row]).enumerate() {
+            let column = back.column(j);
+            *m = raw_m.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
+            *h = raw_h.iter().zip(column.iter()).map(|(a, b)| a * b).sum();
         }
-        // intervals: mean of their ends; the torque as it is timed
-        for k in 0..samples - 1 {
-            let row = |x: &'_ [f64], k: usize| -> Vec<f64> { x[k * n..(k + 1) * n].to_vec() };
-            record.tau.push(if sensors.zero_order_hold {
-                // the motor's force is constant; as a joint torque it is that of the middle pose
-                let (here, next) = (row(&motion.q, k), row(&motion.q, k + 1));
-                let middle: Vec<f64> = here.iter().zip(&next).map(|(a, b)| 0.5 * (a + b)).collect();
-                robot
-                    .transmission()
-                    .carry_torque(&here, &middle, &row(&motion.tau, k), &mut a);
-                a[joint]
-            } else {
-                0.5 * (motion.tau[k * n + joint] + motion.tau[(k + 1) * n + joint])
-            });
-            for j in 0..e {
-                record.m.push(0.5 * (m[k * e + j] + m[(k + 1) * e + j]));
-                record.h.push(0.5 * (h[k * e + j] + h[(k + 1) * e + j]));
-            }
-        }
-        records.push(record);
     }
-    if records.is_empty() {
-        return None;
-    }
-    Some(BuiltRecords {
-        records,
-        velocity,
-        acceleration,
-    })
+    (m, h)
 }
 
 fn median_step(records: &[Record]) -> f64 {

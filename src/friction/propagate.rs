@@ -5,7 +5,7 @@
 //! transition matrix and the sensitivities to the parameters are integrals along the same steps by
 //! Simpson's rule with the exact exponential of the local decay.
 
-use super::problem::{FRICTION, FrictionProblem};
+use super::problem::{FRICTION, FrictionProblem, Record};
 
 /// Longest sub-step relative to the local time constant of the friction.
 const STEP_LIMIT: f64 = 0.8;
@@ -142,6 +142,20 @@ pub struct Interval<'a> {
     pub tau: f64,
     pub m: &'a [f64],
     pub h: &'a [f64],
+}
+
+impl<'a> Interval<'a> {
+    /// Interval k of a record with so many nuisance parameters.
+    #[inline(always)]
+    pub fn of(record: &'a Record, k: usize, nuisance: usize) -> Self {
+        let row = k * nuisance..(k + 1) * nuisance;
+        Interval {
+            dt: record.t[k + 1] - record.t[k],
+            tau: record.tau[k],
+            m: &record.m[row.clone()],
+            h: &record.h[row],
+        }
+    }
 }
 
 /// Inverse inertia and net known torque of one interval under the nuisance `eta`.

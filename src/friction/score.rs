@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{FRICTION, FrictionProblem, NoiseLevels};
+use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
 use super::propagate::{Interval, Law, Transition, state, with_sensitivities};
 
 /// Result of a pass at fixed parameters.
@@ -35,6 +35,38 @@ pub struct LikelihoodScore {
     pub windows: usize,
     /// Square root of the mean squared innovation.
     pub innovation_rms: f64,
+}
+
+impl LikelihoodScore {
+    fn none(parameters: usize) -> Self {
+        LikelihoodScore {
+            log_likelihood: 0.0,
+            gradient: DVector::zeros(parameters),
+            information: DMatrix::zeros(parameters, parameters),
+            outer: DMatrix::zeros(parameters, parameters),
+            blocks: 0,
+            innovations: 0,
+            mean_nis: 0.0,
+            share_inside: 0.0,
+            innovation_rms: 0.0,
+            window_nis: f64::NAN,
+            windows: 0,
+        }
+    }
+
+    /// Takes the gradient of a block, and leaves none.
+    fn close_block(&mut self, part: &mut DVector<f64>) {
+        self.outer.ger(1.0, part, part, 1.0);
+        self.gradient += &*part;
+        self.blocks += 1;
+        part.fill(0.0);
+    }
+}
+
+/// Two-state covariance (qq, qv, vv) at the first sample of a record.
+fn first_covariance(problem: &FrictionProblem, record: &Record, noise: NoiseLevels) -> [f64; 3] {
+    let speed = 0.1 * problem.velocity_scale;
+    [record.r[0] * noise.position_factor, 0.0, speed.powi(2)]
 }
 
 /// Two-state covariance (qq, qv, vv), predicted over one interval.
@@ -114,6 +146,32 @@ impl InnovationWindows {
     }
 }
 
+/// Derivatives of the states by the parameters.
+struct Sensitivities {
+    q: Vec<f64>,
+    v: Vec<f64>,
+}
+
+impl Sensitivities {
+    #[inline(always)]
+    fn propagate(&mut self, t: &Transition) {
+        let inputs = t.b_q.iter().zip(&t.b_v);
+        for ((q, v), (b_q, b_v)) in self.q.iter_mut().zip(&mut self.v).zip(inputs) {
+            *q += t.q_v * *v + b_q;
+            *v = t.v_v * *v + b_v;
+        }
+    }
+
+    #[inline(always)]
+    fn update(&mut self, kq: f64, kv: f64) {
+        for (q, v) in self.q.iter_mut().zip(&mut self.v) {
+            let w = *q;
+            *q -= kq * w;
+            *v -= kv * w;
+        }
+    }
+}
+
 /// Likelihood, score and information of `parameters`. `block` is the number of samples over which
 /// the score is summed before its outer product is taken.
 pub fn score(
@@ -124,45 +182,25 @@ pub fn score(
 ) -> LikelihoodScore {
     let np = problem.parameters();
     let law = Law::new(problem, parameters);
-    let e = problem.nuisance;
     let mut t = Transition::new(np);
-    let mut out = LikelihoodScore {
-        log_likelihood: 0.0,
-        gradient: DVector::zeros(np),
-        information: DMatrix::zeros(np, np),
-        outer: DMatrix::zeros(np, np),
-        blocks: 0,
-        innovations: 0,
-        mean_nis: 0.0,
-        share_inside: 0.0,
-        innovation_rms: 0.0,
-        window_nis: f64::NAN,
-        windows: 0,
-    };
+    let mut out = LikelihoodScore::none(np);
     let mut windows = InnovationWindows::default();
     let s2 = noise.torque * noise.torque;
     let mut info = vec![0.0; np * np];
     let (mut nis, mut inside, mut square) = (0.0, 0usize, 0.0);
-    let mut w_q = vec![0.0; np];
-    let mut w_v = vec![0.0; np];
+    let mut w = Sensitivities {
+        q: vec![0.0; np],
+        v: vec![0.0; np],
+    };
     for record in &problem.records {
         let mut part = DVector::zeros(np);
         let (mut q, mut v) = (record.y[0], record.v0);
-        let mut p = [
-            record.r[0] * noise.position_factor,
-            0.0,
-            (0.1 * problem.velocity_scale).powi(2),
-        ];
-        w_q.fill(0.0);
-        w_v.fill(0.0);
+        let mut p = first_covariance(problem, record, noise);
+        w.q.fill(0.0);
+        w.v.fill(0.0);
         windows.cut();
         for k in 0..record.tau.len() {
-            let interval = Interval {
-                dt: record.t[k + 1] - record.t[k],
-                tau: record.tau[k],
-                m: &record.m[k * e..(k + 1) * e],
-                h: &record.h[k * e..(k + 1) * e],
-            };
+            let interval = Interval::of(record, k, problem.nuisance);
             let next = with_sensitivities(
                 &law,
                 parameters,
@@ -174,10 +212,7 @@ pub fn score(
             );
             (q, v) = next;
             p = predict(p, &t, s2);
-            for j in 0..np {
-                w_q[j] += t.q_v * w_v[j] + t.b_q[j];
-                w_v[j] = t.v_v * w_v[j] + t.b_v[j];
-            }
+            w.propagate(&t);
             let s = p[0] + record.r[k + 1] * noise.position_factor;
             let innovation = record.y[k + 1] - q;
             let (kq, kv) = update(&mut p, s);
@@ -194,38 +229,24 @@ pub fn score(
             inside += usize::from(z < CHI2_95);
             square += innovation * innovation;
             out.innovations += 1;
-            // d(innovation)/dp = -w_q; score = w_q nu / s, information = w_q w_q' / s
+            // d(innovation)/dp = -w; score = w nu / s, information = w w' / s
             let g = innovation / s;
             for i in 0..np {
-                part[i] += w_q[i] * g;
-                let wi = w_q[i] / s;
-                for (a, w) in info[i * np..i * np + i + 1].iter_mut().zip(&w_q[..=i]) {
+                part[i] += w.q[i] * g;
+                let wi = w.q[i] / s;
+                for (a, w) in info[i * np..i * np + i + 1].iter_mut().zip(&w.q[..=i]) {
                     *a += wi * w;
                 }
             }
-            for j in 0..np {
-                let w = w_q[j];
-                w_q[j] -= kq * w;
-                w_v[j] -= kv * w;
-            }
+            w.update(kq, kv);
             if (k + 1) % block.max(1) == 0 {
-                out.outer.ger(1.0, &part, &part, 1.0);
-                out.gradient += &part;
-                out.blocks += 1;
-                part.fill(0.0);
+                out.close_block(&mut part);
             }
         }
         // the last, shorter block
-        out.outer.ger(1.0, &part, &part, 1.0);
-        out.gradient += &part;
-        out.blocks += 1;
+        out.close_block(&mut part);
     }
-    for i in 0..np {
-        for j in 0..=i {
-            out.information[(i, j)] = info[i * np + j];
-            out.information[(j, i)] = info[i * np + j];
-        }
-    }
+    out.information = DMatrix::from_fn(np, np, |i, j| info[i.max(j) * np + i.min(j)]);
     let n = out.innovations.max(1) as f64;
     out.mean_nis = nis / n;
     (out.window_nis, out.windows) = windows.mean();
@@ -241,23 +262,13 @@ const CHI2_95: f64 = 3.841_458_820_694_124;
 pub fn log_likelihood(problem: &FrictionProblem, parameters: &[f64], noise: NoiseLevels) -> f64 {
     let law = Law::new(problem, parameters);
     let eta = &parameters[FRICTION..];
-    let e = problem.nuisance;
     let s2 = noise.torque * noise.torque;
     let mut sum = 0.0;
     for record in &problem.records {
         let (mut q, mut v) = (record.y[0], record.v0);
-        let mut p = [
-            record.r[0] * noise.position_factor,
-            0.0,
-            (0.1 * problem.velocity_scale).powi(2),
-        ];
+        let mut p = first_covariance(problem, record, noise);
         for k in 0..record.tau.len() {
-            let interval = Interval {
-                dt: record.t[k + 1] - record.t[k],
-                tau: record.tau[k],
-                m: &record.m[k * e..(k + 1) * e],
-                h: &record.h[k * e..(k + 1) * e],
-            };
+            let interval = Interval::of(record, k, problem.nuisance);
             let (start_v, dt) = (v, interval.dt);
             let minv = inverse_inertia(&interval, eta, problem.least_inertia);
             (q, v) = state(&law, eta, &interval, problem.least_inertia, q, v);

@@ -66,7 +66,7 @@ pub struct DriveInertia {
 /// covariance stays that of the free fit.
 ///
 /// # Errors
-/// A prior that is no body, and [`crate::inertia::solve::FitError`].
+/// A prior that is no body, and [`crate::inertia::solution::FitError`].
 pub(super) fn consistent(
     machine: &LoggedRobot,
     estimated: &mut Estimated,

@@ -4,7 +4,7 @@ use crate::config::ConfigError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::friction::excitation::FrictionError;
-use crate::inertia::solve::FitError;
+use crate::inertia::solution::FitError;
 use crate::inspect::Fault;
 use crate::log::{LogError, did_you_mean, escape};
 use crate::motion::{MotionError, RunError};

@@ -17,7 +17,8 @@ use crate::inertia::feasible::nearest;
 use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
 use crate::inertia::refine::{self, RefinedFit};
 use crate::inertia::robust::{self, Robust, Weigher};
-use crate::inertia::solve::{self, Fit, FitError, fit};
+use crate::inertia::solution::FitError;
+use crate::inertia::solve::{self, Fit, fit};
 use crate::math::descent::Ending;
 use crate::motion::FilterSettings;
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::columns::{GRADIENT, RegressorColumns};
+use super::columns::RegressorColumns;
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
@@ -226,27 +226,19 @@ impl BlockFactors {
             self.columns.row_width(j),
         )
     }
-}
 
-impl BlockFactors {
     /// Restriction of the global unknowns to those of joint j.
     pub(super) fn own_unknowns(&self, theta: &DVector<f64>, j: usize) -> DVector<f64> {
-        let columns = &self.columns;
-        DVector::from_fn(columns.shared + columns.own[j].len(), |c, _| {
-            theta[columns.unknown(j, c)]
-        })
+        let own = |c, _| theta[self.columns.unknown(j, c)];
+        DVector::from_fn(self.columns.unknowns_of(j), own)
     }
 
     /// The columns of joint j's triangle `r` by what stands in them.
     pub(super) fn parts<'a>(&self, r: &'a DMatrix<f64>, j: usize) -> JointFactor<'a> {
         JointFactor {
             r,
-            unknowns: self.columns.shared + self.columns.own[j].len(),
-            gradient: if self.columns.known[j].is_some() {
-                GRADIENT
-            } else {
-                0
-            },
+            unknowns: self.columns.unknowns_of(j),
+            gradient: self.columns.gradient(j),
         }
     }
 }

@@ -20,7 +20,7 @@ const ASTRAY: f64 = 0.5;
 const LEAST: f64 = 1e-6;
 
 /// Gains of the loop.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gains {
     /// Natural frequency [rad/s].
     pub frequency: f64,

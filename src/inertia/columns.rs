@@ -80,9 +80,14 @@ impl RegressorColumns {
         self.shared + self.own[..j].iter().map(Vec::len).sum::<usize>()
     }
 
+    /// Number of unknowns in the rows of joint j.
+    pub fn unknowns_of(&self, j: usize) -> usize {
+        self.shared + self.own[j].len()
+    }
+
     /// Width of one row of joint j: unknowns, gradient, target b = tau - F(v).
     pub fn row_width(&self, j: usize) -> usize {
-        self.shared + self.own[j].len() + self.gradient(j) + 1
+        self.unknowns_of(j) + self.gradient(j) + 1
     }
 
     /// Gradient columns of joint j.

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::columns::GRADIENT;
+use super::solution::{FitInputs, WeightedSolution};
 use crate::math::long_run::long_run;
 
 /// The two parts and their sum.
@@ -18,24 +19,26 @@ pub(super) struct Covariances {
     pub total: DMatrix<f64>,
 }
 
-/// Sandwich, textbook covariance, and the sensitivities to each joint's known friction of a weighted
-/// solution; `inverse` is that of its normal matrix on what the data determine, `known` the normal matrix of what was known of the unknowns beforehand.
+/// Sandwich, textbook covariance, and the sensitivities to each joint's known friction.
 pub(super) fn covariance(
     factors: &BlockFactors,
     joints: &[DMatrix<f64>],
-    theta: &DVector<f64>,
-    inverse: &DMatrix<f64>,
-    weights: &[f64],
-    known: DMatrix<f64>,
+    solution: &WeightedSolution,
+    inputs: FitInputs,
     residual: &[f64],
 ) -> (Covariances, DMatrix<f64>, Vec<Option<DMatrix<f64>>>) {
     let columns = &factors.columns;
+    let weights = inputs.weights;
     let u = columns.unknowns();
     let rows = factors.rows as f64;
+    let known = inputs.prior.map_or(DMatrix::zeros(u, u), |prior| {
+        let rows = prior.rows.columns(0, u);
+        rows.tr_mul(&rows) * prior.variance
+    });
     // textbook: each joint's residual variance over its weighted normal matrix
     let mut meat = DMatrix::zeros(u, u);
     for (j, r) in joints.iter().enumerate() {
-        let own = columns.shared + columns.own[j].len();
+        let own = columns.unknowns_of(j);
         let x = r.columns(0, own);
         let normal = x.tr_mul(&x) * (weights[j].powi(4) * residual[j] * residual[j]);
         for a in 0..own {
@@ -45,7 +48,7 @@ pub(super) fn covariance(
         }
     }
     let freedom = rows / (rows - u as f64 / columns.joints as f64).max(1.0);
-    let textbook = inverse * (meat + &known) * inverse * freedom;
+    let textbook = &solution.inverse * (meat + &known) * &solution.inverse * freedom;
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
     let scores: Vec<(usize, DVector<f64>)> = factors
@@ -54,7 +57,7 @@ pub(super) fn covariance(
         .map(|block| {
             let mut g = DVector::zeros(u);
             for j in 0..columns.joints {
-                let theta = factors.own_unknowns(theta, j);
+                let theta = factors.own_unknowns(&solution.theta, j);
                 let s = factors.parts(&block.r[j], j).score(&theta);
                 for (c, x) in s.iter().enumerate() {
                     g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
@@ -63,8 +66,10 @@ pub(super) fn covariance(
             (block.stretch, g)
         })
         .collect();
-    let sandwich =
-        inverse * (long_run(&scores, u, bandwidth(&scores, u)) + known) * inverse * freedom;
+    let sandwich = &solution.inverse
+        * (long_run(&scores, u, bandwidth(&scores, u)) + known)
+        * &solution.inverse
+        * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
     // below the textbook's, the latter is the better one.
     let sandwich = at_least(sandwich, &textbook);
@@ -83,7 +88,7 @@ pub(super) fn covariance(
                 global[(columns.unknown(j, c), k)] = weights[j] * weights[j] * xg[(c, k)];
             }
         }
-        let s = -(inverse * global);
+        let s = -(&solution.inverse * global);
         let cov = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
         total += &s * cov * s.transpose();
         sensitivity.push(Some(s));

@@ -5,22 +5,19 @@
 //! is smoothed and rounded again on grids that are shifted by parts of a step; the scatter of the
 //! fits is the part of the uncertainty that the encoders make.
 
-use std::sync::mpsc::{Receiver, sync_channel};
-
 use nalgebra::DMatrix;
 
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
 use super::robust::Weigher;
 use super::solve::Fit;
+use super::two_pass::two_passes;
 use crate::log::Block;
 use crate::motion::{self, FilterSettings, RunError};
 use crate::robot::Robot;
 
 /// Number of shifted grids.
 pub const GRIDS: u32 = 6;
-/// Blocks that wait between the two passes.
-const WAITING: usize = 4;
 
 /// Shifts of grid number `grid`, as parts of a step per motor: multiples of irrational numbers,
 /// spread evenly without chance.
@@ -52,25 +49,21 @@ pub fn accumulate_shifted<E: Send>(
     }
     let n = columns.joints;
     let shift = shifts(grid);
-    let (sender, receiver) = sync_channel::<Block>(WAITING);
     let smooth = FilterSettings {
         decimation: Some(1),
         ..settings.clone()
     };
-    std::thread::scope(|scope| {
-        let first = scope.spawn(move || {
-            let mut block = Block::default();
-            // a pool of its own: a worker of the shared one may be waiting for these very blocks
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-            let mut ran = || {
-                motion::run(
-                    source,
-                    n,
-                    &smooth,
-                    None,
-                    n,
-                    &|s, out| out.copy_from_slice(s.tau),
-                    &mut |row| {
+    let (_, (factors, _)) = two_passes(
+        |outlet| {
+            motion::run(
+                source,
+                n,
+                &smooth,
+                None,
+                n,
+                &|s, out| out.copy_from_slice(s.tau),
+                &mut |row| {
+                    outlet.row(|block| {
                         block.t.push(row.t);
                         let at = block.q.len();
                         block.q.extend_from_slice(row.q);
@@ -78,49 +71,13 @@ pub fn accumulate_shifted<E: Send>(
                             .transmission()
                             .round_at_encoders(&mut block.q[at..], &shift);
                         block.tau.extend_from_slice(row.raw);
-                        if block.len() == Block::ROWS {
-                            // a receiver that is gone has failed, and says so itself
-                            let _ = sender.send(std::mem::take(&mut block));
-                        }
-                    },
-                )
-            };
-            let ran = match &pool {
-                Ok(pool) => pool.install(ran),
-                Err(_) => ran(),
-            };
-            let _ = sender.send(block);
-            ran.map(|_| ())
-        });
-        let second =
-            super::accumulate_weighted(robot, columns, weigher, settings, &mut next(&receiver));
-        drop(receiver);
-        match first.join() {
-            Ok(Err(error)) => return Err(error),
-            Ok(Ok(())) => {}
-            Err(panic) => std::panic::resume_unwind(panic),
-        }
-        match second {
-            Ok((factors, _)) => Ok(Some(factors)),
-            Err(RunError::Motion(error)) => Err(RunError::Motion(error)),
-            Err(RunError::Source(never)) => match never {},
-        }
-    })
-}
-
-/// The blocks of the first pass, as a source of the second.
-pub(super) fn next(
-    receiver: &Receiver<Block>,
-) -> impl FnMut(&mut Block) -> Result<bool, std::convert::Infallible> + '_ {
-    move |block| {
-        Ok(match receiver.recv() {
-            Ok(found) => {
-                *block = found;
-                true
-            }
-            Err(_) => false,
-        })
-    }
+                    });
+                },
+            )
+        },
+        |blocks| super::accumulate_weighted(robot, columns, weigher, settings, blocks),
+    )?;
+    Ok(Some(factors))
 }
 
 /// Adds the scatter of the fits on shifted grids to a fit's covariance.

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::solve::FitError;
+use super::solution::FitError;
 use crate::math::rfactor::RFactor;
 
 /// Ratio of the largest relative standard deviation to the smallest from which on all stay.

@@ -8,19 +8,18 @@
 //! A log is read twice at once: a first pass smooths the reference and simulates, a second one
 //! computes X from the measured and Z from the simulated positions, filtered alike.
 
+use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::sync::mpsc::sync_channel;
-
-use nalgebra::{DMatrix, DVector};
 
 use super::BLOCK_SECONDS;
-use super::accumulate::{Accumulator, BlockFactors};
+use super::accumulate::{Accumulator, BlockFactor, BlockFactors};
 use super::closed_loop::{ClosedLoop, Gains};
 use super::columns::{GRADIENT, RegressorColumns};
 use super::covariance::{at_least, bandwidth};
-use super::encoder::next;
-use super::solve::{Fit, FitError, weights_of};
+use super::solution::FitError;
+use super::solve::{Fit, weights_of};
+use super::two_pass::two_passes;
 use crate::log::Block;
 use crate::math::descent::Ending;
 use crate::math::long_run::long_run;
@@ -34,8 +33,6 @@ pub const REFERENCE_SHARE: f64 = 0.5;
 const SETTLED: f64 = 0.05;
 /// Most iterations.
 const MOST: usize = 12;
-/// Blocks that wait between the two passes.
-const WAITING: usize = 4;
 /// Directions of Z'X, columns scaled, below this share of the largest are open.
 const OPEN: f64 = 1e-11;
 
@@ -84,132 +81,112 @@ pub fn accumulate<E: Send>(
 ) -> Result<InstrumentReading, RunError<E>> {
     let n = columns.joints;
     let wide = doubled(columns);
-    let (sender, receiver) = sync_channel::<Block>(WAITING);
     let (width, share) = match reference {
         ReferenceSource::Logged => (2 * n, ABOVE),
         ReferenceSource::Smoothed => (n, REFERENCE_SHARE),
     };
-    let first_settings = FilterSettings {
-        cutoff_hz: (share * settings.cutoff_hz).min(HIGHEST_SHARE / step),
+    let smooth = reference_filter(
+        settings,
+        (share * settings.cutoff_hz).min(HIGHEST_SHARE / step),
+    );
+    let from = width - n;
+    let mut simulation = Simulation {
+        run: None,
+        begin: |q_ref: &[f64]| {
+            let theta = theta.as_slice().to_vec();
+            ClosedLoop::new(robot, columns, theta, q_ref, settings.cutoff_hz, step)
+        },
+        steps: 0,
+    };
+    let mut factors = Accumulator::new(wide.clone(), BLOCK_SECONDS);
+    let (_, summary) = two_passes(
+        |outlet| {
+            motion::run(
+                source,
+                width,
+                &smooth,
+                None,
+                3 * n,
+                &|s, out| {
+                    out[..n].copy_from_slice(&s.q[from..]);
+                    out[n..2 * n].copy_from_slice(&s.v[from..]);
+                    out[2 * n..].copy_from_slice(&s.tau[..n]);
+                },
+                &mut |row| {
+                    outlet.row(|block| {
+                        block.t.push(row.t);
+                        block.q.extend_from_slice(&row.q[..n]);
+                        simulation.row(row, n, &mut block.q);
+                        block.tau.extend_from_slice(&row.raw[2 * n..]);
+                        // the simulated half has no torque
+                        block.tau.extend(std::iter::repeat_n(0.0, n));
+                    });
+                },
+            )
+        },
+        |blocks| {
+            motion::run(
+                blocks,
+                2 * n,
+                settings,
+                None,
+                wide.channels(),
+                &|s, out| fill(robot, columns, &wide, s, out),
+                &mut |row| factors.add(row.segment, row.t, row.filtered),
+            )
+        },
+    )?;
+    let steps = simulation.steps.max(1) as f64;
+    let (gains, indefinite) = match simulation.run {
+        Some((run, ..)) => (run.gains, run.indefinite),
+        None => (Gains::default(), 0),
+    };
+    Ok(InstrumentReading {
+        factors: factors.finish(),
+        summary,
+        gains,
+        indefinite: indefinite as f64 / steps,
+    })
+}
+
+/// Filters of the reference: up to a cut-off \[Hz\], every row kept.
+fn reference_filter(settings: &FilterSettings, cutoff_hz: f64) -> FilterSettings {
+    FilterSettings {
+        cutoff_hz,
         filter: ParallelFilter::Butterworth { order: 4 },
         decimation: Some(1),
         q_order: 0,
         q_trim_s: None,
         trim_s: None,
         ..settings.clone()
-    };
-    std::thread::scope(|scope| {
-        let first = scope.spawn(move || {
-            let mut block = Block::default();
-            let mut state: Option<(ClosedLoop, usize, f64)> = None;
-            let mut steps = 0u64;
-            // a pool of its own: a worker of the shared one may be waiting for these very blocks
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-            let from = width - n;
-            let theta = theta.as_slice().to_vec();
-            let mut ran = || {
-                motion::run(
-                    source,
-                    width,
-                    &first_settings,
-                    None,
-                    3 * n,
-                    &|s, out| {
-                        out[..n].copy_from_slice(&s.q[from..]);
-                        out[n..2 * n].copy_from_slice(&s.v[from..]);
-                        out[2 * n..].copy_from_slice(&s.tau[..n]);
-                    },
-                    &mut |row| {
-                        let (q_ref, v_ref) = (&row.filtered[..n], &row.filtered[n..2 * n]);
-                        steps += 1;
-                        let at = block.q.len();
-                        block.t.push(row.t);
-                        block.q.extend_from_slice(&row.q[..n]);
-                        match &mut state {
-                            Some((run, segment, before)) if *segment == row.segment => {
-                                let h = row.t - *before;
-                                block.q.extend_from_slice(run.step(h, q_ref, v_ref));
-                                *before = row.t;
-                            }
-                            Some((run, segment, before)) => {
-                                run.place(q_ref, v_ref);
-                                (*segment, *before) = (row.segment, row.t);
-                                block.q.extend_from_slice(q_ref);
-                            }
-                            none => {
-                                let mut run = ClosedLoop::new(
-                                    robot,
-                                    columns,
-                                    theta.clone(),
-                                    q_ref,
-                                    settings.cutoff_hz,
-                                    step,
-                                );
-                                run.place(q_ref, v_ref);
-                                block.q.extend_from_slice(q_ref);
-                                *none = Some((run, row.segment, row.t));
-                            }
-                        }
-                        debug_assert_eq!(block.q.len(), at + 2 * n);
-                        block.tau.extend_from_slice(&row.raw[2 * n..]);
-                        // the simulated half has no torque
-                        block.tau.extend(std::iter::repeat_n(0.0, n));
-                        if block.len() == Block::ROWS {
-                            // a receiver that is gone has failed, and says so itself
-                            let _ = sender.send(std::mem::take(&mut block));
-                        }
-                    },
-                )
-            };
-            let ran = match &pool {
-                Ok(pool) => pool.install(ran),
-                Err(_) => ran(),
-            };
-            let _ = sender.send(block);
-            ran.map(|summary| {
-                (
-                    summary,
-                    state.map(|(run, ..)| (run.gains, run.indefinite)),
-                    steps,
-                )
-            })
-        });
-        let mut factors = Accumulator::new(wide.clone(), BLOCK_SECONDS);
-        let second = motion::run(
-            &mut next(&receiver),
-            2 * n,
-            settings,
-            None,
-            wide.channels(),
-            &|s, out| fill(robot, columns, &wide, s, out),
-            &mut |row| factors.add(row.segment, row.t, row.filtered),
-        );
-        drop(receiver);
-        let (ran, steps) = match first.join() {
-            Ok(Err(error)) => return Err(error),
-            Ok(Ok((_, ran, steps))) => (ran, steps),
-            Err(panic) => std::panic::resume_unwind(panic),
-        };
-        let summary = match second {
-            Ok(summary) => summary,
-            Err(RunError::Motion(error)) => return Err(RunError::Motion(error)),
-            Err(RunError::Source(never)) => match never {},
-        };
-        let (gains, indefinite) = ran.unwrap_or((
-            Gains {
-                frequency: 0.0,
-                proportional: Vec::new(),
-                derivative: Vec::new(),
-            },
-            0,
-        ));
-        Ok(InstrumentReading {
-            factors: factors.finish(),
-            summary,
-            gains,
-            indefinite: indefinite as f64 / steps.max(1) as f64,
-        })
-    })
+    }
+}
+
+/// The loop along the reference of a log, row by row.
+struct Simulation<'a, B> {
+    /// The loop, its segment of the log, and the time of its last row [s].
+    run: Option<(ClosedLoop<'a>, usize, f64)>,
+    /// Begins it at a pose.
+    begin: B,
+    steps: u64,
+}
+
+impl<'a, B: Fn(&[f64]) -> ClosedLoop<'a>> Simulation<'a, B> {
+    /// Appends the simulated positions of a row, whose channels are reference and its velocity.
+    fn row(&mut self, row: &motion::FilteredRow<'_>, n: usize, out: &mut Vec<f64>) {
+        let (q_ref, v_ref) = (&row.filtered[..n], &row.filtered[n..2 * n]);
+        self.steps += 1;
+        let (run, segment, before) = self
+            .run
+            .get_or_insert_with(|| ((self.begin)(q_ref), usize::MAX, row.t));
+        if *segment == row.segment {
+            out.extend_from_slice(run.step(row.t - *before, q_ref, v_ref));
+        } else {
+            run.place(q_ref, v_ref);
+            out.extend_from_slice(q_ref);
+        }
+        (*segment, *before) = (row.segment, row.t);
+    }
 }
 
 /// Cut-off of a logged reference over that of the rows.
@@ -233,7 +210,7 @@ fn fill(
     columns.fill(robot, &s.q[n..], &s.v[n..], &s.a[n..], &s.tau[n..], z);
     columns.fill(robot, &s.q[..n], &s.v[..n], &s.a[..n], &s.tau[..n], x);
     for j in 0..n {
-        let own = columns.shared + columns.own[j].len();
+        let own = columns.unknowns_of(j);
         let (from, whole) = (columns.offset(j), columns.row_width(j));
         let at = wide.offset(j);
         out[at..at + own].copy_from_slice(&z[from..from + own]);
@@ -246,6 +223,66 @@ fn fill(
 /// Twice the channels of the largest robot: 8 joints with 104 columns and 9 of their own.
 const MOST_CHANNELS: usize = 2 * 8 * 115;
 
+/// Z'WX theta = Z'Wb, and Z'W^2 Z times the residual's variance.
+struct InstrumentSystem {
+    normal: DMatrix<f64>,
+    square: DMatrix<f64>,
+    target: DVector<f64>,
+    /// Weighted squared norms of the columns of Z and of X.
+    scale: [DVector<f64>; 2],
+}
+
+impl InstrumentSystem {
+    fn of(
+        joints: &[DMatrix<f64>],
+        columns: &RegressorColumns,
+        weights: &[f64],
+        residual_std: &[f64],
+    ) -> Self {
+        let u = columns.unknowns();
+        let mut system = InstrumentSystem {
+            normal: DMatrix::zeros(u, u),
+            square: DMatrix::zeros(u, u),
+            target: DVector::zeros(u),
+            scale: [DVector::zeros(u), DVector::zeros(u)],
+        };
+        for (j, r) in joints.iter().enumerate() {
+            let (c, w) = (columns.unknowns_of(j), weights[j] * weights[j]);
+            let (z, x) = (r.columns(0, c), r.columns(c, c));
+            let zx = z.tr_mul(&x) * w;
+            let zz = z.tr_mul(&z) * w * w * residual_std[j].powi(2);
+            let zb = z.tr_mul(&r.column(r.ncols() - 1)) * w;
+            for a in 0..c {
+                let row = columns.unknown(j, a);
+                system.target[row] += zb[a];
+                system.scale[0][row] += w * z.column(a).norm_squared();
+                system.scale[1][row] += w * x.column(a).norm_squared();
+                for b in 0..c {
+                    system.normal[(row, columns.unknown(j, b))] += zx[(a, b)];
+                    system.square[(row, columns.unknown(j, b))] += zz[(a, b)];
+                }
+            }
+        }
+        system
+    }
+
+    /// (Z'WX)^-1 over the directions that the data leave closed.
+    fn inverse(&self) -> Result<DMatrix<f64>, FitError> {
+        let u = self.target.len();
+        let inverse_root = |x: f64| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 };
+        let [left, right] = self.scale.each_ref().map(|s| s.map(inverse_root));
+        let scaled = DMatrix::from_fn(u, u, |a, b| self.normal[(a, b)] * left[a] * right[b]);
+        let svd = rank::svd(&scaled)?;
+        let mut inverse = DMatrix::zeros(u, u);
+        for k in (0..u).filter(|k| svd.s[*k] > OPEN * svd.s[0]) {
+            inverse += svd.v.column(k) * svd.u.column(k).transpose() / svd.s[k];
+        }
+        Ok(DMatrix::from_fn(u, u, |a, b| {
+            inverse[(a, b)] * right[a] * left[b]
+        }))
+    }
+}
+
 /// The fit with instruments.
 ///
 /// # Errors
@@ -253,91 +290,78 @@ const MOST_CHANNELS: usize = 2 * 8 * 115;
 fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Result<Fit, FitError> {
     let (n, u) = (columns.joints, columns.unknowns());
     let weights = weights_of(factors, &plain.residual_std);
-    let own = |j: usize| columns.shared + columns.own[j].len();
     let joints: Vec<DMatrix<f64>> = (0..n).map(|j| factors.joint(j)).collect();
-    let mut normal: DMatrix<f64> = DMatrix::zeros(u, u);
-    let mut square = DMatrix::zeros(u, u);
-    let mut target = DVector::zeros(u);
-    let mut scale = [DVector::<f64>::zeros(u), DVector::<f64>::zeros(u)];
-    for (j, r) in joints.iter().enumerate() {
-        let (c, w) = (own(j), weights[j] * weights[j]);
-        let (z, x) = (r.columns(0, c), r.columns(c, c));
-        let zx = z.tr_mul(&x) * w;
-        let zz = z.tr_mul(&z) * w * w * plain.residual_std[j].powi(2);
-        let zb = z.tr_mul(&r.column(r.ncols() - 1)) * w;
-        for a in 0..c {
-            let row = columns.unknown(j, a);
-            target[row] += zb[a];
-            scale[0][row] += w * z.column(a).norm_squared();
-            scale[1][row] += w * x.column(a).norm_squared();
-            for b in 0..c {
-                normal[(row, columns.unknown(j, b))] += zx[(a, b)];
-                square[(row, columns.unknown(j, b))] += zz[(a, b)];
-            }
-        }
-    }
-    let inverse_root = |x: f64| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 };
-    let [left, right] = scale.map(|s| s.map(inverse_root));
-    let scaled = DMatrix::from_fn(u, u, |a, b| normal[(a, b)] * left[a] * right[b]);
-    let svd = rank::svd(&scaled)?;
-    let mut inverse = DMatrix::zeros(u, u);
-    for k in (0..u).filter(|k| svd.s[*k] > OPEN * svd.s[0]) {
-        inverse += svd.v.column(k) * svd.u.column(k).transpose() / svd.s[k];
-    }
-    let inverse = DMatrix::from_fn(u, u, |a, b| inverse[(a, b)] * right[a] * left[b]);
-    let theta = &inverse * target;
-    let of = |j: usize| DVector::from_fn(own(j), |c, _| theta[columns.unknown(j, c)]);
+    let system = InstrumentSystem::of(&joints, columns, &weights, &plain.residual_std);
+    let inverse = system.inverse()?;
+    let theta = &inverse * &system.target;
+    let own: Vec<DVector<f64>> = (0..n)
+        .map(|j| {
+            let of = |c, _| theta[columns.unknown(j, c)];
+            DVector::from_fn(columns.unknowns_of(j), of)
+        })
+        .collect();
+    // b - X theta of a joint's triangle
+    let residual = |r: &DMatrix<f64>, j: usize| {
+        let c = columns.unknowns_of(j);
+        r.column(r.ncols() - 1) - r.columns(c, c) * &own[j]
+    };
     let rows = factors.rows as f64;
     let mut fit = plain.clone();
     for (j, r) in joints.iter().enumerate() {
-        let left = r.column(r.ncols() - 1) - r.columns(own(j), own(j)) * of(j);
-        fit.residual_std[j] = left.norm() / rows.sqrt();
+        fit.residual_std[j] = residual(r, j).norm() / rows.sqrt();
         fit.relative_error[j] = match fit.torque_rms[j] {
             rms if rms > 0.0 => fit.residual_std[j] / rms,
             _ => f64::NAN,
         };
     }
-    let scores: Vec<(usize, DVector<f64>)> = factors
-        .blocks
-        .iter()
-        .map(|block| {
-            let mut g = DVector::zeros(u);
-            for (j, r) in block.r.iter().enumerate() {
-                let left = r.column(r.ncols() - 1) - r.columns(own(j), own(j)) * of(j);
-                let score = r.columns(0, own(j)).tr_mul(&left);
-                for (c, s) in score.iter().enumerate() {
-                    g[columns.unknown(j, c)] += weights[j] * weights[j] * s;
-                }
+    let score = |block: &BlockFactor| {
+        let mut g = DVector::zeros(u);
+        for (j, r) in block.r.iter().enumerate() {
+            let c = columns.unknowns_of(j);
+            let score = r.columns(0, c).tr_mul(&residual(r, j));
+            for (c, s) in score.iter().enumerate() {
+                g[columns.unknown(j, c)] += weights[j] * weights[j] * s;
             }
-            (block.stretch, g)
-        })
-        .collect();
+        }
+        (block.stretch, g)
+    };
+    let scores: Vec<(usize, DVector<f64>)> = factors.blocks.iter().map(score).collect();
     let freedom = rows / (rows - u as f64 / n as f64).max(1.0);
     let about = |middle: DMatrix<f64>| &inverse * middle * inverse.transpose() * freedom;
-    fit.textbook = about(square);
+    fit.textbook = about(system.square);
     let long = about(long_run(&scores, u, bandwidth(&scores, u)));
     fit.covariance = at_least(long, &fit.textbook);
+    add_known_friction(&mut fit, &joints, columns, &weights, &inverse);
+    fit.theta = theta;
+    Ok(fit)
+}
+
+/// Adds what the known friction's own uncertainty makes of the parameters.
+fn add_known_friction(
+    fit: &mut Fit,
+    joints: &[DMatrix<f64>],
+    columns: &RegressorColumns,
+    weights: &[f64],
+    inverse: &DMatrix<f64>,
+) {
     for (j, r) in joints.iter().enumerate() {
         fit.friction_sensitivity[j] = None;
         let Some(known) = &columns.known[j] else {
             continue;
         };
-        let zg = r
-            .columns(0, own(j))
-            .tr_mul(&r.columns(2 * own(j), GRADIENT));
-        let mut global = DMatrix::zeros(u, GRADIENT);
-        for c in 0..own(j) {
+        let own = columns.unknowns_of(j);
+        let zg = r.columns(0, own).tr_mul(&r.columns(2 * own, GRADIENT));
+        let mut global = DMatrix::zeros(columns.unknowns(), GRADIENT);
+        for c in 0..own {
             for k in 0..GRADIENT {
                 global[(columns.unknown(j, c), k)] = weights[j] * weights[j] * zg[(c, k)];
             }
         }
-        let s = -(&inverse * global);
+        let s = -(inverse * global);
         let covariance = DMatrix::from_fn(GRADIENT, GRADIENT, |a, b| known.covariance[a][b]);
         fit.covariance += &s * covariance * s.transpose();
         fit.friction_sensitivity[j] = Some(s);
     }
-    fit.theta = theta;
-    Ok(fit)
 }
 
 /// A fit with instruments.

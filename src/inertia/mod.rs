@@ -1,7 +1,7 @@
 //! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
-//! `accumulate` folds them into R factors, `solve` fits, `covariance` says how sure it is. `robust`,
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
 //! `refine` and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `essential` and `feasible` work on the R factor of a fit.
 
@@ -15,7 +15,9 @@ pub mod feasible;
 pub mod instruments;
 pub mod refine;
 pub mod robust;
+pub mod solution;
 pub mod solve;
+mod two_pass;
 pub mod verdict;
 
 use crate::log::Block;

@@ -14,9 +14,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
 use super::columns::{GRADIENT, KnownFriction, Own, RegressorColumns};
-use super::solve::{
-    Fit, FitError, FitInputs, PriorRows, Weighting, fit, fit_with, least_square, weights_of,
-};
+use super::solution::{FitError, FitInputs, PriorRows};
+use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
 use crate::math::descent::{Ending, StepControl, Tried, descend};
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;

@@ -13,7 +13,8 @@ use serde::Serialize;
 
 use super::accumulate::BlockFactors;
 use super::columns::RegressorColumns;
-use super::solve::{Fit, FitError, FitInputs, Weighting, fit, fit_with};
+use super::solution::{FitError, FitInputs};
+use super::solve::{Fit, Weighting, fit, fit_with};
 use crate::math::descent::Ending;
 
 /// Tuning of Huber's loss: 95 % efficiency where residuals are normal.
@@ -181,10 +182,7 @@ impl Weigher {
             let (row, after) = std::mem::take(&mut rest).split_at_mut(columns.row_width(j));
             rest = after;
             let mut residual = row.last().copied().unwrap_or_default();
-            for (c, x) in row[..columns.shared + columns.own[j].len()]
-                .iter()
-                .enumerate()
-            {
+            for (c, x) in row[..columns.unknowns_of(j)].iter().enumerate() {
                 residual -= x * self.theta[columns.unknown(j, c)];
             }
             let u = match self.scale[j] {

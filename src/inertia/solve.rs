@@ -7,8 +7,10 @@ use serde::Serialize;
 
 use super::accumulate::BlockFactors;
 use super::covariance::covariance;
-use crate::math::rank;
-use crate::math::rfactor::RFactor;
+use super::solution::{
+    ConditionNumbers, Confounded, FitError, FitInputs, conditions, joints, residual_std, solve,
+    stacked,
+};
 
 /// Which rows count how much.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -19,42 +21,6 @@ pub enum Weighting {
     Wls,
     /// Eq. (41) as it stands.
     Ols,
-}
-
-/// Why no fit came out.
-#[derive(Debug, Clone, thiserror::Error)]
-pub enum FitError {
-    #[error(
-        "{rows} rows are left after filtering and decimation, too few for {unknowns} unknowns: \
-         give a longer log, a lower decimation or a higher cut-off"
-    )]
-    TooFewRows { rows: u64, unknowns: usize },
-    #[error(
-        "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero"
-    )]
-    NothingExcited,
-    #[error(
-        "the prior of {link} is no body that can exist: its pseudo-inertia is not positive definite; correct `mass` and `inertia` in its `inertial`, or leave `inertial` out"
-    )]
-    Prior { link: String },
-    #[error(transparent)]
-    Math(#[from] crate::math::MathError),
-}
-
-/// Condition numbers of the unweighted stacked regressor.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct ConditionNumbers {
-    /// Ratio of its extreme singular values as it stands; null where the rank is short.
-    pub raw: Option<f64>,
-    /// With columns scaled to norm 1.
-    pub normalised: Option<f64>,
-}
-
-/// A combination of unknowns that the data do not tell apart: coefficients of the scaled columns.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Confounded {
-    /// Index of the unknown and its coefficient, largest first.
-    pub terms: Vec<(usize, f64)>,
 }
 
 /// Result of the fit, unknowns in the order of `RegressorColumns`.
@@ -83,28 +49,6 @@ pub struct Fit {
     pub rows: u64,
     /// Rows that independent residuals of the same certainty would number.
     pub effective_rows: f64,
-}
-
-/// What a fit is given besides the rows.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct FitInputs<'a> {
-    /// Weight of each joint's rows [1/N or 1/Nm].
-    pub weights: &'a [f64],
-    /// Per joint, by which part of X'X the score falls where theta grows: 1 for least squares, the
-    /// mean of psi' over that of the row weights for a robust fit.
-    pub slope: Option<&'a [f64]>,
-    /// What is known of the unknowns beforehand.
-    pub prior: Option<&'a PriorRows>,
-}
-
-/// What is known of the unknowns beforehand, as rows of unit noise.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PriorRows {
-    /// k x (unknowns + 1), the target last.
-    pub rows: DMatrix<f64>,
-    /// Variance of the rows' noise: above 1 where they are given more weight than one row of data,
-    /// as they must among correlated rows.
-    pub variance: f64,
 }
 
 /// Fits all unknowns of the block factors.
@@ -152,20 +96,6 @@ pub fn weights_of(factors: &BlockFactors, residual: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// R factor of each joint, where there are rows enough.
-fn joints(factors: &BlockFactors) -> Result<Vec<DMatrix<f64>>, FitError> {
-    let u = factors.columns.unknowns();
-    if factors.rows < 2 * u as u64 {
-        return Err(FitError::TooFewRows {
-            rows: factors.rows,
-            unknowns: u,
-        });
-    }
-    Ok((0..factors.columns.joints)
-        .map(|j| factors.joint(j))
-        .collect())
-}
-
 /// Lowest weighted sum of squares that any values of the unknowns reach, prior included.
 pub fn least_square(factors: &BlockFactors, inputs: FitInputs) -> Result<f64, FitError> {
     let r = stacked(factors, &joints(factors)?, inputs.weights, inputs.prior);
@@ -206,19 +136,8 @@ fn finish(
             .collect();
         solution.inverse = solve(factors, joints, &bread, inputs.prior)?.inverse;
     }
-    let known = inputs.prior.map_or(DMatrix::zeros(u, u), |prior| {
-        let rows = prior.rows.columns(0, u);
-        rows.tr_mul(&rows) * prior.variance
-    });
-    let (covariance, textbook, sensitivity) = covariance(
-        factors,
-        joints,
-        &solution.theta,
-        &solution.inverse,
-        weights,
-        known,
-        &residual,
-    );
+    let (covariance, textbook, sensitivity) =
+        covariance(factors, joints, &solution, inputs, &residual);
     let rows = factors.rows as f64;
     let torque_rms: Vec<f64> = factors
         .torque_square
@@ -232,7 +151,7 @@ fn finish(
         .collect();
     let mut column_rms = DMatrix::zeros(n, u);
     for (j, r) in joints.iter().enumerate() {
-        for c in 0..columns.shared + columns.own[j].len() {
+        for c in 0..columns.unknowns_of(j) {
             column_rms[(j, columns.unknown(j, c))] = r.column(c).norm() / rows.sqrt();
         }
     }
@@ -261,138 +180,6 @@ fn finish(
         rows: factors.rows,
         effective_rows,
     })
-}
-
-/// Weighted solution with the directions that the data leave open fixed at zero.
-struct WeightedSolution {
-    theta: DVector<f64>,
-    /// Inverse of the weighted normal matrix on the directions that are open to the data.
-    inverse: DMatrix<f64>,
-    determined: Vec<bool>,
-    confounded: Vec<Confounded>,
-}
-
-/// R factor of all joints' rows, unknowns and target, each joint times its weight, and of a prior.
-pub(super) fn stacked(
-    factors: &BlockFactors,
-    joints: &[DMatrix<f64>],
-    weights: &[f64],
-    prior: Option<&PriorRows>,
-) -> DMatrix<f64> {
-    let columns = &factors.columns;
-    let u = columns.unknowns();
-    let mut factor = RFactor::new(u + 1);
-    let mut row = vec![0.0; u + 1];
-    for (j, r) in joints.iter().enumerate() {
-        let own = columns.shared + columns.own[j].len();
-        for i in 0..r.nrows() {
-            row.fill(0.0);
-            for c in 0..own {
-                row[columns.unknown(j, c)] = weights[j] * r[(i, c)];
-            }
-            row[u] = weights[j] * r[(i, r.ncols() - 1)];
-            factor.fold(&row);
-        }
-    }
-    for known in prior.iter().flat_map(|prior| prior.rows.row_iter()) {
-        row.iter_mut().zip(&known).for_each(|(row, x)| *row = *x);
-        factor.fold(&row);
-    }
-    factor.r()
-}
-
-fn conditions(x: &DMatrix<f64>) -> Result<(ConditionNumbers, usize), FitError> {
-    let raw = rank::svd(x)?;
-    let mut scaled = x.clone();
-    for mut c in scaled.column_iter_mut() {
-        let norm = c.norm();
-        if norm > 0.0 {
-            c /= norm;
-        }
-    }
-    let normalised = rank::svd(&scaled)?;
-    let k = normalised
-        .s
-        .iter()
-        .filter(|s| **s > RANK_TOLERANCE * normalised.s[0])
-        .count();
-    if k == 0 || normalised.s[0] == 0.0 {
-        return Err(FitError::NothingExcited);
-    }
-    let full = k == x.ncols();
-    let ratio = |s: &DVector<f64>| full.then(|| s[0] / s[s.len() - 1]);
-    Ok((
-        ConditionNumbers {
-            raw: ratio(&raw.s),
-            normalised: ratio(&normalised.s),
-        },
-        k,
-    ))
-}
-
-/// Singular values of the scaled columns below this share of the largest carry nothing but
-/// rounding and the differentiation's own error.
-const RANK_TOLERANCE: f64 = 1e-8;
-/// Share of an unknown in an open direction from which on it counts as not determined.
-const SHARE: f64 = 1e-3;
-
-fn solve(
-    factors: &BlockFactors,
-    joints: &[DMatrix<f64>],
-    weights: &[f64],
-    prior: Option<&PriorRows>,
-) -> Result<WeightedSolution, FitError> {
-    let u = factors.columns.unknowns();
-    let r = stacked(factors, joints, weights, prior);
-    let x = r.columns(0, u);
-    let scale: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
-    let unscale = |i: usize| if scale[i] > 0.0 { 1.0 / scale[i] } else { 0.0 };
-    let scaled = DMatrix::from_fn(r.nrows(), u, |i, j| r[(i, j)] * unscale(j));
-    let svd = rank::svd(&scaled)?;
-    let kept: Vec<usize> = (0..svd.s.len())
-        .filter(|&k| svd.s[k] > RANK_TOLERANCE * svd.s[0])
-        .collect();
-    let target = r.column(u);
-    let mut z = DVector::zeros(u);
-    let mut inverse = DMatrix::zeros(u, u);
-    for &k in &kept {
-        let v = svd.v.column(k);
-        z += v * (svd.u.column(k).dot(&target) / svd.s[k]);
-        inverse += v * v.transpose() / (svd.s[k] * svd.s[k]);
-    }
-    let mut determined: Vec<bool> = (0..u).map(|i| scale[i] > 0.0).collect();
-    let mut confounded = Vec::new();
-    for k in (0..svd.s.len()).filter(|k| !kept.contains(k)) {
-        let v = svd.v.column(k);
-        let mut terms: Vec<(usize, f64)> = (0..u)
-            .filter(|&i| v[i].abs() > SHARE)
-            .map(|i| (i, v[i]))
-            .collect();
-        terms.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-        for (i, _) in &terms {
-            determined[*i] = false;
-        }
-        confounded.push(Confounded { terms });
-    }
-    let theta = DVector::from_fn(u, |i, _| z[i] * unscale(i));
-    let inverse = DMatrix::from_fn(u, u, |i, j| inverse[(i, j)] * unscale(i) * unscale(j));
-    Ok(WeightedSolution {
-        theta,
-        inverse,
-        determined,
-        confounded,
-    })
-}
-
-fn residual_std(factors: &BlockFactors, joints: &[DMatrix<f64>], theta: &DVector<f64>) -> Vec<f64> {
-    joints
-        .iter()
-        .enumerate()
-        .map(|(j, r)| {
-            let own = factors.own_unknowns(theta, j);
-            (factors.parts(r, j).residual_square(&own) / factors.rows as f64).sqrt()
-        })
-        .collect()
 }
 
 #[cfg(test)]

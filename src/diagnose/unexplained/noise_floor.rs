@@ -31,21 +31,76 @@ pub fn floor(
     averaged: bool,
     stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
-    let joints = stretches.first().map_or(0, Stretch::joints);
     let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
-    let top = (0.45 * rate / (BORDERS[2] * cutoff_hz)).min(1.0);
-    let low_pass = |times: f64| -> Result<ZeroPhase, MotionError> {
-        let cutoff = times * top * cutoff_hz;
-        Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
-    };
-    let passes = [
-        low_pass(BORDERS[0])?,
-        low_pass(BORDERS[1])?,
-        low_pass(BORDERS[2])?,
-    ];
-    let bands = |x: &[f64]| -> Result<[Vec<f64>; 2], MotionError> {
+    let bands = Bands::design(parallel, cutoff_hz, rate, averaged)?;
+    // what the bands, and the band that is kept, see of white noise and of white noise differentiated twice
+    let mut seen = [[0.0; 2]; 2];
+    let mut kept = [0.0; 2];
+    for (source, kernel) in [&[1.0][..], &[1.0, -2.0, 1.0][..]].into_iter().enumerate() {
+        let (beyond, within) = bands.powers(kernel)?;
+        [seen[0][source], seen[1][source]] = beyond;
+        kept[source] = within;
+    }
+    let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
+    let mut floor = Vec::new();
+    for j in 0..stretches.first().map_or(0, Stretch::joints) {
+        // friction at rest is no noise; a joint that never moves has nothing else
+        let always = stationary.iter().all(|s| s[j]);
+        let logs = residuals.iter().zip(stationary).zip(&periods);
+        let mut of_joint = Vec::with_capacity(stretches.len());
+        for ((residual, _), period) in logs.filter(|((_, s), _)| always || !s[j]) {
+            of_joint.extend(bands.look(&residual[j], *period)?);
+        }
+        floor.push(together(&of_joint, seen, kept));
+    }
+    Ok(floor)
+}
+
+/// The two bands beyond the one that is kept, and the blocks that are looked at.
+struct Bands<'a> {
+    parallel: &'a Parallel,
+    /// Low-pass filters at the borders.
+    passes: [ZeroPhase; 3],
+    /// Samples of a block, some periods of the band.
+    block: usize,
+    /// Independent numbers of a band in a block.
+    freedom: f64,
+    /// Variance of a white signal's fourth difference over its own.
+    gain: f64,
+}
+
+impl<'a> Bands<'a> {
+    fn design(
+        parallel: &'a Parallel,
+        cutoff_hz: f64,
+        rate: f64,
+        averaged: bool,
+    ) -> Result<Self, MotionError> {
+        let top = (0.45 * rate / (BORDERS[2] * cutoff_hz)).min(1.0);
+        let low_pass = |times: f64| -> Result<ZeroPhase, MotionError> {
+            let cutoff = times * top * cutoff_hz;
+            Ok(ZeroPhase::new(Sos::butterworth(4, cutoff, rate)?))
+        };
+        let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
+        let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
+        Ok(Bands {
+            parallel,
+            passes: [
+                low_pass(BORDERS[0])?,
+                low_pass(BORDERS[1])?,
+                low_pass(BORDERS[2])?,
+            ],
+            block,
+            freedom: 2.0 * width * block as f64 / rate,
+            // 1 + 16 + 36 + 16 + 1 = 70; of the mean of two neighbours (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7
+            gain: if averaged { 7.0 } else { 70.0 },
+        })
+    }
+
+    /// A signal in each of the two bands.
+    fn parted(&self, x: &[f64]) -> Result<[Vec<f64>; 2], MotionError> {
         let mut below = [x.to_vec(), x.to_vec(), x.to_vec()];
-        for (pass, x) in passes.iter().zip(&mut below) {
+        for (pass, x) in self.passes.iter().zip(&mut below) {
             pass.run(x, 1)?;
         }
         let between = |k: usize| -> Vec<f64> {
@@ -53,70 +108,53 @@ pub fn floor(
             pairs.map(|(a, b)| a - b).collect()
         };
         Ok([between(0), between(1)])
-    };
-    // what the bands, and the band that is kept, see of white noise and of white noise differentiated twice
-    let length = 2 * parallel.trim.max(500) + 1;
-    let mut seen = [[0.0; 2]; 2];
-    let mut kept = [0.0; 2];
-    for (source, kernel) in [&[1.0][..], &[1.0, -2.0, 1.0][..]].into_iter().enumerate() {
+    }
+
+    /// Power of a kernel in the two bands, and in the one that is kept.
+    fn powers(&self, kernel: &[f64]) -> Result<([f64; 2], f64), MotionError> {
+        let length = 2 * self.parallel.trim.max(500) + 1;
         let mut impulse = vec![0.0; length];
         impulse[length / 2..length / 2 + kernel.len()].copy_from_slice(kernel);
-        for (band, x) in bands(&impulse)?.iter().enumerate() {
-            seen[band][source] = power(x);
-        }
-        parallel.smooth(&mut impulse)?;
-        kept[source] = power(&impulse);
+        let beyond = self.parted(&impulse)?.map(|x| power(&x));
+        self.parallel.smooth(&mut impulse)?;
+        Ok((beyond, power(&impulse)))
     }
-    let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
-    // a block is some periods of the band long
-    let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
-    // A white signal's fourth difference has 1 + 16 + 36 + 16 + 1 = 70 times its variance; of the mean
-    // of two neighbours, (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7 times.
-    let gain = if averaged { 7.0 } else { 70.0 };
-    // independent numbers of a band in a block
-    let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
-    let freedom = 2.0 * width * block as f64 / rate;
-    let mut floor = Vec::with_capacity(joints);
-    for j in 0..joints {
-        // friction at rest is no noise; a joint that never moves has nothing else
-        let always = stationary.iter().all(|s| s[j]);
-        let logs = residuals.iter().zip(stationary).zip(&periods);
-        let mut seen_of = Vec::with_capacity(stretches.len());
-        for ((residual, _), period) in logs.filter(|((_, s), _)| always || !s[j]) {
-            let edge = parallel.trim.min(residual[j].len() / 4);
-            if residual[j].len() < 2 * edge + block {
-                continue;
+
+    /// What the raw residual of a joint along one stretch shows; none where it is too short.
+    fn look(
+        &self,
+        residual: &[f64],
+        period: Option<usize>,
+    ) -> Result<Option<StretchNoise>, MotionError> {
+        let edge = self.parallel.trim.min(residual.len() / 4);
+        if residual.len() < 2 * edge + self.block {
+            return Ok(None);
+        }
+        let inner = edge..residual.len() - edge;
+        let powers = |x: &[f64]| -> Vec<f64> {
+            let blocks = x.chunks_exact(self.block);
+            blocks.map(|b| power(b) / self.block as f64).collect()
+        };
+        let differences: Vec<f64> = residual
+            .windows(5)
+            .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
+            .collect();
+        let repeated = match period {
+            Some(period) => {
+                let mut filtered = residual.to_vec();
+                self.parallel.smooth(&mut filtered)?;
+                unrepeated(&filtered, inner.clone(), period)
             }
-            let banded = bands(&residual[j])?;
-            let inner = edge..residual[j].len() - edge;
-            let powers = |x: &[f64]| -> Vec<f64> {
-                let blocks = x.chunks_exact(block);
-                blocks.map(|b| power(b) / block as f64).collect()
-            };
-            let differences: Vec<f64> = residual[j]
-                .windows(5)
-                .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4])
-                .collect();
-            let repeated = match period {
-                Some(period) => {
-                    let mut filtered = residual[j].clone();
-                    parallel.smooth(&mut filtered)?;
-                    unrepeated(&filtered, inner.clone(), *period)
-                }
-                None => None,
-            };
-            seen_of.push(StretchNoise {
-                weight: residual[j].len() as f64,
-                near: banded
-                    .each_ref()
-                    .map(|x| Middle::of(powers(&x[inner.clone()]), freedom)),
-                top: Middle::of(powers(&differences), f64::INFINITY).value / gain,
-                repeated,
-            });
-        }
-        floor.push(together(&seen_of, seen, kept));
+            None => None,
+        };
+        let near = self.parted(residual)?;
+        Ok(Some(StretchNoise {
+            weight: residual.len() as f64,
+            near: near.map(|x| Middle::of(powers(&x[inner.clone()]), self.freedom)),
+            top: Middle::of(powers(&differences), f64::INFINITY).value / self.gain,
+            repeated,
+        }))
     }
-    Ok(floor)
 }
 
 /// What one stretch shows of a joint's noise.

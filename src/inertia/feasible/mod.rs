@@ -10,7 +10,7 @@ pub mod log_cholesky;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::solve::FitError;
+use super::solution::FitError;
 use crate::math::descent::{Ending, StepControl, Tried, descend};
 use crate::math::rfactor::RFactor;
 use crate::robot::bodies::StandardMap;
