@@ -15,9 +15,9 @@ pub mod passes;
 pub mod plateau;
 pub mod prepare;
 pub mod problem;
-pub mod propagate;
+mod propagate;
 pub mod score;
-pub mod slope;
-pub mod start;
+mod slope;
+mod start;
 #[cfg(test)]
 mod trial;

@@ -49,11 +49,8 @@ const MOST_STEPS: usize = 40;
 const SETTLED: f64 = 1e-4;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl {
-    start: 1e-3,
-    accepted: 0.1,
-    rejected: 10.0,
-    range: [1e-9, 1e8],
     rejected_from: 1e-4,
+    ..StepControl::damping(0.1, 10.0, [1e-9, 1e8])
 };
 
 /// Levels that the user gives; what is not given comes from the log.
@@ -67,7 +64,7 @@ pub struct GivenNoise {
 
 /// Maximum of the innovation likelihood of one joint.
 #[derive(Debug, Clone)]
-pub struct Maximum {
+pub(super) struct Maximum {
     pub parameters: Parameters,
     /// Covariance in the filter's coordinates, widened where the score is coloured.
     pub covariance: DMatrix<f64>,
@@ -93,7 +90,7 @@ pub fn spread(problem: &FrictionProblem) -> Vec<f64> {
 
 /// Noise levels to begin with, from the log alone: a tenth of the torque's second differences
 /// (a controller's own reaction is in them) and the encoder's resolution.
-pub fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> NoiseLevels {
+pub(super) fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> NoiseLevels {
     let mut d: Vec<f64> = problem
         .records
         .iter()
@@ -110,7 +107,7 @@ pub fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> NoiseLevels
 }
 
 /// Runs every start through the annealed passes, then refines the best.
-pub fn maximise(
+pub(super) fn maximise(
     prepared: &Prepared,
     starts: &[FrictionStart],
     given: &GivenNoise,
@@ -182,7 +179,7 @@ fn settle(
 /// Narrows the accelerations of the other joints one after the other as long as the innovations
 /// grow likelier by it. Returns the cut-offs [Hz], one per joint, with the problem and its maximum;
 /// `None` where the motions as they are do best.
-pub fn bands(
+pub(super) fn bands(
     prepared: &Prepared,
     inputs: &Inputs,
     maximum: &Maximum,
@@ -310,7 +307,11 @@ pub(super) fn refine_others(
 /// Adds to the covariance what another smoothing of the known inputs, and another weight of the
 /// encoder, change in the estimate: the innovations cannot show an error that is the same at every
 /// reversal.
-pub fn add_choices(problem: &FrictionProblem, again: &FrictionProblem, maximum: &mut Maximum) {
+pub(super) fn add_choices(
+    problem: &FrictionProblem,
+    again: &FrictionProblem,
+    maximum: &mut Maximum,
+) {
     let spread = spread(again);
     let p = maximum.parameters.clone();
     let coarser = NoiseLevels {

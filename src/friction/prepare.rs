@@ -166,7 +166,7 @@ fn excited_directions(
 
 /// The same problem, its known inputs from motions that were smoothed otherwise: unknowns and
 /// scales stay, so that estimates can be compared.
-pub fn prepare_again(
+pub(super) fn prepare_again(
     robot: &Robot,
     joint: usize,
     motions: &[SmoothedMotion],

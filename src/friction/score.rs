@@ -259,7 +259,11 @@ pub fn score(
 const CHI2_95: f64 = 3.841_458_820_694_124;
 
 /// Log-likelihood alone, at a quarter of the cost.
-pub fn log_likelihood(problem: &FrictionProblem, parameters: &[f64], noise: NoiseLevels) -> f64 {
+pub(super) fn log_likelihood(
+    problem: &FrictionProblem,
+    parameters: &[f64],
+    noise: NoiseLevels,
+) -> f64 {
     let law = Law::new(problem, parameters);
     let eta = &parameters[FRICTION..];
     let s2 = noise.torque * noise.torque;

@@ -15,6 +15,7 @@ use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::{GRIDS, add_scatter};
 use crate::inertia::feasible::nearest;
 use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
+use crate::inertia::law_start;
 use crate::inertia::refine::{self, RefinedFit};
 use crate::inertia::robust::{self, Robust, Weigher};
 use crate::inertia::solution::FitError;
@@ -211,7 +212,7 @@ fn refined(
     passes.work.doing("friction law");
     let mut pass = |columns: &RegressorColumns| passes.read(settings, columns, None);
     let start = match law {
-        true => refine::begin(columns, &mut pass)?,
+        true => law_start::begin(columns, &mut pass)?,
         false => columns.clone(),
     };
     let refined = refine::refine(start, &mut pass)?;

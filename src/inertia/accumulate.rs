@@ -176,7 +176,7 @@ impl BlockFactors {
     }
 
     /// The same rows with those of each joint's own terms alone that `keep` names by their place.
-    pub fn with_own(&self, keep: &[Vec<usize>]) -> BlockFactors {
+    pub(super) fn with_own(&self, keep: &[Vec<usize>]) -> BlockFactors {
         let (n, p) = (self.columns.joints, self.columns.shared);
         let mut columns = self.columns.clone();
         let mut places: Vec<Vec<usize>> = Vec::with_capacity(n);
@@ -244,7 +244,7 @@ impl BlockFactors {
 }
 
 /// Normal quantities of one joint's triangle: X'X, X'G, X't, and |t - X theta|^2 by parts.
-pub struct JointFactor<'a> {
+pub(super) struct JointFactor<'a> {
     pub r: &'a DMatrix<f64>,
     pub unknowns: usize,
     pub gradient: usize,
@@ -260,13 +260,13 @@ impl JointFactor<'_> {
     }
 
     /// |t - X theta|^2.
-    pub fn residual_square(&self, theta: &DVector<f64>) -> f64 {
+    pub(super) fn residual_square(&self, theta: &DVector<f64>) -> f64 {
         let x = self.r.columns(0, self.unknowns);
         (self.r.column(self.r.ncols() - 1) - x * theta).norm_squared()
     }
 
     /// X' G.
-    pub fn with_gradient(&self) -> DMatrix<f64> {
+    pub(super) fn with_gradient(&self) -> DMatrix<f64> {
         let x = self.r.columns(0, self.unknowns);
         x.tr_mul(&self.r.columns(self.unknowns, self.gradient))
     }

@@ -32,7 +32,7 @@ pub struct Gains {
 
 /// A robot under the parameters of a fit.
 #[derive(Debug, Clone)]
-pub struct ClosedLoop<'a> {
+pub(super) struct ClosedLoop<'a> {
     robot: &'a Robot,
     columns: &'a RegressorColumns,
     theta: Vec<f64>,

@@ -28,7 +28,7 @@ use crate::motion::{self, FilterSettings, ParallelFilter, RunError, Summary};
 use crate::robot::Robot;
 
 /// The reference that no log gives is the measured position below this share of the rows' cut-off.
-pub const REFERENCE_SHARE: f64 = 0.5;
+const REFERENCE_SHARE: f64 = 0.5;
 /// Largest change of a parameter, in its standard deviations, of an iteration that has settled.
 const SETTLED: f64 = 0.05;
 /// Most iterations.

@@ -2,7 +2,7 @@
 //!
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
 //! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
-//! `refine` and `instruments` (along motions of `closed_loop`) are estimators that read the logs
+//! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
 //! several times; `essential` and `feasible` work on the R factor of a fit.
 
 pub mod accumulate;
@@ -13,6 +13,7 @@ pub mod encoder;
 pub mod essential;
 pub mod feasible;
 pub mod instruments;
+pub mod law_start;
 pub mod refine;
 pub mod robust;
 pub mod solution;

@@ -6,14 +6,11 @@
 //! and the next pass says whether the step was good. theta is solved anew in each, so that only phi
 //! is searched (variable projection: Golub and Pereyra 1973). The friction that was known before
 //! enters with its covariance, as rows of unit noise.
-//!
-//! Without such a start the law is begun by columns that are linear: v and tanh(w_k v) for eight
-//! slopes w_k, of which every joint takes the two that explain most.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::accumulate::BlockFactors;
-use super::columns::{GRADIENT, KnownFriction, Own, RegressorColumns};
+use super::columns::{GRADIENT, Own, RegressorColumns};
 use super::solution::{FitError, FitInputs, PriorRows};
 use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
 use crate::math::descent::{Ending, StepControl, Tried, descend};
@@ -26,15 +23,7 @@ const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
 const MOST: usize = 40;
 /// Damping of the steps.
-const DAMPING: StepControl = StepControl {
-    start: 1e-3,
-    accepted: 0.1,
-    rejected: 10.0,
-    range: [1e-9, 1e6],
-    rejected_from: 0.0,
-};
-/// Slopes of the columns that begin a law, times the joint's rms speed.
-const SLOPES: [f64; 8] = [0.7, 1.5, 3.3, 7.0, 15.0, 33.0, 70.0, 150.0];
+const DAMPING: StepControl = StepControl::damping(0.1, 10.0, [1e-9, 1e6]);
 /// A slope may change by this factor in one step.
 const FARTHEST: f64 = 4.0;
 /// No slope is steeper than this over the rms speed: tanh is a sign there.
@@ -65,11 +54,7 @@ impl RefinedFit {
     /// [`FitError`].
     pub fn solve(&self, factors: BlockFactors) -> Result<Fit, FitError> {
         let factors = factors.with_free_friction();
-        let inputs = FitInputs {
-            weights: &self.weights,
-            slope: None,
-            prior: self.prior.as_ref(),
-        };
+        let inputs = FitInputs::weighted(&self.weights, self.prior.as_ref());
         let mut fit = fit_with(&factors, inputs)?;
         add_laws(&self.columns, &mut fit.theta);
         Ok(fit)
@@ -189,10 +174,7 @@ fn cost(
     prior: Option<&PriorRows>,
 ) -> Result<f64, FitError> {
     let u = factors.columns.unknowns();
-    let inputs = FitInputs {
-        weights,
-        ..FitInputs::default()
-    };
+    let inputs = FitInputs::weighted(weights, None);
     let known = prior.map_or(0.0, |p| p.rows.column(u).norm_squared());
     Ok(least_square(&factors.with_own(&without_law(&factors.columns)), inputs)? + known)
 }
@@ -227,11 +209,7 @@ impl Point {
     /// The damped step; none where it promises nothing.
     fn step(&self, damping: f64) -> Result<Option<DVector<f64>>, FitError> {
         let damped_rows = damped(&self.factors, &self.weights, self.known.as_ref(), damping);
-        let inputs = FitInputs {
-            weights: &self.weights,
-            slope: None,
-            prior: Some(&damped_rows),
-        };
+        let inputs = FitInputs::weighted(&self.weights, Some(&damped_rows));
         let promised = self.cost - least_square(&self.factors, inputs)?;
         // a cost of one a row is one of the noise: far below it there is none
         if promised <= SETTLED * self.cost || self.cost <= 1e-6 * self.factors.rows as f64 {
@@ -243,11 +221,7 @@ impl Point {
     /// The fit here: values of the last step that was taken, the covariance of the fit about them.
     fn fit(&self) -> Result<Fit, FitError> {
         let (linear, all) = (&self.columns, &self.factors.columns);
-        let inputs = FitInputs {
-            weights: &self.weights,
-            slope: None,
-            prior: self.known.as_ref(),
-        };
+        let inputs = FitInputs::weighted(&self.weights, self.known.as_ref());
         let mut fit = fit_with(&self.factors, inputs)?;
         let found = linear_fit(&self.factors)?;
         fit.theta.fill(0.0);
@@ -381,145 +355,11 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
     next
 }
 
-/// Begins the law of every joint whose own terms name viscous friction: the columns with the laws
-/// as known friction of no covariance, without those terms.
-///
-/// # Errors
-/// Those of `pass`, and [`FitError`].
-pub fn begin<E: From<FitError>>(
-    linear: &RegressorColumns,
-    pass: &mut dyn FnMut(&RegressorColumns) -> Result<BlockFactors, E>,
-) -> Result<RegressorColumns, E> {
-    let plain = fit(&pass(linear)?, Weighting::Wls)?;
-    let ladder = SlopeLadder::of(linear, &plain);
-    let factors = pass(&ladder.columns)?;
-    let weights = weights_of(&factors, &plain.residual_std);
-    let inputs = FitInputs {
-        weights: &weights,
-        ..FitInputs::default()
-    };
-    // one block of each joint's R factor is all that a choice needs
-    let factors = factors.in_one_block();
-    let pairs = ladder.best_pairs(&factors, inputs)?;
-    Ok(ladder.laws(&factors, inputs, &pairs)?)
-}
-
-/// Place of viscous friction among a joint's own terms.
-fn viscous(own: &[Own]) -> Option<usize> {
-    own.iter().position(|o| *o == Own::Viscous)
-}
-
-/// Columns of tanh(w_k v) for all slopes, of every joint with viscous friction.
-struct SlopeLadder<'a> {
-    linear: &'a RegressorColumns,
-    columns: RegressorColumns,
-    /// w_k per joint [s/m or s/rad].
-    slopes: Vec<[f64; SLOPES.len()]>,
-}
-
-impl<'a> SlopeLadder<'a> {
-    fn of(linear: &'a RegressorColumns, plain: &Fit) -> Self {
-        let mut columns = linear.clone();
-        let mut slopes = vec![[0.0; SLOPES.len()]; linear.joints];
-        for (j, slopes) in slopes.iter_mut().enumerate() {
-            let Some(k) = viscous(&linear.own[j]) else {
-                continue;
-            };
-            let speed = plain.column_rms[(j, linear.first_own(j) + k)];
-            let unit = if speed > 0.0 { 1.0 / speed } else { 1.0 };
-            *slopes = SLOPES.map(|s| s * unit);
-            columns.own[j].retain(|o| *o != Own::Coulomb);
-            columns.own[j].extend(slopes.map(Own::Saturating));
-        }
-        SlopeLadder {
-            linear,
-            columns,
-            slopes,
-        }
-    }
-
-    /// Places of a joint's own terms beside the ladder.
-    fn base(&self, j: usize) -> Vec<usize> {
-        let all = self.columns.own[j].iter().enumerate();
-        all.filter(|(_, o)| !matches!(o, Own::Saturating(_)))
-            .map(|(k, _)| k)
-            .collect()
-    }
-
-    /// The same with a pair of slopes on each joint.
-    fn with_pairs(&self, pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
-        let of = |(j, pair): (usize, &[usize; 2])| {
-            let mut keep = self.base(j);
-            if viscous(&self.columns.own[j]).is_some() {
-                let first = self.columns.own[j].len() - SLOPES.len();
-                keep.extend(pair.map(|k| first + k));
-            }
-            keep
-        };
-        pairs.iter().enumerate().map(of).collect()
-    }
-
-    /// The two slopes that explain most, joint after joint.
-    fn best_pairs(
-        &self,
-        factors: &BlockFactors,
-        inputs: FitInputs,
-    ) -> Result<Vec<[usize; 2]>, FitError> {
-        let mut pairs = vec![[SLOPES.len() - 2, 2]; self.linear.joints];
-        for j in (0..pairs.len()).filter(|j| viscous(&self.linear.own[*j]).is_some()) {
-            let mut best = (f64::INFINITY, pairs[j]);
-            for steep in 1..SLOPES.len() {
-                for flat in 0..steep {
-                    pairs[j] = [steep, flat];
-                    let chosen = factors.with_own(&self.with_pairs(&pairs));
-                    let square = least_square(&chosen, inputs)?;
-                    if square < best.0 {
-                        best = (square, pairs[j]);
-                    }
-                }
-            }
-            pairs[j] = best.1;
-        }
-        Ok(pairs)
-    }
-
-    /// The columns with laws of the chosen slopes in place of viscous and Coulomb friction.
-    fn laws(
-        &self,
-        factors: &BlockFactors,
-        inputs: FitInputs,
-        pairs: &[[usize; 2]],
-    ) -> Result<RegressorColumns, FitError> {
-        let chosen = factors.with_own(&self.with_pairs(pairs));
-        let found = fit_with(&chosen, inputs)?;
-        let mut start = self.linear.clone();
-        for j in 0..self.linear.joints {
-            let Some(k) = viscous(&self.linear.own[j]) else {
-                continue;
-            };
-            let at = |k: usize| found.theta[chosen.columns.first_own(j) + k];
-            let last = chosen.columns.own[j].len();
-            let [steep, flat] = pairs[j].map(|k| self.slopes[j][k]);
-            let place = self.base(j).iter().position(|b| *b == k);
-            start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
-            start.known[j] = Some(KnownFriction {
-                law: DoubleTanh::from_parameters([
-                    at(place.unwrap_or_default()),
-                    at(last - 2),
-                    at(last - 1),
-                    steep,
-                    flat,
-                ]),
-                covariance: [[0.0; GRADIENT]; GRADIENT],
-            });
-        }
-        Ok(start)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::accumulate::Accumulator;
+    use super::super::columns::KnownFriction;
+    use super::super::law_start::begin;
     use super::*;
     use crate::robot::{JointKind, Robot};
     use rand::{RngExt, SeedableRng};

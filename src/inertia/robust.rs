@@ -38,7 +38,7 @@ const LOWEST: f64 = 1e-6;
 /// How a residual of u scales counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Loss {
+enum Loss {
     /// All rows alike.
     Square,
     /// Huber 1964: square within 1.345 scales, linear beyond.
@@ -49,7 +49,7 @@ pub enum Loss {
 
 impl Loss {
     /// psi(u)/u, the weight of a row.
-    pub fn weight(self, u: f64) -> f64 {
+    fn weight(self, u: f64) -> f64 {
         match self {
             Loss::Square => 1.0,
             Loss::Huber if u.abs() <= HUBER => 1.0,
@@ -62,7 +62,7 @@ impl Loss {
     }
 
     /// psi'(u).
-    pub fn slope(self, u: f64) -> f64 {
+    fn slope(self, u: f64) -> f64 {
         match self {
             Loss::Square => 1.0,
             Loss::Huber => f64::from(u8::from(u.abs() <= HUBER)),
@@ -174,7 +174,7 @@ impl Weigher {
     }
 
     /// The channels of one instant with each joint's row times the root of its weight.
-    pub fn weigh(&mut self, columns: &RegressorColumns, channels: &[f64]) -> &[f64] {
+    pub(super) fn weigh(&mut self, columns: &RegressorColumns, channels: &[f64]) -> &[f64] {
         self.row.clear();
         self.row.extend_from_slice(channels);
         let mut rest = self.row.as_mut_slice();

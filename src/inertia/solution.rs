@@ -46,8 +46,8 @@ pub struct Confounded {
 }
 
 /// What a fit is given besides the rows.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct FitInputs<'a> {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FitInputs<'a> {
     /// Weight of each joint's rows [1/N or 1/Nm].
     pub weights: &'a [f64],
     /// Per joint, by which part of X'X the score falls where theta grows: 1 for least squares, the
@@ -57,9 +57,20 @@ pub struct FitInputs<'a> {
     pub prior: Option<&'a PriorRows>,
 }
 
+impl<'a> FitInputs<'a> {
+    /// Least squares.
+    pub fn weighted(weights: &'a [f64], prior: Option<&'a PriorRows>) -> Self {
+        FitInputs {
+            weights,
+            slope: None,
+            prior,
+        }
+    }
+}
+
 /// What is known of the unknowns beforehand, as rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PriorRows {
+pub(super) struct PriorRows {
     /// k x (unknowns + 1), the target last.
     pub rows: DMatrix<f64>,
     /// Variance of the rows' noise: above 1 where they are given more weight than one row of data,

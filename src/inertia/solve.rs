@@ -65,10 +65,7 @@ pub fn fit(factors: &BlockFactors, estimator: Weighting) -> Result<Fit, FitError
             weights = weights_of(factors, &residual_std(factors, &joints, &theta));
         }
     }
-    let inputs = FitInputs {
-        weights: &weights,
-        ..FitInputs::default()
-    };
+    let inputs = FitInputs::weighted(&weights, None);
     finish(factors, &joints, inputs)
 }
 
@@ -76,7 +73,7 @@ pub fn fit(factors: &BlockFactors, estimator: Weighting) -> Result<Fit, FitError
 ///
 /// # Errors
 /// [`FitError`].
-pub fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit, FitError> {
+pub(super) fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit, FitError> {
     finish(factors, &joints(factors)?, inputs)
 }
 
@@ -97,7 +94,7 @@ pub fn weights_of(factors: &BlockFactors, residual: &[f64]) -> Vec<f64> {
 }
 
 /// Lowest weighted sum of squares that any values of the unknowns reach, prior included.
-pub fn least_square(factors: &BlockFactors, inputs: FitInputs) -> Result<f64, FitError> {
+pub(super) fn least_square(factors: &BlockFactors, inputs: FitInputs) -> Result<f64, FitError> {
     let r = stacked(factors, &joints(factors)?, inputs.weights, inputs.prior);
     let u = r.ncols() - 1;
     Ok(r[(u, u)] * r[(u, u)])

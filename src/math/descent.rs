@@ -33,6 +33,17 @@ pub struct StepControl {
 }
 
 impl StepControl {
+    /// Damping that begins at a thousandth, and by what it falls and grows within a range.
+    pub const fn damping(accepted: f64, rejected: f64, range: [f64; 2]) -> Self {
+        StepControl {
+            start: 1e-3,
+            accepted,
+            rejected,
+            range,
+            rejected_from: 0.0,
+        }
+    }
+
     /// The whole step, then halves of it, so many lengths in all; anew after each accepted step.
     pub const fn halving(lengths: u32) -> Self {
         StepControl {
@@ -102,13 +113,7 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    const DAMPING: StepControl = StepControl {
-        start: 1e-3,
-        accepted: 0.1,
-        rejected: 10.0,
-        range: [1e-9, 1e6],
-        rejected_from: 0.0,
-    };
+    const DAMPING: StepControl = StepControl::damping(0.1, 10.0, [1e-9, 1e6]);
 
     /// The least of ln(1 + x^2), whose Newton step from far away goes the wrong way and whose
     /// Gauss-Newton step overshoots, damped.

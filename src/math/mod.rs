@@ -5,19 +5,19 @@
 //! |---|---|---|
 //! | [`rfactor`] | triangular factor of a stacked matrix that never exists as a whole | none |
 //! | [`rank`] | singular values, rank, condition number | `faer` |
-//! | [`rank_revealing`] | inverse of a normal matrix with redundant columns | none |
-//! | [`jacobi`] | one-sided Jacobi singular values: fallback and test oracle | none |
+//! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
+//! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
 pub mod descent;
-pub mod jacobi;
-pub mod long_run;
+mod jacobi;
+pub(crate) mod long_run;
 pub mod minimise;
 pub mod rank;
-pub mod rank_revealing;
+pub(crate) mod rank_revealing;
 pub mod rfactor;
 pub mod sos;
 pub mod zero_phase;

@@ -18,25 +18,25 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | [`settings`] | what the user chooses |
-//! | [`time_base`] | uniform steps, gaps, torque by a zero-order hold |
-//! | [`differences`] | v and a from q |
-//! | [`run`](mod@run) | the windows of a streamed log |
-//! | [`zero_order_hold`] | motor forces between two samples, where a linkage turns them |
-//! | [`full_rate`](mod@full_rate) | smooth q, v, a at every sample of one short record |
-//! | [`stretch`] | whole stretches in memory, for searches |
+//! | `settings` | what the user chooses |
+//! | `time_base` | uniform steps, gaps, torque by a zero-order hold |
+//! | `differences` | v and a from q |
+//! | `run` | the windows of a streamed log |
+//! | `zero_order_hold` | motor forces between two samples, where a linkage turns them |
+//! | `full_rate` | smooth q, v, a at every sample of one short record |
+//! | `stretch` | whole stretches in memory, for searches |
 //! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
 
 mod added_noise;
 mod cutter;
-pub mod differences;
-pub mod full_rate;
-pub mod run;
-pub mod settings;
-pub mod stretch;
-pub mod time_base;
+mod differences;
+mod full_rate;
+mod run;
+mod settings;
+mod stretch;
+mod time_base;
 mod window;
-pub mod zero_order_hold;
+mod zero_order_hold;
 
 pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};

@@ -6,7 +6,7 @@
 //! do. What torques do not tell is filled by a prior: the mass properties that the robot file gives,
 //! or a plain body, with a small weight in the same ten numbers.
 
-pub mod log_cholesky;
+mod log_cholesky;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,17 +28,11 @@ pub const PLAIN: Body = Body {
     inertia: [0.04, 0.0, 0.0, 0.04, 0.0, 0.04],
 };
 /// Inertia of a drive before data [kg m^2 or kg].
-pub const PLAIN_DRIVE: f64 = 0.1;
+const PLAIN_DRIVE: f64 = 0.1;
 /// A step that lowers the cost by less than this share is the last.
 const SETTLED: f64 = 1e-6;
 /// Damping of the steps.
-const DAMPING: StepControl = StepControl {
-    start: 1e-3,
-    accepted: 0.2,
-    rejected: 4.0,
-    range: [1e-12, 1e12],
-    rejected_from: 0.0,
-};
+const DAMPING: StepControl = StepControl::damping(0.2, 4.0, [1e-12, 1e12]);
 /// Most steps under each weight of the prior.
 const MOST: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
