@@ -3,12 +3,11 @@
 //! Both models see the same rows, so rows are drawn in pairs: a block bootstrap of the difference of
 //! their relative errors (Kuensch 1989), in which what both models miss alike cancels.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::effect::AugmentedModel;
+use crate::math::bootstrap::intervals_95;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// How much larger the second model's error is.
@@ -32,7 +31,7 @@ impl Difference {
     }
 }
 
-/// ErrorDifferences of all joints.
+/// Differences of all joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorDifferences {
     /// Joint by joint, in the robot's order.
@@ -47,8 +46,8 @@ const PIECES: usize = 30;
 const FEWEST: usize = 12;
 /// Rows of a piece, at least.
 const SHORTEST: usize = 10;
-/// Resamplings.
-const DRAWS: usize = 1000;
+/// Seed of the bootstrap.
+const SEED: u64 = 19_890_901;
 
 /// PieceSquares of one joint over one piece: squared errors of both, squared torque.
 type PieceSquares = [f64; 3];
@@ -113,23 +112,12 @@ fn bootstrapped(pieces: &[Vec<PieceSquares>], n: usize) -> ErrorDifferences {
     };
     let all: Vec<usize> = (0..pieces.len()).collect();
     let found = of(&all);
-    let mut drawn: Vec<Vec<f64>> = vec![Vec::new(); n + 1];
-    if pieces.len() >= FEWEST {
-        let mut chance = ChaCha8Rng::seed_from_u64(19_890_901);
-        for _ in 0..DRAWS {
-            let picked: Vec<usize> = all
-                .iter()
-                .map(|_| chance.random_range(0..pieces.len()))
-                .collect();
-            for (draws, d) in drawn.iter_mut().zip(of(&picked)) {
-                draws.push(d);
-            }
-        }
-    }
-    let mut told = found.iter().zip(&mut drawn).map(|(d, draws)| {
-        draws.sort_by(f64::total_cmp);
-        let at = |permille: usize| draws.get(permille * DRAWS / 1000).copied();
-        let interval = at(25).zip(at(974)).map(|(low, high)| [low, high]);
+    let intervals = match pieces.len() >= FEWEST {
+        true => intervals_95(pieces.len(), 1, SEED, &mut |picked| of(picked)),
+        false => Vec::new(),
+    };
+    let mut told = found.iter().enumerate().map(|(k, d)| {
+        let interval = intervals.get(k).copied();
         Difference {
             difference: *d,
             interval_95: interval.filter(|ends| ends.iter().all(|x| x.is_finite())),

@@ -17,9 +17,6 @@ pub struct Pass {
     pub covariance: Vec<f64>,
     /// Gaussian log-likelihood of the innovations (less the constant).
     pub log_likelihood: f64,
-    /// Mean normalised innovation squared, and number of innovations.
-    pub mean_nis: f64,
-    pub innovations: usize,
 }
 
 /// Working memory of the filter; made once, used for any number of passes.
@@ -66,7 +63,7 @@ impl ExtendedKalmanFilter {
         for (j, s) in spread.iter().enumerate().take(np) {
             self.p[(2 + j) * self.n + 2 + j] = s * s;
         }
-        let (mut log_likelihood, mut nis, mut count) = (0.0, 0.0, 0usize);
+        let mut log_likelihood = 0.0;
         for record in &problem.records {
             self.begin(
                 problem,
@@ -80,10 +77,7 @@ impl ExtendedKalmanFilter {
                 let r = record.r[k + 1] * noise.position_factor;
                 let (innovation, s) = self.update(record.y[k + 1], r);
                 problem.clamp(&mut self.x[2..]);
-                let z = innovation * innovation / s;
-                log_likelihood -= 0.5 * (z + s.ln());
-                nis += z;
-                count += 1;
+                log_likelihood -= 0.5 * (innovation * innovation / s + s.ln());
             }
         }
         let mut covariance = vec![0.0; np * np];
@@ -95,8 +89,6 @@ impl ExtendedKalmanFilter {
             parameters: self.x[2..].to_vec(),
             covariance,
             log_likelihood,
-            mean_nis: nis / count.max(1) as f64,
-            innovations: count,
         }
     }
 

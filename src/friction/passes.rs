@@ -76,8 +76,6 @@ pub(super) struct Maximum {
     /// A slope stands at an end of its range.
     pub at_limit: [bool; 2],
     pub starts: usize,
-    /// Index of the start that won.
-    pub best_start: usize,
 }
 
 /// Prior standard deviations of all parameters.
@@ -116,8 +114,8 @@ pub(super) fn maximise(
     let noise = first_noise(problem, given);
     let spread = spread(problem);
     let mut filter = ExtendedKalmanFilter::new(problem);
-    let mut ends: Vec<(usize, Parameters, f64)> = Vec::new();
-    for (i, start) in starts.iter().enumerate() {
+    let mut ends: Vec<(Parameters, f64)> = Vec::new();
+    for start in starts {
         let mut p = start.parameters.clone();
         problem.clamp(&mut p);
         let annealing: &[f64] = match start.residual.is_finite() {
@@ -140,24 +138,20 @@ pub(super) fn maximise(
         for candidate in [p, start.parameters.clone()] {
             let l = log_likelihood(problem, &candidate, noise);
             if l.is_finite() {
-                ends.push((i, candidate, l));
+                ends.push((candidate, l));
             }
         }
     }
-    ends.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let mut best: Option<(usize, RefinedParameters)> = None;
-    for (i, p, _) in ends.into_iter().take(REFINED) {
+    ends.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut best: Option<RefinedParameters> = None;
+    for (p, _) in ends.into_iter().take(REFINED) {
         let refined = refine(problem, p, noise, &spread, FIRST_STEPS);
-        if best
-            .as_ref()
-            .is_none_or(|b| refined.score.log_likelihood > b.1.score.log_likelihood)
-        {
-            best = Some((i, refined));
+        let likelihood = refined.score.log_likelihood;
+        if (best.as_ref()).is_none_or(|b| likelihood > b.score.log_likelihood) {
+            best = Some(refined);
         }
     }
-    let (best_start, refined) = best?;
-    let counts = (starts.len(), best_start);
-    settle(problem, refined, noise, given, &spread, counts)
+    settle(problem, best?, noise, given, &spread, starts.len())
 }
 
 /// Noise levels and parameters in turn: each is little moved by the other.
@@ -167,13 +161,13 @@ fn settle(
     mut noise: NoiseLevels,
     given: &GivenNoise,
     spread: &[f64],
-    counts: (usize, usize),
+    starts: usize,
 ) -> Option<Maximum> {
     for _ in 0..2 {
         noise = tune(problem, &refined.parameters, noise, given);
         refined = refine(problem, refined.parameters, noise, spread, MOST_STEPS);
     }
-    finish(problem, refined, noise, spread, counts)
+    finish(problem, refined, noise, spread, starts)
 }
 
 /// Narrows the accelerations of the other joints one after the other as long as the innovations
@@ -213,8 +207,8 @@ pub(super) fn bands(
         }
     }
     let (problem, refined) = best?;
-    let counts = (maximum.starts, maximum.best_start);
-    let settled = settle(&problem, refined, maximum.noise, given, &spread, counts)?;
+    let (noise, starts) = (maximum.noise, maximum.starts);
+    let settled = settle(&problem, refined, noise, given, &spread, starts)?;
     Some((cutoffs, problem, settled))
 }
 
@@ -377,7 +371,7 @@ fn finish(
     refined: RefinedParameters,
     noise: NoiseLevels,
     spread: &[f64],
-    (starts, best_start): (usize, usize),
+    starts: usize,
 ) -> Option<Maximum> {
     let np = problem.parameters();
     let mut h = refined.score.information.clone();
@@ -411,6 +405,5 @@ fn finish(
         widening,
         at_limit,
         starts,
-        best_start,
     })
 }

@@ -33,8 +33,6 @@ pub struct LikelihoodScore {
     /// Mean normalised square of innovations summed over windows, and the number of windows.
     pub window_nis: f64,
     pub windows: usize,
-    /// Square root of the mean squared innovation.
-    pub innovation_rms: f64,
 }
 
 impl LikelihoodScore {
@@ -48,7 +46,6 @@ impl LikelihoodScore {
             innovations: 0,
             mean_nis: 0.0,
             share_inside: 0.0,
-            innovation_rms: 0.0,
             window_nis: f64::NAN,
             windows: 0,
         }
@@ -187,7 +184,7 @@ pub fn score(
     let mut windows = InnovationWindows::default();
     let s2 = noise.torque * noise.torque;
     let mut info = vec![0.0; np * np];
-    let (mut nis, mut inside, mut square) = (0.0, 0usize, 0.0);
+    let (mut nis, mut inside) = (0.0, 0usize);
     let mut w = Sensitivities {
         q: vec![0.0; np],
         v: vec![0.0; np],
@@ -227,7 +224,6 @@ pub fn score(
                 record.r[k + 1],
             );
             inside += usize::from(z < CHI2_95);
-            square += innovation * innovation;
             out.innovations += 1;
             // d(innovation)/dp = -w; score = w nu / s, information = w w' / s
             let g = innovation / s;
@@ -251,7 +247,6 @@ pub fn score(
     out.mean_nis = nis / n;
     (out.window_nis, out.windows) = windows.mean();
     out.share_inside = inside as f64 / n;
-    out.innovation_rms = (square / n).sqrt();
     out
 }
 

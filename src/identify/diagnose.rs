@@ -10,7 +10,8 @@ use super::prior::{information, moved_alone, open};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion, Unknown,
+    self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion,
+    Unknown,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::motion::Parallel;

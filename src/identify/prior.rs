@@ -12,7 +12,11 @@ use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
 /// Which parameters the fit may move: all but those that the friction stage left open.
-pub(super) fn open(machine: &LoggedRobot, file: &ModelFile, given: &AugmentedModel) -> FreeParameters {
+pub(super) fn open(
+    machine: &LoggedRobot,
+    file: &ModelFile,
+    given: &AugmentedModel,
+) -> FreeParameters {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()

@@ -7,13 +7,15 @@
 //! | [`rank`] | singular values, rank, condition number | `faer` |
 //! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
 //! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
+//! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
+pub(crate) mod bootstrap;
 pub mod descent;
-mod jacobi;
+pub(crate) mod jacobi;
 pub(crate) mod long_run;
 pub mod minimise;
 pub mod rank;

@@ -1,14 +1,13 @@
 //! Errors of a model over the rows of one use, as `validate` counts them, with block-bootstrap
 //! intervals.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::diagnose::problem::data_split::{DataSplit, RowRole};
 use crate::diagnose::problem::rests::standing;
 use crate::effect::AugmentedModel;
+use crate::math::bootstrap::intervals_95;
 use crate::motion::{MotionError, Parallel, Stretch};
 
 /// Errors of one joint.
@@ -56,8 +55,8 @@ struct PieceErrors {
     raw_torque: f64,
 }
 
-/// Resamplings of the bootstrap.
-const DRAWS: usize = 1000;
+/// Seed of the bootstrap.
+const SEED: u64 = 20_020_520;
 
 /// Which rows of the pieces count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -155,25 +154,11 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
 
     // neighbours together: the residual's slow part reaches over some pieces
     let block = (pieces.len() / 20).clamp(1, 4);
-    let mut chance = ChaCha8Rng::seed_from_u64(20_020_520);
-    let mut drawn: Vec<Vec<f64>> = vec![Vec::with_capacity(DRAWS); n + 1];
-    let mut picked = Vec::with_capacity(pieces.len() + block);
-    for _ in 0..DRAWS {
-        picked.clear();
-        while picked.len() < pieces.len() {
-            let first = chance.random_range(0..pieces.len());
-            picked.extend((0..block).map(|i| (first + i) % pieces.len()));
-        }
-        let errors = relative(&picked);
-        for (j, e) in errors.iter().enumerate() {
-            drawn[j].push(*e);
-        }
-        drawn[n].push(mean(&errors));
-    }
-    let interval = |draws: &mut Vec<f64>| {
-        draws.sort_by(f64::total_cmp);
-        [draws[DRAWS * 25 / 1000], draws[DRAWS * 975 / 1000 - 1]]
-    };
+    let intervals = intervals_95(pieces.len(), block, SEED, &mut |picked| {
+        let mut errors = relative(picked);
+        errors.push(mean(&errors));
+        errors
+    });
     let joints: Vec<JointErrors> = (0..n)
         .map(|j| {
             let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
@@ -184,7 +169,7 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
                 unit: units[j].clone(),
                 rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
                 relative_error: found[j],
-                interval_95: interval(&mut drawn[j]),
+                interval_95: intervals[j],
                 relative_error_raw: ratio(sum(|s| s.raw_error), sum(|s| s.raw_torque)),
                 max_abs: pieces.iter().map(|p| p[j].largest).fold(0.0, f64::max),
                 r2: if scatter > 0.0 {
@@ -202,7 +187,7 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
         overall: OverallErrors {
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
             mean_relative_error: mean(&found),
-            interval_95: interval(&mut drawn[n]),
+            interval_95: intervals[n],
         },
         joints,
     }
