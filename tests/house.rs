@@ -83,8 +83,6 @@ const DOORS: &[(&str, &str)] = &[
 /// one. None may be added, and one that is gone is deleted here.
 const KNOWN_CIRCLES: &[&str] = &[
     "cli: compare, diagnose, diagnose_text, pages",
-    "diagnose: candidates, run, selection, uncertainty, unexplained",
-    "identify: estimate, passes",
     "robot: cft, practice",
 ];
 

@@ -6,16 +6,19 @@ use serde::Serialize;
 
 use super::error::IdentifyError;
 use super::logged_robot::{LoggedRobot, narrowed};
-use super::passes::Passes;
+use super::passes::{Passes, Simulated};
 use crate::config::campaign::EstimatorKind;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::add_processing;
-use crate::inertia::closed_loop::Gains;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::{GRIDS, add_scatter};
 use crate::inertia::feasible::nearest;
+<<<<<<< HEAD
 use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
 use crate::inertia::law_start;
+=======
+use crate::inertia::instruments::{self, Instrumental};
+>>>>>>> 7e28dbd (Passes know nothing of the estimators that make them)
 use crate::inertia::refine::{self, RefinedFit};
 use crate::inertia::robust::{self, Robust, Weigher};
 use crate::inertia::solution::FitError;
@@ -60,19 +63,6 @@ pub struct JointAccount {
     /// Relative residual before a refinement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative_error_before: Option<f64>,
-}
-
-/// The loop by which instruments were simulated.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Simulated {
-    /// Where the reference comes from.
-    pub reference: ReferenceSource,
-    /// Natural frequency [rad/s].
-    pub loop_frequency: f64,
-    /// Share of the steps at which the simulation failed a joint.
-    pub failed_steps_share: f64,
-    #[serde(skip)]
-    pub gains: Gains,
 }
 
 impl Account {

@@ -43,7 +43,7 @@ pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
 pub use control::{Control, Progress};
 pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
 pub use error::{ErrorKind, IdentifyError, ReadError};
-pub use estimate::{Account, JointAccount, Simulated};
+pub use estimate::{Account, JointAccount};
 pub use friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };
@@ -53,6 +53,7 @@ pub use logged_robot::{LoggedRobot, narrowed};
 pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use open_log::{OpenLog, summary_warnings};
+pub use passes::Simulated;
 pub use residual::{JointResidual, RelativeError};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use unknowns::Unknown;

@@ -1,21 +1,36 @@
 //! Readings of the same logs, one after the other, each reduced to what a fit needs.
 
 use nalgebra::DVector;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::control::{Control, Work};
 use super::error::IdentifyError;
-use super::estimate::Simulated;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::open_log::summary_warnings;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
+use crate::inertia::closed_loop::Gains;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::accumulate_shifted;
 use crate::inertia::instruments::{self, ReferenceSource};
 use crate::inertia::robust::Weigher;
 use crate::log::{Block, Provenance};
 use crate::motion::{FilterSettings, Summary};
+
+/// The loop by which instruments were simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Simulated {
+    /// Where the reference comes from.
+    pub reference: ReferenceSource,
+    /// Natural frequency [rad/s].
+    pub loop_frequency: f64,
+    /// Share of the steps at which the simulation failed a joint.
+    pub failed_steps_share: f64,
+    #[serde(skip)]
+    pub gains: Gains,
+}
 
 /// Readings of the same logs, one after the other.
 pub struct Passes<'a> {
