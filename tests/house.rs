@@ -33,7 +33,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "compare",
-        &["robot", "config", "motion", "effect", "verdict"],
+        &["math", "robot", "config", "motion", "effect", "verdict"],
     ),
     (
         "identify",

@@ -13,12 +13,8 @@ use crate::inertia::add_processing;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::{GRIDS, add_scatter};
 use crate::inertia::feasible::nearest;
-<<<<<<< HEAD
-use crate::inertia::instruments::{self, Instrumental, ReferenceSource};
-use crate::inertia::law_start;
-=======
 use crate::inertia::instruments::{self, Instrumental};
->>>>>>> 7e28dbd (Passes know nothing of the estimators that make them)
+use crate::inertia::law_start;
 use crate::inertia::refine::{self, RefinedFit};
 use crate::inertia::robust::{self, Robust, Weigher};
 use crate::inertia::solution::FitError;
