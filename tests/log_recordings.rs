@@ -138,7 +138,7 @@ fn a_topic_that_is_not_there_is_answered_with_those_that_are() {
         return;
     };
     let mut layout = ur10();
-    layout.messages.topic = Some("/joint_state".to_owned());
+    layout.section.topic = Some("/joint_state".to_owned());
     let message = Reader::open(&LogSpec::whole(Path::new(&path)), &layout)
         .unwrap_err()
         .to_string();

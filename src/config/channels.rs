@@ -2,12 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::log_section::{
-    ActuatorChannels, ChannelsKind, DelimiterKind, JointChannels, PositionUnit, StampKind,
-    TimeUnit, TorqueUnit,
-};
 use super::robot_file::{ModelKind, RobotFile};
-use crate::log::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
+use crate::log::{
+    ActuatorChannels, ChannelChoice, Channels, Conversion, JointChannels, Layout, PositionUnit,
+    TorqueUnit, channel,
+};
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::ENCODER_SCALE;
 use crate::robot::cft::{COORDINATES, Setup, pantograph};
@@ -21,9 +20,9 @@ impl RobotFile {
     pub fn layout(&self) -> Layout {
         let actuator = || (self.robot.model == ModelKind::Cft).then(|| self.actuator_layout());
         match self.log.channels {
-            ChannelsKind::Joint => self.joint_layout(),
-            ChannelsKind::Actuator => actuator().unwrap_or_else(|| self.joint_layout()),
-            ChannelsKind::Auto => Layout {
+            ChannelChoice::Joint => self.joint_layout(),
+            ChannelChoice::Actuator => actuator().unwrap_or_else(|| self.joint_layout()),
+            ChannelChoice::Auto => Layout {
                 otherwise: actuator().map(Box::new),
                 ..self.joint_layout()
             },
@@ -66,7 +65,7 @@ impl RobotFile {
             return None;
         }
         for (joint, position) in layout.joints.iter().zip(&mut layout.positions) {
-            position.column = self.log.joint.get(joint)?.reference.clone()?;
+            position.column = self.log.joint.get(joint)?.reference.clone()?.0;
             position.key = Some(format!("[log.joint.{joint}] reference"));
         }
         layout.velocities.clear();
@@ -76,64 +75,44 @@ impl RobotFile {
     fn joint_layout(&self) -> Layout {
         let robot = self.robot();
         let plain = JointChannels::default();
-        let named = |joint: &String| {
-            let channels = self.log.joint.get(joint);
-            let name = channels.and_then(|channels| channels.name.clone());
-            name.unwrap_or_else(|| joint.clone())
-        };
         let mut layout = Layout {
-            time: self.time_channel(),
-            delimiter: self.delimiter(),
-            messages: self.messages(
-                robot.joint_names().iter().map(named).collect(),
-                Channels::Joint,
-            ),
+            time: self.log.time_channel(),
+            zero_order_hold: self.zero_order_hold(Channels::Joint),
+            section: self.log.clone(),
             ..Layout::joint_columns(robot.joint_names())
         };
         for (index, joint) in robot.joint_names().iter().enumerate() {
-            let channels = self.log.joint.get(joint).unwrap_or(&plain);
+            let given = self.log.joint.get(joint).unwrap_or(&plain);
             let kind = robot.joint_kind(index);
-            let key =
-                |name: &str, given: bool| given.then(|| format!("[log.joint.{joint}] {name}"));
-            let unit = channels.position_unit.unwrap_or(match kind {
+            let key = |name: &str| format!("[log.joint.{joint}] {name}");
+            let unit = given.position_unit.unwrap_or(match kind {
                 JointKind::Prismatic => PositionUnit::Metre,
                 JointKind::Revolute => PositionUnit::Radian,
             });
-            let gain =
-                channels.position_sign.unwrap_or(1.0) * channels.position_scale.unwrap_or(1.0);
-            layout.positions[index] = Channel {
-                column: channels
-                    .position
-                    .clone()
-                    .unwrap_or_else(|| format!("q_{joint}")),
-                unit: unit.label().to_owned(),
-                factor: gain * unit.in_si(),
-                offset: channels.position_offset.unwrap_or(0.0),
-                key: key("position", channels.position.is_some()),
-            };
-            layout.velocities[index] = Channel {
-                column: channels
-                    .velocity
-                    .clone()
-                    .unwrap_or_else(|| format!("dq_{joint}")),
-                unit: unit.label().to_owned(),
-                factor: gain * unit.in_si(),
-                offset: 0.0,
-                key: key("velocity", channels.velocity.is_some()),
-            };
-            layout.torques[index] = Channel {
-                column: channels
-                    .torque
-                    .clone()
-                    .unwrap_or_else(|| format!("tau_{joint}")),
-                unit: channels
-                    .torque_unit
-                    .map_or(kind.torque_unit(), TorqueUnit::label)
-                    .to_owned(),
-                factor: channels.torque_sign.unwrap_or(1.0) * channels.torque_scale.unwrap_or(1.0),
-                offset: channels.torque_offset.unwrap_or(0.0),
-                key: key("torque", channels.torque.is_some()),
-            };
+            let gain = given.position_sign.unwrap_or(1.0) * given.position_scale.unwrap_or(1.0);
+            let (gain, label) = (gain * unit.in_si(), unit.label());
+            layout.positions[index] = channel(
+                &given.position,
+                format!("q_{joint}"),
+                label,
+                [gain, given.position_offset.unwrap_or(0.0)],
+                || key("position"),
+            );
+            layout.velocities[index] = channel(
+                &given.velocity,
+                format!("dq_{joint}"),
+                label,
+                [gain, 0.0],
+                || key("velocity"),
+            );
+            let gain = given.torque_sign.unwrap_or(1.0) * given.torque_scale.unwrap_or(1.0);
+            layout.torques[index] = channel(
+                &given.torque,
+                format!("tau_{joint}"),
+                (given.torque_unit).map_or(kind.torque_unit(), TorqueUnit::label),
+                [gain, given.torque_offset.unwrap_or(0.0)],
+                || key("torque"),
+            );
         }
         if !self.log.gears.is_empty() {
             let offsets = layout.positions.iter_mut();
@@ -145,98 +124,45 @@ impl RobotFile {
 
     fn actuator_layout(&self) -> Layout {
         let plain = ActuatorChannels::default();
-        let (mut positions, mut torques) = (Vec::new(), Vec::new());
+        let mut layout = Layout {
+            time: self.log.time_channel(),
+            velocities: Vec::new(),
+            channels: Channels::Actuator,
+            conversion: Some(to_joint_side(self.robot.setup.unwrap_or_default())),
+            zero_order_hold: self.zero_order_hold(Channels::Actuator),
+            section: self.log.clone(),
+            ..Layout::joint_columns(&COORDINATES)
+        };
         for (index, name) in COORDINATES.iter().enumerate() {
-            let channels = self.log.actuator.get(*name).unwrap_or(&plain);
-            let key =
-                |what: &str, given: bool| given.then(|| format!("[log.actuator.{name}] {what}"));
-            let si = if index == 2 {
-                PositionUnit::Radian
-            } else {
-                PositionUnit::Metre
-            };
-            let unit = channels.position_unit.unwrap_or(si);
+            let given = self.log.actuator.get(*name).unwrap_or(&plain);
+            let key = |what: &str| format!("[log.actuator.{name}] {what}");
+            let unit = given.position_unit.unwrap_or(match index {
+                2 => PositionUnit::Radian,
+                _ => PositionUnit::Metre,
+            });
             let size = match unit {
                 PositionUnit::Counts => ENCODER_SCALE[index],
                 other => other.in_si(),
             };
-            positions.push(Channel {
-                column: channels
-                    .position
-                    .clone()
-                    .unwrap_or_else(|| (*name).to_owned()),
-                unit: unit.label().to_owned(),
-                factor: channels.position_sign.unwrap_or(1.0) * size,
-                offset: channels.home.unwrap_or(0.0),
-                key: key("position", channels.position.is_some()),
-            });
-            torques.push(Channel {
-                column: channels
-                    .volts
-                    .clone()
-                    .unwrap_or_else(|| format!("u_{}", index + 1)),
-                unit: "V".to_owned(),
-                factor: channels.volts_sign.unwrap_or(1.0),
-                offset: 0.0,
-                key: key("volts", channels.volts.is_some()),
-            });
+            layout.positions[index] = channel(
+                &given.position,
+                (*name).to_owned(),
+                unit.label(),
+                [
+                    given.position_sign.unwrap_or(1.0) * size,
+                    given.home.unwrap_or(0.0),
+                ],
+                || key("position"),
+            );
+            layout.torques[index] = channel(
+                &given.volts,
+                format!("u_{}", index + 1),
+                "V",
+                [given.volts_sign.unwrap_or(1.0), 0.0],
+                || key("volts"),
+            );
         }
-        Layout {
-            joints: COORDINATES.map(str::to_owned).to_vec(),
-            time: self.time_channel(),
-            positions,
-            torques,
-            velocities: Vec::new(),
-            channels: Channels::Actuator,
-            conversion: Some(to_joint_side(self.robot.setup.unwrap_or_default())),
-            delimiter: self.delimiter(),
-            messages: self.messages(COORDINATES.map(str::to_owned).to_vec(), Channels::Actuator),
-            otherwise: None,
-        }
-    }
-
-    /// Where the channels stand in recordings of messages, for joints of these names there.
-    fn messages(&self, joints: Vec<String>, channels: Channels) -> Messages {
-        Messages {
-            topic: self.log.topic.clone(),
-            torque_topic: self.log.torque_topic.clone(),
-            stamp: match self.log.stamp {
-                StampKind::Auto => Stamp::Auto,
-                StampKind::Header => Stamp::Header,
-                StampKind::Log => Stamp::Log,
-                StampKind::Publish => Stamp::Publish,
-            },
-            joints,
-            zero_order_hold: self.zero_order_hold(channels),
-            torque_delay_s: self.log.torque_delay_s.unwrap_or(0.0),
-        }
-    }
-
-    fn time_channel(&self) -> Channel {
-        let (unit, factor) = match self.log.time_unit {
-            TimeUnit::Second => ("s", 1.0),
-            TimeUnit::Millisecond => ("ms", 1e-3),
-            TimeUnit::Microsecond => ("us", 1e-6),
-            TimeUnit::Nanosecond => ("ns", 1e-9),
-        };
-        Channel {
-            factor,
-            key: self.log.time.as_ref().map(|_| "[log] time".to_owned()),
-            ..Channel::si(
-                self.log.time.clone().unwrap_or_else(|| "t".to_owned()),
-                unit,
-            )
-        }
-    }
-
-    fn delimiter(&self) -> Delimiter {
-        match self.log.delimiter {
-            DelimiterKind::Auto => Delimiter::Auto,
-            DelimiterKind::Comma => Delimiter::Byte(b','),
-            DelimiterKind::Semicolon => Delimiter::Byte(b';'),
-            DelimiterKind::Tab => Delimiter::Byte(b'\t'),
-            DelimiterKind::Space => Delimiter::Spaces,
-        }
+        layout
     }
 }
 
@@ -263,32 +189,28 @@ fn to_joint_side(setup: Setup) -> Conversion {
 fn through_gears(gears: &[Vec<f64>], offsets: Vec<f64>) -> Option<Conversion> {
     let n = gears.len();
     let inverse = gear_matrix(gears)?.try_inverse()?;
-    let inverse: Vec<Vec<f64>> = inverse
-        .row_iter()
-        .map(|row| row.iter().copied().collect())
-        .collect();
-    let gears = gears.to_vec();
+    let transposed = gear_matrix(gears)?.transpose();
     Some(Conversion::new(move |positions, torques, velocities| {
         if n > MOST_JOINTS || positions.len() != n {
             return false;
         }
-        let times = |side: &mut [f64], entry: &dyn Fn(usize, usize) -> f64| {
+        let times = |side: &mut [f64], matrix: &DMatrix<f64>| {
             let mut out = [0.0; MOST_JOINTS];
             for (row, out) in out.iter_mut().enumerate().take(n) {
                 let products = side.iter().enumerate();
-                *out = products.map(|(column, x)| entry(row, column) * x).sum();
+                *out = products.map(|(column, x)| matrix[(row, column)] * x).sum();
             }
             side.copy_from_slice(&out[..side.len()]);
         };
-        times(positions, &|row, column| inverse[row][column]);
+        times(positions, &inverse);
         for (position, offset) in positions.iter_mut().zip(&offsets) {
             *position += offset;
         }
         if velocities.len() == n {
-            times(velocities, &|row, column| inverse[row][column]);
+            times(velocities, &inverse);
         }
         if torques.len() == n {
-            times(torques, &|row, column| gears[column][row]);
+            times(torques, &transposed);
         }
         true
     }))

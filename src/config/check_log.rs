@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::ConfigError;
 use super::channels::gear_matrix;
 use super::document::Document;
-use super::log_section::{ActuatorChannels, JointChannels, PositionUnit, TorqueIs, TorqueUnit};
 use super::robot_file::{ModelKind, RobotFile};
+use crate::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit, TorqueIs, TorqueUnit};
 use crate::robot::JointKind;
 use crate::robot::cft::COORDINATES;
 
@@ -18,9 +18,9 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     gears(file, document)?;
     foreign_effort(file, document)?;
     // Which key reads which column: no column may be read twice.
-    let mut columns: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    let mut columns: BTreeMap<&str, String> = BTreeMap::new();
     if let Some(time) = &log.time {
-        columns.insert(time.as_str(), vec!["log.time".to_owned()]);
+        columns.insert(&time.0, "log.time".to_owned());
     }
     let robot = file.robot();
     for (joint, channels) in &log.joint {
@@ -44,14 +44,12 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
             ("torque", &channels.torque),
         ];
         for (key, column) in named {
-            if let Some(column) = column {
-                claim(
-                    document,
-                    &mut columns,
-                    column,
-                    &["log", "joint", joint, key],
-                )?;
-            }
+            claim(
+                document,
+                &mut columns,
+                column,
+                &["log", "joint", joint, key],
+            )?;
         }
     }
     if file.robot.model != ModelKind::Cft
@@ -68,14 +66,12 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     for (name, channels) in &log.actuator {
         actuator_channels(document, name, channels)?;
         for (key, column) in [("position", &channels.position), ("volts", &channels.volts)] {
-            if let Some(column) = column {
-                claim(
-                    document,
-                    &mut columns,
-                    column,
-                    &["log", "actuator", name, key],
-                )?;
-            }
+            claim(
+                document,
+                &mut columns,
+                column,
+                &["log", "actuator", name, key],
+            )?;
         }
     }
     Ok(())
@@ -132,19 +128,21 @@ fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 /// Refuses a column that is empty or already read as something else.
 fn claim<'c>(
     document: &Document,
-    columns: &mut BTreeMap<&'c str, Vec<String>>,
-    column: &'c str,
+    columns: &mut BTreeMap<&'c str, String>,
+    column: &'c Option<ColumnName>,
     at: &[&str],
 ) -> Result<(), ConfigError> {
+    let Some(ColumnName(column)) = column else {
+        return Ok(());
+    };
     if column.trim().is_empty() {
         return Err(document.value(at, "is empty", "name a column of the log"));
     }
-    let readers = columns.entry(column).or_default();
-    if let Some(first) = readers.first() {
+    if let Some(first) = columns.get(column.as_str()) {
         let problem = format!("reads the column that `{first}` reads already");
         return Err(document.value(at, &problem, "give each channel its own column"));
     }
-    readers.push(at.join("."));
+    columns.insert(column, at.join("."));
     Ok(())
 }
 

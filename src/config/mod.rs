@@ -11,7 +11,6 @@ mod document;
 mod embedded;
 mod error;
 pub mod identified;
-pub mod log_section;
 pub mod model_file;
 mod model_text;
 pub mod robot_file;

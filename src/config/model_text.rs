@@ -8,7 +8,6 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::document::Document;
-use super::log_section::LogSection;
 use super::model_file::{Covariance, Effect, LinkBody, ModelFile, ModelProvenance, Parameter};
 use super::robot_file::ModelKind;
 use super::robot_file::{
@@ -16,6 +15,7 @@ use super::robot_file::{
     RobotSection, SensorsSection,
 };
 use super::{ConfigError, check, urdf};
+use crate::log::LogSection;
 
 /// The file as it is written: the sections of a robot file, and what was identified.
 #[derive(Debug, Deserialize, JsonSchema)]

@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::is_default;
-use super::log_section::LogSection;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
+use crate::log::LogSection;
 use crate::robot::cft::{self, Setup, Structure};
 use crate::robot::{JointKind, Robot};
 

@@ -3,36 +3,28 @@
 use thiserror::Error;
 
 /// An error in a log or in the way it was asked for.
+///
+/// Files and folders are shown as the user named them; `at` is a file with the line or the message in
+/// it, `line` counts from 1, a `remedy` says what to do.
 #[derive(Debug, Error)]
 pub enum LogError {
     /// A span that makes no sense.
     #[error(
         "`{spec}`: the span after @ cannot be used: {reason}; write FILE@0..70% or FILE@15.2..23s"
     )]
-    Span {
-        /// What was asked for.
-        spec: String,
-        /// Why not.
-        reason: &'static str,
-    },
+    Span { spec: String, reason: &'static str },
     /// The system cannot read the file.
     #[error("{file}: cannot be read: {source}; {remedy}")]
     Read {
-        /// File as the user named it.
         file: String,
-        /// What the system said.
         source: std::io::Error,
-        /// What to do.
         remedy: &'static str,
     },
     /// The file is of a kind that is not read.
     #[error("{file}: is {kind}; {remedy}")]
     Format {
-        /// File as the user named it.
         file: String,
-        /// What it is.
         kind: &'static str,
-        /// What to do.
         remedy: &'static str,
     },
     /// A part of a recording that is not what was written.
@@ -40,9 +32,7 @@ pub enum LogError {
         "{file}: {part} is damaged: its checksum is {calculated:08x}, not {saved:08x}; copy the file again from where it was recorded, or use the part before it: FILE@0..10s"
     )]
     Damaged {
-        /// File as the user named it.
         file: String,
-        /// The part.
         part: String,
         /// Checksum in the file.
         saved: u32,
@@ -53,66 +43,41 @@ pub enum LogError {
     #[error(
         "{file}: is no rosbag2 database that can be read: {reason}; check it with `ros2 bag info`"
     )]
-    Database {
-        /// File as the user named it.
-        file: String,
-        /// What SQLite says, or what it lacks.
-        reason: String,
-    },
+    Database { file: String, reason: String },
     /// A folder that is no recording.
     #[error(
         "{folder}: {problem}; name a file inside this folder, or the folder of one rosbag2 recording"
     )]
     Folder {
-        /// Folder as the user named it.
         folder: String,
-        /// Why it is none.
         problem: &'static str,
     },
     /// A recording without messages that hold the robot's channels.
     #[error("{file}: {problem}; {remedy}")]
     Topic {
-        /// File as the user named it.
         file: String,
-        /// What was looked for and not found.
         problem: String,
-        /// What there is, and the key that chooses.
         remedy: String,
     },
     /// No header line.
     #[error("{file}: is empty; record again, or check that the recorder closed the file")]
-    Empty {
-        /// File as the user named it.
-        file: String,
-    },
+    Empty { file: String },
     /// The first line holds numbers.
     #[error(
         "{file}:{line}: there is no header: the first line holds only numbers; add a line that names the columns, e.g. `t,q_q1,tau_q1`, or give them by number in [log] of the robot file, e.g. `time = 1`"
     )]
-    NoHeader {
-        /// File as the user named it.
-        file: String,
-        /// Its line.
-        line: u64,
-    },
+    NoHeader { file: String, line: u64 },
     /// A header and fewer than two rows.
     #[error(
         "{file}: holds {rows} row(s) after its header, which determine nothing; two at least, and some seconds of motion, are needed"
     )]
-    TooFewRows {
-        /// File as the user named it.
-        file: String,
-        /// Rows found.
-        rows: u64,
-    },
+    TooFewRows { file: String, rows: u64 },
     /// A span with fewer than two rows in it.
     #[error(
         "{spec}: the span holds {rows} row(s); the log lasts {duration_s} s: choose a span inside it"
     )]
     EmptySpan {
-        /// File and span.
         spec: String,
-        /// Rows found.
         rows: u64,
         /// Time from the first to the last row that was seen [s].
         duration_s: f64,
@@ -134,15 +99,10 @@ pub enum LogError {
     /// A column that the robot needs.
     #[error("{file}:{line}: column `{column}` ({purpose}) is missing; {remedy}")]
     MissingColumn {
-        /// File as the user named it.
         file: String,
-        /// Line of the header.
         line: u64,
-        /// Name that was looked for.
         column: String,
-        /// What it is needed for.
         purpose: String,
-        /// The nearest name, the key to map it with, and what the header has.
         remedy: String,
     },
     /// A column that is there more than once.
@@ -150,13 +110,9 @@ pub enum LogError {
         "{file}:{line}: column `{column}` is named {count} times; rename or delete all but one"
     )]
     RepeatedColumn {
-        /// File as the user named it.
         file: String,
-        /// Line of the header.
         line: u64,
-        /// The name.
         column: String,
-        /// How often.
         count: usize,
     },
     /// A header that states another unit than the robot file.
@@ -164,65 +120,46 @@ pub enum LogError {
         "{file}:{line}: column `{column}` is in {found}, but is to be read in {declared}; {remedy}"
     )]
     Unit {
-        /// File as the user named it.
         file: String,
-        /// Line of the header.
         line: u64,
-        /// The column.
         column: String,
         /// Unit in the header.
         found: &'static str,
         /// Unit that was declared or assumed.
         declared: &'static str,
-        /// What to do.
         remedy: String,
     },
     /// A row with more or fewer fields than the header.
     #[error("{file}:{line}: the row has {found} fields, the header names {expected}; {remedy}")]
     Fields {
-        /// File as the user named it.
         file: String,
-        /// Line.
         line: u64,
-        /// Fields in the row.
         found: usize,
-        /// Names in the header.
         expected: usize,
-        /// What to do.
         remedy: &'static str,
     },
     /// Text where a number is needed.
     #[error("{at}: column `{column}` holds `{text}`, which is no number; {remedy}")]
     NotANumber {
-        /// File and line, or file and message.
         at: String,
-        /// The column.
         column: String,
-        /// What it holds.
         text: String,
-        /// What to do.
         remedy: &'static str,
     },
     /// NaN or infinity.
     #[error("{at}: column `{column}` holds {text}; {remedy}")]
     NotFinite {
-        /// File and line, or file and message.
         at: String,
-        /// The column.
         column: String,
-        /// What it holds.
         text: String,
-        /// What to do.
         remedy: &'static str,
     },
     /// Two rows at one time.
     #[error("{at}: time stands still at {t} s, with other values than the row before; {remedy}")]
     TimeStandsStill {
-        /// File and line, or file and message.
         at: String,
         /// The time [s].
         t: f64,
-        /// What to do.
         remedy: String,
     },
     /// The same row twice.
@@ -230,7 +167,6 @@ pub enum LogError {
         "{at}: the row repeats the row before it (t = {t} s); delete duplicate rows: each sample may stand there once"
     )]
     DuplicateRow {
-        /// File and line.
         at: String,
         /// The time [s].
         t: f64,
@@ -238,13 +174,11 @@ pub enum LogError {
     /// Time runs backwards.
     #[error("{at}: time runs backwards, from {before} s to {t} s; {remedy}")]
     TimeBackwards {
-        /// File and line, or file and message.
         at: String,
         /// Time of the row before [s].
         before: f64,
         /// Time of this row [s].
         t: f64,
-        /// What to do.
         remedy: String,
     },
     /// A joint that moves though its torque channel is dead.
@@ -252,13 +186,9 @@ pub enum LogError {
         "{file}: torque column `{column}` is 0 in all {rows} rows although {joint} moves; check the channel, or name the right column in the [log] section of the robot file"
     )]
     ZeroTorque {
-        /// File as the user named it.
         file: String,
-        /// The column.
         column: String,
-        /// The joint.
         joint: String,
-        /// Rows read.
         rows: u64,
     },
     /// An actuator position that the robot cannot take.
@@ -266,7 +196,6 @@ pub enum LogError {
         "{at}: the actuator positions {positions} belong to no pose of the robot; check units, homing offsets and column order in [log.actuator]"
     )]
     NoPose {
-        /// File and line, or file and message.
         at: String,
         /// x_c1..x_c4 [m, m, rad, m].
         positions: String,
@@ -276,9 +205,7 @@ pub enum LogError {
         "{file}:{line}: a line or a quoted field is longer than {limit} bytes; this is no text log, or a quote is never closed"
     )]
     LongLine {
-        /// File as the user named it.
         file: String,
-        /// Line where it begins.
         line: u64,
         /// Bytes allowed.
         limit: usize,

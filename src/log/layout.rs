@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use super::section::LogSection;
+
 /// One channel: SI value = `factor` x logged number + `offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
@@ -29,18 +31,6 @@ impl Channel {
             key: None,
         }
     }
-}
-
-/// What parts the columns of a text log.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Delimiter {
-    /// Found from the header line.
-    #[default]
-    Auto,
-    /// One byte: comma, semicolon or tabulator.
-    Byte(u8),
-    /// One or more spaces.
-    Spaces,
 }
 
 /// What the position and torque channels of a layout are.
@@ -87,43 +77,11 @@ impl fmt::Debug for Conversion {
     }
 }
 
-/// Which time of a message is the time of its row.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Stamp {
-    /// The field that the robot file names, else the header's stamp where messages have one, else
-    /// the time of recording.
-    #[default]
-    Auto,
-    /// The stamp in the message's header.
-    Header,
-    /// When the message was recorded.
-    Log,
-    /// When the message was published.
-    Publish,
-}
-
-/// Where the channels stand in recordings of messages.
-///
-/// A channel's column is the path of a field there (`a.b[2]`, `/a/b/2`). Where a message has no such
-/// field, the channel is looked for as `position`, `velocity` or `effort` of the joint that the list
-/// `name` holds, as in `sensor_msgs/msg/JointState`.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Messages {
-    /// Topic of the positions, and of all else that it holds; found where absent.
-    pub topic: Option<String>,
-    /// Topic of the torques, where they have one of their own; found where absent.
-    pub torque_topic: Option<String>,
-    /// Which time of a message counts.
-    pub stamp: Stamp,
-    /// Names of the joints in messages, in joint order.
-    pub joints: Vec<String>,
-    /// A torque of its own topic holds until its next message; else it is interpolated.
-    pub zero_order_hold: bool,
-    /// Time by which the torques of an own topic lag behind the positions [s]; it is taken off.
-    pub torque_delay_s: f64,
-}
-
 /// Which columns are read.
+///
+/// In recordings of messages a channel's column is the path of a field (`a.b[2]`, `/a/b/2`). Where a
+/// message has no such field, the channel is looked for as `position`, `velocity` or `effort` of the
+/// joint that the list `name` holds, as in `sensor_msgs/msg/JointState`.
 #[derive(Debug, Clone)]
 pub struct Layout {
     /// Names of the joints (or actuator coordinates), for messages.
@@ -140,10 +98,11 @@ pub struct Layout {
     pub channels: Channels,
     /// Applied to every row.
     pub conversion: Option<Conversion>,
-    /// What parts the columns.
-    pub delimiter: Delimiter,
-    /// Where the channels stand in recordings of messages.
-    pub messages: Messages,
+    /// A torque holds from its row, or from its message, to the next; else it is interpolated where
+    /// messages of an own topic have it.
+    pub zero_order_hold: bool,
+    /// How the logs are written: delimiter, topics, stamps, names of joints in messages.
+    pub section: LogSection,
     /// Layout to use instead where the log has none of this layout's positions.
     pub otherwise: Option<Box<Layout>>,
 }
@@ -159,10 +118,6 @@ impl Layout {
         };
         let joints: Vec<String> = joints.iter().map(|j| j.as_ref().to_owned()).collect();
         Self {
-            messages: Messages {
-                joints: joints.clone(),
-                ..Messages::default()
-            },
             time: Channel::si("t", "s"),
             positions: each("q_"),
             torques: each("tau_"),
@@ -170,9 +125,21 @@ impl Layout {
             joints,
             channels: Channels::Joint,
             conversion: None,
-            delimiter: Delimiter::Auto,
+            zero_order_hold: false,
+            section: LogSection::default(),
             otherwise: None,
         }
+    }
+
+    /// Name of a joint in messages that list their joints by name.
+    pub(super) fn name_in_messages(&self, joint: usize) -> Option<&str> {
+        let joint = self.joints.get(joint)?;
+        let named = self
+            .section
+            .joint
+            .get(joint)
+            .and_then(|c| c.name.as_deref());
+        Some(named.unwrap_or(joint))
     }
 
     /// Whether any column is given by its number (`#1`, `#2`, ...), as a log without a header needs.

@@ -19,6 +19,7 @@ mod raw;
 mod reader;
 mod recording;
 mod rows;
+mod section;
 mod source;
 mod spec;
 mod stale;
@@ -28,15 +29,20 @@ mod time;
 pub use arrays::Arrays;
 pub use block::Block;
 pub use error::LogError;
-pub use layout::{Channel, Channels, Conversion, Delimiter, Layout, Messages, Stamp};
+pub use layout::{Channel, Channels, Conversion, Layout};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader};
 pub use reader::Reader;
 pub use recording::{CdrReader, DefinitionError, Delay, DelayEstimate, Malformed, Value};
+pub use section::{
+    ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
+    PositionUnit, Stamp, TimeUnit, TorqueIs, TorqueUnit,
+};
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;
 pub(crate) use names::{did_you_mean, list};
+pub(crate) use section::channel;
 pub(crate) use source::{remedy, shown};

@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::message::MessageHead;
 use super::path::Path;
 use super::value::Value;
-use crate::log::layout::{Channel, Layout, Stamp, column_number};
+use crate::log::layout::{Channel, Layout, column_number};
+use crate::log::section::Stamp;
 use crate::log::time::{FAR_S, Instant, Stamped};
 
 /// The fields of one robot in messages, each with the paths that it may have.
@@ -42,7 +43,7 @@ impl RobotFields {
                 if column_number(&channel.column).is_none() {
                     places.push(Path::parse(&channel.column));
                 }
-                if let Some(joint) = layout.messages.joints.get(index) {
+                if let Some(joint) = layout.name_in_messages(index) {
                     places.push(Path::named(field, "name", joint));
                 }
                 paths.push(places);

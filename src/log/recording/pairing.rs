@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 
 use super::delay::Delay;
-use crate::log::layout::Messages;
+use crate::log::layout::Layout;
 use crate::log::time::{Instant, Stamped};
 
 /// Rows that wait for their torque at most.
@@ -72,10 +72,10 @@ pub(super) struct Pairing {
 }
 
 impl Pairing {
-    pub(super) fn new(messages: &Messages) -> Self {
+    pub(super) fn new(layout: &Layout) -> Self {
         Self {
-            zero_order_hold: messages.zero_order_hold,
-            delay_s: messages.torque_delay_s,
+            zero_order_hold: layout.zero_order_hold,
+            delay_s: layout.section.torque_delay_s.unwrap_or(0.0),
             waiting: VecDeque::new(),
             torques: VecDeque::new(),
             ready: VecDeque::new(),

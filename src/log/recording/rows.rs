@@ -82,10 +82,7 @@ impl MessageRows {
         let mut names = vec![choice.topic.clone()];
         names.extend(choice.torque_topic.clone());
         let fields = RobotFields::new(&layout);
-        let pairing = choice
-            .torque_topic
-            .is_some()
-            .then(|| Pairing::new(&layout.messages));
+        let pairing = choice.torque_topic.is_some().then(|| Pairing::new(&layout));
         let velocities = match choice.velocities {
             true => &layout.velocities[..],
             false => &[],

@@ -153,7 +153,7 @@ fn survey(
             complete = pick(&found, layout, fields).is_ok();
         }
         if complete {
-            let named = layout.messages.topic.is_some();
+            let named = layout.section.topic.is_some();
             further += 1;
             if further > if named { TRIES } else { FURTHER } {
                 break;
@@ -193,7 +193,7 @@ fn pick(
     layout: &Layout,
     fields: &RobotFields,
 ) -> Result<Choice, (String, String)> {
-    let asked = &layout.messages;
+    let asked = &layout.section;
     let one = |holds: &dyn Fn(&Candidate) -> bool, key: &str, what: &str| {
         let mut holding = found.iter().filter(|c| holds(c));
         let first = holding.next();
@@ -281,7 +281,7 @@ fn missing(
     fields: &RobotFields,
     positions: Option<&Candidate>,
 ) -> (String, String) {
-    let asked = &layout.messages;
+    let asked = &layout.section;
     let wanted = match positions {
         Some(_) => &asked.torque_topic,
         None => &asked.topic,
@@ -330,7 +330,7 @@ fn missing(
     }
     let lacking = range.clone().find(|index| best.missing[*index]);
     let index = lacking.map_or(0, |index| index - range.start);
-    let joint = asked.joints.get(index).map_or("", String::as_str);
+    let joint = layout.name_in_messages(index).unwrap_or_default();
     let column = channels.get(index).map_or("", |c| c.column.as_str());
     let near = nearest(joint, best.names.iter().map(String::as_str));
     let near = near.map(|name| format!("the nearest is `{}`; ", escape(name)));

@@ -77,7 +77,7 @@ impl TextFile {
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
-        let found = head::look_at(path, begin, layout.delimiter, layout.by_number())?;
+        let found = head::look_at(path, begin, layout.section.delimiter, layout.by_number())?;
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::number;
 use crate::log::content::HEAD;
-use crate::log::layout::Delimiter;
+use crate::log::section::Delimiter;
 use crate::log::time::Instant;
 use crate::log::{LogError, source};
 
@@ -123,8 +123,10 @@ fn is_datum(field: &str) -> bool {
 /// The delimiter byte, and whether runs of it count as one.
 fn delimiter_of(line: &str, wanted: Delimiter) -> (u8, bool) {
     match wanted {
-        Delimiter::Byte(byte) => (byte, false),
-        Delimiter::Spaces => (b' ', true),
+        Delimiter::Comma => (b',', false),
+        Delimiter::Semicolon => (b';', false),
+        Delimiter::Tab => (b'\t', false),
+        Delimiter::Space => (b' ', true),
         Delimiter::Auto => {
             let count = |sign: u8| {
                 let mut quoted = false;

@@ -1,13 +1,14 @@
-//! The `[log]` section: how the logs of a machine are written.
+//! The `[log]` section of a robot file: how the logs of a machine are written.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserializer, Error, Visitor};
 use serde::{Deserialize, Serialize};
 
-use super::document::is_default;
+use super::layout::Channel;
 
 /// Unit of a logged position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -112,10 +113,22 @@ pub enum TimeUnit {
     Nanosecond,
 }
 
+impl TimeUnit {
+    /// As it is written in files, and seconds in one of it.
+    const fn in_seconds(self) -> (&'static str, f64) {
+        match self {
+            Self::Second => ("s", 1.0),
+            Self::Millisecond => ("ms", 1e-3),
+            Self::Microsecond => ("us", 1e-6),
+            Self::Nanosecond => ("ns", 1e-9),
+        }
+    }
+}
+
 /// What parts the columns of a text log.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum DelimiterKind {
+pub enum Delimiter {
     /// Found from the header line.
     #[default]
     Auto,
@@ -132,7 +145,7 @@ pub enum DelimiterKind {
 /// Which channels of a log are read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum ChannelsKind {
+pub enum ChannelChoice {
     /// Joint channels where the log has them, else actuator channels.
     #[default]
     Auto,
@@ -145,7 +158,7 @@ pub enum ChannelsKind {
 /// Which time of a message is the time of its row.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum StampKind {
+pub enum Stamp {
     /// The field that `time` names, else the header's stamp, else the time of recording.
     #[default]
     Auto,
@@ -166,13 +179,8 @@ pub struct JointChannels {
     pub name: Option<String>,
     /// Column of the position, by name or by number from 1, or field of a message; `q_NAME` where
     /// absent.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub position: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<ColumnName>,
     /// Unit of the position column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_unit: Option<PositionUnit>,
@@ -186,29 +194,15 @@ pub struct JointChannels {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_offset: Option<f64>,
     /// Column of the velocity; `dq_NAME` where absent, and then optional.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub velocity: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<ColumnName>,
     /// Column of the position that the controller was asked for, in the unit, sign and scale of the
     /// position; `lsq --estimator iv` simulates along it where every joint has one.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    pub reference: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ColumnName>,
     /// Column of the torque; `tau_NAME` where absent.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub torque: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub torque: Option<ColumnName>,
     /// Unit of the torque column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_unit: Option<TorqueUnit>,
@@ -228,13 +222,8 @@ pub struct JointChannels {
 #[serde(deny_unknown_fields)]
 pub struct ActuatorChannels {
     /// Column of the position; `x_c1`.. where absent.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub position: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<ColumnName>,
     /// Unit of the position: SI where absent, or `counts` (Table 5).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_unit: Option<PositionUnit>,
@@ -245,13 +234,8 @@ pub struct ActuatorChannels {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home: Option<f64>,
     /// Column of the volts; `u_1`.. where absent.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub volts: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volts: Option<ColumnName>,
     /// 1 or -1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volts_sign: Option<f64>,
@@ -262,19 +246,14 @@ pub struct ActuatorChannels {
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
     /// Column of the time, or field of a message; `t` where absent.
-    #[serde(
-        default,
-        deserialize_with = "column",
-        skip_serializing_if = "Option::is_none"
-    )]
-    #[schemars(with = "Option<NameOrNumber>")]
-    pub time: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<ColumnName>,
     /// Unit of the time column.
     #[serde(default, skip_serializing_if = "is_default")]
     pub time_unit: TimeUnit,
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub delimiter: DelimiterKind,
+    pub delimiter: Delimiter,
     /// Topic of a recording that holds the positions; found where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
@@ -283,13 +262,13 @@ pub struct LogSection {
     pub torque_topic: Option<String>,
     /// Which time of a message counts.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub stamp: StampKind,
+    pub stamp: Stamp,
     /// Time by which torques of a topic of their own lag behind the positions [s]; it is taken off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_delay_s: Option<f64>,
     /// Joint or actuator channels.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub channels: ChannelsKind,
+    pub channels: ChannelChoice,
     /// What the torque channel is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_is: Option<TorqueIs>,
@@ -308,37 +287,80 @@ pub struct LogSection {
     pub actuator: BTreeMap<String, ActuatorChannels>,
 }
 
-/// What [`column`] reads, for the schema.
-#[derive(JsonSchema)]
-#[serde(untagged)]
-#[allow(dead_code)]
-enum NameOrNumber {
-    Name(String),
-    Number(u32),
+impl LogSection {
+    /// Which column is the time, and how it becomes seconds.
+    pub(crate) fn time_channel(&self) -> Channel {
+        let (unit, factor) = self.time_unit.in_seconds();
+        let time = || "[log] time".to_owned();
+        channel(&self.time, "t".to_owned(), unit, [factor, 0.0], time)
+    }
+}
+
+/// A channel by the column that the file names under `key`, else by the name of the contract; SI value =
+/// `gain[0]` x logged number + `gain[1]`.
+pub(crate) fn channel(
+    named: &Option<ColumnName>,
+    contract: String,
+    unit: &str,
+    [factor, offset]: [f64; 2],
+    key: impl Fn() -> String,
+) -> Channel {
+    Channel {
+        column: named.as_ref().map_or(contract, |name| name.0.clone()),
+        unit: unit.to_owned(),
+        factor,
+        offset,
+        key: named.as_ref().map(|_| key()),
+    }
 }
 
 /// A column by its name, or by its number from 1: `3` is kept as `#3`.
-fn column<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
-    struct Column;
-    impl Visitor<'_> for Column {
-        type Value = String;
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ColumnName(pub String);
 
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("the name of a column, or its number from 1")
-        }
-
-        fn visit_str<E: Error>(self, name: &str) -> Result<String, E> {
-            Ok(name.to_owned())
-        }
-
-        fn visit_i64<E: Error>(self, number: i64) -> Result<String, E> {
-            if number < 1 {
-                return Err(E::custom(format!(
-                    "columns are numbered from 1, not {number}"
-                )));
-            }
-            Ok(format!("#{number}"))
-        }
+impl<'de> Deserialize<'de> for ColumnName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NameOrNumber)
     }
-    deserializer.deserialize_any(Column).map(Some)
+}
+
+impl JsonSchema for ColumnName {
+    fn schema_name() -> Cow<'static, str> {
+        "NameOrNumber".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"anyOf": [
+            {"type": "string"},
+            {"type": "integer", "format": "uint32", "minimum": 0},
+        ]})
+    }
+}
+
+struct NameOrNumber;
+
+impl Visitor<'_> for NameOrNumber {
+    type Value = ColumnName;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a column, or its number from 1")
+    }
+
+    fn visit_str<E: Error>(self, name: &str) -> Result<ColumnName, E> {
+        Ok(ColumnName(name.to_owned()))
+    }
+
+    fn visit_i64<E: Error>(self, number: i64) -> Result<ColumnName, E> {
+        if number < 1 {
+            return Err(E::custom(format!(
+                "columns are numbered from 1, not {number}"
+            )));
+        }
+        Ok(ColumnName(format!("#{number}")))
+    }
+}
+
+/// What is as where it is not written, is not written.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
