@@ -2,14 +2,16 @@
 
 use super::CliError;
 use crate::identify::LoggedRobot;
-use crate::inspect::{Channel, Fault, Kind, Plan, Planned, Role, Severity, is_time};
+use crate::inspect::{
+    Channel, ChannelColumn, ColumnPlan, Fault, FaultKind, Role, Severity, is_time,
+};
 use crate::log::{self, Channels, Layout, RawReader};
 
 /// Channels by their names alone.
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn guessed(log: &RawReader) -> Result<(Plan, Option<Fault>), CliError> {
+pub(super) fn guessed(log: &RawReader) -> Result<(ColumnPlan, Option<Fault>), CliError> {
     let (time, seconds) = time_column(log)?;
     let names = log.names();
     let mut channels = Vec::new();
@@ -18,7 +20,7 @@ pub(super) fn guessed(log: &RawReader) -> Result<(Plan, Option<Fault>), CliError
             channels.push(other(log, column));
         }
     }
-    let plan = Plan {
+    let plan = ColumnPlan {
         time: Some((time, seconds)),
         channels,
     };
@@ -45,12 +47,12 @@ pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
 /// reading the log.
-pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (Plan, Option<Fault>) {
+pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Option<Fault>) {
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
     let time = time.or_else(|| names.iter().position(|name| is_time(name)));
-    let mut known: Vec<Option<Planned>> = vec![None; names.len()];
+    let mut known: Vec<Option<ChannelColumn>> = vec![None; names.len()];
     place(log, machine, layout, &mut known);
     if let Some(other) = &layout.otherwise {
         // A log may hold both sides of the gears.
@@ -61,7 +63,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (Plan, Option<
         .filter(|(column, _)| Some(*column) != time)
         .map(|(column, planned)| planned.unwrap_or_else(|| other(log, column)))
         .collect();
-    let plan = Plan {
+    let plan = ColumnPlan {
         time: time.map(|time| (time, layout.time.factor)),
         channels,
     };
@@ -69,7 +71,12 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (Plan, Option<
 }
 
 /// Finds the channels of a layout among the columns that are not known yet.
-fn place(log: &RawReader, machine: &LoggedRobot, layout: &Layout, known: &mut [Option<Planned>]) {
+fn place(
+    log: &RawReader,
+    machine: &LoggedRobot,
+    layout: &Layout,
+    known: &mut [Option<ChannelColumn>],
+) {
     let raw = layout.channels == Channels::Actuator;
     let kinds = [
         (&layout.positions, Role::Position),
@@ -96,7 +103,7 @@ fn place(log: &RawReader, machine: &LoggedRobot, layout: &Layout, known: &mut [O
             let name = &log.names()[column];
             let mut seen = Channel::new(name, role, Some(joint), Some(&unit));
             (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
-            known[column] = Some(Planned {
+            known[column] = Some(ChannelColumn {
                 column,
                 factor: channel.factor,
                 offset: channel.offset,
@@ -107,10 +114,10 @@ fn place(log: &RawReader, machine: &LoggedRobot, layout: &Layout, known: &mut [O
 }
 
 /// A column that no robot file names.
-fn other(log: &RawReader, column: usize) -> Planned {
+fn other(log: &RawReader, column: usize) -> ChannelColumn {
     let mut channel = Channel::guessed(&log.names()[column]);
     channel.unit = log.unit(column).map(str::to_owned);
-    Planned {
+    ChannelColumn {
         column,
         factor: 1.0,
         offset: 0.0,
@@ -172,15 +179,11 @@ fn refusal(text: String) -> Fault {
     let (effect, remedy) = text
         .rsplit_once("; ")
         .unwrap_or((&text, "correct the file"));
-    Fault {
-        kind: Kind::MissingChannel,
-        severity: Severity::Error,
-        channel: None,
-        from_s: 0.0,
-        to_s: 0.0,
-        rows: 0,
-        effect: effect.to_owned(),
-        remedy: remedy.to_owned(),
-        cut: false,
-    }
+    Fault::whole(
+        Severity::Error,
+        FaultKind::MissingChannel,
+        0.0,
+        effect.to_owned(),
+        remedy,
+    )
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{CliError, Context, Exit, Outcome, columns};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot};
-use crate::inspect::{Comparison, Fault, Findings, Inspection, Kind, look};
+use crate::inspect::{Comparison, Fault, FaultKind, Findings, Inspection, look};
 use crate::log::{LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::report::json::Document;
@@ -92,7 +92,9 @@ fn inspect(
             Ok(None) => {}
             // A delay by the model is surer than one without it.
             Ok(Some(found)) => {
-                findings.faults.retain(|fault| fault.kind != Kind::Delay);
+                findings
+                    .faults
+                    .retain(|fault| fault.kind != FaultKind::Delay);
                 findings.faults.push(found);
                 findings.sort();
             }

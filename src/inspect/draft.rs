@@ -1,45 +1,55 @@
-//! Faults as they are found, and how their texts name rows and times.
+//! Faults as they are told: of a whole channel, or of stretches of it.
 
-use super::fault::{Episodes, Fault, Kind, Severity};
+use super::fault::{Episodes, Fault, FaultKind, Severity};
+use super::judge::Track;
 
 /// Faults under construction, and what is to be cut out.
 pub(super) struct Draft {
     pub(super) faults: Vec<Fault>,
     pub(super) cuts: Vec<[f64; 2]>,
-    /// First time of the log, and how long it is [s].
     first: f64,
-    duration: f64,
+    last: f64,
 }
 
 impl Draft {
-    pub(super) fn new(first: f64, duration: f64) -> Self {
+    /// No faults yet, of a log from `first` to `last` [s].
+    pub(super) fn new(first: f64, last: f64) -> Self {
         Self {
             faults: Vec::new(),
             cuts: Vec::new(),
             first,
-            duration,
+            last,
         }
     }
 
-    /// Adds a fault of the whole log.
+    /// Adds a fault of a channel all through the log.
     pub(super) fn whole(
         &mut self,
-        kind: Kind,
         severity: Severity,
-        channel: Option<&str>,
-        rows: u64,
-        (effect, remedy): (String, &str),
+        kind: FaultKind,
+        track: &Track,
+        effect: String,
+        remedy: &str,
     ) {
+        self.of_log(severity, kind, track.rows, effect, remedy);
+        if let Some(fault) = self.faults.last_mut() {
+            fault.channel = Some(track.channel.name.clone());
+        }
+    }
+
+    /// Adds a fault of all channels all through the log.
+    pub(super) fn of_log(
+        &mut self,
+        severity: Severity,
+        kind: FaultKind,
+        rows: u64,
+        effect: String,
+        remedy: &str,
+    ) {
+        let duration_s = self.last - self.first;
         self.faults.push(Fault {
-            kind,
-            severity,
-            channel: channel.map(str::to_owned),
-            from_s: 0.0,
-            to_s: self.duration,
             rows,
-            effect,
-            remedy: remedy.to_owned(),
-            cut: false,
+            ..Fault::whole(severity, kind, duration_s, effect, remedy)
         });
     }
 
@@ -47,29 +57,26 @@ impl Draft {
     /// given the rows and the number of stretches.
     pub(super) fn stretches(
         &mut self,
-        kind: Kind,
+        kind: FaultKind,
         severity: Severity,
         channel: Option<&str>,
         episodes: &Episodes,
-        (effect, remedy): (&dyn Fn(u64, usize) -> String, &str),
+        effect: &dyn Fn(u64, usize) -> String,
+        remedy: &str,
     ) {
         for (episode, count) in episodes.told() {
+            let effect = effect(episode.rows, count);
             self.faults.push(Fault {
-                kind,
-                severity,
                 channel: channel.map(str::to_owned),
                 from_s: episode.from - self.first,
-                to_s: episode.to - self.first,
                 rows: episode.rows,
-                effect: effect(episode.rows, count),
-                remedy: remedy.to_owned(),
-                cut: false,
+                ..Fault::whole(severity, kind, episode.to - self.first, effect, remedy)
             });
         }
     }
 
     /// Leaves the rows of some stretches out, which were told as this fault of this channel.
-    pub(super) fn cut(&mut self, kind: Kind, channel: &str, episodes: &Episodes) {
+    pub(super) fn cut(&mut self, kind: FaultKind, channel: &str, episodes: &Episodes) {
         for fault in &mut self.faults {
             fault.cut |= fault.kind == kind && fault.channel.as_deref() == Some(channel);
         }

@@ -29,7 +29,7 @@ impl Severity {
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum FaultKind {
     /// The file breaks off, or the reader could not use all of it.
     IncompleteFile,
     /// Rows with more or fewer fields than the header.
@@ -72,7 +72,7 @@ pub enum Kind {
     Delay,
 }
 
-impl Kind {
+impl FaultKind {
     /// As it is printed and stands in JSON.
     pub fn word(self) -> &'static str {
         match self {
@@ -104,7 +104,7 @@ impl Kind {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Fault {
     /// What is wrong.
-    pub kind: Kind,
+    pub kind: FaultKind,
     /// How much it matters.
     pub severity: Severity,
     /// The channel, by the name that the log gives it; absent for what concerns all of them.
@@ -125,6 +125,27 @@ pub struct Fault {
 }
 
 impl Fault {
+    /// A fault of a log from its first row to `to_s` [s], of no rows in particular.
+    pub fn whole(
+        severity: Severity,
+        kind: FaultKind,
+        to_s: f64,
+        effect: String,
+        remedy: &str,
+    ) -> Self {
+        Self {
+            kind,
+            severity,
+            channel: None,
+            from_s: 0.0,
+            to_s,
+            rows: 0,
+            effect,
+            remedy: remedy.to_owned(),
+            cut: false,
+        }
+    }
+
     /// Where it is, for a person: `5.000..5.399`, or `5.000` for a single row.
     pub fn span(&self) -> String {
         match self.to_s > self.from_s {
@@ -224,10 +245,10 @@ mod tests {
     #[test]
     fn a_kind_is_printed_as_it_stands_in_json() {
         for kind in [
-            Kind::Nan,
-            Kind::WrongSignOrOrder,
-            Kind::RepeatedTime,
-            Kind::Filter,
+            FaultKind::Nan,
+            FaultKind::WrongSignOrOrder,
+            FaultKind::RepeatedTime,
+            FaultKind::Filter,
         ] {
             let json = serde_json::to_value(kind).unwrap();
             assert_eq!(json, kind.word());

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::channel::Role;
-use super::excitation::JointMotion;
+use super::detectors::excitation::JointMotion;
 use super::fault::{Fault, Severity};
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.

@@ -1,14 +1,14 @@
 //! Runs every detector over the rows of a log, and gathers what they know at the end.
 
 use super::channel::{Channel, Role};
-use super::clock::{self, Clock, Step};
-use super::copies::Copies;
-use super::excitation::Excitation;
+use super::detectors::clock::{RowStep, SampleClock, typical_step};
+use super::detectors::copies::Copies;
+use super::detectors::excitation::Excitation;
+use super::detectors::flat::Flat;
+use super::detectors::repeats::Repeats;
+use super::detectors::spike::Spikes;
+use super::detectors::windows::Windows;
 use super::fault::Episodes;
-use super::flat::Flat;
-use super::repeats::Repeats;
-use super::spike::Spikes;
-use super::windows::Windows;
 
 /// A joint moves where it travels further than this share of what the farthest joint does.
 const TRAVELS: f64 = 0.02;
@@ -91,7 +91,7 @@ impl Track {
     fn take(
         &mut self,
         times: &[f64],
-        steps: &[Step],
+        steps: &[RowStep],
         values: &[f64],
         positions: Option<&[f64]>,
         join: f64,
@@ -104,10 +104,10 @@ impl Track {
                 continue;
             }
             self.number(t, value, join);
-            if *step == Step::Unusable || !self.shaped {
+            if *step == RowStep::Unusable || !self.shaped {
                 continue;
             }
-            if *step == Step::Apart {
+            if *step == RowStep::Apart {
                 self.part();
             }
             let position = positions.map_or(f64::NAN, |positions| positions[k]);
@@ -143,7 +143,7 @@ impl Track {
 #[derive(Debug, Clone)]
 pub struct Judge {
     pub(super) depth: Depth,
-    pub(super) clock: Clock,
+    pub(super) clock: SampleClock,
     pub(super) tracks: Vec<Track>,
     pub(super) repeats: Repeats,
     pub(super) copies: Copies,
@@ -152,7 +152,7 @@ pub struct Judge {
     /// Channels that hold positions.
     pub(super) positions: Vec<usize>,
     pub(super) windows: Windows,
-    steps: Vec<Step>,
+    steps: Vec<RowStep>,
     /// Channels with torques and velocities.
     others: Vec<usize>,
     row: [Vec<f64>; 2],
@@ -201,7 +201,7 @@ impl Judge {
         others.extend(of_role(Role::Velocity));
         Self {
             depth,
-            clock: Clock::default(),
+            clock: SampleClock::default(),
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
             compared,
@@ -220,7 +220,7 @@ impl Judge {
             return;
         }
         if self.clock.rows == 0 && self.depth == Depth::Whole {
-            let dt = clock::typical_step(times);
+            let dt = typical_step(times);
             for &index in &self.positions {
                 self.tracks[index].excitation = Some(Excitation::new(dt));
             }
@@ -235,12 +235,12 @@ impl Judge {
         }
         let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
         for (k, step) in steps.iter().enumerate() {
-            if *step != Step::Unusable {
+            if *step != RowStep::Unusable {
                 self.copies.take(&compared, k);
             }
         }
         self.watch_repeats(times, &steps, columns);
-        let whole = steps.iter().skip(1).all(|step| *step == Step::Next);
+        let whole = steps.iter().skip(1).all(|step| *step == RowStep::Next);
         let finite = || {
             columns
                 .iter()
@@ -253,13 +253,13 @@ impl Judge {
         self.steps = steps;
     }
 
-    fn watch_repeats(&mut self, times: &[f64], steps: &[Step], columns: &[&[f64]]) {
+    fn watch_repeats(&mut self, times: &[f64], steps: &[RowStep], columns: &[&[f64]]) {
         // At the gate the reader has left them out already.
         if self.positions.is_empty() || self.depth == Depth::Gate {
             return;
         }
         for (k, (&t, step)) in times.iter().zip(steps).enumerate() {
-            if *step == Step::Unusable {
+            if *step == RowStep::Unusable {
                 continue;
             }
             let [positions, others] = &mut self.row;
@@ -270,7 +270,7 @@ impl Judge {
             };
             gather(positions, &self.positions);
             gather(others, &self.others);
-            if *step == Step::Apart || positions.iter().any(|x| !x.is_finite()) {
+            if *step == RowStep::Apart || positions.iter().any(|x| !x.is_finite()) {
                 self.repeats.part();
             }
             self.repeats.take(t, positions, others);

@@ -1,11 +1,12 @@
 //! Delay between positions and torques, from the motion itself.
 
 use super::channel::Role;
-use super::clock::ClockFacts;
+use super::detectors::clock::ClockFacts;
+use super::detectors::windows::Window;
 use super::draft::{Draft, seconds};
-use super::fault::{Kind, Severity};
+use super::fault::FaultKind;
+use super::fault::Severity::Warning;
 use super::judge::Judge;
-use super::windows::Window;
 use crate::log::Delay;
 
 /// Stretches of the log that are looked at.
@@ -59,13 +60,7 @@ pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
         seconds(median.abs()),
         seconds(2.0 * std.max(0.1 * clock.dt))
     );
-    draft.whole(
-        Kind::Delay,
-        Severity::Warning,
-        None,
-        judge.clock.rows,
-        (effect, REMEDY),
-    );
+    draft.of_log(Warning, FaultKind::Delay, judge.clock.rows, effect, REMEDY);
 }
 
 /// The delay in one stretch [s].

@@ -1,14 +1,14 @@
 //! Shows a log, as it stands in its files, to the judge.
 
 use super::channel::Channel;
-use super::fault::{Fault, Kind, Severity};
+use super::fault::{Fault, FaultKind, Severity};
 use super::findings::Findings;
 use super::judge::{Depth, Judge};
 use crate::log::{LogError, RawBlock, RawReader};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Planned {
+pub struct ChannelColumn {
     /// Place of the column.
     pub column: usize,
     /// Unit of the channel per unit of the column, sign included.
@@ -21,11 +21,11 @@ pub struct Planned {
 
 /// Which columns of a table are what.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct ColumnPlan {
     /// Place of the time, and seconds per unit of it; absent where rows carry their own.
     pub time: Option<(usize, f64)>,
     /// The other columns.
-    pub channels: Vec<Planned>,
+    pub channels: Vec<ChannelColumn>,
 }
 
 /// Reads a table to its end and says what there is to say; `None` where `stop` asks for it.
@@ -34,7 +34,7 @@ pub struct Plan {
 /// A file that can no longer be read.
 pub fn look(
     log: &mut RawReader,
-    plan: &Plan,
+    plan: &ColumnPlan,
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Findings>, LogError> {
     if let Some((column, seconds)) = plan.time {
@@ -62,53 +62,45 @@ pub fn look(
         judge.take(&block.t, &columns);
     }
     let mut findings = judge.finish();
-    if log.malformed() > 0 {
-        let rows = log.malformed();
-        findings.faults.insert(
-            0,
-            Fault {
-                kind: Kind::MalformedRows,
-                severity: Severity::Error,
-                channel: None,
-                from_s: 0.0,
-                to_s: findings.duration_s,
-                rows,
-                effect: format!("{rows} rows have more or fewer fields than the header names: a fit refuses the log"),
-                remedy: "complete or delete these rows; write decimal points, not commas".to_owned(),
-                cut: false,
-            },
+    let rows = log.malformed();
+    if rows > 0 {
+        let effect = format!(
+            "{rows} rows have more or fewer fields than the header names: a fit refuses the log"
         );
+        let remedy = "complete or delete these rows; write decimal points, not commas";
+        let to_s = findings.duration_s;
+        let fault = Fault::whole(
+            Severity::Error,
+            FaultKind::MalformedRows,
+            to_s,
+            effect,
+            remedy,
+        );
+        findings.faults.insert(0, Fault { rows, ..fault });
     }
-    if findings.rows < 2 {
-        let rows = findings.rows;
-        findings.faults.insert(
-            0,
-            Fault {
-                kind: Kind::IncompleteFile,
-                severity: Severity::Error,
-                channel: None,
-                from_s: 0.0,
-                to_s: 0.0,
-                rows,
-                effect: format!("{rows} row(s): nothing can be said, and a fit refuses the log"),
-                remedy: "record again, or check the span".to_owned(),
-                cut: false,
-            },
+    let rows = findings.rows;
+    if rows < 2 {
+        let effect = format!("{rows} row(s): nothing can be said, and a fit refuses the log");
+        let remedy = "record again, or check the span";
+        let fault = Fault::whole(
+            Severity::Error,
+            FaultKind::IncompleteFile,
+            0.0,
+            effect,
+            remedy,
         );
+        findings.faults.insert(0, Fault { rows, ..fault });
     }
     for effect in log.breaks() {
+        let remedy = "copy it again from where it was recorded; a recorder that is killed loses its last chunk";
+        let at_s = findings.duration_s;
+        let kind = FaultKind::IncompleteFile;
+        let fault = Fault::whole(Severity::Warning, kind, at_s, effect, remedy);
         findings.faults.insert(
             0,
             Fault {
-                kind: Kind::IncompleteFile,
-                severity: Severity::Warning,
-                channel: None,
-                from_s: findings.duration_s,
-                to_s: findings.duration_s,
-                rows: 0,
-                effect,
-                remedy: "copy it again from where it was recorded; a recorder that is killed loses its last chunk".to_owned(),
-                cut: false,
+                from_s: at_s,
+                ..fault
             },
         );
     }

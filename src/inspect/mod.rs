@@ -11,33 +11,24 @@
 //! measure. Nothing is assumed about rate, units or noise.
 
 mod channel;
-mod clock;
-mod copies;
+mod detectors;
 mod draft;
-mod excitation;
 mod fault;
 mod findings;
-mod flat;
 mod gate;
-mod grain;
-mod histogram;
 mod judge;
 mod lag;
 mod look;
 mod order;
-mod repeats;
 mod shape;
-mod spike;
 mod together;
-mod velocity;
 mod verdicts;
-mod windows;
 
 pub use channel::{Channel, Role, is_time};
-pub use excitation::JointMotion;
-pub use fault::{Fault, Kind, Severity};
+pub use detectors::excitation::JointMotion;
+pub use fault::{Fault, FaultKind, Severity};
 pub use findings::{ChannelFacts, Findings, Gap, Inspection};
 pub use gate::{Cutter, Gate};
 pub use judge::{Depth, Judge};
-pub use look::{Plan, Planned, look};
+pub use look::{ChannelColumn, ColumnPlan, look};
 pub use order::{Change, Comparison};

@@ -5,7 +5,7 @@
 //! and in both. Where one such change explains what was not explained without it, it is told.
 
 use super::draft::seconds;
-use super::fault::{Fault, Kind, Severity};
+use super::fault::{Fault, FaultKind, Severity};
 use super::lag;
 use crate::log::escape;
 
@@ -170,20 +170,13 @@ impl Comparison {
             return None;
         }
         let side = if delay > 0.0 { "behind" } else { "ahead of" };
-        Some(Fault {
-            kind: Kind::Delay,
-            severity: Severity::Warning,
-            channel: None,
-            from_s: 0.0,
-            to_s: duration_s,
-            rows,
-            effect: format!(
-                "torques are {} {side} the positions, by the model: inertia and viscous friction are mixed up, the more the faster the motion",
-                seconds(delay.abs())
-            ),
-            remedy: lag::REMEDY.to_owned(),
-            cut: false,
-        })
+        let effect = format!(
+            "torques are {} {side} the positions, by the model: inertia and viscous friction are mixed up, the more the faster the motion",
+            seconds(delay.abs())
+        );
+        let kind = FaultKind::Delay;
+        let fault = Fault::whole(Severity::Warning, kind, duration_s, effect, lag::REMEDY);
+        Some(Fault { rows, ..fault })
     }
 
     /// Share of the torque's power that is left, the mean of the joints, under change `index` of the
@@ -248,21 +241,14 @@ impl Comparison {
             ),
         };
         let share = |left: f64| 100.0 * left.max(0.0).sqrt();
-        Some(Fault {
-            kind: Kind::WrongSignOrOrder,
-            severity: Severity::Error,
-            channel: None,
-            from_s: 0.0,
-            to_s: duration_s,
-            rows,
-            effect: format!(
-                "{problem}: as logged the model is off by {:.0} % of the torque, with that put right by {:.0} %; a fit gives parameters of no robot",
-                share(as_logged),
-                share(left)
-            ),
-            remedy: remedy.to_owned(),
-            cut: false,
-        })
+        let effect = format!(
+            "{problem}: as logged the model is off by {:.0} % of the torque, with that put right by {:.0} %; a fit gives parameters of no robot",
+            share(as_logged),
+            share(left)
+        );
+        let kind = FaultKind::WrongSignOrOrder;
+        let fault = Fault::whole(Severity::Error, kind, duration_s, effect, remedy);
+        Some(Fault { rows, ..fault })
     }
 }
 

@@ -2,11 +2,12 @@
 //! coarse.
 
 use super::channel::Role;
-use super::clock::ClockFacts;
+use super::detectors::clock::ClockFacts;
+use super::detectors::flat::{FlatRun, Levels};
+use super::detectors::grain;
 use super::draft::{Draft, rows_text};
-use super::fault::{Episodes, Kind, Severity};
-use super::flat::{Levels, Run};
-use super::grain;
+use super::fault::Severity::{Error, Info, Warning};
+use super::fault::{Episodes, FaultKind};
 use super::judge::{Depth, Judge, Track};
 
 /// Rows of one value from which a channel may be stuck.
@@ -53,7 +54,6 @@ pub(super) fn faults(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &m
 
 /// A channel that never changes.
 fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
-    let name = Some(track.channel.name.as_str());
     let value = track.low;
     let joint_moves = track
         .position
@@ -69,22 +69,16 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
     match track.channel.role {
         Role::Torque | Role::Velocity if joint_moves => {
             let severity = if track.channel.role == Role::Torque {
-                Severity::Error
+                Error
             } else {
-                Severity::Warning
+                Warning
             };
             let effect = format!(
                 "{value} in all {} rows although the joint moves: nothing can be fitted to it",
                 track.rows
             );
             let remedy = "check the sensor and the recorder, or name the right column in the [log] section of the robot file";
-            draft.whole(
-                Kind::StuckChannel,
-                severity,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(severity, FaultKind::StuckChannel, track, effect, remedy);
         }
         Role::Position if all_rest => {
             let effect = format!(
@@ -92,13 +86,7 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
                 track.rows
             );
             let remedy = "check the encoder and the recorder; log a motion";
-            draft.whole(
-                Kind::StuckChannel,
-                Severity::Warning,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(Warning, FaultKind::StuckChannel, track, effect, remedy);
         }
         Role::Position => {
             let effect = format!(
@@ -106,13 +94,7 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
                 track.rows
             );
             let remedy = "nothing, if this joint is not to move in this log";
-            draft.whole(
-                Kind::StuckChannel,
-                Severity::Info,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(Info, FaultKind::StuckChannel, track, effect, remedy);
         }
         _ => {}
     }
@@ -127,8 +109,8 @@ struct Flatness<'a> {
     usual: f64,
     /// A joint has moved where it travelled further.
     moved: f64,
-    tops: Vec<Run>,
-    stuck: Vec<Run>,
+    tops: Vec<FlatRun>,
+    stuck: Vec<FlatRun>,
 }
 
 impl<'a> Flatness<'a> {
@@ -151,7 +133,7 @@ impl<'a> Flatness<'a> {
         }
     }
 
-    fn is_abrupt(&self, run: &Run) -> bool {
+    fn is_abrupt(&self, run: &FlatRun) -> bool {
         run.entry.abs() > self.abrupt || run.exit.abs() > self.abrupt
     }
 
@@ -164,7 +146,7 @@ impl<'a> Flatness<'a> {
             if !levels.piles_up() {
                 continue;
             }
-            let runs: Vec<Run> = self
+            let runs: Vec<FlatRun> = self
                 .track
                 .flat
                 .runs()
@@ -212,7 +194,7 @@ impl<'a> Flatness<'a> {
         } else {
             "a fit does not read this channel"
         };
-        let gathered = |runs: &[Run]| {
+        let gathered = |runs: &[FlatRun]| {
             let mut episodes = Episodes::default();
             for run in runs {
                 // Noise about the limit breaks a flat top into many.
@@ -222,9 +204,9 @@ impl<'a> Flatness<'a> {
         };
         let tops = gathered(&self.tops);
         let kind = if role == Role::Torque {
-            Kind::Saturation
+            FaultKind::Saturation
         } else {
-            Kind::Clipping
+            FaultKind::Clipping
         };
         // What an amplifier gave at its limit is what acted.
         let applied = track.channel.saturates;
@@ -249,15 +231,11 @@ impl<'a> Flatness<'a> {
             true => "choose a slower motion where the robot should follow its reference",
             false => "choose a slower motion or a wider measuring range",
         };
-        let severity = if used {
-            Severity::Warning
-        } else {
-            Severity::Info
-        };
-        let of_tops = if applied { Severity::Info } else { severity };
+        let severity = if used { Warning } else { Info };
+        let of_tops = if applied { Info } else { severity };
         // Told as reaching the limit of the robot file where that is known.
         if track.at_limit.is_empty() {
-            draft.stretches(kind, of_tops, name, &tops, (&effect, remedy));
+            draft.stretches(kind, of_tops, name, &tops, &effect, remedy);
         }
         let stuck = gathered(&self.stuck);
         let effect = |rows: u64, times: usize| {
@@ -269,17 +247,18 @@ impl<'a> Flatness<'a> {
         let remedy =
             "check cable, sensor and recorder of this channel; record again if much is lost";
         draft.stretches(
-            Kind::StuckChannel,
+            FaultKind::StuckChannel,
             severity,
             name,
             &stuck,
-            (&effect, remedy),
+            &effect,
+            remedy,
         );
         if used {
             if !applied {
                 draft.cut(kind, &track.channel.name, &tops);
             }
-            draft.cut(Kind::StuckChannel, &track.channel.name, &stuck);
+            draft.cut(FaultKind::StuckChannel, &track.channel.name, &stuck);
         }
     }
 }
@@ -317,11 +296,11 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft)
     let used = matches!(track.channel.role, Role::Position | Role::Torque);
     let (severity, then) = if used {
         (
-            Severity::Warning,
+            Warning,
             "differentiated or squared they outweigh thousands of good rows; a fit leaves them out",
         )
     } else {
-        (Severity::Info, "a fit does not read this channel")
+        (Info, "a fit does not read this channel")
     };
     let effect = |rows: u64, times: usize| {
         format!(
@@ -331,14 +310,15 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft)
     };
     let remedy = "look for a loose cable, a lost bus message or a counter that overflows";
     draft.stretches(
-        Kind::Spike,
+        FaultKind::Spike,
         severity,
         Some(&track.channel.name),
         &episodes,
-        (&effect, remedy),
+        &effect,
+        remedy,
     );
     if used {
-        draft.cut(Kind::Spike, &track.channel.name, &episodes);
+        draft.cut(FaultKind::Spike, &track.channel.name, &episodes);
     }
 }
 
@@ -358,7 +338,6 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
     if track.channel.role == Role::Position && !judge.moves(track) {
         return;
     }
-    let name = Some(track.channel.name.as_str());
     let remedy =
         "use a finer sensor or more digits; lower the cut-off in [filter] of the robot file";
     match (track.channel.role, &track.excitation) {
@@ -372,13 +351,7 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
                     "steps of {step:.3e}: below {BAND_HZ} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
                     100.0 * share
                 );
-                draft.whole(
-                    Kind::Quantisation,
-                    Severity::Warning,
-                    name,
-                    track.rows,
-                    (effect, remedy),
-                );
+                draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);
                 return;
             }
         }
@@ -387,13 +360,7 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
                 "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters drown in it",
                 100.0 * step / track.deviation()
             );
-            draft.whole(
-                Kind::Quantisation,
-                Severity::Warning,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);
             return;
         }
         _ => {}
@@ -402,12 +369,6 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
         let effect = format!(
             "steps of {step:.3e}, {levels:.0} levels over the range: a fit averages them out"
         );
-        draft.whole(
-            Kind::Quantisation,
-            Severity::Info,
-            name,
-            track.rows,
-            (effect, remedy),
-        );
+        draft.whole(Info, FaultKind::Quantisation, track, effect, remedy);
     }
 }

@@ -1,12 +1,14 @@
 //! Faults that show between channels: copies, rows that repeat, velocities that lag.
 
 use super::channel::Role;
-use super::clock::ClockFacts;
+use super::detectors::clock::ClockFacts;
+use super::detectors::grain;
+use super::detectors::velocity;
 use super::draft::{Draft, seconds};
-use super::fault::{Kind, Severity};
-use super::grain;
+use super::fault::Severity::{Error, Info, Warning};
+use super::fault::{Fault, FaultKind};
 use super::judge::{Depth, Judge, Track};
-use super::velocity;
+use super::lag;
 
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;
@@ -21,7 +23,7 @@ pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     copies(judge, draft);
     if judge.depth == Depth::Whole {
         velocities(judge, clock, draft);
-        super::lag::faults(judge, clock, draft);
+        lag::faults(judge, clock, draft);
         noiseless(judge, draft);
     }
 }
@@ -36,7 +38,7 @@ fn repeated_rows(judge: &Judge, draft: &mut Draft) {
     if stale.moving == 0 {
         return;
     }
-    let episodes = stale.where_.told();
+    let episodes = stale.episodes.told();
     let (from, to) = match (episodes.first(), episodes.last()) {
         (Some((first, _)), Some((last, _))) => (first.from, last.to),
         _ => return,
@@ -49,16 +51,12 @@ fn repeated_rows(judge: &Judge, draft: &mut Draft) {
         }
     );
     let remedy = "log each sample of the robot once, by the robot's own clock";
-    draft.faults.push(super::fault::Fault {
-        kind: Kind::RepeatedRows,
-        severity: Severity::Warning,
-        channel: None,
-        from_s: from - judge.clock.first.unwrap_or(0.0),
-        to_s: to - judge.clock.first.unwrap_or(0.0),
+    let first = judge.clock.first.unwrap_or(0.0);
+    draft.faults.push(Fault {
+        from_s: from - first,
         rows: stale.rows,
-        effect,
-        remedy: remedy.to_owned(),
         cut: true,
+        ..Fault::whole(Warning, FaultKind::RepeatedRows, to - first, effect, remedy)
     });
     draft.cuts.extend(stale.cuts);
 }
@@ -74,61 +72,38 @@ fn copies(judge: &Judge, draft: &mut Draft) {
             ""
         };
         let name = |track: &Track| crate::log::escape(&track.channel.name);
-        let tell = |draft: &mut Draft, kind, severity, of: &Track, text: String, remedy: &str| {
-            draft.whole(
-                kind,
-                severity,
-                Some(&of.channel.name),
-                copy.rows,
-                (text, remedy),
-            );
-        };
-        match (a, b) {
-            (Role::Command, Role::Command) => {}
+        let (severity, kind, of, effect, remedy) = match (a, b) {
+            (Role::Command, Role::Command) => continue,
             (Role::Command, _) | (_, Role::Command) => {
-                let (command, measured) = if a == Role::Command {
-                    (first, second)
-                } else {
-                    (second, first)
+                let (command, measured) = match a {
+                    Role::Command => (first, second),
+                    _ => (second, first),
                 };
-                let text = format!(
+                let effect = format!(
                     "equals `{}`{sign} in every row: it is the command and no measurement, and a fit takes tracking errors for forces",
                     name(command)
                 );
-                tell(
-                    draft,
-                    Kind::CommandAsMeasurement,
-                    Severity::Warning,
-                    measured,
-                    text,
-                    "log the measured value, or name the measured column in the [log] section of the robot file",
-                );
+                let remedy = "log the measured value, or name the measured column in the [log] section of the robot file";
+                let kind = FaultKind::CommandAsMeasurement;
+                (Warning, kind, measured, effect, remedy)
             }
             (Role::Position, Role::Position) | (Role::Torque, Role::Torque) => {
-                let text = format!(
+                let effect = format!(
                     "equals `{}`{sign} in every row: one of the two is not what it says, and the data of a joint are missing",
                     name(first)
                 );
-                tell(
-                    draft,
-                    Kind::CopiedChannel,
-                    Severity::Error,
-                    second,
-                    text,
-                    "check the columns of the recorder; name the right ones in the [log] section of the robot file",
-                );
+                let remedy = "check the columns of the recorder; name the right ones in the [log] section of the robot file";
+                (Error, FaultKind::CopiedChannel, second, effect, remedy)
             }
             _ => {
-                let text = format!("equals `{}`{sign} in every row", name(first));
-                tell(
-                    draft,
-                    Kind::CopiedChannel,
-                    Severity::Warning,
-                    second,
-                    text,
-                    "check the columns of the recorder",
-                );
+                let effect = format!("equals `{}`{sign} in every row", name(first));
+                let remedy = "check the columns of the recorder";
+                (Warning, FaultKind::CopiedChannel, second, effect, remedy)
             }
+        };
+        draft.whole(severity, kind, of, effect, remedy);
+        if let Some(fault) = draft.faults.last_mut() {
+            fault.rows = copy.rows;
         }
     }
 }
@@ -141,7 +116,6 @@ fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
         let Some(found) = velocity::follows(judge.windows.iter(), position, index) else {
             continue;
         };
-        let name = Some(track.channel.name.as_str());
         let of = crate::log::escape(&judge.tracks[position].channel.name);
         if found.best < -0.7 {
             let effect = format!(
@@ -149,13 +123,7 @@ fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
                 found.best
             );
             let remedy = "turn the sign of one of them in the [log] section of the robot file";
-            draft.whole(
-                Kind::WrongSignOrOrder,
-                Severity::Error,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(Error, FaultKind::WrongSignOrOrder, track, effect, remedy);
             continue;
         }
         if found.best < 0.7 {
@@ -173,13 +141,7 @@ fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
                 seconds(found.rows.abs() * clock.dt)
             );
             let remedy = "nothing here: velocities are formed from the positions; do not use this channel elsewhere";
-            draft.whole(
-                Kind::Filter,
-                Severity::Warning,
-                name,
-                track.rows,
-                (effect, remedy),
-            );
+            draft.whole(Warning, FaultKind::Filter, track, effect, remedy);
         }
     }
 }
@@ -193,7 +155,7 @@ fn noiseless(judge: &Judge, draft: &mut Draft) {
             None => grain::noise(judge.windows.iter(), index),
         };
         let told = draft.faults.iter().any(|fault| {
-            fault.kind == Kind::CommandAsMeasurement
+            fault.kind == FaultKind::CommandAsMeasurement
                 && fault.channel.as_ref() == Some(&track.channel.name)
         });
         if told || noise.is_none_or(|noise| noise > NOISELESS * track.travel()) {
@@ -201,12 +163,6 @@ fn noiseless(judge: &Judge, draft: &mut Draft) {
         }
         let effect = "has neither noise nor the step of an encoder: it was filtered or computed, or it is a command, in which case a fit takes tracking errors for forces".to_owned();
         let remedy = "make sure that it is the measured position";
-        draft.whole(
-            Kind::CommandAsMeasurement,
-            Severity::Info,
-            Some(&track.channel.name),
-            track.rows,
-            (effect, remedy),
-        );
+        draft.whole(Info, FaultKind::CommandAsMeasurement, track, effect, remedy);
     }
 }

@@ -1,12 +1,15 @@
 //! From what the detectors gathered to faults: all thresholds stand here and in [`super::shape`].
 
 use super::channel::Role;
-use super::clock::ClockFacts;
+use super::detectors::clock::ClockFacts;
+use super::detectors::excitation::JointMotion;
+use super::detectors::grain;
 use super::draft::{Draft, rows_text, seconds};
-use super::fault::{Episodes, Kind, Severity};
+use super::fault::Severity::{Error, Info, Warning};
+use super::fault::{Episodes, FaultKind};
 use super::findings::{ChannelFacts, Findings, Gap, joined};
 use super::judge::{Depth, Judge, Track};
-use super::{grain, shape, together};
+use super::{shape, together};
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
 const UNEVEN: f64 = 0.05;
@@ -23,10 +26,11 @@ impl Judge {
     }
 }
 
+/// Everything there is to say.
 fn conclude(judge: &Judge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
-    let mut draft = Draft::new(first, judge.clock.duration().max(0.0));
+    let mut draft = Draft::new(first, first + judge.clock.duration().max(0.0));
     time_faults(judge, &clock, &mut draft);
     for track in &judge.tracks {
         number_faults(track, &mut draft);
@@ -87,7 +91,7 @@ fn channel_facts(judge: &Judge, index: usize, track: &Track, rate: Option<f64>) 
     }
 }
 
-fn joints(judge: &Judge) -> Vec<super::JointMotion> {
+fn joints(judge: &Judge) -> Vec<JointMotion> {
     let tracks = judge.positions.iter().map(|index| &judge.tracks[*index]);
     tracks
         .filter_map(|track| {
@@ -97,7 +101,7 @@ fn joints(judge: &Judge) -> Vec<super::JointMotion> {
             };
             let excitation = track.excitation.as_ref()?;
             let moves = judge.moves(track);
-            Some(super::JointMotion {
+            Some(JointMotion {
                 unit: track.channel.unit.clone(),
                 ..excitation.facts(name, &track.channel.name, track.travel(), moves)
             })
@@ -113,13 +117,7 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
             rows_text(seen.without_time, 1)
         );
         let remedy = "delete these rows, or name the right time column in the [log] section of the robot file";
-        draft.whole(
-            Kind::Nan,
-            Severity::Error,
-            None,
-            seen.without_time,
-            (effect, remedy),
-        );
+        draft.of_log(Error, FaultKind::Nan, seen.without_time, effect, remedy);
     }
     let effect = |rows: u64, times: usize| {
         let which = if times > 1 {
@@ -134,11 +132,12 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     };
     let remedy = "delete duplicate rows; if the clock is too coarse, log time with more digits";
     draft.stretches(
-        Kind::RepeatedTime,
-        Severity::Error,
+        FaultKind::RepeatedTime,
+        Error,
         None,
         &seen.repeated,
-        (&effect, remedy),
+        &effect,
+        remedy,
     );
     let effect = |_: u64, times: usize| {
         let which = if times > 1 {
@@ -152,11 +151,12 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     };
     let remedy = "sort the rows by time, or split the file where a second recording begins";
     draft.stretches(
-        Kind::BackwardTime,
-        Severity::Error,
+        FaultKind::BackwardTime,
+        Error,
         None,
         &seen.backward,
-        (&effect, remedy),
+        &effect,
+        remedy,
     );
     let mut gaps = Episodes::default();
     for [from, to] in &clock.gaps {
@@ -175,19 +175,9 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
         )
     };
     let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
-    draft.stretches(
-        Kind::Dropout,
-        Severity::Warning,
-        None,
-        &gaps,
-        (&effect, remedy),
-    );
+    draft.stretches(FaultKind::Dropout, Warning, None, &gaps, &effect, remedy);
     if clock.uneven > UNEVEN || clock.jitter > JITTER {
-        let severity = if clock.uneven > UNEVEN {
-            Severity::Warning
-        } else {
-            Severity::Info
-        };
+        let severity = if clock.uneven > UNEVEN { Warning } else { Info };
         let effect = format!(
             "steps from {} to {}, median {}, {:.1} % of them off it by more than a tenth: samples are interpolated onto an even clock, which is right as far as the times are those of the measurements",
             seconds(clock.least),
@@ -196,12 +186,12 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
             100.0 * clock.uneven
         );
         let remedy = "log the time at which a sample was taken, not at which it was written";
-        draft.whole(
-            Kind::IrregularClock,
+        draft.of_log(
             severity,
-            None,
+            FaultKind::IrregularClock,
             seen.rows,
-            (effect, remedy),
+            effect,
+            remedy,
         );
     }
 }
@@ -213,11 +203,7 @@ fn number_faults(track: &Track, draft: &mut Draft) {
         // A column of words is no channel.
         return;
     }
-    let severity = if used {
-        Severity::Error
-    } else {
-        Severity::Info
-    };
+    let severity = if used { Error } else { Info };
     let effect = |rows: u64, times: usize| {
         let then = if used {
             "a fit refuses the log"
@@ -228,7 +214,14 @@ fn number_faults(track: &Track, draft: &mut Draft) {
     };
     let remedy =
         "delete the rows without a measurement: a gap in time is handled, a made-up number is not";
-    draft.stretches(Kind::Nan, severity, name, &track.missing, (&effect, remedy));
+    draft.stretches(
+        FaultKind::Nan,
+        severity,
+        name,
+        &track.missing,
+        &effect,
+        remedy,
+    );
     if let Some([low, high]) = track.channel.limits {
         let effect = |rows: u64, times: usize| {
             format!(
@@ -240,11 +233,12 @@ fn number_faults(track: &Track, draft: &mut Draft) {
         };
         let remedy = "check the unit and offset of this channel in [log], and the limit in [limits] of the robot file";
         draft.stretches(
-            Kind::BeyondLimits,
-            Severity::Warning,
+            FaultKind::BeyondLimits,
+            Warning,
             name,
             &track.beyond,
-            (&effect, remedy),
+            &effect,
+            remedy,
         );
         let effect = |rows: u64, times: usize| {
             format!(
@@ -254,11 +248,12 @@ fn number_faults(track: &Track, draft: &mut Draft) {
         };
         let remedy = "choose a slower motion where the robot should follow its reference";
         draft.stretches(
-            Kind::Saturation,
-            Severity::Info,
+            FaultKind::Saturation,
+            Info,
             name,
             &track.at_limit,
-            (&effect, remedy),
+            &effect,
+            remedy,
         );
     }
 }

@@ -75,7 +75,7 @@ pub(super) fn look(spec: &LogSpec, context: &Context) -> Result<Seen, CliError> 
 
 fn look_at(
     table: &mut RawReader,
-    plan: &inspect::Plan,
+    plan: &inspect::ColumnPlan,
     context: &Context,
 ) -> Result<inspect::Findings, CliError> {
     let found = inspect::look(table, plan, &|| context.interrupted())?;

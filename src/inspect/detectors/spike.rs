@@ -19,15 +19,15 @@ const MOST: usize = 4096;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spike {
-    pub(super) t: f64,
+pub(in crate::inspect) struct Spike {
+    pub(in crate::inspect) t: f64,
     /// Difference from the median of its neighbours.
-    pub(super) height: f64,
+    pub(in crate::inspect) height: f64,
 }
 
 /// Looks for the spikes of one channel.
 #[derive(Debug, Clone)]
-pub(super) struct Spikes {
+pub(in crate::inspect) struct Spikes {
     values: [f64; RING],
     times: [f64; RING],
     differences: [f64; RING],
@@ -35,7 +35,7 @@ pub(super) struct Spikes {
     count: usize,
     /// Rows whose difference was looked at as a spike.
     judged: usize,
-    pub(super) differences_seen: Histogram,
+    pub(in crate::inspect) differences_seen: Histogram,
     /// A difference above it may be a spike.
     suspect: f64,
     found: Vec<Spike>,
@@ -62,7 +62,7 @@ impl Default for Spikes {
 impl Spikes {
     /// Takes the next row.
     #[inline]
-    pub(super) fn take(&mut self, t: f64, value: f64) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
         let k = self.count;
         self.values[k % RING] = value;
         self.times[k % RING] = t;
@@ -81,7 +81,7 @@ impl Spikes {
     }
 
     /// The next row belongs to another stretch.
-    pub(super) fn part(&mut self) {
+    pub(in crate::inspect) fn part(&mut self) {
         if self.count >= WIDTH {
             let last = self.count - 1 - HALF;
             for row in self.judged.max(HALF)..=last {
@@ -93,7 +93,7 @@ impl Spikes {
     }
 
     /// Brings the suspicion up to date with what was seen so far.
-    pub(super) fn settle(&mut self) {
+    pub(in crate::inspect) fn settle(&mut self) {
         self.suspect = 3.0 * self.differences_seen.quantile(0.99);
     }
 
@@ -145,7 +145,7 @@ impl Spikes {
     }
 
     /// Those that may be spikes, in the order of time.
-    pub(super) fn found(&self) -> &[Spike] {
+    pub(in crate::inspect) fn found(&self) -> &[Spike] {
         &self.found
     }
 }

@@ -13,7 +13,7 @@ const GAIN: f64 = 113.446;
 
 /// The step of a channel's numbers, where they have one: all differences from row to row are
 /// multiples of it.
-pub(super) fn step<'w>(
+pub(in crate::inspect) fn step<'w>(
     windows: impl Iterator<Item = &'w Window> + Clone,
     channel: usize,
 ) -> Option<f64> {
@@ -61,7 +61,10 @@ pub(super) fn step<'w>(
 
 /// Deviation of the noise that a moving channel carries, by its differences of order eight; `None`
 /// where it does not move long enough to tell.
-pub(super) fn noise<'w>(windows: impl Iterator<Item = &'w Window>, channel: usize) -> Option<f64> {
+pub(in crate::inspect) fn noise<'w>(
+    windows: impl Iterator<Item = &'w Window>,
+    channel: usize,
+) -> Option<f64> {
     let mut sizes = Vec::new();
     for window in windows {
         for rows in window.columns[channel].windows(ORDER + 1) {

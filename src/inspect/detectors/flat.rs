@@ -16,37 +16,37 @@ const LEVELS: usize = 8;
 
 /// Rows in which a channel kept one value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Run {
-    pub(super) value: f64,
-    pub(super) from: f64,
-    pub(super) to: f64,
-    pub(super) rows: u64,
+pub(in crate::inspect) struct FlatRun {
+    pub(in crate::inspect) value: f64,
+    pub(in crate::inspect) from: f64,
+    pub(in crate::inspect) to: f64,
+    pub(in crate::inspect) rows: u64,
     /// Change from the row before, and to the row after it; NaN where there is none.
-    pub(super) entry: f64,
-    pub(super) exit: f64,
+    pub(in crate::inspect) entry: f64,
+    pub(in crate::inspect) exit: f64,
     /// How far the joint's position went meanwhile.
-    pub(super) travel: f64,
+    pub(in crate::inspect) travel: f64,
 }
 
 /// The runs of one channel.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Flat {
+pub(in crate::inspect) struct Flat {
     current: Option<Current>,
-    runs: Vec<Run>,
+    runs: Vec<FlatRun>,
     /// Rows of the shortest run that is kept, once there are too many.
     shortest: u64,
     /// Lengths of all runs, runs of one row too.
-    pub(super) lengths: Histogram,
+    pub(in crate::inspect) lengths: Histogram,
     /// Sizes of the steps from row to row, and of their changes, where the channel moves.
-    pub(super) steps: Histogram,
-    pub(super) bends: Histogram,
-    pub(super) top: Levels,
-    pub(super) bottom: Levels,
+    pub(in crate::inspect) steps: Histogram,
+    pub(in crate::inspect) bends: Histogram,
+    pub(in crate::inspect) top: Levels,
+    pub(in crate::inspect) bottom: Levels,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Current {
-    run: Run,
+    run: FlatRun,
     low: f64,
     high: f64,
     /// Step into the row before this one.
@@ -56,7 +56,7 @@ struct Current {
 impl Flat {
     /// Takes the next row: `position` is the joint's, where it is known and not this channel.
     #[inline]
-    pub(super) fn take(&mut self, t: f64, value: f64, position: f64) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64, position: f64) {
         self.top.take(value);
         self.bottom.take(-value);
         let Some(current) = &mut self.current else {
@@ -83,14 +83,14 @@ impl Flat {
     }
 
     /// The next row belongs to another stretch.
-    pub(super) fn part(&mut self) {
+    pub(in crate::inspect) fn part(&mut self) {
         self.end(f64::NAN);
         self.current = None;
     }
 
     fn begin(&mut self, t: f64, value: f64, position: f64, entry: f64, step: f64) {
         self.current = Some(Current {
-            run: Run {
+            run: FlatRun {
                 value,
                 from: t,
                 to: t,
@@ -126,14 +126,14 @@ impl Flat {
     }
 
     /// The runs of three rows and more, in the order of time.
-    pub(super) fn runs(&self) -> &[Run] {
+    pub(in crate::inspect) fn runs(&self) -> &[FlatRun] {
         &self.runs
     }
 }
 
 /// The largest values of a channel, and how often each was there.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Levels {
+pub(in crate::inspect) struct Levels {
     /// Falling values.
     list: Vec<(f64, u64)>,
 }
@@ -162,13 +162,13 @@ impl Levels {
     }
 
     /// The largest value; NaN where there is none.
-    pub(super) fn extreme(&self) -> f64 {
+    pub(in crate::inspect) fn extreme(&self) -> f64 {
         self.list.first().map_or(f64::NAN, |(value, _)| *value)
     }
 
     /// Whether the largest value is there so much more often than those next to it that it must be
     /// where something ends.
-    pub(super) fn piles_up(&self) -> bool {
+    pub(in crate::inspect) fn piles_up(&self) -> bool {
         let Some(((_, count), others)) = self.list.split_first() else {
             return false;
         };

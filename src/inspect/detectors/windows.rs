@@ -7,15 +7,15 @@ const NUMBERS: usize = 1 << 23;
 
 /// Consecutive rows without a gap.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Window {
-    pub(super) t: Vec<f64>,
+pub(in crate::inspect) struct Window {
+    pub(in crate::inspect) t: Vec<f64>,
     /// One list per channel.
-    pub(super) columns: Vec<Vec<f64>>,
+    pub(in crate::inspect) columns: Vec<Vec<f64>>,
 }
 
 /// Stretches of a log of any length.
 #[derive(Debug, Clone)]
-pub(super) struct Windows {
+pub(in crate::inspect) struct Windows {
     kept: Vec<Window>,
     /// Every how many stretches one is kept.
     stride: u64,
@@ -34,7 +34,7 @@ impl Default for Windows {
 
 impl Windows {
     /// Offers the next stretch.
-    pub(super) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
+    pub(in crate::inspect) fn offer(&mut self, t: &[f64], columns: &[&[f64]]) {
         let number = self.seen;
         self.seen += 1;
         if !number.is_multiple_of(self.stride) {
@@ -71,13 +71,13 @@ impl Windows {
     }
 
     /// At most so many of them, evenly spread.
-    pub(super) fn spread(&self, most: usize) -> impl Iterator<Item = &Window> {
+    pub(in crate::inspect) fn spread(&self, most: usize) -> impl Iterator<Item = &Window> {
         self.kept
             .iter()
             .step_by(self.kept.len().div_ceil(most).max(1))
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Window> + Clone {
+    pub(in crate::inspect) fn iter(&self) -> impl Iterator<Item = &Window> + Clone {
         self.kept.iter()
     }
 }

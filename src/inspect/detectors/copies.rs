@@ -8,15 +8,15 @@ const CHANGES: u64 = 50;
 /// Counts for every pair of channels the rows in which both changed, and those of them in which they were
 /// equal, or equal but for the sign.
 #[derive(Debug, Clone)]
-pub(super) struct Copies {
+pub(in crate::inspect) struct Copies {
     channels: usize,
-    pairs: Vec<Pair>,
+    pairs: Vec<PairCounts>,
     previous: Vec<f64>,
     row: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Pair {
+struct PairCounts {
     changed: u64,
     equal: u64,
     opposite: u64,
@@ -24,19 +24,19 @@ struct Pair {
 
 /// A pair of channels that hold the same numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Copy {
-    pub(super) first: usize,
-    pub(super) second: usize,
+pub(in crate::inspect) struct CopiedChannel {
+    pub(in crate::inspect) first: usize,
+    pub(in crate::inspect) second: usize,
     /// Equal but for the sign.
-    pub(super) opposite: bool,
-    pub(super) rows: u64,
+    pub(in crate::inspect) opposite: bool,
+    pub(in crate::inspect) rows: u64,
 }
 
 impl Copies {
-    pub(super) fn new(channels: usize) -> Self {
+    pub(in crate::inspect) fn new(channels: usize) -> Self {
         Self {
             channels,
-            pairs: vec![Pair::default(); channels * channels.saturating_sub(1) / 2],
+            pairs: vec![PairCounts::default(); channels * channels.saturating_sub(1) / 2],
             previous: vec![f64::NAN; channels],
             row: vec![0.0; channels],
         }
@@ -44,7 +44,7 @@ impl Copies {
 
     /// Takes row `k` of some columns.
     #[inline]
-    pub(super) fn take(&mut self, columns: &[&[f64]], k: usize) {
+    pub(in crate::inspect) fn take(&mut self, columns: &[&[f64]], k: usize) {
         for (value, column) in self.row.iter_mut().zip(columns) {
             *value = column[k];
         }
@@ -64,7 +64,7 @@ impl Copies {
     }
 
     /// Pairs that are copies.
-    pub(super) fn found(&self) -> Vec<Copy> {
+    pub(in crate::inspect) fn found(&self) -> Vec<CopiedChannel> {
         let mut found = Vec::new();
         let mut pairs = self.pairs.iter();
         for first in 0..self.channels {
@@ -72,7 +72,7 @@ impl Copies {
                 let Some(pair) = pairs.next() else { break };
                 let most = pair.equal.max(pair.opposite);
                 if pair.changed >= CHANGES && most as f64 >= SHARE * pair.changed as f64 {
-                    found.push(Copy {
+                    found.push(CopiedChannel {
                         first,
                         second,
                         opposite: pair.opposite > pair.equal,

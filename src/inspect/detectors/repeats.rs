@@ -3,8 +3,8 @@
 //! A recorder that is faster than the robot, or runs beside it on a clock of its own, now and then
 //! logs one sample twice and leaves out the next. Differentiated, that is a stop and a leap.
 
-use super::fault::Episodes;
 use super::flat::Flat;
+use crate::inspect::fault::Episodes;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
 const LONGEST: usize = 20;
@@ -13,7 +13,7 @@ const MOST: usize = 1 << 18;
 
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
-struct Run {
+struct RepeatRun {
     /// Times of the first row that shows these positions, and of the last.
     first: f64,
     last: f64,
@@ -30,7 +30,7 @@ struct Run {
 
 /// Watches the positions of all joints together.
 #[derive(Debug, Clone)]
-pub(super) struct Repeats {
+pub(in crate::inspect) struct Repeats {
     joints: usize,
     previous: Vec<f64>,
     entry: Vec<f64>,
@@ -43,12 +43,12 @@ pub(super) struct Repeats {
     /// Rows in which positions changed, and those of them in which nothing else did.
     changed: u64,
     coincidences: u64,
-    runs: Vec<Run>,
+    runs: Vec<RepeatRun>,
 }
 
 impl Repeats {
     /// For so many positions, and torques and velocities.
-    pub(super) fn new(joints: usize, others: usize) -> Self {
+    pub(in crate::inspect) fn new(joints: usize, others: usize) -> Self {
         Self {
             joints,
             previous: vec![f64::NAN; joints],
@@ -65,7 +65,7 @@ impl Repeats {
 
     /// Takes the positions of the next row, and its torques and velocities.
     #[inline]
-    pub(super) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         let same = others == self.others;
         if self.rows > 0 && positions == self.previous {
             self.rows += 1;
@@ -96,7 +96,7 @@ impl Repeats {
     }
 
     /// The next row belongs to another stretch.
-    pub(super) fn part(&mut self) {
+    pub(in crate::inspect) fn part(&mut self) {
         self.previous.fill(f64::NAN);
         self.entry.fill(f64::NAN);
         self.rows = 0;
@@ -112,7 +112,7 @@ impl Repeats {
             .zip(&self.previous)
             .map(|(next, last)| next - last);
         let [first, second, before_last, last] = self.times;
-        self.runs.push(Run {
+        self.runs.push(RepeatRun {
             first,
             last,
             second,
@@ -129,14 +129,14 @@ impl Repeats {
     }
 
     /// What was found; `channels` are the joints' own, in the same order.
-    pub(super) fn judge(&self, channels: &[&Flat]) -> Stale {
+    pub(in crate::inspect) fn judge(&self, channels: &[&Flat]) -> RepeatedRows {
         debug_assert_eq!(channels.len(), self.joints);
         let least: Vec<f64> = channels
             .iter()
             .map(|flat| flat.steps.quantile_not_zero(0.05))
             .collect();
         // Whether the robot goes on in the same direction, in steps of so many usual least ones.
-        let goes_on = |run: &Run, factor: f64| {
+        let goes_on = |run: &RepeatRun, factor: f64| {
             run.steps.iter().zip(&least).any(|(&[entry, exit], least)| {
                 let (entry, exit) = (f64::from(entry), f64::from(exit));
                 let smaller = entry.abs().min(exit.abs());
@@ -146,9 +146,9 @@ impl Repeats {
         // A coarse encoder on a slow joint repeats its number for good; but not all that is measured
         // does at once, where it does not do so in motion.
         let telling = !self.others.is_empty() && 100 * self.coincidences < self.changed;
-        let certain = |run: &Run| telling && run.identical && goes_on(run, 0.9);
-        let likely = |run: &Run| goes_on(run, 3.0);
-        let count = |which: &dyn Fn(&Run) -> bool| -> u64 {
+        let certain = |run: &RepeatRun| telling && run.identical && goes_on(run, 0.9);
+        let likely = |run: &RepeatRun| goes_on(run, 3.0);
+        let count = |which: &dyn Fn(&RepeatRun) -> bool| -> u64 {
             let runs = self.runs.iter().filter(|run| which(run));
             runs.map(|run| u64::from(run.rows)).sum()
         };
@@ -156,17 +156,17 @@ impl Repeats {
         let sure = count(&certain);
         let mostly = 5 * sure > 4 * all;
         let in_motion =
-            |run: &&Run| certain(run) || ((mostly || self.others.is_empty()) && likely(run));
+            |run: &&RepeatRun| certain(run) || ((mostly || self.others.is_empty()) && likely(run));
         let moving = count(&|run| in_motion(&run));
-        let mut stale = Stale {
+        let mut stale = RepeatedRows {
             // Where most are of that kind, so are those at the slow turns of the motion.
             rows: if mostly { all } else { moving },
             moving,
-            ..Stale::default()
+            ..RepeatedRows::default()
         };
         for run in self.runs.iter().filter(in_motion) {
             stale
-                .where_
+                .episodes
                 .add(run.first, run.last, u64::from(run.rows), 0.0);
             // The leap is on the side where a sample is missing: what lies next to it is in time.
             let size = |side: usize| -> f64 {
@@ -188,13 +188,13 @@ impl Repeats {
 
 /// Repeated rows of a log.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Stale {
+pub(in crate::inspect) struct RepeatedRows {
     /// All of them, and those at whose place the robot certainly moves.
-    pub(super) rows: u64,
-    pub(super) moving: u64,
-    pub(super) where_: Episodes,
+    pub(in crate::inspect) rows: u64,
+    pub(in crate::inspect) moving: u64,
+    pub(in crate::inspect) episodes: Episodes,
     /// Rows to be left out: from, to [s].
-    pub(super) cuts: Vec<[f64; 2]>,
+    pub(in crate::inspect) cuts: Vec<[f64; 2]>,
 }
 
 #[cfg(test)]
@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     /// Positions alone, or with a torque that is different in every row but the repeated ones.
-    fn judged(positions: &[f64], repeated: Option<&[usize]>) -> Stale {
+    fn judged(positions: &[f64], repeated: Option<&[usize]>) -> RepeatedRows {
         let width = usize::from(repeated.is_some());
         let (mut repeats, mut flat) = (Repeats::new(1, width), Flat::default());
         let mut torque = 0.0;

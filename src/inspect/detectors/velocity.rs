@@ -7,17 +7,17 @@ const FARTHEST: usize = 50;
 
 /// How a velocity channel follows its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Follows {
+pub(in crate::inspect) struct Follows {
     /// Rows by which it is late; negative where it is early.
-    pub(super) rows: f64,
+    pub(in crate::inspect) rows: f64,
     /// Correlation with the derivative at that lag, and without a lag.
-    pub(super) best: f64,
-    pub(super) now: f64,
+    pub(in crate::inspect) best: f64,
+    pub(in crate::inspect) now: f64,
 }
 
-/// Sums of one lag.
+/// LagSums of one lag.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct LagSums {
     n: f64,
     v: f64,
     d: f64,
@@ -26,7 +26,7 @@ struct Sums {
     vd: f64,
 }
 
-impl Sums {
+impl LagSums {
     fn correlation(&self) -> f64 {
         let spread = (self.vv - self.v * self.v / self.n) * (self.dd - self.d * self.d / self.n);
         (self.vd - self.v * self.d / self.n) / spread.sqrt()
@@ -35,12 +35,12 @@ impl Sums {
 
 /// Finds the lag at which a velocity resembles the derivative of a position most; `None` where
 /// they do not move enough to tell.
-pub(super) fn follows<'w>(
+pub(in crate::inspect) fn follows<'w>(
     windows: impl Iterator<Item = &'w Window>,
     position: usize,
     velocity: usize,
 ) -> Option<Follows> {
-    let mut sums = [Sums::default(); 2 * FARTHEST + 1];
+    let mut sums = [LagSums::default(); 2 * FARTHEST + 1];
     let mut derivative = Vec::new();
     for window in windows {
         let (q, v) = (&window.columns[position], &window.columns[velocity]);

@@ -11,7 +11,7 @@ const SHIFT: u32 = 52 - PER_OCTAVE.trailing_zeros();
 /// Counts of magnitudes in bins that are 1/32 of an octave wide, so that a quantile is right to
 /// about 1 %.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Histogram {
+pub(in crate::inspect) struct Histogram {
     // Taken when the first number comes: most channels of a wide log have none.
     counts: Vec<u64>,
     sums: Vec<f64>,
@@ -22,7 +22,7 @@ pub(super) struct Histogram {
 impl Histogram {
     /// Counts the magnitude of a finite number.
     #[inline]
-    pub(super) fn add(&mut self, value: f64) {
+    pub(in crate::inspect) fn add(&mut self, value: f64) {
         let magnitude = value.abs();
         self.total += 1;
         let lowest = ((1023 + LOWEST) as u64) << 52;
@@ -40,17 +40,17 @@ impl Histogram {
     }
 
     /// The magnitude that `share` (0..=1) of those counted do not exceed; 0 where there are none.
-    pub(super) fn quantile(&self, share: f64) -> f64 {
+    pub(in crate::inspect) fn quantile(&self, share: f64) -> f64 {
         self.at(self.zeros, self.total, share)
     }
 
     /// The same among those that are not 0.
-    pub(super) fn quantile_not_zero(&self, share: f64) -> f64 {
+    pub(in crate::inspect) fn quantile_not_zero(&self, share: f64) -> f64 {
         self.at(0, self.total - self.zeros, share)
     }
 
     /// Share of those counted that lie below `low` or above `high`, to the width of a bin.
-    pub(super) fn share_outside(&self, low: f64, high: f64) -> f64 {
+    pub(in crate::inspect) fn share_outside(&self, low: f64, high: f64) -> f64 {
         if self.total == 0 {
             return 0.0;
         }

@@ -49,7 +49,7 @@ pub struct JointMotion {
 
 /// Follows one position channel.
 #[derive(Debug, Clone)]
-pub(super) struct Excitation {
+pub(in crate::inspect) struct Excitation {
     /// Rows between the three positions that a speed and an acceleration are formed from.
     spacing: usize,
     times: Vec<f64>,
@@ -67,7 +67,7 @@ pub(super) struct Excitation {
 
 impl Excitation {
     /// For rows `dt` apart [s].
-    pub(super) fn new(dt: f64) -> Self {
+    pub(in crate::inspect) fn new(dt: f64) -> Self {
         let spacing = if dt > 0.0 {
             ((SPACING_S / dt).round() as usize).clamp(1, LONGEST)
         } else {
@@ -89,7 +89,7 @@ impl Excitation {
 
     /// Takes the next row.
     #[inline]
-    pub(super) fn take(&mut self, t: f64, value: f64) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
         let length = self.times.len();
         let at = self.count % length;
         self.times[at] = t;
@@ -101,7 +101,7 @@ impl Excitation {
     }
 
     /// The next row belongs to another stretch.
-    pub(super) fn part(&mut self) {
+    pub(in crate::inspect) fn part(&mut self) {
         self.count = 0;
         self.direction = 0.0;
     }
@@ -132,7 +132,7 @@ impl Excitation {
     }
 
     /// Root mean square of the acceleration.
-    pub(super) fn acceleration_rms(&self) -> f64 {
+    pub(in crate::inspect) fn acceleration_rms(&self) -> f64 {
         self.rms(0)
     }
 
@@ -141,7 +141,7 @@ impl Excitation {
     }
 
     /// What is known at the end; `travel` of the channel, `moves` as judged among all joints.
-    pub(super) fn facts(
+    pub(in crate::inspect) fn facts(
         &self,
         joint: &str,
         channel: &str,

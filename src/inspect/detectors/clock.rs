@@ -1,10 +1,10 @@
 //! The clock of a log: its step, how even it is, and where it stands still, runs back or leaps.
 
-use super::fault::Episodes;
 use super::histogram::Histogram;
+use crate::inspect::fault::Episodes;
 
 /// A step longer than this many median ones is a gap (as `motion::FilterSettings::gap_factor`).
-pub(super) const GAP: f64 = 2.5;
+pub(in crate::inspect) const GAP: f64 = 2.5;
 /// A step within this share of the median is even.
 const EVEN: f64 = 0.10;
 /// Long steps that are kept until the median is known.
@@ -12,7 +12,7 @@ const MOST: usize = 1 << 16;
 
 /// What a row's time is to the row before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Step {
+pub(in crate::inspect) enum RowStep {
     /// The next row of the same stretch.
     Next,
     /// The first row of a stretch: the first at all, after a gap, or after time ran back.
@@ -23,39 +23,39 @@ pub(super) enum Step {
 
 /// The times of a log, seen one after the other.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Clock {
-    pub(super) rows: u64,
-    pub(super) first: Option<f64>,
+pub(in crate::inspect) struct SampleClock {
+    pub(in crate::inspect) rows: u64,
+    pub(in crate::inspect) first: Option<f64>,
     /// Time of the last row that had one [s].
-    pub(super) last: f64,
+    pub(in crate::inspect) last: f64,
     steps: Histogram,
     /// Steps from, to [s] that may be gaps.
     long: Vec<[f64; 2]>,
     /// What is long for now.
     long_from: f64,
-    pub(super) repeated: Episodes,
-    pub(super) backward: Episodes,
-    pub(super) without_time: u64,
+    pub(in crate::inspect) repeated: Episodes,
+    pub(in crate::inspect) backward: Episodes,
+    pub(in crate::inspect) without_time: u64,
 }
 
 /// What the clock was like.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct ClockFacts {
+pub(in crate::inspect) struct ClockFacts {
     /// Median step [s]; 0 where there is none.
-    pub(super) dt: f64,
+    pub(in crate::inspect) dt: f64,
     /// Half the range that the middle 90 % of the steps take, over the median.
-    pub(super) jitter: f64,
+    pub(in crate::inspect) jitter: f64,
     /// Share of the steps that are off the median by more than a tenth, gaps aside.
-    pub(super) uneven: f64,
+    pub(in crate::inspect) uneven: f64,
     /// From, to [s].
-    pub(super) gaps: Vec<[f64; 2]>,
-    pub(super) least: f64,
-    pub(super) largest: f64,
+    pub(in crate::inspect) gaps: Vec<[f64; 2]>,
+    pub(in crate::inspect) least: f64,
+    pub(in crate::inspect) largest: f64,
 }
 
-impl Clock {
+impl SampleClock {
     /// Takes the times of some rows, and says for each what it is to the row before.
-    pub(super) fn take(&mut self, times: &[f64], steps: &mut Vec<Step>) {
+    pub(in crate::inspect) fn take(&mut self, times: &[f64], steps: &mut Vec<RowStep>) {
         steps.clear();
         if self.rows == 0 {
             self.long_from = GAP * typical_step(times);
@@ -68,33 +68,33 @@ impl Clock {
         }
     }
 
-    fn step(&mut self, t: f64) -> Step {
+    fn step(&mut self, t: f64) -> RowStep {
         if !t.is_finite() {
             self.without_time += 1;
-            return Step::Unusable;
+            return RowStep::Unusable;
         }
         if self.first.is_none() {
             self.first = Some(t);
             self.last = t;
-            return Step::Apart;
+            return RowStep::Apart;
         }
         let before = self.last;
         let step = t - before;
         if step == 0.0 {
             self.repeated.add(t, t, 1, 0.0);
-            return Step::Unusable;
+            return RowStep::Unusable;
         }
         self.last = t;
         if step < 0.0 {
             self.backward.add(t, before, 1, -1.0);
-            return Step::Apart;
+            return RowStep::Apart;
         }
         self.steps.add(step);
         if step > self.long_from && self.long_from > 0.0 {
             self.note_long(before, t);
-            return Step::Apart;
+            return RowStep::Apart;
         }
-        Step::Next
+        RowStep::Next
     }
 
     #[cold]
@@ -112,17 +112,17 @@ impl Clock {
     }
 
     /// Median step of the rows so far [s].
-    pub(super) fn step_so_far(&self) -> f64 {
+    pub(in crate::inspect) fn step_so_far(&self) -> f64 {
         self.steps.quantile(0.5)
     }
 
     /// Time from the first to the last row [s].
-    pub(super) fn duration(&self) -> f64 {
+    pub(in crate::inspect) fn duration(&self) -> f64 {
         self.first.map_or(0.0, |first| self.last - first)
     }
 
     /// What is known at the end.
-    pub(super) fn facts(&self) -> ClockFacts {
+    pub(in crate::inspect) fn facts(&self) -> ClockFacts {
         let dt = self.steps.quantile(0.5);
         if dt <= 0.0 {
             return ClockFacts::default();
@@ -143,7 +143,7 @@ impl Clock {
 }
 
 /// Median of the steps forward between some times [s]; 0 where there is none.
-pub(super) fn typical_step(times: &[f64]) -> f64 {
+pub(in crate::inspect) fn typical_step(times: &[f64]) -> f64 {
     let pairs = times.windows(2).map(|pair| pair[1] - pair[0]);
     let mut steps: Vec<f64> = pairs.filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn gaps_repeats_and_steps_back_are_told_apart_and_placed() {
-        let mut clock = Clock::default();
+        let mut clock = SampleClock::default();
         let mut times: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.001).collect();
         times.drain(500..550);
         times[100] = times[99];
@@ -166,9 +166,12 @@ mod tests {
         clock.take(&times, &mut steps);
         let facts = clock.facts();
         assert!((facts.dt - 0.001).abs() < 1e-6, "{facts:?}");
-        assert_eq!((steps[0], steps[1]), (Step::Apart, Step::Next));
-        assert_eq!((steps[100], steps[300]), (Step::Unusable, Step::Unusable));
-        assert_eq!((steps[200], steps[500]), (Step::Apart, Step::Apart));
+        assert_eq!((steps[0], steps[1]), (RowStep::Apart, RowStep::Next));
+        assert_eq!(
+            (steps[100], steps[300]),
+            (RowStep::Unusable, RowStep::Unusable)
+        );
+        assert_eq!((steps[200], steps[500]), (RowStep::Apart, RowStep::Apart));
         assert_eq!(clock.repeated.rows(), 1);
         assert_eq!(clock.backward.rows(), 1);
         // from 0.15 back up to 0.201, and over the rows that are gone
@@ -178,7 +181,7 @@ mod tests {
 
     #[test]
     fn an_uneven_clock_has_its_spread_over_the_step_as_jitter() {
-        let mut clock = Clock::default();
+        let mut clock = SampleClock::default();
         let times: Vec<f64> = (0..20_000)
             .map(|k| f64::from(k) * 0.01 + if k % 2 == 0 { 0.001 } else { -0.001 })
             .collect();

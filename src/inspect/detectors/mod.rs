@@ -1,0 +1,12 @@
+//! What is gathered of a log while its rows go by, in fixed memory: one detector a file.
+
+pub(super) mod clock;
+pub(super) mod copies;
+pub(super) mod excitation;
+pub(super) mod flat;
+pub(super) mod grain;
+pub(super) mod histogram;
+pub(super) mod repeats;
+pub(super) mod spike;
+pub(super) mod velocity;
+pub(super) mod windows;
