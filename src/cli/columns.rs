@@ -3,7 +3,8 @@
 use super::CliError;
 use crate::identify::LoggedRobot;
 use crate::inspect::{
-    Channel, ChannelColumn, ColumnPlan, Fault, FaultKind, Role, Severity, is_time,
+    ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
+    is_time,
 };
 use crate::log::{self, Channels, Layout, RawReader};
 
@@ -11,7 +12,7 @@ use crate::log::{self, Channels, Layout, RawReader};
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn guessed(log: &RawReader) -> Result<(ColumnPlan, Option<Fault>), CliError> {
+pub(super) fn guessed(log: &RawReader) -> Result<(ColumnPlan, Option<LogFault>), CliError> {
     let (time, seconds) = time_column(log)?;
     let names = log.names();
     let mut channels = Vec::new();
@@ -47,7 +48,7 @@ pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
 /// reading the log.
-pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Option<Fault>) {
+pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Option<LogFault>) {
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
@@ -79,9 +80,9 @@ fn place(
 ) {
     let raw = layout.channels == Channels::Actuator;
     let kinds = [
-        (&layout.positions, Role::Position),
-        (&layout.velocities, Role::Velocity),
-        (&layout.torques, Role::Torque),
+        (&layout.positions, ChannelRole::Position),
+        (&layout.velocities, ChannelRole::Velocity),
+        (&layout.torques, ChannelRole::Torque),
     ];
     for (channels, role) in kinds {
         for (j, channel) in channels.iter().enumerate() {
@@ -95,13 +96,13 @@ fn place(
             };
             let position = kind.position_unit();
             let unit = match role {
-                Role::Velocity => format!("{position}/s"),
-                Role::Torque if raw => "V".to_owned(),
-                Role::Torque => machine.file.torque_unit(j).to_owned(),
+                ChannelRole::Velocity => format!("{position}/s"),
+                ChannelRole::Torque if raw => "V".to_owned(),
+                ChannelRole::Torque => machine.file.torque_unit(j).to_owned(),
                 _ => position.to_owned(),
             };
             let name = &log.names()[column];
-            let mut seen = Channel::new(name, role, Some(joint), Some(&unit));
+            let mut seen = InspectedChannel::new(name, role, Some(joint), Some(&unit));
             (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
             known[column] = Some(ChannelColumn {
                 column,
@@ -115,7 +116,7 @@ fn place(
 
 /// A column that no robot file names.
 fn other(log: &RawReader, column: usize) -> ChannelColumn {
-    let mut channel = Channel::guessed(&log.names()[column]);
+    let mut channel = InspectedChannel::guessed(&log.names()[column]);
     channel.unit = log.unit(column).map(str::to_owned);
     ChannelColumn {
         column,
@@ -151,35 +152,35 @@ fn seconds(unit: Option<&str>) -> f64 {
 fn limits(
     machine: &LoggedRobot,
     (j, joint): (usize, &str),
-    role: Role,
+    role: ChannelRole,
     raw: bool,
 ) -> (Option<[f64; 2]>, bool) {
     // Volts are logged as the amplifier gave them.
-    let applied = raw && role == Role::Torque;
+    let applied = raw && role == ChannelRole::Torque;
     let Some(limits) = machine.file.limits.get(joint) else {
         // Table 5 of the report
         let of_set_up = match (machine.robot.transmission().limits(), role, raw) {
-            (Some(limits), Role::Position, true) => limits.of(j),
+            (Some(limits), ChannelRole::Position, true) => limits.of(j),
             _ => None,
         };
         return (of_set_up, applied);
     };
     let both = |limit: Option<f64>| limit.map(|limit| [-limit, limit]);
     match role {
-        Role::Position => (limits.position, false),
-        Role::Velocity => (both(limits.speed), false),
-        Role::Torque if raw => (both(limits.volts), true),
-        Role::Torque => (both(limits.torque), false),
+        ChannelRole::Position => (limits.position, false),
+        ChannelRole::Velocity => (both(limits.speed), false),
+        ChannelRole::Torque if raw => (both(limits.volts), true),
+        ChannelRole::Torque => (both(limits.torque), false),
         _ => (None, false),
     }
 }
 
 /// What keeps the strict reader from a log, as a fault.
-fn refusal(text: String) -> Fault {
+fn refusal(text: String) -> LogFault {
     let (effect, remedy) = text
         .rsplit_once("; ")
         .unwrap_or((&text, "correct the file"));
-    Fault::whole(
+    LogFault::whole(
         Severity::Error,
         FaultKind::MissingChannel,
         0.0,

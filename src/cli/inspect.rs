@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{CliError, Context, Exit, Outcome, columns};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot};
-use crate::inspect::{Comparison, Fault, FaultKind, Findings, Inspection, look};
+use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look};
 use crate::log::{LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::report::json::Document;
@@ -132,7 +132,7 @@ fn compare(
     model: &Model,
     spec: &LogSpec,
     context: &Context,
-) -> Result<Option<Fault>, CliError> {
+) -> Result<Option<LogFault>, CliError> {
     let joints = machine.robot.joint_names();
     let n = joints.len();
     let mut comparison = Comparison::new(n);

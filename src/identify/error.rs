@@ -5,7 +5,7 @@ use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::friction::excitation::FrictionError;
 use crate::inertia::solution::FitError;
-use crate::inspect::Fault;
+use crate::inspect::LogFault;
 use crate::log::{LogError, did_you_mean, escape};
 use crate::motion::{MotionError, RunError};
 
@@ -37,7 +37,7 @@ pub enum IdentifyError {
     NoLog,
     /// A fault of the data for which a fit refuses a log; its remedy is told apart.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
-    Refused { log: String, fault: Box<Fault> },
+    Refused { log: String, fault: Box<LogFault> },
     /// The motion of a log, or the processing that a robot file asks for.
     #[error("{of}: {error}")]
     Motion { of: String, error: MotionError },

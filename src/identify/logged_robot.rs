@@ -12,7 +12,7 @@ use super::reference::LoggedReference;
 use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
-use crate::inspect::{Fault, Gate};
+use crate::inspect::{Gate, LogFault};
 use crate::log::{Layout, LogError, Reader, escape};
 use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
 use crate::robot::{JointKind, Robot};
@@ -84,7 +84,7 @@ impl LoggedRobot {
     ///
     /// # Errors
     /// A log that cannot be read, and interruption.
-    pub fn fault(&self, log: &Log, control: &Control) -> Result<Option<Fault>, IdentifyError> {
+    pub fn fault(&self, log: &Log, control: &Control) -> Result<Option<LogFault>, IdentifyError> {
         let gate = self.look(log, &self.file.layout(), control)?;
         Ok(gate.refusal().cloned())
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// What a channel holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Role {
+pub enum ChannelRole {
     /// Position of a joint or motor.
     Position,
     /// Velocity of a joint or motor.
@@ -23,11 +23,11 @@ pub enum Role {
 
 /// A channel: a column as the judge sees it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
+pub struct InspectedChannel {
     /// Name of the column.
     pub name: String,
     /// What it holds.
-    pub role: Role,
+    pub role: ChannelRole,
     /// The joint (or actuator coordinate) that it belongs to.
     pub joint: Option<String>,
     /// Unit of its numbers, where it is known.
@@ -38,19 +38,19 @@ pub struct Channel {
     pub saturates: bool,
 }
 
-impl Channel {
+impl InspectedChannel {
     /// A channel by its name alone.
     pub fn guessed(name: &str) -> Self {
         let (role, joint) = guess(name);
         Self {
             role,
             joint,
-            ..Self::new(name, Role::Other, None, None)
+            ..Self::new(name, ChannelRole::Other, None, None)
         }
     }
 
     /// A channel that is known.
-    pub fn new(name: &str, role: Role, joint: Option<&str>, unit: Option<&str>) -> Self {
+    pub fn new(name: &str, role: ChannelRole, joint: Option<&str>, unit: Option<&str>) -> Self {
         Self {
             name: name.to_owned(),
             role,
@@ -77,34 +77,34 @@ pub fn is_time(name: &str) -> bool {
 }
 
 /// Words that stand for a role where a name begins with one, the longer before the shorter.
-const WORDS: [(&str, Role); 27] = [
-    ("acceleration", Role::Acceleration),
-    ("accel", Role::Acceleration),
-    ("acc", Role::Acceleration),
-    ("ddq", Role::Acceleration),
-    ("qdd", Role::Acceleration),
-    ("velocity", Role::Velocity),
-    ("speed", Role::Velocity),
-    ("vel", Role::Velocity),
-    ("omega", Role::Velocity),
-    ("dq", Role::Velocity),
-    ("qd", Role::Velocity),
-    ("position", Role::Position),
-    ("angle", Role::Position),
-    ("pos", Role::Position),
-    ("x_c", Role::Position),
-    ("q", Role::Position),
-    ("torque", Role::Torque),
-    ("effort", Role::Torque),
-    ("force", Role::Torque),
-    ("current", Role::Torque),
-    ("voltage", Role::Torque),
-    ("tau", Role::Torque),
-    ("iq", Role::Torque),
-    ("u", Role::Torque),
-    ("i", Role::Torque),
-    ("f", Role::Torque),
-    ("v", Role::Velocity),
+const WORDS: [(&str, ChannelRole); 27] = [
+    ("acceleration", ChannelRole::Acceleration),
+    ("accel", ChannelRole::Acceleration),
+    ("acc", ChannelRole::Acceleration),
+    ("ddq", ChannelRole::Acceleration),
+    ("qdd", ChannelRole::Acceleration),
+    ("velocity", ChannelRole::Velocity),
+    ("speed", ChannelRole::Velocity),
+    ("vel", ChannelRole::Velocity),
+    ("omega", ChannelRole::Velocity),
+    ("dq", ChannelRole::Velocity),
+    ("qd", ChannelRole::Velocity),
+    ("position", ChannelRole::Position),
+    ("angle", ChannelRole::Position),
+    ("pos", ChannelRole::Position),
+    ("x_c", ChannelRole::Position),
+    ("q", ChannelRole::Position),
+    ("torque", ChannelRole::Torque),
+    ("effort", ChannelRole::Torque),
+    ("force", ChannelRole::Torque),
+    ("current", ChannelRole::Torque),
+    ("voltage", ChannelRole::Torque),
+    ("tau", ChannelRole::Torque),
+    ("iq", ChannelRole::Torque),
+    ("u", ChannelRole::Torque),
+    ("i", ChannelRole::Torque),
+    ("f", ChannelRole::Torque),
+    ("v", ChannelRole::Velocity),
 ];
 
 /// Words that make a command of whatever they stand in.
@@ -124,7 +124,7 @@ const COMMANDS: [&str; 12] = [
 ];
 
 /// Role and joint by the name of a column: `q_elbow`, `dq1`, `position[elbow]`, `Reference Velocity`.
-fn guess(name: &str) -> (Role, Option<String>) {
+fn guess(name: &str) -> (ChannelRole, Option<String>) {
     let lower = name.trim().to_lowercase();
     // A unit in brackets is no part of the name; a joint in brackets is.
     let base = match lower.rsplit_once([' ', '_']) {
@@ -137,7 +137,7 @@ fn guess(name: &str) -> (Role, Option<String>) {
             .to_owned()
     };
     if words().any(|word| COMMANDS.contains(&plain(word).as_str())) {
-        return (Role::Command, None);
+        return (ChannelRole::Command, None);
     }
     for (word, role) in WORDS {
         let Some(rest) = base.strip_prefix(word) else {
@@ -153,7 +153,7 @@ fn guess(name: &str) -> (Role, Option<String>) {
             return (role, Some(joint.unwrap_or_default()));
         }
     }
-    (Role::Other, None)
+    (ChannelRole::Other, None)
 }
 
 #[cfg(test)]
@@ -163,36 +163,36 @@ mod tests {
     #[test]
     fn the_names_of_the_contract_and_of_measured_logs_are_understood() {
         for (name, role, joint) in [
-            ("q_q1", Role::Position, Some("q1")),
-            ("dq_q1", Role::Velocity, Some("q1")),
-            ("ddq_elbow", Role::Acceleration, Some("elbow")),
-            ("tau_q5", Role::Torque, Some("q5")),
-            ("x_c3", Role::Position, Some("3")),
-            ("u_3", Role::Torque, Some("3")),
-            ("q1", Role::Position, Some("1")),
-            ("dq7", Role::Velocity, Some("7")),
-            ("tau7", Role::Torque, Some("7")),
-            ("u1", Role::Torque, Some("1")),
-            ("q_ref1", Role::Command, None),
-            ("Reference Velocity", Role::Command, None),
-            ("Position", Role::Position, Some("")),
-            ("Velocity", Role::Velocity, Some("")),
-            ("Iq", Role::Torque, Some("")),
+            ("q_q1", ChannelRole::Position, Some("q1")),
+            ("dq_q1", ChannelRole::Velocity, Some("q1")),
+            ("ddq_elbow", ChannelRole::Acceleration, Some("elbow")),
+            ("tau_q5", ChannelRole::Torque, Some("q5")),
+            ("x_c3", ChannelRole::Position, Some("3")),
+            ("u_3", ChannelRole::Torque, Some("3")),
+            ("q1", ChannelRole::Position, Some("1")),
+            ("dq7", ChannelRole::Velocity, Some("7")),
+            ("tau7", ChannelRole::Torque, Some("7")),
+            ("u1", ChannelRole::Torque, Some("1")),
+            ("q_ref1", ChannelRole::Command, None),
+            ("Reference Velocity", ChannelRole::Command, None),
+            ("Position", ChannelRole::Position, Some("")),
+            ("Velocity", ChannelRole::Velocity, Some("")),
+            ("Iq", ChannelRole::Torque, Some("")),
             (
                 "position[shoulder_pan_joint]",
-                Role::Position,
+                ChannelRole::Position,
                 Some("shoulder_pan_joint"),
             ),
-            ("effort[0]", Role::Torque, Some("0")),
-            ("q1 [deg]", Role::Position, Some("1")),
-            ("Function Activated", Role::Other, None),
-            ("status_1", Role::Other, None),
-            ("quality", Role::Other, None),
-            ("pulses", Role::Other, None),
-            ("temperature", Role::Other, None),
-            ("v", Role::Other, None),
+            ("effort[0]", ChannelRole::Torque, Some("0")),
+            ("q1 [deg]", ChannelRole::Position, Some("1")),
+            ("Function Activated", ChannelRole::Other, None),
+            ("status_1", ChannelRole::Other, None),
+            ("quality", ChannelRole::Other, None),
+            ("pulses", ChannelRole::Other, None),
+            ("temperature", ChannelRole::Other, None),
+            ("v", ChannelRole::Other, None),
         ] {
-            let found = Channel::guessed(name);
+            let found = InspectedChannel::guessed(name);
             assert_eq!(
                 (found.role, found.joint.as_deref()),
                 (role, joint),

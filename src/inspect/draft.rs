@@ -1,17 +1,17 @@
 //! Faults as they are told: of a whole channel, or of stretches of it.
 
-use super::fault::{Episodes, Fault, FaultKind, Severity};
+use super::fault::{Episodes, FaultKind, LogFault, Severity};
 use super::judge::Track;
 
 /// Faults under construction, and what is to be cut out.
-pub(super) struct Draft {
-    pub(super) faults: Vec<Fault>,
+pub(super) struct FaultList {
+    pub(super) faults: Vec<LogFault>,
     pub(super) cuts: Vec<[f64; 2]>,
     first: f64,
     last: f64,
 }
 
-impl Draft {
+impl FaultList {
     /// No faults yet, of a log from `first` to `last` [s].
     pub(super) fn new(first: f64, last: f64) -> Self {
         Self {
@@ -47,9 +47,9 @@ impl Draft {
         remedy: &str,
     ) {
         let duration_s = self.last - self.first;
-        self.faults.push(Fault {
+        self.faults.push(LogFault {
             rows,
-            ..Fault::whole(severity, kind, duration_s, effect, remedy)
+            ..LogFault::whole(severity, kind, duration_s, effect, remedy)
         });
     }
 
@@ -66,11 +66,11 @@ impl Draft {
     ) {
         for (episode, count) in episodes.told() {
             let effect = effect(episode.rows, count);
-            self.faults.push(Fault {
+            self.faults.push(LogFault {
                 channel: channel.map(str::to_owned),
                 from_s: episode.from - self.first,
                 rows: episode.rows,
-                ..Fault::whole(severity, kind, episode.to - self.first, effect, remedy)
+                ..LogFault::whole(severity, kind, episode.to - self.first, effect, remedy)
             });
         }
     }

@@ -102,7 +102,7 @@ impl FaultKind {
 
 /// One fault of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Fault {
+pub struct LogFault {
     /// What is wrong.
     pub kind: FaultKind,
     /// How much it matters.
@@ -124,7 +124,7 @@ pub struct Fault {
     pub cut: bool,
 }
 
-impl Fault {
+impl LogFault {
     /// A fault of a log from its first row to `to_s` [s], of no rows in particular.
     pub fn whole(
         severity: Severity,
@@ -158,12 +158,12 @@ impl Fault {
 /// Stretches of a log, in the order of time, few enough to be listed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Episodes {
-    list: Vec<Episode>,
+    list: Vec<FaultEpisode>,
 }
 
 /// One stretch: times of its first and last row [s], and how many rows of it are concerned.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Episode {
+pub(super) struct FaultEpisode {
     pub(super) from: f64,
     pub(super) to: f64,
     pub(super) rows: u64,
@@ -183,7 +183,7 @@ impl Episodes {
                 last.to = last.to.max(to);
                 last.rows += rows;
             }
-            _ => self.list.push(Episode { from, to, rows }),
+            _ => self.list.push(FaultEpisode { from, to, rows }),
         }
     }
 
@@ -196,12 +196,12 @@ impl Episodes {
         self.list.iter().map(|episode| episode.rows).sum()
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Episode> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &FaultEpisode> {
         self.list.iter()
     }
 
     /// As they are told: one by one, or all as one where there are many.
-    pub(super) fn told(&self) -> Vec<(Episode, usize)> {
+    pub(super) fn told(&self) -> Vec<(FaultEpisode, usize)> {
         let (Some(first), true) = (self.list.first(), self.list.len() > LISTED) else {
             return self.list.iter().map(|episode| (*episode, 1)).collect();
         };
@@ -211,7 +211,7 @@ impl Episodes {
             .iter()
             .fold(first.from, |from, e| from.min(e.from));
         let rows = self.rows();
-        vec![(Episode { from, to, rows }, self.list.len())]
+        vec![(FaultEpisode { from, to, rows }, self.list.len())]
     }
 }
 

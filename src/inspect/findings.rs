@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::channel::Role;
+use super::channel::ChannelRole;
 use super::detectors::excitation::JointMotion;
-use super::fault::{Fault, Severity};
+use super::fault::{LogFault, Severity};
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -25,7 +25,7 @@ pub struct Several {
     pub channels: Vec<OfLog<ChannelFacts>>,
     pub gaps: Vec<OfLog<Gap>>,
     pub joints: Vec<OfLog<JointMotion>>,
-    pub faults: Vec<OfLog<Fault>>,
+    pub faults: Vec<OfLog<LogFault>>,
     pub logs: Vec<OfLog<Findings>>,
 }
 
@@ -90,7 +90,7 @@ pub struct Findings {
     /// What the joints do, in the order of their position channels.
     pub joints: Vec<JointMotion>,
     /// What is wrong, the worst first, then in the order of time.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<LogFault>,
     /// Rows that a fit leaves out: first and last time, by the log's own clock [s], in order and
     /// apart.
     #[serde(skip)]
@@ -112,7 +112,7 @@ pub struct ChannelFacts {
     /// Name of the column.
     pub name: String,
     /// What it holds.
-    pub role: Role,
+    pub role: ChannelRole,
     /// Unit of its numbers, where it is known.
     pub unit: Option<String>,
     /// Smallest number; absent where there is none.
@@ -139,7 +139,7 @@ impl Findings {
     }
 
     /// The faults of one severity.
-    pub fn of(&self, severity: Severity) -> impl Iterator<Item = &Fault> {
+    pub fn of(&self, severity: Severity) -> impl Iterator<Item = &LogFault> {
         self.faults
             .iter()
             .filter(move |fault| fault.severity == severity)

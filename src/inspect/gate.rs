@@ -1,9 +1,9 @@
 //! What a fit must know of a log before it begins: whether it can be used, and which of its rows
 //! are to be left out.
 
-use super::channel::{Channel, Role};
-use super::fault::{Fault, Severity};
-use super::judge::{Depth, Judge};
+use super::channel::{ChannelRole, InspectedChannel};
+use super::fault::{LogFault, Severity};
+use super::judge::{Depth, LogJudge};
 use crate::log::{Block, Channels, Instant, LogError, Reader, escape};
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
@@ -14,9 +14,9 @@ const WIDER: f64 = 1.1;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gate {
     /// The first fault for which a fit refuses the log.
-    refusal: Option<Fault>,
+    refusal: Option<LogFault>,
     /// Faults whose rows are left out.
-    marked: Vec<Fault>,
+    marked: Vec<LogFault>,
     /// First and last time of the rows to leave out [s], in order and apart.
     cuts: Vec<[f64; 2]>,
     /// Median step of the log [s].
@@ -31,7 +31,7 @@ impl Gate {
     /// # Errors
     /// Whatever keeps the reader from the log.
     pub fn look(reader: &mut Reader, stop: &dyn Fn() -> bool) -> Result<Option<Self>, LogError> {
-        let mut judge = Judge::new(channels(reader), Depth::Gate);
+        let mut judge = LogJudge::new(channels(reader), Depth::Gate);
         let mut block = Block::default();
         let mut columns: Vec<Vec<f64>> = Vec::new();
         while reader.read(&mut block)? {
@@ -66,7 +66,7 @@ impl Gate {
     }
 
     /// The fault for which a fit refuses the log.
-    pub fn refusal(&self) -> Option<&Fault> {
+    pub fn refusal(&self) -> Option<&LogFault> {
         self.refusal.as_ref()
     }
 
@@ -87,7 +87,7 @@ impl Gate {
 
     /// What is left out and where, one sentence for each channel and kind of fault.
     pub fn warnings(&self) -> Vec<String> {
-        let mut told: Vec<(&Fault, u64, Vec<String>)> = Vec::new();
+        let mut told: Vec<(&LogFault, u64, Vec<String>)> = Vec::new();
         for fault in &self.marked {
             let alike = told
                 .iter_mut()
@@ -100,7 +100,7 @@ impl Gate {
                 None => told.push((fault, fault.rows, vec![fault.span()])),
             }
         }
-        let sentence = |(fault, rows, spans): (&Fault, u64, Vec<String>)| {
+        let sentence = |(fault, rows, spans): (&LogFault, u64, Vec<String>)| {
             let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
             let more = match spans.len() {
                 0..=4 => String::new(),
@@ -129,18 +129,18 @@ fn part(rows: &[f64], columns: &mut [Vec<f64>]) {
 }
 
 /// The channels whose numbers a fit reads.
-fn channels(reader: &Reader) -> Vec<Channel> {
+fn channels(reader: &Reader) -> Vec<InspectedChannel> {
     let layout = reader.layout();
     let kinds = [
-        (&layout.positions, Role::Position),
-        (&layout.torques, Role::Torque),
+        (&layout.positions, ChannelRole::Position),
+        (&layout.torques, ChannelRole::Torque),
     ];
     let each = kinds.into_iter().flat_map(|(channels, role)| {
         let joints = channels.iter().zip(&layout.joints);
         joints.map(move |(channel, joint)| {
-            let mut seen = Channel::new(&channel.column, role, Some(joint), None);
+            let mut seen = InspectedChannel::new(&channel.column, role, Some(joint), None);
             // Volts are logged as the amplifier gave them.
-            seen.saturates = role == Role::Torque && layout.channels == Channels::Actuator;
+            seen.saturates = role == ChannelRole::Torque && layout.channels == Channels::Actuator;
             seen
         })
     });

@@ -1,7 +1,7 @@
 //! Runs every detector over the rows of a log, and gathers what they know at the end.
 
-use super::channel::{Channel, Role};
-use super::detectors::clock::{RowStep, SampleClock, typical_step};
+use super::channel::{ChannelRole, InspectedChannel};
+use super::detectors::clock::{LogClock, RowStep, typical_step};
 use super::detectors::copies::Copies;
 use super::detectors::excitation::Excitation;
 use super::detectors::flat::Flat;
@@ -30,7 +30,7 @@ pub enum Depth {
 /// One channel's detectors.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
-    pub(super) channel: Channel,
+    pub(super) channel: InspectedChannel,
     /// Rows with a number.
     pub(super) rows: u64,
     pub(super) low: f64,
@@ -50,8 +50,11 @@ pub(super) struct Track {
 }
 
 impl Track {
-    fn new(channel: Channel, position: Option<usize>) -> Self {
-        let shaped = matches!(channel.role, Role::Position | Role::Velocity | Role::Torque);
+    fn new(channel: InspectedChannel, position: Option<usize>) -> Self {
+        let shaped = matches!(
+            channel.role,
+            ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
+        );
         Self {
             channel,
             rows: 0,
@@ -141,9 +144,9 @@ impl Track {
 
 /// Looks at the rows of one log.
 #[derive(Debug, Clone)]
-pub struct Judge {
+pub struct LogJudge {
     pub(super) depth: Depth,
-    pub(super) clock: SampleClock,
+    pub(super) clock: LogClock,
     pub(super) tracks: Vec<Track>,
     pub(super) repeats: Repeats,
     pub(super) copies: Copies,
@@ -158,23 +161,26 @@ pub struct Judge {
     row: [Vec<f64>; 2],
 }
 
-impl Judge {
+impl LogJudge {
     /// For a log of these channels, time aside.
-    pub fn new(mut channels: Vec<Channel>, depth: Depth) -> Self {
+    pub fn new(mut channels: Vec<InspectedChannel>, depth: Depth) -> Self {
         let of_motion = channels.iter_mut().filter(|channel| {
-            matches!(channel.role, Role::Position | Role::Velocity | Role::Torque)
+            matches!(
+                channel.role,
+                ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
+            )
         });
         for channel in of_motion.skip(SHAPED) {
-            channel.role = Role::Other;
+            channel.role = ChannelRole::Other;
         }
-        let of_role = |role: Role| -> Vec<usize> {
+        let of_role = |role: ChannelRole| -> Vec<usize> {
             let all = channels.iter().enumerate();
             all.filter(|(_, channel)| channel.role == role)
                 .map(|(index, _)| index)
                 .collect()
         };
-        let positions = of_role(Role::Position);
-        let position_of = |channel: &Channel| {
+        let positions = of_role(ChannelRole::Position);
+        let position_of = |channel: &InspectedChannel| {
             let joint = channel.joint.as_deref()?;
             let of_joint = |index: &&usize| channels[**index].joint.as_deref() == Some(joint);
             let only = match positions[..] {
@@ -183,25 +189,31 @@ impl Judge {
                 _ => None,
             };
             let found = positions.iter().find(of_joint).copied().or(only);
-            found.filter(|_| channel.role != Role::Position)
+            found.filter(|_| channel.role != ChannelRole::Position)
         };
         let tracks: Vec<Track> = channels
             .iter()
             .map(|channel| Track::new(channel.clone(), position_of(channel)))
             .collect();
         let mut compared = Vec::new();
-        for role in [Role::Position, Role::Velocity, Role::Torque, Role::Command] {
-            if depth == Depth::Whole || role == Role::Position || role == Role::Torque {
+        for role in [
+            ChannelRole::Position,
+            ChannelRole::Velocity,
+            ChannelRole::Torque,
+            ChannelRole::Command,
+        ] {
+            if depth == Depth::Whole || role == ChannelRole::Position || role == ChannelRole::Torque
+            {
                 compared.extend(of_role(role));
             }
         }
         compared.sort_unstable();
         compared.truncate(COMPARED);
-        let mut others = of_role(Role::Torque);
-        others.extend(of_role(Role::Velocity));
+        let mut others = of_role(ChannelRole::Torque);
+        others.extend(of_role(ChannelRole::Velocity));
         Self {
             depth,
-            clock: SampleClock::default(),
+            clock: LogClock::default(),
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
             compared,

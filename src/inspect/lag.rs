@@ -1,13 +1,13 @@
 //! Delay between positions and torques, from the motion itself.
 
-use super::channel::Role;
+use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::windows::Window;
-use super::draft::{Draft, seconds};
+use super::draft::{FaultList, seconds};
 use super::fault::FaultKind;
 use super::fault::Severity::Warning;
-use super::judge::Judge;
-use crate::log::Delay;
+use super::judge::LogJudge;
+use crate::log::DelayEstimator;
 
 /// Stretches of the log that are looked at.
 const STRETCHES: usize = 8;
@@ -24,13 +24,13 @@ const SURE: f64 = 6.0;
 pub(super) const REMEDY: &str = "take both from one message or one cycle of the controller; in recordings of two topics `torque_delay_s` in [log] of the robot file takes a delay off";
 
 /// Tells a delay where the stretches of the log agree in one.
-pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     // Joints that have both channels.
     let pairs: Vec<(usize, usize)> = judge
         .tracks
         .iter()
         .enumerate()
-        .filter(|(_, track)| track.channel.role == Role::Torque)
+        .filter(|(_, track)| track.channel.role == ChannelRole::Torque)
         .filter_map(|(torque, track)| Some((track.position?, torque)))
         .filter(|(position, _)| judge.moves(&judge.tracks[*position]))
         .collect();
@@ -65,7 +65,7 @@ pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
 
 /// The delay in one stretch [s].
 fn delay(window: &Window, pairs: &[(usize, usize)]) -> Option<f64> {
-    let mut delay = Delay::default();
+    let mut delay = DelayEstimator::default();
     let (mut q, mut tau) = (Vec::new(), Vec::new());
     for (row, t) in window.t.iter().enumerate() {
         q.clear();

@@ -1,9 +1,9 @@
 //! Shows a log, as it stands in its files, to the judge.
 
-use super::channel::Channel;
-use super::fault::{Fault, FaultKind, Severity};
+use super::channel::InspectedChannel;
+use super::fault::{FaultKind, LogFault, Severity};
 use super::findings::Findings;
-use super::judge::{Depth, Judge};
+use super::judge::{Depth, LogJudge};
 use crate::log::{LogError, RawBlock, RawReader};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
@@ -16,7 +16,7 @@ pub struct ChannelColumn {
     /// Added after it.
     pub offset: f64,
     /// What it is.
-    pub channel: Channel,
+    pub channel: InspectedChannel,
 }
 
 /// Which columns of a table are what.
@@ -41,7 +41,7 @@ pub fn look(
         log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
-    let mut judge = Judge::new(channels.collect(), Depth::Whole);
+    let mut judge = LogJudge::new(channels.collect(), Depth::Whole);
     let mut block = RawBlock::default();
     while log.read(&mut block)? {
         if stop() {
@@ -69,36 +69,36 @@ pub fn look(
         );
         let remedy = "complete or delete these rows; write decimal points, not commas";
         let to_s = findings.duration_s;
-        let fault = Fault::whole(
+        let fault = LogFault::whole(
             Severity::Error,
             FaultKind::MalformedRows,
             to_s,
             effect,
             remedy,
         );
-        findings.faults.insert(0, Fault { rows, ..fault });
+        findings.faults.insert(0, LogFault { rows, ..fault });
     }
     let rows = findings.rows;
     if rows < 2 {
         let effect = format!("{rows} row(s): nothing can be said, and a fit refuses the log");
         let remedy = "record again, or check the span";
-        let fault = Fault::whole(
+        let fault = LogFault::whole(
             Severity::Error,
             FaultKind::IncompleteFile,
             0.0,
             effect,
             remedy,
         );
-        findings.faults.insert(0, Fault { rows, ..fault });
+        findings.faults.insert(0, LogFault { rows, ..fault });
     }
     for effect in log.breaks() {
         let remedy = "copy it again from where it was recorded; a recorder that is killed loses its last chunk";
         let at_s = findings.duration_s;
         let kind = FaultKind::IncompleteFile;
-        let fault = Fault::whole(Severity::Warning, kind, at_s, effect, remedy);
+        let fault = LogFault::whole(Severity::Warning, kind, at_s, effect, remedy);
         findings.faults.insert(
             0,
-            Fault {
+            LogFault {
                 from_s: at_s,
                 ..fault
             },

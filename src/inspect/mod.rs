@@ -24,11 +24,11 @@ mod shape;
 mod together;
 mod verdicts;
 
-pub use channel::{Channel, Role, is_time};
+pub use channel::{ChannelRole, InspectedChannel, is_time};
 pub use detectors::excitation::JointMotion;
-pub use fault::{Fault, FaultKind, Severity};
+pub use fault::{FaultKind, LogFault, Severity};
 pub use findings::{ChannelFacts, Findings, Gap, Inspection};
 pub use gate::{Cutter, Gate};
-pub use judge::{Depth, Judge};
+pub use judge::{Depth, LogJudge};
 pub use look::{ChannelColumn, ColumnPlan, look};
 pub use order::{Change, Comparison};

@@ -5,7 +5,7 @@
 //! and in both. Where one such change explains what was not explained without it, it is told.
 
 use super::draft::seconds;
-use super::fault::{Fault, FaultKind, Severity};
+use super::fault::{FaultKind, LogFault, Severity};
 use super::lag;
 use crate::log::escape;
 
@@ -148,7 +148,7 @@ impl Comparison {
 
     /// The delay of the torques behind the positions, where it explains what the model leaves;
     /// `dt` is the log's step [s].
-    pub fn delay(&self, dt: f64, rows: u64, duration_s: f64) -> Option<Fault> {
+    pub fn delay(&self, dt: f64, rows: u64, duration_s: f64) -> Option<LogFault> {
         // Each joint counts as much as it is sure.
         let (mut top, mut bottom) = (0.0, 0.0);
         let (mut explained, mut all) = (0.0, 0.0);
@@ -175,8 +175,8 @@ impl Comparison {
             seconds(delay.abs())
         );
         let kind = FaultKind::Delay;
-        let fault = Fault::whole(Severity::Warning, kind, duration_s, effect, lag::REMEDY);
-        Some(Fault { rows, ..fault })
+        let fault = LogFault::whole(Severity::Warning, kind, duration_s, effect, lag::REMEDY);
+        Some(LogFault { rows, ..fault })
     }
 
     /// Share of the torque's power that is left, the mean of the joints, under change `index` of the
@@ -204,7 +204,7 @@ impl Comparison {
     }
 
     /// What is wrong with order and signs, where a single change explains it.
-    pub fn fault(&self, joints: &[String], rows: u64, duration_s: f64) -> Option<Fault> {
+    pub fn fault(&self, joints: &[String], rows: u64, duration_s: f64) -> Option<LogFault> {
         let as_logged = self.left(0, Change::None);
         let mut best = (as_logged, Change::None, "");
         for (index, change) in self.changes.iter().enumerate().skip(1) {
@@ -247,8 +247,8 @@ impl Comparison {
             share(left)
         );
         let kind = FaultKind::WrongSignOrOrder;
-        let fault = Fault::whole(Severity::Error, kind, duration_s, effect, remedy);
-        Some(Fault { rows, ..fault })
+        let fault = LogFault::whole(Severity::Error, kind, duration_s, effect, remedy);
+        Some(LogFault { rows, ..fault })
     }
 }
 

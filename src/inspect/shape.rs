@@ -1,14 +1,14 @@
 //! Faults in the shape of one channel: flat where it should change, off where it should be smooth,
 //! coarse.
 
-use super::channel::Role;
+use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::flat::{FlatRun, Levels};
 use super::detectors::grain;
-use super::draft::{Draft, rows_text};
+use super::draft::{FaultList, rows_text};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
-use super::judge::{Depth, Judge, Track};
+use super::judge::{Depth, LogJudge, Track};
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;
@@ -30,10 +30,10 @@ const COARSE_TORQUE: f64 = 0.1;
 const BAND_HZ: f64 = 20.0;
 
 /// The faults of one channel.
-pub(super) fn faults(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
+pub(super) fn faults(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut FaultList) {
     match track.channel.role {
-        Role::Position | Role::Velocity | Role::Torque => {}
-        Role::Acceleration | Role::Command | Role::Other => return,
+        ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque => {}
+        ChannelRole::Acceleration | ChannelRole::Command | ChannelRole::Other => return,
     }
     if track.rows == 0 {
         return;
@@ -53,7 +53,7 @@ pub(super) fn faults(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &m
 }
 
 /// A channel that never changes.
-fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
+fn constant(judge: &LogJudge, track: &Track, draft: &mut FaultList) {
     let value = track.low;
     let joint_moves = track
         .position
@@ -67,8 +67,8 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
         .iter()
         .all(|index| judge.tracks[*index].travel() == 0.0);
     match track.channel.role {
-        Role::Torque | Role::Velocity if joint_moves => {
-            let severity = if track.channel.role == Role::Torque {
+        ChannelRole::Torque | ChannelRole::Velocity if joint_moves => {
+            let severity = if track.channel.role == ChannelRole::Torque {
                 Error
             } else {
                 Warning
@@ -80,7 +80,7 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
             let remedy = "check the sensor and the recorder, or name the right column in the [log] section of the robot file";
             draft.whole(severity, FaultKind::StuckChannel, track, effect, remedy);
         }
-        Role::Position if all_rest => {
+        ChannelRole::Position if all_rest => {
             let effect = format!(
                 "{value} in all {} rows, and no other joint moves: a log at rest determines nothing",
                 track.rows
@@ -88,7 +88,7 @@ fn constant(judge: &Judge, track: &Track, draft: &mut Draft) {
             let remedy = "check the encoder and the recorder; log a motion";
             draft.whole(Warning, FaultKind::StuckChannel, track, effect, remedy);
         }
-        Role::Position => {
+        ChannelRole::Position => {
             let effect = format!(
                 "{value} in all {} rows: either the joint is held, or its channel is dead",
                 track.rows
@@ -114,7 +114,7 @@ struct Flatness<'a> {
 }
 
 impl<'a> Flatness<'a> {
-    fn of(judge: &Judge, track: &'a Track) -> Self {
+    fn of(judge: &LogJudge, track: &'a Track) -> Self {
         let flat = &track.flat;
         let bends = flat.bends.quantile_not_zero(0.99);
         let grain = flat.steps.quantile_not_zero(0.05);
@@ -154,7 +154,7 @@ impl<'a> Flatness<'a> {
                 .filter(|run| run.value == value)
                 .copied()
                 .collect();
-            let position = self.track.channel.role == Role::Position;
+            let position = self.track.channel.role == ChannelRole::Position;
             let longest = runs.iter().map(|run| run.rows).max().unwrap_or(0);
             // A torque that meets a limit does so while its joint is driven; positions and
             // velocities also rest where they are largest, but do not get there at once.
@@ -170,7 +170,7 @@ impl<'a> Flatness<'a> {
 
     /// Runs at any other value.
     fn stuck(&mut self) {
-        let position = self.track.channel.role == Role::Position;
+        let position = self.track.channel.role == ChannelRole::Position;
         for run in self.track.flat.runs() {
             let long = run.rows >= STUCK_ROWS
                 && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
@@ -185,10 +185,10 @@ impl<'a> Flatness<'a> {
         }
     }
 
-    fn tell(&self, track: &Track, draft: &mut Draft) {
+    fn tell(&self, track: &Track, draft: &mut FaultList) {
         let name = Some(track.channel.name.as_str());
         let role = track.channel.role;
-        let used = matches!(role, Role::Position | Role::Torque);
+        let used = matches!(role, ChannelRole::Position | ChannelRole::Torque);
         let then = if used {
             "these rows are left out of a fit"
         } else {
@@ -203,7 +203,7 @@ impl<'a> Flatness<'a> {
             episodes
         };
         let tops = gathered(&self.tops);
-        let kind = if role == Role::Torque {
+        let kind = if role == ChannelRole::Torque {
             FaultKind::Saturation
         } else {
             FaultKind::Clipping
@@ -263,13 +263,13 @@ impl<'a> Flatness<'a> {
     }
 }
 
-fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft) {
+fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut FaultList) {
     let usual = track.spikes.differences_seen.quantile(0.995);
     let grain = track.flat.steps.quantile_not_zero(0.05);
     let least = (SPIKE * usual)
         .max(GRAINS * grain)
         .max(match track.channel.role {
-            Role::Position => 0.0,
+            ChannelRole::Position => 0.0,
             _ => SPIKE_SHARE * track.deviation(),
         });
     // Where a channel leaps out of a flat stretch it is told already.
@@ -293,7 +293,10 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft)
     if episodes.is_empty() {
         return;
     }
-    let used = matches!(track.channel.role, Role::Position | Role::Torque);
+    let used = matches!(
+        track.channel.role,
+        ChannelRole::Position | ChannelRole::Torque
+    );
     let (severity, then) = if used {
         (
             Warning,
@@ -322,7 +325,7 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut Draft)
     }
 }
 
-fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
+fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut FaultList) {
     let index = judge
         .tracks
         .iter()
@@ -332,16 +335,16 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
     };
     let levels = track.travel() / step;
     // A joint that is held shows a few counts, which is no fault.
-    if levels < 30.0 && track.channel.role != Role::Torque {
+    if levels < 30.0 && track.channel.role != ChannelRole::Torque {
         return;
     }
-    if track.channel.role == Role::Position && !judge.moves(track) {
+    if track.channel.role == ChannelRole::Position && !judge.moves(track) {
         return;
     }
     let remedy =
         "use a finer sensor or more digits; lower the cut-off in [filter] of the robot file";
     match (track.channel.role, &track.excitation) {
-        (Role::Position, Some(excitation)) => {
+        (ChannelRole::Position, Some(excitation)) => {
             // White noise of step^2/12, differentiated twice, up to the cut-off.
             let w = std::f64::consts::TAU * BAND_HZ;
             let noise = step * (clock.dt * BAND_HZ / 30.0).sqrt() * w * w;
@@ -355,7 +358,7 @@ fn coarse(judge: &Judge, track: &Track, clock: &ClockFacts, draft: &mut Draft) {
                 return;
             }
         }
-        (Role::Torque, _) if step > COARSE_TORQUE * track.deviation() => {
+        (ChannelRole::Torque, _) if step > COARSE_TORQUE * track.deviation() => {
             let effect = format!(
                 "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters drown in it",
                 100.0 * step / track.deviation()

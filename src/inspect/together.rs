@@ -1,13 +1,13 @@
 //! Faults that show between channels: copies, rows that repeat, velocities that lag.
 
-use super::channel::Role;
+use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::grain;
 use super::detectors::velocity;
-use super::draft::{Draft, seconds};
+use super::draft::{FaultList, seconds};
 use super::fault::Severity::{Error, Info, Warning};
-use super::fault::{Fault, FaultKind};
-use super::judge::{Depth, Judge, Track};
+use super::fault::{FaultKind, LogFault};
+use super::judge::{Depth, LogJudge, Track};
 use super::lag;
 
 /// A velocity that lags by more rows is filtered.
@@ -18,7 +18,7 @@ const EXPLAINED: f64 = 1.3;
 const NOISELESS: f64 = 1e-8;
 
 /// The faults between channels.
-pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     repeated_rows(judge, draft);
     copies(judge, draft);
     if judge.depth == Depth::Whole {
@@ -28,7 +28,7 @@ pub(super) fn faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     }
 }
 
-fn repeated_rows(judge: &Judge, draft: &mut Draft) {
+fn repeated_rows(judge: &LogJudge, draft: &mut FaultList) {
     let flats: Vec<_> = judge
         .positions
         .iter()
@@ -52,16 +52,16 @@ fn repeated_rows(judge: &Judge, draft: &mut Draft) {
     );
     let remedy = "log each sample of the robot once, by the robot's own clock";
     let first = judge.clock.first.unwrap_or(0.0);
-    draft.faults.push(Fault {
+    draft.faults.push(LogFault {
         from_s: from - first,
         rows: stale.rows,
         cut: true,
-        ..Fault::whole(Warning, FaultKind::RepeatedRows, to - first, effect, remedy)
+        ..LogFault::whole(Warning, FaultKind::RepeatedRows, to - first, effect, remedy)
     });
     draft.cuts.extend(stale.cuts);
 }
 
-fn copies(judge: &Judge, draft: &mut Draft) {
+fn copies(judge: &LogJudge, draft: &mut FaultList) {
     for copy in judge.copies.found() {
         let track = |index: usize| &judge.tracks[judge.compared[index]];
         let (first, second) = (track(copy.first), track(copy.second));
@@ -73,10 +73,10 @@ fn copies(judge: &Judge, draft: &mut Draft) {
         };
         let name = |track: &Track| crate::log::escape(&track.channel.name);
         let (severity, kind, of, effect, remedy) = match (a, b) {
-            (Role::Command, Role::Command) => continue,
-            (Role::Command, _) | (_, Role::Command) => {
+            (ChannelRole::Command, ChannelRole::Command) => continue,
+            (ChannelRole::Command, _) | (_, ChannelRole::Command) => {
                 let (command, measured) = match a {
-                    Role::Command => (first, second),
+                    ChannelRole::Command => (first, second),
                     _ => (second, first),
                 };
                 let effect = format!(
@@ -87,7 +87,8 @@ fn copies(judge: &Judge, draft: &mut Draft) {
                 let kind = FaultKind::CommandAsMeasurement;
                 (Warning, kind, measured, effect, remedy)
             }
-            (Role::Position, Role::Position) | (Role::Torque, Role::Torque) => {
+            (ChannelRole::Position, ChannelRole::Position)
+            | (ChannelRole::Torque, ChannelRole::Torque) => {
                 let effect = format!(
                     "equals `{}`{sign} in every row: one of the two is not what it says, and the data of a joint are missing",
                     name(first)
@@ -108,9 +109,9 @@ fn copies(judge: &Judge, draft: &mut Draft) {
     }
 }
 
-fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+fn velocities(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     for (index, track) in judge.tracks.iter().enumerate() {
-        let (Role::Velocity, Some(position)) = (track.channel.role, track.position) else {
+        let (ChannelRole::Velocity, Some(position)) = (track.channel.role, track.position) else {
             continue;
         };
         let Some(found) = velocity::follows(judge.windows.iter(), position, index) else {
@@ -147,7 +148,7 @@ fn velocities(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
 }
 
 /// Positions without any noise or grain are no measurement.
-fn noiseless(judge: &Judge, draft: &mut Draft) {
+fn noiseless(judge: &LogJudge, draft: &mut FaultList) {
     for &index in &judge.positions {
         let track = &judge.tracks[index];
         let noise = match grain::step(judge.windows.iter(), index) {

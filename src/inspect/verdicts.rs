@@ -1,14 +1,14 @@
 //! From what the detectors gathered to faults: all thresholds stand here and in [`super::shape`].
 
-use super::channel::Role;
+use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::excitation::JointMotion;
 use super::detectors::grain;
-use super::draft::{Draft, rows_text, seconds};
+use super::draft::{FaultList, rows_text, seconds};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::findings::{ChannelFacts, Findings, Gap, joined};
-use super::judge::{Depth, Judge, Track};
+use super::judge::{Depth, LogJudge, Track};
 use super::{shape, together};
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.
@@ -16,7 +16,7 @@ const UNEVEN: f64 = 0.05;
 /// Jitter from which it is worth knowing.
 const JITTER: f64 = 0.02;
 
-impl Judge {
+impl LogJudge {
     /// What there is to say about the log.
     pub fn finish(mut self) -> Findings {
         for track in &mut self.tracks {
@@ -27,17 +27,17 @@ impl Judge {
 }
 
 /// Everything there is to say.
-fn conclude(judge: &Judge) -> Findings {
+fn conclude(judge: &LogJudge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
-    let mut draft = Draft::new(first, first + judge.clock.duration().max(0.0));
+    let mut draft = FaultList::new(first, first + judge.clock.duration().max(0.0));
     time_faults(judge, &clock, &mut draft);
     for track in &judge.tracks {
         number_faults(track, &mut draft);
         shape::faults(judge, track, &clock, &mut draft);
     }
     together::faults(judge, &clock, &mut draft);
-    let Draft {
+    let FaultList {
         mut faults, cuts, ..
     } = draft;
     faults.sort_by(|a, b| {
@@ -72,7 +72,7 @@ fn conclude(judge: &Judge) -> Findings {
     }
 }
 
-fn channel_facts(judge: &Judge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {
+fn channel_facts(judge: &LogJudge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {
     let number = |x: f64| x.is_finite().then_some(x);
     let share = track.rows as f64 / judge.clock.rows.max(1) as f64;
     let step = match judge.depth {
@@ -91,7 +91,7 @@ fn channel_facts(judge: &Judge, index: usize, track: &Track, rate: Option<f64>) 
     }
 }
 
-fn joints(judge: &Judge) -> Vec<JointMotion> {
+fn joints(judge: &LogJudge) -> Vec<JointMotion> {
     let tracks = judge.positions.iter().map(|index| &judge.tracks[*index]);
     tracks
         .filter_map(|track| {
@@ -109,7 +109,7 @@ fn joints(judge: &Judge) -> Vec<JointMotion> {
         .collect()
 }
 
-fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
+fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let seen = &judge.clock;
     if seen.without_time > 0 {
         let effect = format!(
@@ -196,9 +196,12 @@ fn time_faults(judge: &Judge, clock: &ClockFacts, draft: &mut Draft) {
     }
 }
 
-fn number_faults(track: &Track, draft: &mut Draft) {
+fn number_faults(track: &Track, draft: &mut FaultList) {
     let name = Some(track.channel.name.as_str());
-    let used = matches!(track.channel.role, Role::Position | Role::Torque);
+    let used = matches!(
+        track.channel.role,
+        ChannelRole::Position | ChannelRole::Torque
+    );
     if track.rows == 0 && !used {
         // A column of words is no channel.
         return;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::layout::Layout;
-use super::rows::Rows;
+use super::rows::LogRows;
 use super::source::Checksum;
 use super::time::Stamped;
 use super::{Block, LogError};
@@ -148,7 +148,7 @@ impl ArrayRows {
     }
 }
 
-impl Rows for ArrayRows {
+impl LogRows for ArrayRows {
     fn names(&self) -> &[String] {
         &self.names
     }

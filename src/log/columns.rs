@@ -6,7 +6,7 @@ use super::names::{escape, list, nearest};
 
 /// Where a channel stands and how its numbers become SI.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
+pub(super) struct ScaledColumn {
     pub(super) index: usize,
     pub(super) factor: f64,
     pub(super) offset: f64,
@@ -14,12 +14,12 @@ pub(super) struct Column {
 
 /// The columns of one log that are read.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Columns {
-    pub(super) time: Option<Column>,
-    pub(super) positions: Vec<Column>,
-    pub(super) torques: Vec<Column>,
+pub(super) struct ScaledColumns {
+    pub(super) time: Option<ScaledColumn>,
+    pub(super) positions: Vec<ScaledColumn>,
+    pub(super) torques: Vec<ScaledColumn>,
     /// Empty where the log lacks a velocity.
-    pub(super) velocities: Vec<Column>,
+    pub(super) velocities: Vec<ScaledColumn>,
 }
 
 /// A header and where it stands.
@@ -31,8 +31,8 @@ pub(super) struct Header<'a> {
 
 impl Header<'_> {
     /// Finds every channel of the layout.
-    pub(super) fn columns(&self, layout: &Layout) -> Result<Columns, LogError> {
-        let each = |channels: &[Channel], what: &str| -> Result<Vec<Column>, LogError> {
+    pub(super) fn columns(&self, layout: &Layout) -> Result<ScaledColumns, LogError> {
+        let each = |channels: &[Channel], what: &str| -> Result<Vec<ScaledColumn>, LogError> {
             let named = channels.iter().zip(&layout.joints);
             named
                 .map(|(channel, joint)| self.find(channel, &format!("{what} of {joint}")))
@@ -48,7 +48,7 @@ impl Header<'_> {
         } else {
             Vec::new()
         };
-        Ok(Columns {
+        Ok(ScaledColumns {
             time: Some(time),
             positions,
             torques,
@@ -56,7 +56,7 @@ impl Header<'_> {
         })
     }
 
-    fn find(&self, channel: &Channel, purpose: &str) -> Result<Column, LogError> {
+    fn find(&self, channel: &Channel, purpose: &str) -> Result<ScaledColumn, LogError> {
         let mut indices = positions_of(self.names, channel);
         let Some(index) = indices.next() else {
             return Err(self.missing(channel, purpose));
@@ -71,7 +71,7 @@ impl Header<'_> {
             });
         }
         self.check_unit(channel, &self.names[index])?;
-        Ok(Column {
+        Ok(ScaledColumn {
             index,
             factor: channel.factor,
             offset: channel.offset,

@@ -58,7 +58,7 @@ impl Content {
             if head.is_empty() {
                 return Err(fail(error));
             }
-            rest = Box::new(Failing(error.kind(), error.to_string()));
+            rest = Box::new(CutOff(error.kind(), error.to_string()));
         }
         Ok(Self {
             compression,
@@ -115,9 +115,9 @@ impl Unpacker {
 }
 
 /// The end of a file that cannot be read any further.
-struct Failing(io::ErrorKind, String);
+struct CutOff(io::ErrorKind, String);
 
-impl Read for Failing {
+impl Read for CutOff {
     fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
         Err(io::Error::new(self.0, self.1.clone()))
     }

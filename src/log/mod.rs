@@ -33,7 +33,9 @@ pub use layout::{Channel, Channels, Conversion, Layout};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader};
 pub use reader::Reader;
-pub use recording::{CdrReader, DefinitionError, Delay, DelayEstimate, Malformed, Value};
+pub use recording::{
+    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, Value,
+};
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
     PositionUnit, Stamp, TimeUnit, TorqueIs, TorqueUnit,

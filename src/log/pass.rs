@@ -6,7 +6,7 @@ use super::columns::choose;
 use super::content::Content;
 use super::layout::Layout;
 use super::recording::{JointStates, MessageRows, format_of};
-use super::rows::{Rows, Strictness};
+use super::rows::{LogRows, Strictness};
 use super::source::{self, Provenance};
 use super::text::TextRows;
 use super::time::Instant;
@@ -14,11 +14,11 @@ use super::{LogError, LogSpec, Span};
 
 /// A log that is being gone through.
 #[derive(Debug)]
-pub(super) struct Pass {
+pub(super) struct LogPass {
     pub(super) spec: LogSpec,
     pub(super) files: Vec<PathBuf>,
     strictness: Strictness,
-    pub(super) rows: Box<dyn Rows>,
+    pub(super) rows: Box<dyn LogRows>,
     /// The layout that the log turned out to have.
     pub(super) layout: Layout,
     /// What keeps a strict reader from it.
@@ -35,7 +35,7 @@ pub(super) struct Pass {
     pub(super) samples: u64,
 }
 
-impl Pass {
+impl LogPass {
     /// Opens a log of any format and finds its channels.
     pub(super) fn open(
         spec: &LogSpec,
@@ -53,7 +53,7 @@ impl Pass {
     }
 
     /// Goes through rows that are there already.
-    pub(super) fn of_rows(spec: LogSpec, rows: Box<dyn Rows>, layout: Layout) -> Self {
+    pub(super) fn of_rows(spec: LogSpec, rows: Box<dyn LogRows>, layout: Layout) -> Self {
         Self {
             spec,
             files: Vec::new(),
@@ -149,7 +149,7 @@ impl Pass {
 }
 
 /// Rows of a log, the layout that it turns out to have, and what keeps a strict reader from it.
-type Opened = (Box<dyn Rows>, Layout, Option<LogError>);
+type Opened = (Box<dyn LogRows>, Layout, Option<LogError>);
 
 fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
     if let [path] = files {

@@ -3,7 +3,7 @@
 
 use super::columns::{position_of, unit_of};
 use super::layout::{Channel, Layout};
-use super::pass::Pass;
+use super::pass::LogPass;
 use super::rows::Strictness;
 use super::source::Provenance;
 use super::time::Instant;
@@ -39,7 +39,7 @@ impl RawBlock {
 /// A log that is read as it stands: what is wrong with it is recorded, and reading goes on.
 #[derive(Debug)]
 pub struct RawReader {
-    pass: Pass,
+    pass: LogPass,
     /// Fields that are neither empty nor a number, per column.
     words: Vec<u64>,
 }
@@ -56,7 +56,7 @@ impl RawReader {
             ..Layout::joint_columns(&[] as &[&str])
         };
         let layout = layout.cloned().unwrap_or_else(without_robot);
-        let pass = Pass::open(spec, &layout, Strictness::Record)?;
+        let pass = LogPass::open(spec, &layout, Strictness::Record)?;
         let words = vec![0; pass.rows.names().len()];
         Ok(Self { pass, words })
     }

@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use super::arrays::{ArrayRows, Arrays};
 use super::layout::Layout;
-use super::pass::Pass;
+use super::pass::LogPass;
 use super::rows::Strictness;
 use super::source::{self, Provenance};
-use super::stale::{Stale, Verdict};
+use super::stale::Stale;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
 
 /// A log that is being read, and refused where anything is wrong with it.
 #[derive(Debug)]
 pub struct Reader {
-    pass: Pass,
+    pass: LogPass,
     /// Times of the first and the last row of the file so far [s].
     seen: Option<(f64, f64)>,
     finished: bool,
@@ -40,7 +40,7 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read, is no log, or lacks a channel of the layout.
     pub fn open(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
-        Pass::open(spec, layout, Strictness::Refuse).map(Self::new)
+        LogPass::open(spec, layout, Strictness::Refuse).map(Self::new)
     }
 
     /// Reads a log that is in memory; `layout` names its joints and says whether torques are read.
@@ -50,10 +50,10 @@ impl Reader {
     pub fn of_arrays(arrays: &Arc<Arrays>, layout: Layout) -> Result<Self, LogError> {
         let rows = Box::new(ArrayRows::open(arrays, &layout)?);
         let spec = LogSpec::whole(arrays.name());
-        Ok(Self::new(Pass::of_rows(spec, rows, layout)))
+        Ok(Self::new(LogPass::of_rows(spec, rows, layout)))
     }
 
-    fn new(pass: Pass) -> Self {
+    fn new(pass: LogPass) -> Self {
         let (joints, torques) = (pass.layout.positions.len(), pass.layout.torques.len());
         Self {
             pass,
@@ -224,11 +224,11 @@ impl Reader {
                 positions: format!("{q:?}"),
             });
         }
-        let verdict = self
+        let stale = self
             .stale
             .judge(t, &block.q[at_q..], || block.repeats_beside_positions());
-        if let Verdict::Drop(rows) = verdict {
-            block.remove_before_last(rows);
+        if stale > 0 {
+            block.remove_before_last(stale);
         }
         Ok(())
     }

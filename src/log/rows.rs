@@ -15,7 +15,7 @@ pub(super) enum Strictness {
 }
 
 /// The rows of one log.
-pub(super) trait Rows: Debug + Send {
+pub(super) trait LogRows: Debug + Send {
     /// Names of the columns.
     fn names(&self) -> &[String];
 

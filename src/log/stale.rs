@@ -16,15 +16,6 @@ const KNOWN: u64 = 10;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
 const ALIKE: f64 = 3.0;
 
-/// What a new row says about those before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
-    /// Nothing.
-    Keep,
-    /// The rows before it, so many, are stale.
-    Drop(usize),
-}
-
 /// The motion right before the current row.
 #[derive(Debug)]
 pub(super) struct Stale {
@@ -59,28 +50,29 @@ impl Stale {
         }
     }
 
-    /// Takes the next row into account; `same` tells whether all but its positions repeats too.
+    /// Takes the next row into account; `same` tells whether all but its positions repeats too. How
+    /// many rows before it turn out to be stale.
     #[inline]
-    pub(super) fn judge(&mut self, t: f64, q: &[f64], same: impl FnOnce() -> bool) -> Verdict {
+    pub(super) fn judge(&mut self, t: f64, q: &[f64], same: impl FnOnce() -> bool) -> usize {
         if self.q == q && self.t.is_some() && !q.is_empty() {
             self.run += 1;
             self.repeated += 1;
             self.whole &= same();
-            return Verdict::Keep;
+            return 0;
         }
-        let verdict = match self.t {
+        let stale = match self.t {
             Some(before) => self.moved(t - before, q),
-            None => Verdict::Keep,
+            None => 0,
         };
         self.q.copy_from_slice(q);
         self.t = Some(t);
         self.run = 0;
         self.whole = true;
-        verdict
+        stale
     }
 
     #[inline]
-    fn moved(&mut self, duration: f64, q: &[f64]) -> Verdict {
+    fn moved(&mut self, duration: f64, q: &[f64]) -> usize {
         let stale = (1..=LONGEST).contains(&self.run)
             && (self.whole || self.dropped >= KNOWN)
             && self.goes_on(duration, q);
@@ -93,10 +85,10 @@ impl Stale {
         }
         self.duration = duration;
         if !stale {
-            return Verdict::Keep;
+            return 0;
         }
         self.dropped += self.run as u64;
-        Verdict::Drop(self.run)
+        self.run
     }
 
     /// Whether the motion before the run goes on in the step after it.
@@ -139,13 +131,12 @@ mod tests {
 
     fn dropped(rows: &[f64]) -> Vec<usize> {
         let mut stale = Stale::new(1);
-        let verdicts = rows.iter().enumerate();
-        verdicts
-            .filter_map(|(i, q)| match stale.judge(i as f64, &[*q], || true) {
-                Verdict::Drop(rows) => Some(i - rows),
-                Verdict::Keep => None,
-            })
-            .collect()
+        let rows = rows.iter().enumerate();
+        rows.filter_map(|(i, q)| match stale.judge(i as f64, &[*q], || true) {
+            0 => None,
+            rows => Some(i - rows),
+        })
+        .collect()
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub(super) enum Array {
 
 /// A topic: names, and for each array the columns that it is filled from; none where it is empty.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Topic {
+pub(super) struct TopicColumns {
     pub(super) name: String,
     pub(super) names: Vec<String>,
     pub(super) arrays: Vec<(Array, Vec<usize>)>,
@@ -28,7 +28,7 @@ pub(super) const JOINTS: &str = "/joint_states";
 pub(super) const COLUMNS: &str = "/columns";
 
 /// The topics of a log with these columns, of which the first is the time.
-pub(super) fn topics(columns: &[String]) -> Vec<Topic> {
+pub(super) fn topics(columns: &[String]) -> Vec<TopicColumns> {
     let joints = joints(columns);
     let mut left: Vec<usize> = (1..columns.len()).collect();
     let mut out = Vec::new();
@@ -60,7 +60,7 @@ pub(super) fn topics(columns: &[String]) -> Vec<Topic> {
     let arrays = main.map(|(kind, array)| Some((array, take(kind)?)));
     let arrays: Vec<_> = arrays.into_iter().flatten().collect();
     if !arrays.is_empty() {
-        out.push(Topic {
+        out.push(TopicColumns {
             name: JOINTS.to_owned(),
             names: joints.clone(),
             arrays,
@@ -77,14 +77,14 @@ pub(super) fn topics(columns: &[String]) -> Vec<Topic> {
         } else {
             Array::Position
         };
-        out.push(Topic {
+        out.push(TopicColumns {
             name: format!("/{kind}"),
             names: joints.clone(),
             arrays: vec![(array, found)],
         });
     }
     if !left.is_empty() {
-        out.push(Topic {
+        out.push(TopicColumns {
             name: COLUMNS.to_owned(),
             names: left.iter().map(|index| columns[*index].clone()).collect(),
             arrays: vec![(Array::Position, left)],
@@ -134,7 +134,7 @@ fn joints(columns: &[String]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn of(columns: &str) -> Vec<Topic> {
+    fn of(columns: &str) -> Vec<TopicColumns> {
         let columns: Vec<String> = columns.split(',').map(str::to_owned).collect();
         topics(&columns)
     }
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn joints_kinds_and_what_is_left_have_topics_of_their_own() {
         use Array::*;
-        let topic = |name: &str, names: &[&str], arrays: &[(Array, &[usize])]| Topic {
+        let topic = |name: &str, names: &[&str], arrays: &[(Array, &[usize])]| TopicColumns {
             name: name.to_owned(),
             names: names.iter().map(|n| (*n).to_owned()).collect(),
             arrays: arrays

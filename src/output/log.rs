@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::mcap::Recording;
+use super::mcap::McapLog;
 use super::text::Text;
 use super::{AtomicFile, OutputError};
 use crate::log::Instant;
@@ -100,7 +100,7 @@ impl Write for Packed {
 
 enum Sink {
     Text(Box<Text<io::BufWriter<Packed>>>),
-    Messages(Box<Recording<Packed>>),
+    Messages(Box<McapLog<Packed>>),
 }
 
 /// Writes a log row by row: whole or not at all.
@@ -138,7 +138,7 @@ impl LogWriter {
         let file = AtomicFile::create(path)?;
         let begun = Packed::new(file, form.packing).and_then(|packed| {
             Ok(if form.messages {
-                Sink::Messages(Box::new(Recording::new(packed, &columns)?))
+                Sink::Messages(Box::new(McapLog::new(packed, &columns)?))
             } else {
                 let buffered = io::BufWriter::with_capacity(1 << 16, packed);
                 Sink::Text(Box::new(Text::new(buffered, &columns)?))

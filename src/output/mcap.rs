@@ -11,7 +11,7 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::columns::{self, Array, Topic};
+use super::columns::{self, Array, TopicColumns};
 use crate::log::Instant;
 
 /// Topic of the times that are no whole nanoseconds.
@@ -37,16 +37,16 @@ uint32 nanosec
 const FLOAT: &str = "float64 data\n";
 
 /// Rows as messages.
-pub(super) struct Recording<W: Write> {
+pub(super) struct McapLog<W: Write> {
     writer: Writer<NoSeek<W>>,
-    topics: Vec<(u16, Topic, Vec<u8>)>,
+    topics: Vec<(u16, TopicColumns, Vec<u8>)>,
     /// Channel of the times, once one is needed.
     times: Option<u16>,
     sequence: u32,
     body: Vec<u8>,
 }
 
-impl<W: Write> Recording<W> {
+impl<W: Write> McapLog<W> {
     /// Begins a recording of these columns, of which the first is the time.
     pub(super) fn new(out: W, columns: &[String]) -> io::Result<Self> {
         // One thread compresses: the number of threads shows in the bytes.
@@ -165,7 +165,7 @@ fn text(out: &mut Vec<u8>, text: &str) {
 }
 
 /// A `JointState` as little-endian CDR.
-fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &Topic, names: &[u8], row: &[f64]) {
+fn message(out: &mut Vec<u8>, stamp_ns: i128, topic: &TopicColumns, names: &[u8], row: &[f64]) {
     out.clear();
     out.extend([0, 1, 0, 0]);
     let (sec, nanosec) = (

@@ -75,7 +75,7 @@ pub fn remove_unfinished() {
 }
 
 #[derive(Debug)]
-enum Target {
+enum OutputTarget {
     /// A file under a temporary name, and the name that it is to have.
     Temporary(NamedTempFile, PathBuf),
     /// Something that is no regular file.
@@ -87,7 +87,7 @@ enum Target {
 pub struct AtomicFile {
     path: PathBuf,
     /// `None` only while it is being committed.
-    target: Option<BufWriter<Target>>,
+    target: Option<BufWriter<OutputTarget>>,
 }
 
 impl AtomicFile {
@@ -125,12 +125,15 @@ impl AtomicFile {
 }
 
 /// Opens the temporary file, or what is no regular file itself.
-fn open(path: &Path) -> io::Result<Target> {
+fn open(path: &Path) -> io::Result<OutputTarget> {
     let existing = std::fs::metadata(path).ok();
     match &existing {
         Some(existing) if existing.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Some(existing) if !existing.is_file() => {
-            return File::options().write(true).open(path).map(Target::Direct);
+            return File::options()
+                .write(true)
+                .open(path)
+                .map(OutputTarget::Direct);
         }
         // A file that may not be written is not replaced either, though its folder would let us.
         Some(existing) if existing.permissions().readonly() => {
@@ -159,7 +162,7 @@ fn open(path: &Path) -> io::Result<Target> {
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     let file = builder.tempfile_in(folder).map_err(plain)?;
     unfinished.insert(file.path().to_owned());
-    Ok(Target::Temporary(file, path))
+    Ok(OutputTarget::Temporary(file, path))
 }
 
 /// The error of the system alone: the temporary file's own names a path that nobody asked for.
@@ -171,8 +174,8 @@ fn plain(error: io::Error) -> io::Error {
     code.map_or(error, io::Error::from_raw_os_error)
 }
 
-fn finish(target: Target) -> io::Result<()> {
-    let Target::Temporary(file, path) = target else {
+fn finish(target: OutputTarget) -> io::Result<()> {
+    let OutputTarget::Temporary(file, path) = target else {
         return Ok(());
     };
     // Delayed writes may fail only here.
@@ -185,14 +188,14 @@ fn finish(target: Target) -> io::Result<()> {
 }
 
 /// A temporary file that removes itself need not be removed by an interruption.
-fn forget(target: &Target) {
-    if let Target::Temporary(file, _) = target {
+fn forget(target: &OutputTarget) {
+    if let OutputTarget::Temporary(file, _) = target {
         let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
         unfinished.remove(file.path());
     }
 }
 
-impl Write for Target {
+impl Write for OutputTarget {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         match self {
             // The file itself, for its errors: see `plain`.

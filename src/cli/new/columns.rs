@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::{CliError, Context, columns};
-use crate::inspect::{self, Role};
+use crate::inspect::{self, ChannelRole};
 use crate::log::{LogSpec, Provenance, RawReader, escape, nearest};
 use crate::robot::JointKind;
 
@@ -12,7 +12,7 @@ use crate::robot::JointKind;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Column {
     pub name: String,
-    pub role: Role,
+    pub role: ChannelRole,
     /// The joint that its name speaks of; empty where it names none.
     pub joint: String,
     pub unit: Option<String>,
@@ -116,21 +116,25 @@ pub(super) struct Mapping {
 impl Mapping {
     /// Joints of a URDF, or else those that the log's positions name.
     pub(super) fn of(named: Option<&[(String, JointKind)]>, seen: Option<&Seen>) -> Self {
-        let of_role = |role: Role| -> Vec<&Column> {
+        let of_role = |role: ChannelRole| -> Vec<&Column> {
             let all = seen.into_iter().flat_map(|s| &s.columns);
             all.filter(|c| c.role == role).collect()
         };
-        let positions = of_role(Role::Position);
+        let positions = of_role(ChannelRole::Position);
         let names: Vec<(String, JointKind)> = match named {
             Some(named) => named.to_vec(),
             None if positions.is_empty() => vec![("q1".to_owned(), JointKind::Revolute)],
-            None => named_by(&positions, &of_role(Role::Torque)),
+            None => named_by(&positions, &of_role(ChannelRole::Torque)),
         };
         let labels: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
         let mut by_order = false;
         let mut warnings = Vec::new();
         let mut columns: Vec<[Option<&Column>; 3]> = vec![[None; 3]; names.len()];
-        let sides = [Role::Position, Role::Velocity, Role::Torque];
+        let sides = [
+            ChannelRole::Position,
+            ChannelRole::Velocity,
+            ChannelRole::Torque,
+        ];
         for (side, role) in sides.into_iter().enumerate() {
             let found = of_role(role);
             let matched = match_up(&labels, &found);
@@ -286,7 +290,7 @@ mod tests {
             .iter()
             .map(|(name, joint)| Column {
                 name: (*name).to_owned(),
-                role: Role::Position,
+                role: ChannelRole::Position,
                 joint: (*joint).to_owned(),
                 unit: None,
                 span: 1.0,

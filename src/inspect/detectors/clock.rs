@@ -23,7 +23,7 @@ pub(in crate::inspect) enum RowStep {
 
 /// The times of a log, seen one after the other.
 #[derive(Debug, Clone, Default)]
-pub(in crate::inspect) struct SampleClock {
+pub(in crate::inspect) struct LogClock {
     pub(in crate::inspect) rows: u64,
     pub(in crate::inspect) first: Option<f64>,
     /// Time of the last row that had one [s].
@@ -53,7 +53,7 @@ pub(in crate::inspect) struct ClockFacts {
     pub(in crate::inspect) largest: f64,
 }
 
-impl SampleClock {
+impl LogClock {
     /// Takes the times of some rows, and says for each what it is to the row before.
     pub(in crate::inspect) fn take(&mut self, times: &[f64], steps: &mut Vec<RowStep>) {
         steps.clear();
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn gaps_repeats_and_steps_back_are_told_apart_and_placed() {
-        let mut clock = SampleClock::default();
+        let mut clock = LogClock::default();
         let mut times: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.001).collect();
         times.drain(500..550);
         times[100] = times[99];
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn an_uneven_clock_has_its_spread_over_the_step_as_jitter() {
-        let mut clock = SampleClock::default();
+        let mut clock = LogClock::default();
         let times: Vec<f64> = (0..20_000)
             .map(|k| f64::from(k) * 0.01 + if k % 2 == 0 { 0.001 } else { -0.001 })
             .collect();

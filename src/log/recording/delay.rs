@@ -16,7 +16,7 @@ const EXPLAINED: f64 = 0.5;
 
 /// Rows from which a delay is estimated.
 #[derive(Debug, Default)]
-pub struct Delay {
+pub struct DelayEstimator {
     joints: usize,
     t: Vec<f64>,
     q: Vec<f64>,
@@ -32,7 +32,7 @@ pub struct DelayEstimate {
     pub std_s: f64,
 }
 
-impl Delay {
+impl DelayEstimator {
     /// Adds a row; those beyond the first some thousands are not needed.
     pub fn add(&mut self, t: f64, q: &[f64], tau: &[f64]) {
         if self.t.len() == ROWS || q.len() != tau.len() || q.is_empty() {
@@ -234,8 +234,8 @@ mod tests {
     use super::*;
 
     /// A joint whose torque lags by `delay_s`, with measurement noise from a fixed pattern.
-    fn moved(delay_s: f64, noise: f64) -> Delay {
-        let mut delay = Delay::default();
+    fn moved(delay_s: f64, noise: f64) -> DelayEstimator {
+        let mut delay = DelayEstimator::default();
         let dt = 0.004;
         let q = |t: f64| 0.8 * (1.7 * t).sin() + 0.3 * (4.1 * t).sin();
         let v = |t: f64| 0.8 * 1.7 * (1.7 * t).cos() + 0.3 * 4.1 * (4.1 * t).cos();
@@ -277,9 +277,9 @@ mod tests {
             *tau = ((index * 7919) % 104729) as f64;
         }
         assert_eq!(other.estimate(), None);
-        assert_eq!(Delay::default().estimate(), None);
+        assert_eq!(DelayEstimator::default().estimate(), None);
         assert!(
-            Delay::default()
+            DelayEstimator::default()
                 .describe("/a", "/b", 0.0)
                 .contains("cannot be told")
         );

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::message::MessageHead;
-use super::path::Path;
+use super::path::FieldPath;
 use super::value::Value;
 use crate::log::layout::{Channel, Layout, column_number};
 use crate::log::section::Stamp;
@@ -12,7 +12,7 @@ use crate::log::time::{FAR_S, Instant, Stamped};
 /// The fields of one robot in messages, each with the paths that it may have.
 #[derive(Debug, Clone)]
 pub(super) struct RobotFields {
-    pub(super) paths: Vec<Vec<Path>>,
+    pub(super) paths: Vec<Vec<FieldPath>>,
     pub(super) positions: Range<usize>,
     pub(super) torques: Range<usize>,
     pub(super) velocities: Range<usize>,
@@ -35,16 +35,16 @@ pub(super) enum TimeSource {
 
 impl RobotFields {
     pub(super) fn new(layout: &Layout) -> Self {
-        let mut paths: Vec<Vec<Path>> = Vec::new();
+        let mut paths: Vec<Vec<FieldPath>> = Vec::new();
         let mut add = |channels: &[Channel], field: &str| -> Range<usize> {
             let from = paths.len();
             for (index, channel) in channels.iter().enumerate() {
                 let mut places = Vec::new();
                 if column_number(&channel.column).is_none() {
-                    places.push(Path::parse(&channel.column));
+                    places.push(FieldPath::parse(&channel.column));
                 }
                 if let Some(joint) = layout.name_in_messages(index) {
-                    places.push(Path::named(field, "name", joint));
+                    places.push(FieldPath::named(field, "name", joint));
                 }
                 paths.push(places);
             }
@@ -56,11 +56,11 @@ impl RobotFields {
         let time = paths.len();
         let named = layout.time.key.is_some() && column_number(&layout.time.column).is_none();
         paths.push(match named {
-            true => vec![Path::parse(&layout.time.column)],
+            true => vec![FieldPath::parse(&layout.time.column)],
             false => Vec::new(),
         });
         // ROS 2, ROS 1, and the stamps of Foxglove's messages as protobuf and JSON.
-        let parse = |texts: &[&str]| texts.iter().map(|text| Path::parse(text)).collect();
+        let parse = |texts: &[&str]| texts.iter().map(|text| FieldPath::parse(text)).collect();
         paths.push(parse(&[
             "header.stamp.sec",
             "header.stamp.secs",

@@ -8,11 +8,11 @@ use std::path::PathBuf;
 
 use super::encoding::reader_of;
 use super::message::{MessageHead, MessageReader, Schema, Wanted};
-use super::parts::Recording;
-use super::path::Path;
+use super::parts::MessageFiles;
+use super::path::FieldPath;
 use super::value::Value;
 use crate::log::names::{escape, list};
-use crate::log::rows::Rows;
+use crate::log::rows::LogRows;
 use crate::log::time::{Instant, Stamped};
 use crate::log::{LogError, source};
 
@@ -68,7 +68,7 @@ struct StateRow {
 
 /// The rows of a recording.
 pub(in crate::log) struct JointStates {
-    recording: Recording,
+    recording: MessageFiles,
     sources: Vec<StateTopic>,
     times: Option<(Schema, Box<dyn MessageReader>)>,
     columns: Vec<String>,
@@ -115,17 +115,17 @@ impl JointStates {
             let first = columns.len();
             let mut fields = vec![
                 vec![
-                    Path::parse("header.stamp.sec"),
-                    Path::parse("header.stamp.secs"),
+                    FieldPath::parse("header.stamp.sec"),
+                    FieldPath::parse("header.stamp.secs"),
                 ],
                 vec![
-                    Path::parse("header.stamp.nanosec"),
-                    Path::parse("header.stamp.nsecs"),
+                    FieldPath::parse("header.stamp.nanosec"),
+                    FieldPath::parse("header.stamp.nsecs"),
                 ],
             ];
             for ((array, letter), _) in ARRAYS.iter().zip(one.arrays).filter(|(_, held)| *held) {
                 for name in &one.names {
-                    fields.push(vec![Path::named(array, "name", name)]);
+                    fields.push(vec![FieldPath::named(array, "name", name)]);
                     columns.push(column(&one, letter, name, &main));
                 }
             }
@@ -146,7 +146,7 @@ impl JointStates {
             names.push(TIMES.to_owned());
         }
         let mut states = Self {
-            recording: Recording::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, Wanted { names })?,
             row: StateRow::new(columns.len(), sources.len()),
             ahead: StateRow::new(columns.len(), sources.len()),
             sources,
@@ -214,7 +214,7 @@ impl JointStates {
     }
 }
 
-impl Rows for JointStates {
+impl LogRows for JointStates {
     fn names(&self) -> &[String] {
         &self.columns
     }
@@ -333,7 +333,7 @@ type Survey = (
 
 /// Looks at the beginning of a recording.
 fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
-    let mut recording = Recording::open(paths, Wanted::default())?;
+    let mut recording = MessageFiles::open(paths, Wanted::default())?;
     let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
     let mut messages = 0;
@@ -364,7 +364,7 @@ fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
             }
             None => {
                 if topic == TIMES && schema.name.ends_with("Float64") && times.is_none() {
-                    let reader = reader_of(schema, &[vec![Path::parse("data")]]);
+                    let reader = reader_of(schema, &[vec![FieldPath::parse("data")]]);
                     times = reader.ok().map(|reader| (schema.clone(), reader));
                 }
                 continue;
@@ -382,20 +382,20 @@ fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
 }
 
 /// What is asked of a message to see what it holds; the last makes the decoder look at the names.
-fn probes() -> Vec<Vec<Path>> {
-    let mut fields: Vec<Vec<Path>> = ARRAYS
+fn probes() -> Vec<Vec<FieldPath>> {
+    let mut fields: Vec<Vec<FieldPath>> = ARRAYS
         .iter()
-        .map(|(array, _)| vec![Path::parse(&format!("{array}[0]"))])
+        .map(|(array, _)| vec![FieldPath::parse(&format!("{array}[0]"))])
         .collect();
     fields.push(vec![
-        Path::parse("header.stamp.sec"),
-        Path::parse("header.stamp.secs"),
+        FieldPath::parse("header.stamp.sec"),
+        FieldPath::parse("header.stamp.secs"),
     ]);
     fields.push(vec![
-        Path::parse("header.stamp.nanosec"),
-        Path::parse("header.stamp.nsecs"),
+        FieldPath::parse("header.stamp.nanosec"),
+        FieldPath::parse("header.stamp.nsecs"),
     ]);
-    fields.push(vec![Path::named("position", "name", "")]);
+    fields.push(vec![FieldPath::named("position", "name", "")]);
     fields
 }
 

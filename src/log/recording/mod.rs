@@ -20,6 +20,6 @@ pub(super) use format::{FORMATS, format_of};
 pub(super) use joint_states::JointStates;
 pub(super) use rows::MessageRows;
 
-pub use delay::{Delay, DelayEstimate};
-pub use encoding::{CdrReader, DefinitionError, Malformed};
+pub use delay::{DelayEstimate, DelayEstimator};
+pub use encoding::{CdrReader, DefinitionError, MalformedMessage};
 pub use value::Value;

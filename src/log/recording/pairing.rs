@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::path::PathBuf;
 
-use super::delay::Delay;
+use super::delay::DelayEstimator;
 use crate::log::layout::Layout;
 use crate::log::time::{Instant, Stamped};
 
@@ -68,7 +68,7 @@ pub(super) struct Pairing {
     dropouts: u64,
     /// Torques whose time does not increase.
     disordered: u64,
-    delay: Delay,
+    delay: DelayEstimator,
 }
 
 impl Pairing {
@@ -86,7 +86,7 @@ impl Pairing {
             outside: 0,
             dropouts: 0,
             disordered: 0,
-            delay: Delay::default(),
+            delay: DelayEstimator::default(),
         }
     }
 

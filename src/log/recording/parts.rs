@@ -11,7 +11,7 @@ use crate::log::{LogError, source};
 const OPEN: usize = 16;
 
 /// One file of a recording, one message ahead.
-struct Part {
+struct OpenFile {
     path: PathBuf,
     file: Box<dyn MessageFile>,
     head: Option<MessageHead>,
@@ -19,7 +19,7 @@ struct Part {
     unpacker: Unpacker,
 }
 
-impl Part {
+impl OpenFile {
     fn open(path: &Path, wanted: &Wanted) -> Result<Self, LogError> {
         let content = Content::open(path)?;
         let Some(format) = format_of(content.head()) else {
@@ -54,8 +54,8 @@ impl Part {
 }
 
 /// A recording: the messages of its files in the order in which they were recorded.
-pub(super) struct Recording {
-    parts: Vec<Part>,
+pub(super) struct MessageFiles {
+    parts: Vec<OpenFile>,
     /// Files that are not open yet, the next one last.
     waiting: Vec<PathBuf>,
     wanted: Wanted,
@@ -75,7 +75,7 @@ pub(super) struct Message<'r> {
     pub(super) data: &'r [u8],
 }
 
-impl Recording {
+impl MessageFiles {
     /// Opens files as one recording; later ones are opened when earlier ones are read.
     pub(super) fn open(paths: &[PathBuf], wanted: Wanted) -> Result<Self, LogError> {
         let mut recording = Self {
@@ -95,7 +95,7 @@ impl Recording {
             let Some(path) = self.waiting.pop() else {
                 return Ok(());
             };
-            let part = Part::open(&path, &self.wanted)?;
+            let part = OpenFile::open(&path, &self.wanted)?;
             self.parts.push(part);
             self.retire()?;
         }

@@ -2,7 +2,7 @@
 
 /// One step from a message to a number in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum PathStep {
     /// A field of a message; of an array, where it is a number, the element with that index.
     Field(String),
     /// An element of an array, counted from 0.
@@ -21,12 +21,12 @@ pub(crate) enum Step {
 
 /// Where a number stands in a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Path {
-    pub(crate) steps: Vec<Step>,
+pub(crate) struct FieldPath {
+    pub(crate) steps: Vec<PathStep>,
     text: String,
 }
 
-impl Path {
+impl FieldPath {
     /// Reads a JSON pointer (RFC 6901) or a dotted path.
     ///
     /// Text that is neither is the name of a field, spaces and brackets included: any column name
@@ -35,9 +35,9 @@ impl Path {
         let steps = match text.strip_prefix('/') {
             Some(pointer) => pointer
                 .split('/')
-                .map(|part| Step::Field(part.replace("~1", "/").replace("~0", "~")))
+                .map(|part| PathStep::Field(part.replace("~1", "/").replace("~0", "~")))
                 .collect(),
-            None => dotted(text).unwrap_or_else(|| vec![Step::Field(text.to_owned())]),
+            None => dotted(text).unwrap_or_else(|| vec![PathStep::Field(text.to_owned())]),
         };
         Self {
             steps,
@@ -49,8 +49,8 @@ impl Path {
     pub(crate) fn named(field: &str, list: &str, name: &str) -> Self {
         Self {
             steps: vec![
-                Step::Field(field.to_owned()),
-                Step::Named {
+                PathStep::Field(field.to_owned()),
+                PathStep::Named {
                     list: list.to_owned(),
                     value: name.to_owned(),
                 },
@@ -66,7 +66,7 @@ impl Path {
 }
 
 /// Steps of a dotted path; `None` where the text has another form.
-fn dotted(text: &str) -> Option<Vec<Step>> {
+fn dotted(text: &str) -> Option<Vec<PathStep>> {
     let mut steps = Vec::new();
     let mut rest = text;
     loop {
@@ -76,16 +76,16 @@ fn dotted(text: &str) -> Option<Vec<Step>> {
         if name.is_empty() || !name.chars().all(plain) {
             return None;
         }
-        steps.push(Step::Field(name.to_owned()));
+        steps.push(PathStep::Field(name.to_owned()));
         rest = tail;
         while let Some(inner) = rest.strip_prefix('[') {
             let (selector, tail) = inner.split_once(']')?;
             steps.push(match selector.split_once('=') {
-                Some((list, value)) => Step::Named {
+                Some((list, value)) => PathStep::Named {
                     list: list.trim().to_owned(),
                     value: value.trim().to_owned(),
                 },
-                None => Step::Index(selector.trim().parse().ok()?),
+                None => PathStep::Index(selector.trim().parse().ok()?),
             });
             rest = tail;
         }
@@ -101,21 +101,24 @@ fn dotted(text: &str) -> Option<Vec<Step>> {
 mod tests {
     use super::*;
 
-    fn field(name: &str) -> Step {
-        Step::Field(name.to_owned())
+    fn field(name: &str) -> PathStep {
+        PathStep::Field(name.to_owned())
     }
 
     #[test]
     fn dotted_paths_indices_names_and_pointers_are_read() {
-        let steps = |text: &str| Path::parse(text).steps;
+        let steps = |text: &str| FieldPath::parse(text).steps;
         assert_eq!(
             steps("header.stamp.sec"),
             [field("header"), field("stamp"), field("sec")]
         );
-        assert_eq!(steps("a[2].b"), [field("a"), Step::Index(2), field("b")]);
+        assert_eq!(
+            steps("a[2].b"),
+            [field("a"), PathStep::Index(2), field("b")]
+        );
         assert_eq!(
             steps("position[name=left/arm 1]"),
-            Path::named("position", "name", "left/arm 1").steps
+            FieldPath::named("position", "name", "left/arm 1").steps
         );
         assert_eq!(
             steps("/joints/0/a~1b~0"),
@@ -126,7 +129,7 @@ mod tests {
     #[test]
     fn any_other_text_is_the_name_of_one_field() {
         for text in ["motor torque", "q1 [deg]", "a..b", "a[x]", "a[1", "", "#3"] {
-            assert_eq!(Path::parse(text).steps, [field(text)], "{text}");
+            assert_eq!(FieldPath::parse(text).steps, [field(text)], "{text}");
         }
     }
 }

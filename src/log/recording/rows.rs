@@ -9,18 +9,18 @@ use super::encoding::reader_of;
 use super::fields::{RobotFields, TimeSource};
 use super::message::{MessageReader, Schema, Wanted};
 use super::pairing::{Pairing, Sample};
-use super::parts::{Message, Recording};
+use super::parts::{Message, MessageFiles};
 use super::survey::{self, Choice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
-use crate::log::rows::Rows;
+use crate::log::rows::LogRows;
 use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
 
 /// The rows of a recording.
 pub(in crate::log) struct MessageRows {
-    recording: Recording,
-    reading: Reading,
+    recording: MessageFiles,
+    reading: SampleReader,
     pairing: Option<Pairing>,
     row: Sample,
     previous: Sample,
@@ -30,7 +30,7 @@ pub(in crate::log) struct MessageRows {
 }
 
 /// How messages become samples.
-struct Reading {
+struct SampleReader {
     layout: Layout,
     fields: RobotFields,
     choice: Choice,
@@ -93,12 +93,12 @@ impl MessageRows {
         let channels = channels.map(|channel| channel.column.clone());
         let rows = Self {
             names: std::iter::once("t".to_owned()).chain(channels).collect(),
-            recording: Recording::open(paths, Wanted { names })?,
+            recording: MessageFiles::open(paths, Wanted { names })?,
             pairing,
             row: Sample::default(),
             previous: Sample::default(),
             messages: 0,
-            reading: Reading {
+            reading: SampleReader {
                 values: vec![Value::Absent; fields.paths.len()],
                 layout: layout.clone(),
                 fields,
@@ -133,7 +133,7 @@ impl MessageRows {
     }
 }
 
-impl Rows for MessageRows {
+impl LogRows for MessageRows {
     fn names(&self) -> &[String] {
         &self.names
     }
@@ -249,7 +249,7 @@ impl Rows for MessageRows {
     }
 }
 
-impl Reading {
+impl SampleReader {
     /// Reads one message into a sample; `None` where it is left out.
     fn read(&mut self, message: &Message<'_>, sample: &mut Sample) -> Option<Holds> {
         let Message {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::encoding::reader_of;
 use super::fields::{RobotFields, TimeSource};
 use super::message::{MessageReader, Wanted};
-use super::parts::Recording;
+use super::parts::MessageFiles;
 use super::value::Value;
 use crate::log::layout::Layout;
 use crate::log::names::{escape, list, nearest};
@@ -31,7 +31,7 @@ pub(super) struct Choice {
 }
 
 /// What the messages of one topic turned out to hold.
-struct Candidate {
+struct TopicCandidate {
     name: String,
     kind: String,
     reader: Result<Box<dyn MessageReader>, String>,
@@ -49,7 +49,7 @@ struct Candidate {
     names: Vec<String>,
 }
 
-impl Candidate {
+impl TopicCandidate {
     /// Looks at one message; whether it shows anything new.
     fn look(&mut self, data: &[u8], fields: &RobotFields, values: &mut [Value]) -> bool {
         let before = self.shown();
@@ -122,16 +122,16 @@ fn survey(
     paths: &[PathBuf],
     layout: &Layout,
     fields: &RobotFields,
-) -> Result<Vec<Candidate>, LogError> {
-    let mut recording = Recording::open(paths, Wanted::default())?;
-    let mut found: Vec<Candidate> = Vec::new();
+) -> Result<Vec<TopicCandidate>, LogError> {
+    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut found: Vec<TopicCandidate> = Vec::new();
     let mut values = vec![Value::Absent; fields.paths.len()];
     let (mut complete, mut further) = (false, 0);
     while let Some(message) = recording.next()? {
         let index = match found.iter().position(|c| c.name == message.topic.name) {
             Some(index) => index,
             None => {
-                found.push(Candidate {
+                found.push(TopicCandidate {
                     name: message.topic.name.clone(),
                     kind: message.topic.schema.name.clone(),
                     reader: reader_of(&message.topic.schema, &fields.paths),
@@ -189,12 +189,12 @@ fn survey(
 
 /// Chooses among the topics; else what is wrong and what to do.
 fn pick(
-    found: &[Candidate],
+    found: &[TopicCandidate],
     layout: &Layout,
     fields: &RobotFields,
 ) -> Result<Choice, (String, String)> {
     let asked = &layout.section;
-    let one = |holds: &dyn Fn(&Candidate) -> bool, key: &str, what: &str| {
+    let one = |holds: &dyn Fn(&TopicCandidate) -> bool, key: &str, what: &str| {
         let mut holding = found.iter().filter(|c| holds(c));
         let first = holding.next();
         match (first, holding.count()) {
@@ -208,7 +208,7 @@ fn pick(
             )),
         }
     };
-    let is = |c: &Candidate, name: &Option<String>| name.as_ref().is_none_or(|n| *n == c.name);
+    let is = |c: &TopicCandidate, name: &Option<String>| name.as_ref().is_none_or(|n| *n == c.name);
     let separate = asked.torque_topic.is_some() && asked.torque_topic != asked.topic;
     let both = match separate {
         true => None,
@@ -240,8 +240,8 @@ fn pick(
             }
         }
     };
-    let all = |holds: &dyn Fn(&Candidate) -> bool| holds(first) && second.is_none_or(holds);
-    let any = |holds: &dyn Fn(&Candidate) -> bool| holds(first) || second.is_some_and(holds);
+    let all = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) && second.is_none_or(holds);
+    let any = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) || second.is_some_and(holds);
     let mut notes = Vec::new();
     let time = match RobotFields::asked(asked.stamp) {
         Some(TimeSource::Header) if !all(&|c| c.header) => {
@@ -276,10 +276,10 @@ fn pick(
 
 /// Why no topic can be used.
 fn missing(
-    found: &[Candidate],
+    found: &[TopicCandidate],
     layout: &Layout,
     fields: &RobotFields,
-    positions: Option<&Candidate>,
+    positions: Option<&TopicCandidate>,
 ) -> (String, String) {
     let asked = &layout.section;
     let wanted = match positions {
@@ -306,7 +306,7 @@ fn missing(
         None if fields.positions.is_empty() => (&fields.torques, &layout.torques, "torque"),
         None => (&fields.positions, &layout.positions, "position"),
     };
-    let count = |c: &Candidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
+    let count = |c: &TopicCandidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
     let best = found
         .iter()
         .filter(|c| wanted.as_ref().is_none_or(|name| *name == c.name))

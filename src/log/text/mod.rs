@@ -7,10 +7,10 @@ mod number;
 use std::path::Path;
 
 use self::csv::TextFile;
-use super::columns::{Columns, Header, choose};
+use super::columns::{Header, ScaledColumns, choose};
 use super::content::Content;
 use super::layout::Layout;
-use super::rows::{Rows, Strictness};
+use super::rows::{LogRows, Strictness};
 use super::time::{FAR_S, Stamped};
 use super::{Block, LogError};
 
@@ -29,7 +29,7 @@ struct TimeColumn {
 #[derive(Debug)]
 pub(super) struct TextRows {
     file: TextFile,
-    columns: Columns,
+    columns: ScaledColumns,
     time: Option<TimeColumn>,
     strictness: Strictness,
 }
@@ -53,7 +53,7 @@ impl TextRows {
         let (columns, refused) = match (header.columns(&layout), strictness) {
             (Ok(columns), _) => (columns, None),
             (Err(error), Strictness::Refuse) => return Err(error),
-            (Err(error), Strictness::Record) => (Columns::default(), Some(error)),
+            (Err(error), Strictness::Record) => (ScaledColumns::default(), Some(error)),
         };
         let mut rows = Self {
             file,
@@ -97,7 +97,7 @@ impl TextRows {
     }
 }
 
-impl Rows for TextRows {
+impl LogRows for TextRows {
     fn set_time(&mut self, index: usize, seconds: f64) {
         self.time = Some(TimeColumn {
             index,

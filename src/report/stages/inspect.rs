@@ -1,6 +1,6 @@
 //! The report of `inspect`: what logs hold and what is wrong with them.
 
-use crate::inspect::{Fault, Findings, Severity};
+use crate::inspect::{Findings, LogFault, Severity};
 use crate::log::escape;
 use crate::number;
 use crate::report::table::{Align, Table};
@@ -130,16 +130,16 @@ fn faults(out: &mut Writer, found: &Findings) {
         count(Severity::Info)
     ));
     // One channel at several times, or several channels with the same words.
-    let alike = |a: &Fault, b: &Fault| {
+    let alike = |a: &LogFault, b: &LogFault| {
         (a.kind, a.severity, &a.remedy) == (b.kind, b.severity, &b.remedy)
             && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span()))
     };
-    let mut told: Vec<&Fault> = Vec::new();
+    let mut told: Vec<&LogFault> = Vec::new();
     for fault in &found.faults {
         if told.iter().any(|earlier| alike(earlier, fault)) {
             continue;
         }
-        let all: Vec<&Fault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
+        let all: Vec<&LogFault> = found.faults.iter().filter(|f| alike(f, fault)).collect();
         told.push(fault);
         let channels = all.iter().filter_map(|fault| fault.channel.as_deref());
         let channels = distinct(channels.map(escape).collect());

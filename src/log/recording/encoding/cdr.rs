@@ -3,17 +3,17 @@
 //! The definition is turned into a plan once; each message is then walked up to the last field
 //! that is asked for.
 
-use super::cursor::{Cursor, Encoding, Malformed, Span};
+use super::cursor::{ByteSpan, Cursor, Encoding, MalformedMessage};
 use super::msg::{Definition, DefinitionError, ElementType, Field};
 use super::plan::{By, Node, Slot, Walkthrough};
 use crate::log::recording::message::{MessageReader, Schema};
-use crate::log::recording::path::Path;
+use crate::log::recording::path::FieldPath;
 use crate::log::recording::value::Value;
 
 /// Messages in CDR, and in the packed form of ROS 1, by their `.msg` definitions.
 pub(super) fn open(
     schema: &Schema,
-    fields: &[Vec<Path>],
+    fields: &[Vec<FieldPath>],
 ) -> Option<Result<Box<dyn MessageReader>, String>> {
     let encoding = match (schema.encoding.as_str(), schema.language.as_str()) {
         ("cdr", "ros2msg" | "") => Encoding::Cdr,
@@ -39,9 +39,9 @@ pub struct CdrReader {
     encoding: Encoding,
     plan: Walkthrough,
     /// Place and number of the elements of each array that is asked for.
-    arrays: Vec<Option<Span>>,
+    arrays: Vec<Option<ByteSpan>>,
     /// Places of the texts in each list of names.
-    lists: Vec<Vec<Span>>,
+    lists: Vec<Vec<ByteSpan>>,
     outputs: usize,
 }
 
@@ -57,15 +57,18 @@ impl CdrReader {
     /// [`DefinitionError`] where the definition cannot be used.
     pub fn parse(name: &str, definition: &str, paths: &[&str]) -> Result<Self, DefinitionError> {
         let definition = Definition::parse(name, definition)?;
-        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        let fields: Vec<Vec<FieldPath>> = paths
+            .iter()
+            .map(|path| vec![FieldPath::parse(path)])
+            .collect();
         Ok(Self::new(&definition, Encoding::Cdr, &fields).0)
     }
 
     /// The fields of one message, in the order of their paths.
     ///
     /// # Errors
-    /// [`Malformed`]: the bytes are no message of this type.
-    pub fn values(&mut self, data: &[u8]) -> Result<Vec<Value>, Malformed> {
+    /// [`MalformedMessage`]: the bytes are no message of this type.
+    pub fn values(&mut self, data: &[u8]) -> Result<Vec<Value>, MalformedMessage> {
         let mut out = vec![Value::Absent; self.outputs];
         self.read(data, &mut out)?;
         Ok(out)
@@ -73,7 +76,11 @@ impl CdrReader {
 
     /// Plans the reading of `fields`: for each the paths it may have, the first that leads to a
     /// number is taken. Says for each whether one does.
-    fn new(definition: &Definition, encoding: Encoding, fields: &[Vec<Path>]) -> (Self, Vec<bool>) {
+    fn new(
+        definition: &Definition,
+        encoding: Encoding,
+        fields: &[Vec<FieldPath>],
+    ) -> (Self, Vec<bool>) {
         let mut plan = Walkthrough::default();
         let mut found = Vec::with_capacity(fields.len());
         for (output, paths) in fields.iter().enumerate() {
@@ -94,8 +101,8 @@ impl CdrReader {
     /// Reads the fields of one message into `out`, one value for each field that was asked for.
     ///
     /// # Errors
-    /// [`Malformed`]: the bytes are no message of this type.
-    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), Malformed> {
+    /// [`MalformedMessage`]: the bytes are no message of this type.
+    fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), MalformedMessage> {
         out.fill(Value::Absent);
         if out.len() != self.outputs {
             return Ok(());
@@ -161,8 +168,9 @@ impl MessageReader for CdrReader {
 }
 
 /// Index of a name, where it stood before or anywhere else.
-fn find(data: &[u8], names: &[Span], name: &str, last: usize) -> Option<usize> {
-    let is = |span: &Span| data.get(span.start..span.start + span.count) == Some(name.as_bytes());
+fn find(data: &[u8], names: &[ByteSpan], name: &str, last: usize) -> Option<usize> {
+    let is =
+        |span: &ByteSpan| data.get(span.start..span.start + span.count) == Some(name.as_bytes());
     if names.get(last).is_some_and(is) {
         return Some(last);
     }
@@ -172,8 +180,8 @@ fn find(data: &[u8], names: &[Span], name: &str, last: usize) -> Option<usize> {
 /// One message being walked, and where its numbers go.
 struct Walk<'w> {
     messages: &'w [Vec<Field>],
-    arrays: &'w mut [Option<Span>],
-    lists: &'w mut [Vec<Span>],
+    arrays: &'w mut [Option<ByteSpan>],
+    lists: &'w mut [Vec<ByteSpan>],
     out: &'w mut [Value],
 }
 
@@ -184,7 +192,7 @@ impl Walk<'_> {
         cursor: &mut Cursor<'_>,
         message: usize,
         node: Option<&Node>,
-    ) -> Result<(), Malformed> {
+    ) -> Result<(), MalformedMessage> {
         let mut wanted = node.map_or(&[][..], |node| &node.slots).iter().peekable();
         let messages = self.messages;
         for (index, field) in messages[message].iter().enumerate() {
@@ -207,7 +215,7 @@ impl Walk<'_> {
         cursor: &mut Cursor<'_>,
         field: &Field,
         slot: Option<&Slot>,
-    ) -> Result<(), Malformed> {
+    ) -> Result<(), MalformedMessage> {
         let count = cursor.count(field.count)?;
         match field.kind {
             ElementType::Primitive(kind) => {
@@ -347,7 +355,10 @@ mod tests {
 
     fn reader(paths: &[&str]) -> (CdrReader, Vec<bool>) {
         let definition = Definition::parse("sensor_msgs/msg/JointState", "").unwrap();
-        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        let fields: Vec<Vec<FieldPath>> = paths
+            .iter()
+            .map(|path| vec![FieldPath::parse(path)])
+            .collect();
         CdrReader::new(&definition, Encoding::Cdr, &fields)
     }
 
@@ -384,7 +395,10 @@ mod tests {
             "last",
             "drives[2].code",
         ];
-        let fields: Vec<Vec<Path>> = paths.iter().map(|path| vec![Path::parse(path)]).collect();
+        let fields: Vec<Vec<FieldPath>> = paths
+            .iter()
+            .map(|path| vec![FieldPath::parse(path)])
+            .collect();
         let (mut reader, found) = CdrReader::new(&definition, Encoding::Cdr, &fields);
         assert_eq!(found, [true; 5]);
         let mut out = Writer::new(1);
@@ -421,8 +435,8 @@ mod tests {
         let text = "Header header\nfloat64[] position\n===\nMSG: std_msgs/Header\nuint32 seq\nuint8 odd\ntime stamp\n";
         let definition = Definition::parse("p/M", text).unwrap();
         let fields = [
-            vec![Path::parse("header.stamp.nsecs")],
-            vec![Path::parse("position[1]")],
+            vec![FieldPath::parse("header.stamp.nsecs")],
+            vec![FieldPath::parse("position[1]")],
         ];
         let (mut reader, _) = CdrReader::new(&definition, Encoding::Ros1, &fields);
         let mut bytes = vec![1, 0, 0, 0, 5];
@@ -496,7 +510,7 @@ mod tests {
             let Ok(definition) = Definition::parse("p/R", &text) else {
                 return Ok(());
             };
-            let fields = [vec![Path::parse(&path)]];
+            let fields = [vec![FieldPath::parse(&path)]];
             for encoding in [Encoding::Cdr, Encoding::Ros1] {
                 let (mut reader, _) = CdrReader::new(&definition, encoding, &fields);
                 let message = [&[0, kind, 0, 0][..], &data].concat();

@@ -10,7 +10,7 @@ use crate::log::recording::value::Value;
 
 /// What is wrong with the bytes of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum Malformed {
+pub enum MalformedMessage {
     /// The message ends inside a field.
     #[error("it ends after {bytes} bytes, inside a field")]
     Short {
@@ -42,7 +42,7 @@ pub(super) enum Encoding {
 
 /// Bytes from `start`: `count` elements of an array, or bytes of a text.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Span {
+pub(super) struct ByteSpan {
     pub(super) start: usize,
     pub(super) count: usize,
 }
@@ -59,7 +59,7 @@ pub(super) struct Cursor<'d> {
 }
 
 impl<'d> Cursor<'d> {
-    pub(super) fn new(data: &'d [u8], encoding: Encoding) -> Result<Self, Malformed> {
+    pub(super) fn new(data: &'d [u8], encoding: Encoding) -> Result<Self, MalformedMessage> {
         let total = data.len();
         let (data, big, align) = match (encoding, data) {
             (Encoding::Ros1, data) => (data, false, 1),
@@ -71,10 +71,10 @@ impl<'d> Cursor<'d> {
                     1 => (body, false, 8),
                     6 => (body, true, 4),
                     7 => (body, false, 4),
-                    _ => return Err(Malformed::Encapsulation { kind }),
+                    _ => return Err(MalformedMessage::Encapsulation { kind }),
                 }
             }
-            (Encoding::Cdr, _) => return Err(Malformed::Short { bytes: total }),
+            (Encoding::Cdr, _) => return Err(MalformedMessage::Short { bytes: total }),
         };
         Ok(Self {
             data,
@@ -85,8 +85,8 @@ impl<'d> Cursor<'d> {
         })
     }
 
-    pub(super) fn short(&self) -> Malformed {
-        Malformed::Short { bytes: self.total }
+    pub(super) fn short(&self) -> MalformedMessage {
+        MalformedMessage::Short { bytes: self.total }
     }
 
     #[inline]
@@ -97,7 +97,7 @@ impl<'d> Cursor<'d> {
 
     /// Passes over `count` bytes; where they begin.
     #[inline]
-    pub(super) fn pass(&mut self, count: usize) -> Result<usize, Malformed> {
+    pub(super) fn pass(&mut self, count: usize) -> Result<usize, MalformedMessage> {
         let start = self.at;
         match start.checked_add(count) {
             Some(end) if end <= self.data.len() => {
@@ -109,7 +109,7 @@ impl<'d> Cursor<'d> {
     }
 
     #[inline]
-    fn bytes_at<const N: usize>(&self, at: usize) -> Result<[u8; N], Malformed> {
+    fn bytes_at<const N: usize>(&self, at: usize) -> Result<[u8; N], MalformedMessage> {
         let bytes = self.data.get(at..).and_then(|tail| tail.first_chunk());
         let mut bytes: [u8; N] = *bytes.ok_or_else(|| self.short())?;
         if self.big {
@@ -119,7 +119,7 @@ impl<'d> Cursor<'d> {
     }
 
     #[inline]
-    pub(super) fn number_at(&self, at: usize, kind: Primitive) -> Result<Value, Malformed> {
+    pub(super) fn number_at(&self, at: usize, kind: Primitive) -> Result<Value, MalformedMessage> {
         Ok(match kind {
             Primitive::F64 => Value::Float(f64::from_le_bytes(self.bytes_at(at)?)),
             Primitive::F32 => Value::Float(f32::from_le_bytes(self.bytes_at(at)?).into()),
@@ -136,21 +136,21 @@ impl<'d> Cursor<'d> {
         })
     }
 
-    pub(super) fn length(&mut self) -> Result<usize, Malformed> {
+    pub(super) fn length(&mut self) -> Result<usize, MalformedMessage> {
         self.align_to(4);
         let at = self.pass(4)?;
         Ok(u32::from_le_bytes(self.bytes_at(at)?) as usize)
     }
 
     /// Number of elements of a field; refused where fewer bytes than elements are left.
-    pub(super) fn count(&mut self, count: Count) -> Result<usize, Malformed> {
+    pub(super) fn count(&mut self, count: Count) -> Result<usize, MalformedMessage> {
         let count = match count {
             Count::One => return Ok(1),
             Count::Fixed(count) => count,
             Count::Sequence => self.length()?,
         };
         if count > self.data.len().saturating_sub(self.at) {
-            return Err(Malformed::Count {
+            return Err(MalformedMessage::Count {
                 count: count as u64,
             });
         }
@@ -158,19 +158,23 @@ impl<'d> Cursor<'d> {
     }
 
     /// A text without its closing NUL.
-    pub(super) fn text(&mut self) -> Result<Span, Malformed> {
+    pub(super) fn text(&mut self) -> Result<ByteSpan, MalformedMessage> {
         let length = self.length()?;
         let start = self.pass(length)?;
         let closed = length > 0 && self.data.get(start + length - 1) == Some(&0);
-        Ok(Span {
+        Ok(ByteSpan {
             start,
             count: length - usize::from(closed),
         })
     }
 
-    pub(super) fn primitives(&mut self, count: usize, kind: Primitive) -> Result<Span, Malformed> {
+    pub(super) fn primitives(
+        &mut self,
+        count: usize,
+        kind: Primitive,
+    ) -> Result<ByteSpan, MalformedMessage> {
         if count == 0 {
-            return Ok(Span {
+            return Ok(ByteSpan {
                 start: self.at,
                 count,
             });
@@ -178,6 +182,6 @@ impl<'d> Cursor<'d> {
         self.align_to(kind.size());
         let bytes = count.checked_mul(kind.size()).ok_or_else(|| self.short())?;
         let start = self.pass(bytes)?;
-        Ok(Span { start, count })
+        Ok(ByteSpan { start, count })
     }
 }

@@ -3,18 +3,18 @@
 use serde_json::Value as Json;
 
 use crate::log::recording::message::{MessageReader, Schema};
-use crate::log::recording::path::{Path, Step};
+use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Reads some fields of JSON messages.
 struct JsonReader {
-    fields: Vec<Vec<Path>>,
+    fields: Vec<Vec<FieldPath>>,
 }
 
 /// Messages in JSON, whatever their schema.
 pub(super) fn open(
     schema: &Schema,
-    fields: &[Vec<Path>],
+    fields: &[Vec<FieldPath>],
 ) -> Option<Result<Box<dyn MessageReader>, String>> {
     let fields = fields.to_vec();
     (schema.encoding == "json").then(|| Ok(Box::new(JsonReader { fields }) as Box<_>))
@@ -31,7 +31,11 @@ impl MessageReader for JsonReader {
 }
 
 /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
-fn read(data: &[u8], fields: &[Vec<Path>], out: &mut [Value]) -> Result<(), serde_json::Error> {
+fn read(
+    data: &[u8],
+    fields: &[Vec<FieldPath>],
+    out: &mut [Value],
+) -> Result<(), serde_json::Error> {
     let root: Json = serde_json::from_slice(data)?;
     for (paths, out) in fields.iter().zip(out) {
         let numbers = paths.iter().filter_map(|path| find(&root, &path.steps));
@@ -61,18 +65,18 @@ fn number(value: &Json) -> Value {
 }
 
 /// Follows a path; elements that are named are looked up beside their array, then further out.
-fn find<'j>(root: &'j Json, steps: &[Step]) -> Option<&'j Json> {
+fn find<'j>(root: &'j Json, steps: &[PathStep]) -> Option<&'j Json> {
     let mut at = root;
     let mut outer = vec![root];
     for step in steps {
         at = match step {
-            Step::Field(name) => match at {
+            PathStep::Field(name) => match at {
                 Json::Object(fields) => fields.get(name)?,
                 Json::Array(elements) => elements.get(name.parse::<usize>().ok()?)?,
                 _ => return None,
             },
-            Step::Index(index) => at.as_array()?.get(*index)?,
-            Step::Named { list, value } => {
+            PathStep::Index(index) => at.as_array()?.get(*index)?,
+            PathStep::Named { list, value } => {
                 let elements = at.as_array()?;
                 let is = |name: Option<&Json>| name.and_then(Json::as_str) == Some(value);
                 match elements.iter().find(|element| is(element.get(list))) {
@@ -112,7 +116,7 @@ mod tests {
         "joints": [{"id": "x", "q": -1}, {"id": "y", "q": 7}], "deep/key": {"~": [[4]]}}"#;
 
     fn value(paths: &[&str]) -> Value {
-        let fields = [paths.iter().map(|path| Path::parse(path)).collect()];
+        let fields = [paths.iter().map(|path| FieldPath::parse(path)).collect()];
         let mut out = [Value::Absent];
         read(MESSAGE, &fields, &mut out).unwrap();
         out[0]

@@ -11,15 +11,15 @@ mod proto;
 mod wire;
 
 pub use cdr::CdrReader;
-pub use cursor::Malformed;
+pub use cursor::MalformedMessage;
 pub use msg::DefinitionError;
 
 use super::message::{MessageReader, Schema};
-use super::path::Path;
+use super::path::FieldPath;
 
 /// Makes a reader of some fields, for each the paths that it may have; `None` for a schema of another
 /// encoding, else why its messages cannot be read.
-type Open = fn(&Schema, &[Vec<Path>]) -> Option<Result<Box<dyn MessageReader>, String>>;
+type Open = fn(&Schema, &[Vec<FieldPath>]) -> Option<Result<Box<dyn MessageReader>, String>>;
 
 const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
 
@@ -29,7 +29,7 @@ const ENCODINGS: [Open; 3] = [cdr::open, json::open, proto::open];
 /// Why messages of this schema cannot be read, for the user.
 pub(super) fn reader_of(
     schema: &Schema,
-    fields: &[Vec<Path>],
+    fields: &[Vec<FieldPath>],
 ) -> Result<Box<dyn MessageReader>, String> {
     let opened = ENCODINGS.iter().find_map(|open| open(schema, fields));
     opened.unwrap_or_else(|| {

@@ -153,7 +153,7 @@ const KNOWN: [(&str, &str); 9] = [
 ];
 
 /// A field as its line says, its type not yet looked up.
-struct Unresolved<'t> {
+struct UnresolvedField<'t> {
     name: &'t str,
     of: &'t str,
     count: Count,
@@ -171,7 +171,7 @@ impl Definition {
             return Err(DefinitionError::Long { bytes: text.len() });
         }
         let root = short(name);
-        let mut sections: BTreeMap<String, Vec<Unresolved<'_>>> = BTreeMap::new();
+        let mut sections: BTreeMap<String, Vec<UnresolvedField<'_>>> = BTreeMap::new();
         for (name, known) in KNOWN {
             sections.insert(name.to_owned(), section(name, known)?);
         }
@@ -207,7 +207,7 @@ impl Definition {
     }
 }
 
-fn section<'t>(name: &str, text: &'t str) -> Result<Vec<Unresolved<'t>>, DefinitionError> {
+fn section<'t>(name: &str, text: &'t str) -> Result<Vec<UnresolvedField<'t>>, DefinitionError> {
     let lines = text.lines().enumerate();
     lines
         .filter_map(|(index, line)| field(line, name, index + 1).transpose())
@@ -224,7 +224,7 @@ fn field<'t>(
     line: &'t str,
     message: &str,
     number: usize,
-) -> Result<Option<Unresolved<'t>>, DefinitionError> {
+) -> Result<Option<UnresolvedField<'t>>, DefinitionError> {
     let code = line.split('#').next().unwrap_or_default().trim();
     if code.is_empty() {
         return Ok(None);
@@ -267,14 +267,14 @@ fn field<'t>(
     if of.is_empty() || !of.chars().all(known) {
         return Err(refuse());
     }
-    Ok(Some(Unresolved { name, of, count }))
+    Ok(Some(UnresolvedField { name, of, count }))
 }
 
 /// Adds message `name` and all it needs to `messages`; its index there.
 fn resolve(
     name: &str,
     root: &str,
-    sections: &BTreeMap<String, Vec<Unresolved<'_>>>,
+    sections: &BTreeMap<String, Vec<UnresolvedField<'_>>>,
     numbers: &mut BTreeMap<String, usize>,
     messages: &mut Vec<Vec<Field>>,
     depth: usize,
@@ -337,7 +337,7 @@ fn resolve(
 fn full_name(
     name: &str,
     inside: &str,
-    sections: &BTreeMap<String, Vec<Unresolved<'_>>>,
+    sections: &BTreeMap<String, Vec<UnresolvedField<'_>>>,
 ) -> Option<String> {
     let package = inside.split_once('/').map(|(package, _)| package);
     let candidates = [

@@ -1,7 +1,7 @@
 //! Which numbers are taken from the messages of one type: field paths resolved against its definition.
 
 use super::msg::{Count, ElementType, Field, Primitive};
-use crate::log::recording::path::Step;
+use crate::log::recording::path::PathStep;
 
 /// What is taken from a message, and where it goes.
 #[derive(Debug, Clone, Default)]
@@ -75,7 +75,12 @@ enum End {
 
 impl Walkthrough {
     /// Adds the number at the end of a path to the plan; false where the path leads to none.
-    pub(super) fn add(&mut self, messages: &[Vec<Field>], steps: &[Step], output: usize) -> bool {
+    pub(super) fn add(
+        &mut self,
+        messages: &[Vec<Field>],
+        steps: &[PathStep],
+        output: usize,
+    ) -> bool {
         match route(messages, steps) {
             Some(route) => {
                 self.follow(output, route);
@@ -126,14 +131,14 @@ impl Walkthrough {
 }
 
 /// Follows a path through the types.
-fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
+fn route(messages: &[Vec<Field>], steps: &[PathStep]) -> Option<Route> {
     let mut hops = Vec::new();
     let mut inside = 0;
     let mut steps = steps.iter().peekable();
     // Messages on the way, with the hops that lead to them: where lists of names are looked for.
     let mut outer = vec![(0, 0)];
     loop {
-        let Step::Field(name) = steps.next()? else {
+        let PathStep::Field(name) = steps.next()? else {
             return None;
         };
         let (index, field) = find_field(&messages[inside], name)?;
@@ -144,9 +149,9 @@ fn route(messages: &[Vec<Field>], steps: &[Step]) -> Option<Route> {
         };
         let number = match selector {
             None => None,
-            Some(Step::Index(index)) => Some(*index),
-            Some(Step::Field(digits)) => Some(digits.parse().ok()?),
-            Some(Step::Named { list, value }) => {
+            Some(PathStep::Index(index)) => Some(*index),
+            Some(PathStep::Field(digits)) => Some(digits.parse().ok()?),
+            Some(PathStep::Named { list, value }) => {
                 let ElementType::Primitive(kind) = field.kind else {
                     return None;
                 };

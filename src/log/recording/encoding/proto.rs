@@ -6,7 +6,7 @@
 use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
 use super::wire::{Broken, Fields, Item, fixed, varint};
 use crate::log::recording::message::{MessageReader, Schema};
-use crate::log::recording::path::{Path, Step};
+use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Steps that a path may have.
@@ -15,7 +15,7 @@ const LONGEST: usize = 16;
 /// Messages in protobuf, by the descriptor set that is their schema.
 pub(super) fn open(
     schema: &Schema,
-    fields: &[Vec<Path>],
+    fields: &[Vec<FieldPath>],
 ) -> Option<Result<Box<dyn MessageReader>, String>> {
     if (&*schema.encoding, &*schema.language) != ("protobuf", "protobuf") {
         return None;
@@ -28,7 +28,7 @@ pub(super) fn open(
 /// Reads some fields of messages of one type.
 struct FieldReader {
     reader: ProtoReader,
-    fields: Vec<Vec<Path>>,
+    fields: Vec<Vec<FieldPath>>,
 }
 
 impl MessageReader for FieldReader {
@@ -74,7 +74,7 @@ impl ProtoReader {
     pub(super) fn read(
         &self,
         data: &[u8],
-        fields: &[Vec<Path>],
+        fields: &[Vec<FieldPath>],
         out: &mut [Value],
     ) -> Result<(), String> {
         let broken = |_: Broken| "it is no protobuf message, or is cut off".to_owned();
@@ -101,7 +101,7 @@ impl ProtoReader {
     }
 
     /// Follows a path; elements that are named are looked up beside their array, then further out.
-    fn find(&self, data: &[u8], steps: &[Step]) -> Result<Value, Broken> {
+    fn find(&self, data: &[u8], steps: &[PathStep]) -> Result<Value, Broken> {
         let Some(root) = self.types.messages.get(self.types.root) else {
             return Ok(Value::Absent);
         };
@@ -125,12 +125,12 @@ impl ProtoReader {
     }
 
     /// One step from the last place of the way.
-    fn go<'m>(&'m self, way: &[Place<'m>], step: &Step) -> Result<Place<'m>, Broken> {
+    fn go<'m>(&'m self, way: &[Place<'m>], step: &PathStep) -> Result<Place<'m>, Broken> {
         let Some(at) = way.last() else {
             return Ok(Place::Nothing);
         };
         match (at, step) {
-            (Place::Message(data, kind), Step::Field(name)) => {
+            (Place::Message(data, kind), PathStep::Field(name)) => {
                 let Some(field) = field(kind, name) else {
                     return Ok(Place::Nothing);
                 };
@@ -139,15 +139,17 @@ impl ProtoReader {
                 }
                 self.last(data, field)
             }
-            (Place::Elements(data, field), Step::Index(index)) => self.element(data, field, *index),
-            (Place::Elements(data, field), Step::Field(name)) => match self.map_entry(field) {
+            (Place::Elements(data, field), PathStep::Index(index)) => {
+                self.element(data, field, *index)
+            }
+            (Place::Elements(data, field), PathStep::Field(name)) => match self.map_entry(field) {
                 Some(entry) => self.map_value(data, field, entry, name),
                 None => match name.parse() {
                     Ok(index) => self.element(data, field, index),
                     Err(_) => Ok(Place::Nothing),
                 },
             },
-            (Place::Elements(data, field), Step::Named { list, value }) => {
+            (Place::Elements(data, field), PathStep::Named { list, value }) => {
                 if let Kind::Message(kind) = field.kind {
                     let kind = &self.types.messages[kind];
                     for element in elements(data, field.number) {
@@ -482,7 +484,7 @@ mod tests {
     fn value(syntax: &str, data: &[u8], path: &str) -> Result<Value, String> {
         let reader = ProtoReader::new("lab.Arm", &set(syntax)).unwrap();
         let mut out = [Value::Absent];
-        reader.read(data, &[vec![Path::parse(path)]], &mut out)?;
+        reader.read(data, &[vec![FieldPath::parse(path)]], &mut out)?;
         Ok(out[0])
     }
 
@@ -568,7 +570,7 @@ mod tests {
             }
             if let Ok(reader) = ProtoReader::new("lab.Arm", &set) {
                 let mut out = [Value::Absent];
-                let _ = reader.read(&data, &[vec![Path::parse(&path)]], &mut out);
+                let _ = reader.read(&data, &[vec![FieldPath::parse(&path)]], &mut out);
                 reader.names();
             }
         }
