@@ -158,24 +158,7 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
         &effect,
         remedy,
     );
-    let mut gaps = Episodes::default();
-    for [from, to] in &clock.gaps {
-        let lost = ((to - from) / clock.dt).round() - 1.0;
-        gaps.add(*from, *to, lost.clamp(0.0, 1e15) as u64, -1.0);
-    }
-    let effect = |rows: u64, times: usize| {
-        let many = if times > 1 {
-            format!("{times} gaps, ")
-        } else {
-            String::new()
-        };
-        format!(
-            "{many}about {} lost: nothing is differentiated across a gap, the log is parted there and the ends of its stretches are given up",
-            rows_text(rows, 1)
-        )
-    };
-    let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
-    draft.stretches(FaultKind::Dropout, Warning, None, &gaps, &effect, remedy);
+    gap_faults(clock, draft);
     if clock.uneven > UNEVEN || clock.jitter > JITTER {
         let severity = if clock.uneven > UNEVEN { Warning } else { Info };
         let effect = format!(
@@ -194,6 +177,28 @@ fn time_faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
             remedy,
         );
     }
+}
+
+/// Steps that are much longer than the others.
+fn gap_faults(clock: &ClockFacts, draft: &mut FaultList) {
+    let mut gaps = Episodes::default();
+    for [from, to] in &clock.gaps {
+        let lost = ((to - from) / clock.dt).round() - 1.0;
+        gaps.add(*from, *to, lost.clamp(0.0, 1e15) as u64, -1.0);
+    }
+    let effect = |rows: u64, times: usize| {
+        let many = if times > 1 {
+            format!("{times} gaps, ")
+        } else {
+            String::new()
+        };
+        format!(
+            "{many}about {} lost: nothing is differentiated across a gap, the log is parted there and the ends of its stretches are given up",
+            rows_text(rows, 1)
+        )
+    };
+    let remedy = "record with a larger buffer or a lower rate; a few gaps in a long log do no harm";
+    draft.stretches(FaultKind::Dropout, Warning, None, &gaps, &effect, remedy);
 }
 
 fn number_faults(track: &Track, draft: &mut FaultList) {

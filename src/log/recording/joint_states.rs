@@ -123,7 +123,8 @@ impl JointStates {
                     FieldPath::parse("header.stamp.nsecs"),
                 ],
             ];
-            for ((array, letter), _) in ARRAYS.iter().zip(one.arrays).filter(|(_, held)| *held) {
+            for ((array, letter), _) in ARRAYS.iter().zip(one.arrays).filter(|(_, filled)| *filled)
+            {
                 for name in &one.names {
                     fields.push(vec![FieldPath::named(array, "name", name)]);
                     columns.push(column(&one, letter, name, &main));
@@ -317,7 +318,7 @@ fn column(of: &FoundTopic, letter: &str, name: &str, main: &str) -> String {
         return format!("{letter}_{name}");
     }
     let topic = of.topic.trim_matches('/');
-    let alone = of.arrays.iter().filter(|held| **held).count() == 1;
+    let alone = of.arrays.iter().filter(|filled| **filled).count() == 1;
     match (topic, alone) {
         (COLUMNS, true) => name.to_owned(),
         (topic, true) => format!("{}_{name}", topic.replace('/', ".")),
@@ -409,8 +410,8 @@ impl FoundTopic {
         if self.probe.read(data, &mut values).is_err() {
             return;
         }
-        for (held, value) in self.arrays.iter_mut().zip(&values) {
-            *held |= *value != Value::Absent;
+        for (filled, value) in self.arrays.iter_mut().zip(&values) {
+            *filled |= *value != Value::Absent;
         }
         self.stamped |= values[3..5]
             .iter()

@@ -9,6 +9,7 @@ use super::parts::MessageFiles;
 use super::value::Value;
 use crate::log::layout::Layout;
 use crate::log::names::{escape, list, nearest};
+use crate::log::section::Stamp;
 use crate::log::{LogError, source};
 
 /// Messages of a topic that are looked at before it is given up.
@@ -44,7 +45,7 @@ struct TopicCandidate {
     velocities: bool,
     header: bool,
     time: bool,
-    /// RobotFields that no message held so far.
+    /// Fields that no message held so far.
     missing: Vec<bool>,
     names: Vec<String>,
 }
@@ -240,31 +241,7 @@ fn pick(
             }
         }
     };
-    let all = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) && second.is_none_or(holds);
-    let any = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) || second.is_some_and(holds);
-    let mut notes = Vec::new();
-    let time = match RobotFields::asked(asked.stamp) {
-        Some(TimeSource::Header) if !all(&|c| c.header) => {
-            return Err((
-                format!(
-                    "messages of {} have no stamp in a header",
-                    escape(&first.name)
-                ),
-                "set `stamp = \"log\"` in [log] of the robot file".to_owned(),
-            ));
-        }
-        Some(asked) => asked,
-        None if all(&|c| c.time) => TimeSource::Field,
-        None if all(&|c| c.header) => TimeSource::Header,
-        None => {
-            if any(&|c| c.header) {
-                notes.push(
-                    "only one of the two topics has stamps in headers: the times of recording are used for both, delays of transport included".to_owned(),
-                );
-            }
-            TimeSource::Log
-        }
-    };
+    let (time, notes) = time_source(first, second, asked.stamp)?;
     Ok(Choice {
         topic: first.name.clone(),
         torque_topic: second.map(|c| c.name.clone()),
@@ -272,6 +249,35 @@ fn pick(
         velocities: first.velocities,
         notes,
     })
+}
+
+/// Which time of the messages of one or two topics counts, and what the user should know of it; else
+/// what is wrong and what to do.
+fn time_source(
+    first: &TopicCandidate,
+    second: Option<&TopicCandidate>,
+    asked: Stamp,
+) -> Result<(TimeSource, Vec<String>), (String, String)> {
+    let all = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) && second.is_none_or(holds);
+    let any = |holds: &dyn Fn(&TopicCandidate) -> bool| holds(first) || second.is_some_and(holds);
+    let source = match RobotFields::asked(asked) {
+        Some(TimeSource::Header) if !all(&|c| c.header) => {
+            let topic = escape(&first.name);
+            return Err((
+                format!("messages of {topic} have no stamp in a header"),
+                "set `stamp = \"log\"` in [log] of the robot file".to_owned(),
+            ));
+        }
+        Some(asked) => asked,
+        None if all(&|c| c.time) => TimeSource::Field,
+        None if all(&|c| c.header) => TimeSource::Header,
+        None if any(&|c| c.header) => {
+            let note = "only one of the two topics has stamps in headers: the times of recording are used for both, delays of transport included";
+            return Ok((TimeSource::Log, vec![note.to_owned()]));
+        }
+        None => TimeSource::Log,
+    };
+    Ok((source, Vec::new()))
 }
 
 /// Why no topic can be used.
