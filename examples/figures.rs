@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use cft_ident::report::figure::{
-    CurvePoint, FrictionFigure, FrictionPanel, JointTorque, TorqueFigure,
-};
+use cft_ident::friction::estimate::FrictionCurvePoint;
+use cft_ident::report::figure::{FrictionFigure, FrictionPanel, JointTorque, TorqueFigure};
 
 fn main() -> std::io::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".into()));
@@ -85,7 +84,7 @@ fn friction(count: usize) -> FrictionFigure {
                     let v = 1.25 * top * k as f64 / 120.0;
                     let beyond = (v.abs() / top - 1.0).max(0.0);
                     let std = size * (0.008 + 0.6 * beyond);
-                    CurvePoint {
+                    FrictionCurvePoint {
                         v,
                         torque: law(v) * 1.01,
                         std,
@@ -96,7 +95,7 @@ fn friction(count: usize) -> FrictionFigure {
                 .flat_map(|k| [-1.0, 1.0].map(|side| (k, side * top * k as f64 / 7.2)))
                 .map(|(k, v)| {
                     let std = size * 0.012;
-                    CurvePoint {
+                    FrictionCurvePoint {
                         v,
                         torque: law(v) + std * noise(k + 31 * j),
                         std,

@@ -121,13 +121,19 @@ impl From<ConfigError> for CliError {
 
 impl From<IdentifyError> for CliError {
     fn from(error: IdentifyError) -> Self {
+        Self::from(&error)
+    }
+}
+
+impl From<&IdentifyError> for CliError {
+    fn from(error: &IdentifyError) -> Self {
         let exit = match error.kind() {
             ErrorKind::Usage => Exit::Usage,
             ErrorKind::Input => Exit::BadInput,
             ErrorKind::Undetermined => Exit::Undetermined,
             ErrorKind::Interrupted => return Self::interrupted(),
         };
-        let told = Self::from_room(exit, &error);
+        let told = Self::from_room(exit, error);
         match error.remedy() {
             Some(remedy) => told.hint(remedy),
             None => told,

@@ -3,23 +3,22 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::Serialize;
 
-use super::{
-    CliError, Context, Outcome, campaign, diagnose, diagnose_fault, diagnose_text, logs_of,
-    names_of, pages, pictures, validate,
-};
+use super::{CliError, Context, Outcome, campaign, logs_of, names_of, pictures, validate};
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
 use crate::identify::{
-    self, Campaigned, DiagnoseEnd, IdentifySettings, LoggedRobot, RoleLogs, StageEnd,
+    self, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, IdentifySettings,
+    LoggedRobot, RoleLogs, StageEnd, Validated,
 };
 use crate::log::LogSpec;
 use crate::output::write_whole;
 use crate::report::json::Document;
-use crate::report::{Report, stages, summary};
+use crate::report::stages;
 use crate::simulate::TruthFile;
-use crate::verdict::Verdict;
+use crate::simulate::effects::EffectValue;
 
 const EXAMPLE: &str = "\
 Example:
@@ -133,125 +132,138 @@ fn execute(
         ..IdentifySettings::default()
     };
     let control = context.control();
-    let Campaigned {
-        friction: of_joints,
-        dynamics,
-        model,
-        numbers,
-        validated,
-        diagnosed: last,
-        refined,
-        inputs,
-        warnings: told,
-    } = identify::identify(&machine, &role_logs, &settings, control, &mut |end| {
+    let found = identify::identify(&machine, &role_logs, &settings, control, &mut |end| {
         keep(end, &machine, &title, folder, &mut files)
     })?;
-    let of_joints = of_joints.as_ref().map(|(found, _)| found);
-    warnings.extend(told);
-    let (mut diagnosed, mut at_fault) = (None, None);
-    let (diagnose_json, lacking) = match last {
-        Ok(DiagnoseEnd::DataFault(fault)) => {
-            let told = (diagnose_fault::json(&fault), diagnose_fault::text(&fault));
-            at_fault = Some(fault);
-            told
+    warnings.extend(found.warnings.iter().cloned());
+    let (mut diagnosis, mut residuals) = (None, String::new());
+    match &found.diagnosed {
+        Ok(DiagnoseEnd::DataFault(fault)) => diagnosis = Some(fault.result()),
+        Ok(DiagnoseEnd::Diagnosed(diagnosed)) => {
+            diagnosis = Some(diagnosed.result(&machine));
+            let figure = stages::diagnose::figure(&machine, diagnosed).map_err(CliError::input)?;
+            residuals = figure.svg();
         }
-        Ok(DiagnoseEnd::Diagnosed(found)) => {
-            let told = (
-                diagnose::json(&machine, &found),
-                diagnose_text::text(&machine, &found, "model.toml"),
-            );
-            diagnosed = Some(found);
-            told
-        }
-        Err(error) => {
-            warnings.push(format!("no diagnosis: {}", CliError::from(error)));
-            (Value::Null, String::new())
-        }
-    };
+        Err(error) => warnings.push(format!("no diagnosis: {}", CliError::from(error))),
+    }
 
     // only now, with everything decided, may the truth be looked at
     let truth = match &campaign.truth {
         None => None,
         Some(path) => Some(load_truth(&base.join(path))?),
     };
-    let errors = match &validated {
-        None => "no validation log: the errors on unseen data are not known\n".to_owned(),
-        Some(found) => {
-            let mut report = Report::new("");
-            let caption = format!("torque on unseen data ({title})");
-            stages::validate::told(&mut report.terminal(), &found.validation, &caption);
-            report.text()
-        }
-    };
-    let latest = refined.as_ref().unwrap_or(&model);
-    let parameters = parameters(latest, truth.as_ref());
-    let mut report = Report::new("");
-    stages::lsq::fit_quality(&mut report.terminal(), &dynamics);
-    let quality = report.text();
-    let text = format!("{parameters}{quality}\n{errors}\n{lacking}");
-    let truth_json = match &truth {
-        None => Value::Null,
-        Some(truth) => comparison(latest, truth),
-    };
-    let held = match diagnosed {
-        None if !unseen.is_empty() => {
-            pictures::in_memory(&machine, &role_logs.validation, context)?
-        }
-        _ => None,
-    };
-    let campaign_text = toml::to_string(campaign).unwrap_or_default();
-    let page = pages::Identify {
+    let unseen_names = names_of(&unseen);
+    let of = stages::identify::Identify {
         machine: &machine,
-        campaign: (name, &campaign_text),
-        friction: of_joints,
-        fitted: &dynamics,
-        declared: &model,
-        refined: refined.as_ref(),
-        numbers: &numbers,
-        validated: validated.as_ref(),
-        diagnosed: diagnosed.as_deref(),
-        fault: at_fault.as_ref(),
-        look: pictures::look(&machine, held.as_ref(), &names_of(&unseen))?,
-        unseen: &unseen,
-        logs: one_joint.iter().chain(&training).chain(&unseen).collect(),
+        campaign: name,
+        found: &found,
+        unseen: &unseen_names,
         truth: &|p| true_value(truth.as_ref(), p),
         limit: campaign.settings.max_relative_error,
-        inputs: &inputs,
+    };
+    let mut report = stages::identify::identify(&of);
+    let held = match residuals.as_str() {
+        "" if !unseen.is_empty() => pictures::in_memory(&machine, &role_logs.validation, context)?,
+        _ => None,
+    };
+    let look = pictures::look(&machine, held.as_ref(), &unseen_names)?;
+    let all = one_joint.iter().chain(&training).chain(&unseen);
+    let origin = stages::identify::Origin {
+        campaign: &toml::to_string(campaign).unwrap_or_default(),
+        inputs: &found.inputs,
         warnings: &warnings,
+        quality: &pictures::inspected(all, &machine, context)?,
+        command: context.command(),
     };
-    let residuals = match &diagnosed {
-        None => String::new(),
-        Some(found) => {
-            let figure = pages::diagnose_figure(&machine, found)?.svg();
-            write(folder, "residual.svg", &figure, &mut files)?;
-            figure
-        }
-    };
-    let page = pages::identify(&page, &residuals, context)?;
+    let mut page = report.page();
+    stages::identify::pictures(&mut page, &of, look.as_ref(), &residuals, &origin)
+        .map_err(CliError::input)?;
     context.check()?;
-    write(folder, "report.html", &page, &mut files)?;
-    write(folder, "summary.txt", &text, &mut files)?;
+    if !residuals.is_empty() {
+        write(folder, "residual.svg", &residuals, &mut files)?;
+    }
+    write(folder, "report.html", &report.html(), &mut files)?;
+    write(folder, "summary.txt", &report.text(), &mut files)?;
     files.push("result.json".into());
-    let result = json!({
-        "friction": of_joints,
-        "lsq": dynamics,
-        "validate": validated,
-        "diagnose": diagnose_json,
-        "truth": truth_json,
-        "files": files,
-    });
-    let document = Document::new("identify", &inputs, &warnings, &result)?;
+    let latest = found.refined.as_ref().unwrap_or(&found.model);
+    let result = Identified {
+        friction: found.friction.as_ref().map(|(laws, _)| laws),
+        lsq: &found.dynamics,
+        validate: found.validated.as_ref(),
+        diagnose: diagnosis,
+        truth: truth.as_ref().map(|truth| BesideTruth::of(latest, truth)),
+        files,
+    };
+    let document = Document::new("identify", &found.inputs, &warnings, &result)?;
     write_whole(&folder.join("result.json"), |f| {
         f.write_all(document.text().as_bytes())
     })?;
-    let missed = validated
+    let missed = found
+        .validated
         .as_ref()
         .map(|found| validate::missed(&found.validation, campaign.settings.max_relative_error));
     Ok(Outcome {
-        text,
+        text: report.text(),
         document,
         missed: missed.unwrap_or_default(),
     })
+}
+
+/// The results of all stages.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Identified<'a> {
+    /// Null where there is no one-joint log.
+    friction: Option<&'a IdentifiedFriction>,
+    lsq: &'a IdentifiedDynamics,
+    /// Null where there is no validation log.
+    validate: Option<&'a Validated>,
+    /// Null where the logs are too short to look for effects.
+    diagnose: Option<DiagnosisResult>,
+    /// Of simulated logs.
+    truth: Option<BesideTruth>,
+    /// Files that were written, in their order.
+    files: Vec<String>,
+}
+
+/// Parameters against their truth.
+#[derive(Debug, Serialize, JsonSchema)]
+struct BesideTruth {
+    parameters: Vec<TrueParameter>,
+    /// Effects that the simulated robot has.
+    effects: Vec<EffectValue>,
+}
+
+/// One parameter against its truth.
+#[derive(Debug, Serialize, JsonSchema)]
+struct TrueParameter {
+    name: String,
+    joint: Option<String>,
+    theta: Option<u32>,
+    value: f64,
+    std: Option<f64>,
+    truth: f64,
+    standard_deviations_off: Option<f64>,
+}
+
+impl BesideTruth {
+    fn of(model: &ModelFile, truth: &TruthFile) -> Self {
+        let parameter = |p: &Parameter| {
+            let true_value = true_value(Some(truth), p)?;
+            Some(TrueParameter {
+                name: p.name.clone(),
+                joint: p.joint.clone(),
+                theta: p.theta,
+                value: p.value,
+                std: p.std,
+                truth: true_value,
+                standard_deviations_off: p.std.map(|std| (p.value - true_value) / std),
+            })
+        };
+        BesideTruth {
+            parameters: model.parameters.iter().filter_map(parameter).collect(),
+            effects: truth.effects.clone(),
+        }
+    }
 }
 
 /// Writes what a stage leaves; `unseen` names the validation logs.
@@ -301,48 +313,4 @@ fn true_value(truth: Option<&TruthFile>, parameter: &Parameter) -> Option<f64> {
         .iter()
         .find(|p| p.name == parameter.name && p.joint == parameter.joint)
         .map(|p| p.value)
-}
-
-/// Every parameter of the model, beside its truth where that is known.
-fn parameters(model: &ModelFile, truth: Option<&TruthFile>) -> String {
-    let rows: Vec<summary::Parameter> = model
-        .parameters
-        .iter()
-        .map(|p| {
-            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
-            summary::Parameter {
-                joint: p.joint.as_deref().unwrap_or(""),
-                name: &p.name,
-                theta: p.theta,
-                value: if unknown { f64::NAN } else { p.value },
-                std: p.std.filter(|_| !unknown).unwrap_or(f64::NAN),
-                unit: &p.unit,
-                verdict: p.verdict.map_or("", Verdict::word),
-                truth: true_value(truth, p),
-            }
-        })
-        .collect();
-    format!("{}\n", summary::parameters("identified parameters", &rows))
-}
-
-/// Parameters against their truth.
-fn comparison(model: &ModelFile, truth: &TruthFile) -> Value {
-    let rows: Vec<Value> = model
-        .parameters
-        .iter()
-        .filter_map(|p| {
-            let true_value = true_value(Some(truth), p)?;
-            let off = p.std.map(|std| (p.value - true_value) / std);
-            Some(json!({
-                "name": p.name,
-                "joint": p.joint,
-                "theta": p.theta,
-                "value": p.value,
-                "std": p.std,
-                "truth": true_value,
-                "standard_deviations_off": off,
-            }))
-        })
-        .collect();
-    json!({ "parameters": rows, "effects": truth.effects })
 }

@@ -3,8 +3,6 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use crate::report::table::WIDTH;
-
 /// Options that name what is written.
 const OUTPUTS: [&str; 6] = [
     "-o",
@@ -60,39 +58,6 @@ fn local(word: &str) -> String {
     }
 }
 
-/// A command in lines that fit a terminal and that a shell takes as one: none begins with the value
-/// of an option. Its words hold no spaces.
-pub(super) fn folded(command: &str, indent: usize) -> String {
-    let mut parts: Vec<String> = Vec::new();
-    for word in command.split(' ') {
-        match parts.last_mut() {
-            Some(part)
-                if part.starts_with('-') && !part.contains(' ') && !word.starts_with('-') =>
-            {
-                part.push(' ');
-                part.push_str(word);
-            }
-            _ => parts.push(word.to_owned()),
-        }
-    }
-    // room for the mark that the command goes on
-    let room = WIDTH - 2;
-    let mut out = String::new();
-    let mut line = " ".repeat(indent);
-    let mut begun = false;
-    for part in parts {
-        if begun && line.chars().count() + 1 + part.chars().count() > room {
-            out += &format!("{line} \\\n");
-            line = " ".repeat(indent + 2);
-        } else if begun {
-            line.push(' ');
-        }
-        line += &part;
-        begun = true;
-    }
-    out + &line + "\n"
-}
-
 /// As a shell takes it.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./@%,:=+~".contains(c);
@@ -134,21 +99,6 @@ mod tests {
             typed,
             "cft-ident validate 'my log.csv@0..70%' -m runs/m.toml --holdout=b.csv --json r.json"
         );
-    }
-
-    #[test]
-    fn a_long_command_is_folded_between_its_options() {
-        let told = folded(
-            "cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 -o separate.csv",
-            7,
-        );
-        assert_eq!(
-            told,
-            "       cft-ident simulate -r ROBOT.toml -m MODEL.toml --move q1 --seconds 60 \\\n         \
-             -o separate.csv\n"
-        );
-        assert!(told.lines().all(|line| line.len() <= WIDTH));
-        assert_eq!(folded("cft-ident new", 2), "  cft-ident new\n");
     }
 
     #[test]

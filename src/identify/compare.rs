@@ -1,18 +1,24 @@
 //! Two models of one robot beside each other, and on the same logs.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::control::Control;
+use super::curve::friction_curve;
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{refined, refined_or_friction};
-use crate::compare::{self, ErrorDifferences, ParameterPair, SideBySide};
+use crate::compare::{self, Difference, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
+use crate::friction::estimate::FrictionCurvePoint;
 use crate::log::{Provenance, escape};
 use crate::motion::Parallel;
+use crate::motion::Summary;
 use crate::robot::model::JointFriction;
-use crate::validate::{Reconstruction, Validation};
+use crate::validate::{JointError, Overall, Reconstruction, Validation};
 
 /// Deviation from which on two estimates are called different: 95 % of a normal distribution.
 pub const DIFFERENT: f64 = 1.96;
@@ -60,6 +66,105 @@ pub struct Curves {
     pub most: f64,
     pub speeds_from: &'static str,
     pub laws: [Option<JointFriction>; 2],
+}
+
+/// A comparison as a document holds it.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Comparison {
+    /// A and B.
+    pub models: Vec<ComparedModel>,
+    #[serde(flatten)]
+    pub table: SideBySide,
+    /// Joints where a model has friction.
+    pub friction: Vec<ComparedFriction>,
+    /// Null where no log is given.
+    pub logs: Option<ComparedOnLogs>,
+}
+
+/// Where a model comes from.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ComparedModel {
+    /// Name of its file.
+    pub name: String,
+    /// Version of the tool that wrote it.
+    pub version: String,
+    /// Command that wrote it.
+    pub command: String,
+    /// What it was made from.
+    pub inputs: Vec<Provenance>,
+}
+
+/// Friction of one joint by both models.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ComparedFriction {
+    pub joint: String,
+    pub speed_unit: String,
+    pub torque_unit: String,
+    /// What the largest speed is from.
+    #[schemars(extend("enum" = ["logs", "limits", "assumed"]))]
+    pub speeds_from: &'static str,
+    pub curve: Vec<BothAt>,
+}
+
+/// Friction at one speed; null where a model has none.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct BothAt {
+    /// Velocity \[speed_unit\].
+    pub v: Option<f64>,
+    /// Torque \[torque_unit\], and its standard deviation.
+    pub a: Option<f64>,
+    pub a_std: Option<f64>,
+    pub b: Option<f64>,
+    pub b_std: Option<f64>,
+}
+
+/// Both models on the same logs.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ComparedOnLogs {
+    pub joints: Vec<ComparedErrors<JointError>>,
+    pub overall: ComparedErrors<Overall>,
+    pub processing: Summary,
+}
+
+/// Errors of both.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ComparedErrors<T> {
+    /// The joint; absent over all of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Unit of its torque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<&'static str>,
+    pub a: T,
+    pub b: T,
+    #[serde(flatten)]
+    pub difference: Difference,
+}
+
+impl Tried {
+    fn result(&self) -> ComparedOnLogs {
+        let [a, b] = &self.validations;
+        let joints = a.joints.iter().zip(&b.joints);
+        let joint =
+            |((a, b), difference): ((&JointError, &JointError), &Difference)| ComparedErrors {
+                joint: Some(a.joint.clone()),
+                unit: Some(a.unit),
+                a: a.clone(),
+                b: b.clone(),
+                difference: *difference,
+            };
+        ComparedOnLogs {
+            joints: joints.zip(&self.differences.joints).map(joint).collect(),
+            overall: ComparedErrors {
+                joint: None,
+                unit: None,
+                a: a.overall,
+                b: b.overall,
+                difference: self.differences.overall,
+            },
+            processing: self.held.summary.clone(),
+        }
+    }
 }
 
 /// A model; without logs one of friction alone will do.
@@ -173,7 +278,9 @@ fn on_logs(
             all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})
                 .map_err(named)?;
         }
-        Ok::<_, IdentifyError>(all.finish(held.summary.clone()))
+        let mut validation = all.finish(held.summary.clone());
+        machine.name_units(&mut validation);
+        Ok::<_, IdentifyError>(validation)
     };
     let validations = [validation(&sides[0])?, validation(&sides[1])?];
     control.check()?;
@@ -222,6 +329,64 @@ fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Ve
 }
 
 impl Compared {
+    /// The comparison as a document holds it.
+    pub fn result(&self) -> Comparison {
+        let model = |side: &Side| {
+            let from = &side.given.file.provenance;
+            ComparedModel {
+                name: side.given.provenance.name.clone(),
+                version: from.version.clone(),
+                command: from.command.clone(),
+                inputs: from.inputs.clone(),
+            }
+        };
+        Comparison {
+            models: self.sides.iter().map(model).collect(),
+            table: self.table.clone(),
+            friction: self.curves.iter().map(|c| self.friction(c)).collect(),
+            logs: self.tried.as_ref().map(Tried::result),
+        }
+    }
+
+    fn friction(&self, curves: &Curves) -> ComparedFriction {
+        // 50 equal steps in each direction
+        let steps = (-50..=50).filter(|k| *k != 0);
+        let [a, b] = self.at(curves, steps.map(|k| f64::from(k) / 50.0 * curves.most));
+        let point = |i: usize| {
+            let (a, b) = (a.get(i), b.get(i));
+            BothAt {
+                v: a.or(b).map(|p| p.v),
+                a: a.map(|p| p.torque),
+                a_std: a.map(|p| p.std),
+                b: b.map(|p| p.torque),
+                b_std: b.map(|p| p.std),
+            }
+        };
+        ComparedFriction {
+            joint: curves.joint.clone(),
+            speed_unit: curves.speed_unit.clone(),
+            torque_unit: curves.torque_unit.clone(),
+            speeds_from: curves.speeds_from,
+            curve: (0..a.len().max(b.len())).map(point).collect(),
+        }
+    }
+
+    /// Both curves of a joint at these speeds; an empty one where a model has no friction there.
+    pub fn at(
+        &self,
+        curves: &Curves,
+        speeds: impl Iterator<Item = f64> + Clone,
+    ) -> [Vec<FrictionCurvePoint>; 2] {
+        let of = |k: usize| match &curves.laws[k] {
+            None => Vec::new(),
+            Some(law) => {
+                let file = &self.sides[k].given.file;
+                friction_curve(file, law, &curves.joint, speeds.clone())
+            }
+        };
+        [of(0), of(1)]
+    }
+
     /// Name of a model's file.
     pub fn name(&self, side: usize) -> String {
         escape(&self.sides[side].given.provenance.name)

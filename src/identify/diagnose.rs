@@ -1,5 +1,8 @@
 //! What the torque residual still holds, and the effects behind it.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::control::Control;
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
@@ -61,7 +64,7 @@ pub struct Diagnosed {
 }
 
 /// A fault of the data.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DataFault {
     pub kind: String,
     pub channel: Option<String>,
@@ -216,19 +219,6 @@ fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
 }
 
 impl Diagnosed {
-    /// Whether there is a verdict of effects, of nothing, or of structure without a name.
-    pub fn verdict(&self) -> &'static str {
-        let diagnosis = &self.diagnosis;
-        let named = |step| diagnosis.explained(step);
-        if diagnosis.steps.iter().any(named) {
-            "effects-found"
-        } else if diagnosis.structured() {
-            "unexplained-residual"
-        } else {
-            "nothing-missing"
-        }
-    }
-
     /// Parameters of an accepted effect with their standard deviations.
     pub fn told(&self, machine: &LoggedRobot, effect: usize) -> Vec<EffectNumber> {
         let added = &self.diagnosis.model.effects[effect];

@@ -16,6 +16,7 @@ use crate::inspect::{Gate, LogFault};
 use crate::log::{Layout, LogError, Reader, escape};
 use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
 use crate::robot::{JointKind, Robot};
+use crate::validate::Validation;
 
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
@@ -173,6 +174,13 @@ impl LoggedRobot {
         let (mut open, held) = self.open_raw(log, control)?;
         open.centre = held.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
         Ok(open)
+    }
+
+    /// Names the unit of every joint's torque as its channel has it.
+    pub(super) fn name_units(&self, validation: &mut Validation) {
+        for (j, error) in validation.joints.iter_mut().enumerate() {
+            error.unit = self.file.torque_unit(j);
+        }
     }
 
     /// Processing of logs for least squares and validation.

@@ -72,9 +72,7 @@ pub fn validate(
     }
     let summary = last.ok_or(IdentifyError::NoLog)?;
     let mut validation = all.finish(summary);
-    for (j, error) in validation.joints.iter_mut().enumerate() {
-        error.unit = machine.file.torque_unit(j);
-    }
+    machine.name_units(&mut validation);
     Ok(Validated {
         validation,
         inputs,

@@ -7,20 +7,10 @@ use super::joint_grid::{self, Heading};
 use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use crate::friction::estimate::FrictionCurvePoint;
 
 /// Half a 95 % interval in standard deviations.
 const WITHIN_95: f64 = 1.959_964;
-
-/// A friction torque and its standard deviation at one velocity.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CurvePoint {
-    /// Velocity [speed unit].
-    pub v: f64,
-    /// Friction torque [torque unit].
-    pub torque: f64,
-    /// Standard deviation of `torque` [torque unit]; not finite where unknown.
-    pub std: f64,
-}
 
 /// The friction of one joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,11 +25,11 @@ pub struct FrictionPanel {
     pub torque_unit: String,
     /// The curve in order of `v`; a point that is not finite splits it (at 0 for a law that jumps).
     /// Outside `covered` it is drawn dashed.
-    pub curve: Vec<CurvePoint>,
+    pub curve: Vec<FrictionCurvePoint>,
     /// Intervals of velocity that the data cover, from the lower to the upper end.
     pub covered: Vec<[f64; 2]>,
     /// Mean torque at constant speed.
-    pub plateaus: Vec<CurvePoint>,
+    pub plateaus: Vec<FrictionCurvePoint>,
     /// The true curve in order of `v`, where it is known; else empty.
     pub truth: Vec<[f64; 2]>,
 }
@@ -177,26 +167,26 @@ impl FrictionPanel {
     }
 }
 
-fn finite(point: &CurvePoint) -> bool {
+fn finite(point: &FrictionCurvePoint) -> bool {
     point.v.is_finite() && point.torque.is_finite()
 }
 
 /// Stretches of consecutive finite points that `wanted` accepts.
 pub(super) fn runs(
-    curve: &[CurvePoint],
-    wanted: impl Fn(&CurvePoint) -> bool,
-) -> Vec<Vec<CurvePoint>> {
+    curve: &[FrictionCurvePoint],
+    wanted: impl Fn(&FrictionCurvePoint) -> bool,
+) -> Vec<Vec<FrictionCurvePoint>> {
     curve
         .split(|point| !finite(point) || !wanted(point))
         .filter(|run| run.len() > 1)
-        .map(<[CurvePoint]>::to_vec)
+        .map(<[FrictionCurvePoint]>::to_vec)
         .collect()
 }
 
 /// Lines between consecutive finite points that `wanted` accepts in pairs.
 pub(super) fn lines(
-    curve: &[CurvePoint],
-    wanted: impl Fn(&CurvePoint, &CurvePoint) -> bool,
+    curve: &[FrictionCurvePoint],
+    wanted: impl Fn(&FrictionCurvePoint, &FrictionCurvePoint) -> bool,
 ) -> Vec<Vec<[f64; 2]>> {
     let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
     let mut open = false;
@@ -215,7 +205,7 @@ pub(super) fn lines(
 }
 
 /// Ends of the 95 % band of a point [torque unit]; the torque alone where the band is unknown.
-pub(super) fn spread(point: &CurvePoint) -> [f64; 2] {
+pub(super) fn spread(point: &FrictionCurvePoint) -> [f64; 2] {
     let half = match point.std.is_finite() {
         true => WITHIN_95 * point.std,
         false => 0.0,
@@ -224,8 +214,8 @@ pub(super) fn spread(point: &CurvePoint) -> [f64; 2] {
 }
 
 /// The outline of curve plus and minus its 95 % [px].
-pub(super) fn band(panel: &Panel, run: &[CurvePoint]) -> Vec<[f64; 2]> {
-    let edge = |point: &CurvePoint, side: f64| {
+pub(super) fn band(panel: &Panel, run: &[FrictionCurvePoint]) -> Vec<[f64; 2]> {
+    let edge = |point: &FrictionCurvePoint, side: f64| {
         let torque = point.torque + side * WITHIN_95 * point.std;
         [panel.x.px(point.v), panel.y.px(torque)]
     };
@@ -235,7 +225,7 @@ pub(super) fn band(panel: &Panel, run: &[CurvePoint]) -> Vec<[f64; 2]> {
 }
 
 /// A dot with its 95 % bar, capped.
-fn plateau(svg: &mut Svg, panel: &Panel, point: &CurvePoint) {
+fn plateau(svg: &mut Svg, panel: &Panel, point: &FrictionCurvePoint) {
     if !finite(point) {
         return;
     }
@@ -257,7 +247,7 @@ mod tests {
     use super::*;
 
     fn panel() -> FrictionPanel {
-        let point = |v: f64| CurvePoint {
+        let point = |v: f64| FrictionCurvePoint {
             v,
             torque: v + v.signum(),
             std: 0.1,
@@ -309,7 +299,7 @@ mod tests {
         let mut odd = panel();
         odd.curve[2].torque = f64::NAN;
         odd.curve[4].std = f64::INFINITY;
-        odd.plateaus = vec![CurvePoint {
+        odd.plateaus = vec![FrictionCurvePoint {
             v: f64::NAN,
             torque: 1.0,
             std: f64::NAN,

@@ -17,7 +17,7 @@ mod residual;
 mod svg;
 mod torque;
 
-pub use friction::{CurvePoint, FrictionFigure, FrictionPanel};
+pub use friction::{FrictionFigure, FrictionPanel};
 pub use motion::{MotionFigure, MotionPanel};
 pub use overlay::{OverlayFigure, OverlayPanel};
 pub use png::{PngError, png};

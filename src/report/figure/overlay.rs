@@ -2,11 +2,12 @@
 
 use super::axis;
 use super::colour;
-use super::friction::{CurvePoint, band, lines, runs, spread};
+use super::friction::{band, lines, runs, spread};
 use super::joint_grid::{self, Heading};
 use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use crate::friction::estimate::FrictionCurvePoint;
 
 /// The friction of one joint by two models.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +20,7 @@ pub struct OverlayPanel {
     pub torque_unit: String,
     /// Both curves in order of `v`; a point that is not finite splits one, and a model without
     /// friction there has none.
-    pub curves: [Vec<CurvePoint>; 2],
+    pub curves: [Vec<FrictionCurvePoint>; 2],
 }
 
 /// A figure of one panel per joint, two beside each other.
@@ -96,9 +97,9 @@ impl OverlayPanel {
 mod tests {
     use super::*;
 
-    fn curve(height: f64, std: f64) -> Vec<CurvePoint> {
+    fn curve(height: f64, std: f64) -> Vec<FrictionCurvePoint> {
         [-1.0, -0.5, 0.5, 1.0]
-            .map(|v: f64| CurvePoint {
+            .map(|v: f64| FrictionCurvePoint {
                 v,
                 torque: height * v.signum(),
                 std,
@@ -106,7 +107,7 @@ mod tests {
             .to_vec()
     }
 
-    fn figure(curves: [Vec<CurvePoint>; 2]) -> OverlayFigure {
+    fn figure(curves: [Vec<FrictionCurvePoint>; 2]) -> OverlayFigure {
         OverlayFigure {
             title: "t".into(),
             names: ["A: first.toml".into(), "B: second.toml".into()],

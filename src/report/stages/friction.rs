@@ -1,11 +1,11 @@
 //! The report of `friction`.
 
 use crate::config::ModelFile;
-use crate::friction::estimate::curve_std;
+use crate::friction::estimate::{FrictionCurvePoint, curve_std};
 use crate::identify::{FrictionOfJoint, IdentifiedFriction, LoggedRobot};
 use crate::log::{Provenance, escape};
 use crate::number;
-use crate::report::figure::{CurvePoint, FrictionFigure, FrictionPanel};
+use crate::report::figure::{FrictionFigure, FrictionPanel};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, parameters, provenance};
 use crate::report::table::Table;
@@ -189,12 +189,12 @@ pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigu
     let panel = |found: &FrictionOfJoint| {
         let (j, e) = (found.index, &found.estimate);
         let [low, high] = e.speeds.covered;
-        let curve = speeds_to_draw([low, high]).map(|v| CurvePoint {
+        let curve = speeds_to_draw([low, high]).map(|v| FrictionCurvePoint {
             v,
             torque: e.law.torque(v),
             std: curve_std(&e.law, &e.covariance, v),
         });
-        let plateaus = e.plateaus.iter().map(|p| CurvePoint {
+        let plateaus = e.plateaus.iter().map(|p| FrictionCurvePoint {
             v: p.v,
             torque: p.torque,
             std: p.std,

@@ -1,8 +1,11 @@
 //! The reports, one file per stage: the verdict comes first, in words and one table; what it stands on
 //! follows; where it came from ends the page.
 
+pub mod compare;
+pub mod diagnose;
 pub mod excite;
 pub mod friction;
+pub mod identify;
 pub mod inspect;
 pub mod lsq;
 pub mod validate;

@@ -1,15 +1,15 @@
 //! `cft-ident schema`: the JSON schema of every file that is read or written.
 
-mod documents;
-
 use clap::ValueEnum;
 use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
-use crate::cli::{convert, export, new, simulate};
+use crate::cli::{convert, export, identify, new, simulate};
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
-use crate::identify::{IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated};
+use crate::identify::{
+    Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated,
+};
 use crate::inspect::Inspection;
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -83,6 +83,9 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Friction => json::schema::<IdentifiedFriction>("friction"),
         Kind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
         Kind::Validate => json::schema::<Validated>("validate"),
+        Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
+        Kind::Compare => json::schema::<Comparison>("compare"),
+        Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
         Kind::Inspect => json::schema::<Inspection>("inspect"),
@@ -90,7 +93,6 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Convert => json::schema::<convert::Converted>("convert"),
         Kind::Export => json::schema::<export::Exported>("export"),
         Kind::New => json::schema::<new::Drafted>("new"),
-        of_document => documents::schema(of_document),
     }
 }
 

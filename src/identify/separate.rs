@@ -6,7 +6,7 @@ use crate::robot::Robot;
 
 /// A motion of one joint or motor alone, both ways at ten speeds over its range, where such a motion
 /// separates the effect; none where it takes a payload, a standstill or other sensors.
-pub fn command(effect: &Added, robot: &Robot) -> Option<String> {
+pub fn separating_command(effect: &Added, robot: &Robot) -> Option<String> {
     let Ladder { seconds, travel } = effect.law.entry.ladder?;
     let travel = travel.map_or(String::new(), |share| format!(" --travel {share}"));
     let moves = match effect.place {
@@ -43,7 +43,7 @@ mod tests {
                 shape: vec![0.0; law.shape.len()],
                 linear: vec![0.0; law.linear.len()],
             };
-            command(&effect, &robot)
+            separating_command(&effect, &robot)
         };
         let friction = told("actuator-friction", Place::Actuator(0)).unwrap();
         assert!(friction.contains("--move x_c2 "), "{friction}");

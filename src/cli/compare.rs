@@ -1,0 +1,97 @@
+//! `cft-ident compare`: two models of one robot beside each other, and on the same logs.
+
+use std::path::{Path, PathBuf};
+
+use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
+use crate::identify::{self, GivenModel};
+use crate::log::{LogSpec, escape};
+use crate::report::json::Document;
+use crate::report::stages;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident compare model.toml refined.toml
+  cft-ident compare model.toml refined.toml unseen.csv --report compare.html";
+
+/// Set two models of one robot side by side, and on the same logs.
+///
+/// Differences of parameters are told in standard deviations; errors on the logs with an interval of
+/// their difference. Both models are judged with the log mapping and the filter of the first.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// First model file
+    #[arg(value_name = "A.toml")]
+    pub a: PathBuf,
+    /// Second model file
+    #[arg(value_name = "B.toml")]
+    pub b: PathBuf,
+    /// Logs that both models are tried on; a span is chosen by LOG@0..70%
+    #[arg(value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Draw the friction curves over each other; may be given more than once
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
+    pub plot: Vec<PathBuf>,
+    /// Write a report with verdict, numbers and pictures, as one page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let logs = args.logs.iter().map(|l| l.path.as_path());
+    let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();
+    let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
+    context.check_outputs(&inputs, &outputs)?;
+    let given = |path: &Path| {
+        let given = files::model(path)?;
+        Ok::<_, CliError>(GivenModel {
+            name: given.name,
+            file: given.value,
+            provenance: given.provenance,
+        })
+    };
+    let models = [given(&args.a)?, given(&args.b)?];
+    let of = identify::compare(models, &logs_of(&args.logs), context.control())?;
+    if of.curves.is_empty() && !args.plot.is_empty() {
+        return Err(
+            CliError::input("neither model has a friction law: there is nothing to draw")
+                .hint("leave --plot out; --report shows the rest"),
+        );
+    }
+    let mut read: Vec<_> = of
+        .sides
+        .iter()
+        .map(|s| s.given.provenance.clone())
+        .collect();
+    if let Some(tried) = &of.tried {
+        read.extend(tried.held.inputs.iter().cloned());
+    }
+    let document = Document::new("compare", &read, &of.warnings, &of.result())?;
+    let names = names_of(&args.logs);
+    let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
+    let mut report = stages::compare::compare(&of, &shown.join(", "));
+    if args.report.is_some() {
+        let held = of.tried.as_ref().map(|tried| &tried.held);
+        let look = pictures::look(&of.machine, held, &names)?;
+        let quality = pictures::inspected(&args.logs, &of.machine, context)?;
+        let (mut page, command) = (report.page(), context.command());
+        stages::compare::pictures(&mut page, &of, &read, look.as_ref(), &quality, command)
+            .map_err(CliError::input)?;
+    }
+    context.check()?;
+    if let Some(path) = &args.report {
+        outputs::write_text(path, &report.html())?;
+    }
+    for path in &args.plot {
+        outputs::write_picture(path, &stages::compare::figure(&of).svg())?;
+    }
+    Ok(Outcome {
+        text: report.text(),
+        document,
+        missed: Vec::new(),
+    })
+}

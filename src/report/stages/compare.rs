@@ -1,0 +1,319 @@
+//! The report of `compare`.
+
+use crate::compare::{Apart, Difference, ParameterEstimate, Reason};
+use crate::identify::{Compared, DIFFERENT, Tried};
+use crate::log::{Provenance, escape};
+use crate::motion::MotionError;
+use crate::number;
+use crate::report::figure::{OverlayFigure, OverlayPanel};
+use crate::report::sections::friction::speeds;
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::torque::{self, Drawn};
+use crate::report::sections::{Look, provenance};
+use crate::report::table::{Align, Table};
+use crate::report::{Report, TraceStyle, Writer};
+
+/// The comparison; `logs` names the logs that both were tried on.
+pub fn compare(of: &Compared, logs: &str) -> Report {
+    let title = format!("{} and {}", of.name(0), of.name(1));
+    let mut report = Report::new(&format!("Comparison of {title}"));
+    let apart = || [0, 1].into_iter().filter_map(|side| apart_table(of, side));
+    let parameters = (!of.table.parameters.is_empty()).then(|| parameter_table(of));
+    report
+        .everywhere()
+        .verdict(&words(of), of.warnings.is_empty());
+    for table in parameters.clone().into_iter().chain(apart()) {
+        let mut terminal = report.terminal();
+        terminal.line("");
+        terminal.table(table);
+    }
+    if let Some(tried) = &of.tried {
+        let errors = error_table(tried, logs);
+        report.terminal().line("");
+        report.terminal().table(errors.clone());
+        let mut page = report.page();
+        page.list(&of.warnings);
+        page.table(errors);
+        used_before(&mut page, of, &tried.held.inputs);
+    } else {
+        report.page().list(&of.warnings);
+    }
+    let mut page = report.page();
+    page.heading("Parameters");
+    for table in parameters.into_iter().chain(apart()) {
+        page.table(table);
+    }
+    if !of.curves.is_empty() {
+        page.heading("Friction");
+        page.figure(&figure(of).svg());
+    }
+    report
+}
+
+/// What a page has room for besides; `read` are both model files and the logs, `look` is absent where
+/// no log is given.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Compared,
+    read: &[Provenance],
+    look: Option<&Look>,
+    quality: &[Inspected],
+    command: &str,
+) -> Result<(), MotionError> {
+    if let Some(look) = look {
+        let models = [
+            Drawn {
+                names: ["A", "residual of A"],
+                styles: [TraceStyle::Before, TraceStyle::Before],
+                model: &of.sides[0].model,
+            },
+            Drawn {
+                names: ["B", "residual of B"],
+                styles: [TraceStyle::Model, TraceStyle::After],
+                model: &of.sides[1].model,
+            },
+        ];
+        let all: Vec<usize> = (0..look.names.len()).collect();
+        torque::section(page, look, &all, &models, &look.names.join(", "))?;
+        quality::section(page, quality, &[]);
+    }
+    let summary = of.tried.as_ref().map(|tried| &tried.held.summary);
+    let made_from = of.sides.iter();
+    let made_from = made_from.flat_map(|side| side.given.file.provenance.inputs.iter().cloned());
+    let mut made_from: Vec<Provenance> = made_from.collect();
+    made_from.dedup();
+    provenance::section(page, &of.machine.file, read, &made_from, summary, command);
+    Ok(())
+}
+
+/// Friction curves over each other.
+pub fn figure(of: &Compared) -> OverlayFigure {
+    let panels = of.curves.iter().map(|curves| OverlayPanel {
+        joint: curves.joint.clone(),
+        speed_unit: curves.speed_unit.clone(),
+        torque_unit: curves.torque_unit.clone(),
+        curves: of.at(curves, speeds(curves.most).collect::<Vec<_>>().into_iter()),
+    });
+    let range = match of.curves.first().map(|c| c.speeds_from) {
+        Some("logs") => "up to the fastest of the logs",
+        Some("limits") => "up to the speed limit",
+        _ => "speeds assumed, no log is given",
+    };
+    OverlayFigure {
+        title: format!("Friction of two models, {range}"),
+        names: [0, 1].map(|k| format!("{}: {}", LETTERS[k], of.name(k))),
+        panels: panels.collect(),
+    }
+}
+
+/// The verdict in words.
+fn words(of: &Compared) -> String {
+    let rated = of.table.parameters.iter().filter(|p| p.deviation.is_some());
+    let (rated, different) = (rated.count(), of.different());
+    let mut text = format!(
+        "{} of {rated} parameters with known uncertainty differ by more than {DIFFERENT} \
+         standard deviations",
+        different.len()
+    );
+    if let Some(most) = different.first() {
+        text += &format!(
+            "; the most by {} of {}",
+            number::significant(most.deviation.unwrap_or(f64::NAN).abs(), 3),
+            key(&most.name, most.joint.as_deref())
+        );
+    }
+    text.push('.');
+    let Some(tried) = &of.tried else {
+        return text;
+    };
+    let told = match tried.differences.overall.sign() {
+        -1 => "B is closer on these logs",
+        1 => "A is closer on these logs",
+        _ => "these logs do not tell which model is closer",
+    };
+    let error = |k: usize| number::percent(tried.validations[k].overall.mean_relative_error);
+    text += &format!(
+        " Over joints A is off by {}, B by {}: {told}.",
+        error(0),
+        error(1)
+    );
+    text
+}
+
+const LETTERS: [&str; 2] = ["A", "B"];
+
+fn key(name: &str, joint: Option<&str>) -> String {
+    match joint {
+        Some(joint) => format!("{} of {}", escape(name), escape(joint)),
+        None => escape(name),
+    }
+}
+
+/// Parameters that both have.
+fn parameter_table(of: &Compared) -> Table {
+    let joints = of.table.parameters.iter().any(|p| p.joint.is_some());
+    let mut columns = vec![("parameter", Align::Left)];
+    if joints {
+        columns.insert(0, ("joint", Align::Left));
+    }
+    columns.extend([
+        ("A", Align::Decimal),
+        ("std", Align::Decimal),
+        ("B", Align::Decimal),
+        ("std", Align::Decimal),
+        ("B - A", Align::Decimal),
+        ("unit", Align::Left),
+    ]);
+    let mut table = Table::new(&columns).caption(&format!(
+        "parameters: A is {}, B is {}; B - A in standard deviations of the difference",
+        of.name(0),
+        of.name(1)
+    ));
+    for p in &of.table.parameters {
+        let cells = |e: &ParameterEstimate| {
+            let (value, std) = number::value_and_std(e.value, e.std.unwrap_or(f64::NAN));
+            [value, std]
+        };
+        let mut row = vec![p.name.clone()];
+        if joints {
+            row.insert(0, p.joint.clone().unwrap_or_default());
+        }
+        row.extend(cells(&p.a));
+        row.extend(cells(&p.b));
+        row.push(match p.deviation {
+            Some(d) if d.abs() < 1000.0 => format!("{d:+.1}"),
+            Some(d) => format!("{d:+.1e}"),
+            None => number::ABSENT.into(),
+        });
+        row.push(p.unit.clone());
+        table.row(row);
+    }
+    table
+}
+
+/// Parameters of one model alone; none where there are none.
+fn apart_table(of: &Compared, side: usize) -> Option<Table> {
+    let only: &[Apart] = [&of.table.only_in_a, &of.table.only_in_b][side];
+    if only.is_empty() {
+        return None;
+    }
+    let caption = format!("only in {}, {}", LETTERS[side], of.name(side));
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("parameter", Align::Left),
+        ("value", Align::Decimal),
+        ("std", Align::Decimal),
+        ("unit", Align::Left),
+        ("in the other", Align::Left),
+    ])
+    .caption(&caption);
+    for p in only {
+        let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
+        let reason = match p.reason {
+            Reason::Absent => "absent",
+            Reason::OtherUnit => "in another unit",
+            Reason::OtherMeaning => "of another meaning",
+        };
+        let joint = p.joint.as_deref().unwrap_or("");
+        table.row([joint, &p.name, &value, &std, &p.unit, reason]);
+    }
+    Some(table)
+}
+
+/// Errors of both on the same logs.
+fn error_table(tried: &Tried, logs: &str) -> Table {
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("A", Align::Decimal),
+        ("B", Align::Decimal),
+        ("B - A", Align::Decimal),
+        ("its 95 %", Align::Right),
+        ("rms A", Align::Decimal),
+        ("rms B", Align::Decimal),
+        ("unit", Align::Left),
+        ("closer", Align::Left),
+    ])
+    .caption(&format!("relative torque error of {logs} [%], and its rms"));
+    let hundred = number::hundredths;
+    let cells = |a: f64, b: f64, d: &Difference| {
+        let interval = d
+            .interval_95
+            .map_or(number::ABSENT.to_owned(), |[low, high]| {
+                format!("{}..{}", hundred(low), hundred(high))
+            });
+        [hundred(a), hundred(b), hundred(d.difference), interval]
+    };
+    let closer = |d: &Difference| match d.sign() {
+        -1 => "B",
+        1 => "A",
+        _ => number::ABSENT,
+    };
+    let [a, b] = &tried.validations;
+    let told = a
+        .joints
+        .iter()
+        .zip(&b.joints)
+        .zip(&tried.differences.joints);
+    for ((a, b), d) in told {
+        let [ours, theirs, difference, interval] = cells(a.relative_error, b.relative_error, d);
+        let rms = [a.rmse, b.rmse].map(|e| number::significant(e, 3));
+        let unit = a.unit;
+        let row = [
+            &a.joint,
+            &ours,
+            &theirs,
+            &difference,
+            &interval,
+            &rms[0],
+            &rms[1],
+            unit,
+            closer(d),
+        ];
+        table.row(row);
+    }
+    if a.joints.len() > 1 {
+        let d = &tried.differences.overall;
+        let [a, b] = [a, b].map(|v| v.overall.mean_relative_error);
+        let [ours, theirs, difference, interval] = cells(a, b, d);
+        table.row([
+            "all",
+            &ours,
+            &theirs,
+            &difference,
+            &interval,
+            "",
+            "",
+            "",
+            closer(d),
+        ]);
+    }
+    table
+}
+
+/// A log that one of the models was made from favours that model.
+fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
+    for (letter, side) in ["A", "B"].iter().zip(&of.sides) {
+        let made_from = &side.given.file.provenance.inputs;
+        let known = |i: &&Provenance| {
+            let mut made = made_from.iter().filter(|m| m.samples > 0);
+            made.any(|m| m.sha256 == i.sha256)
+        };
+        let names: Vec<String> = inputs
+            .iter()
+            .filter(known)
+            .map(|i| escape(&i.name))
+            .collect();
+        if !names.is_empty() {
+            page.verdict(
+                &format!(
+                    "{} was used to make {letter}, unless the spans are apart: it favours {letter}.",
+                    names.join(", ")
+                ),
+                false,
+            );
+        }
+    }
+}

@@ -1,0 +1,506 @@
+//! The report of `diagnose`.
+
+use crate::config::ModelFile;
+use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors};
+use crate::identify::{DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command};
+use crate::log::{Provenance, escape};
+use crate::motion::MotionError;
+use crate::number;
+use crate::report::figure::ResidualFigure;
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::table::{Align, Table};
+use crate::report::{Report, TraceStyle, Writer};
+
+/// Candidates that a page tells.
+const MOST: usize = 20;
+/// Margin of what a terminal says of an effect.
+const MARGIN: &str = "     ";
+
+/// What the report is made from.
+pub struct Diagnose<'a> {
+    pub machine: &'a LoggedRobot,
+    pub file: &'a ModelFile,
+    /// The model file.
+    pub given: &'a Provenance,
+    pub found: &'a Diagnosed,
+}
+
+/// The effects, their numbers, what is left, and the errors before and after.
+pub fn diagnose(of: &Diagnose) -> Report {
+    let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
+    told(
+        &mut report.terminal(),
+        of.machine,
+        of.found,
+        &of.machine.name,
+    );
+    let (text, good) = words(of.machine, of.found);
+    let mut page = report.page();
+    page.verdict(&text, good);
+    errors(&mut page, of.machine, of.found);
+    report
+}
+
+/// What a page has room for besides; `figure` is that of [`figure`].
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Diagnose,
+    figure: &str,
+    quality: &[Inspected],
+    command: &str,
+) -> Result<(), MotionError> {
+    let (machine, found) = (of.machine, of.found);
+    sections(page, machine, found, figure)?;
+    let look = look(machine, found)?;
+    let refined = found.model(machine, of.file);
+    parameters::section(page, &refined, &|_| None);
+    let curves = friction::figure(&look, &refined, &found.diagnosis.model);
+    friction::section(page, &curves);
+    page.heading("What the model hardly tells apart");
+    fit::pairs(page, &refined);
+    quality::section(page, quality, &found.held.warnings);
+    let mut inputs = vec![of.given.clone()];
+    inputs.extend(found.held.inputs.iter().cloned());
+    let (summary, made_from) = (Some(&found.held.summary), &of.file.provenance.inputs);
+    provenance::section(page, &machine.file, &inputs, made_from, summary, command);
+    Ok(())
+}
+
+/// Where the data are at fault, which comes before any physics.
+pub fn data_fault(fault: &DataFault, given: &Provenance) -> Report {
+    let mut report = Report::new(&format!("Diagnosis of {}", escape(&given.name)));
+    fault_told(&mut report.terminal(), fault);
+    let mut page = report.page();
+    page.verdict(&at_fault(fault), false);
+    page.paragraph(&format!("What to do: {}.", fault.remedy));
+    report
+}
+
+/// A fault of the data for a terminal.
+pub fn fault_told(terminal: &mut Writer, fault: &DataFault) {
+    terminal.line(&at_fault(fault));
+    terminal.line(&format!("  {}", fault.remedy));
+}
+
+/// The same in a sentence.
+pub fn at_fault(fault: &DataFault) -> String {
+    format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
+}
+
+/// The diagnosis for a terminal; `name` names the model.
+pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed, name: &str) {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    match found.verdict() {
+        DiagnosisVerdict::EffectsFound => terminal.line(&format!("{name} lacks:")),
+        DiagnosisVerdict::NothingMissing => {
+            terminal.line(&nothing_missing(d, &format!(" in {name}")));
+        }
+        _ if d.steps.is_empty() => terminal.line(&format!(
+            "{name} leaves a residual above the noise that no known effect explains."
+        )),
+        _ => terminal.verdict(
+            &format!(
+                "{name} leaves a residual above the noise that no known effect explains. What \
+                 comes near to it was added, and lowers the error:"
+            ),
+            false,
+        ),
+    }
+    for (i, step) in d.steps.iter().enumerate() {
+        step_told(terminal, machine, found, (i + 1, step));
+    }
+    terminal.list(doubts(machine, found));
+    for e in &d.disturbances {
+        let told = format!(
+            "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
+             residual)",
+            e.from_s,
+            e.to_s,
+            found.logs[e.log],
+            robot.joint_names()[e.joint],
+            e.over
+        );
+        terminal.note("  ", &told, 4);
+    }
+    terminal.table(before_and_after(machine, d));
+}
+
+/// One effect that was added, for a terminal.
+fn step_told(
+    terminal: &mut Writer,
+    machine: &LoggedRobot,
+    found: &Diagnosed,
+    (number, step): (usize, &AcceptedEffect),
+) {
+    let effect = &found.diagnosis.model.effects[step.effect];
+    let what = format!(
+        "{} ({}): {}",
+        effect.title(&machine.robot),
+        effect.family().name(),
+        in_words(machine, found, step.effect)
+    );
+    terminal.note(&format!("{number:>3}. "), &what, 7);
+    if let Some(s) = &step.candidate.score {
+        let told = format!(
+            "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows",
+            number::percent(s.cv_gain),
+            s.delta_bic,
+            s.effective_rows
+        );
+        terminal.note(MARGIN, &told, 7);
+    }
+    if let Some([before, after]) = step.holdout {
+        let worse = if after > before {
+            ": it worsens them"
+        } else {
+            ""
+        };
+        terminal.line(&format!(
+            "{MARGIN}data that decided nothing: {} before, {} after{worse}",
+            number::percent(before),
+            number::percent(after)
+        ));
+    }
+    if step.alternatives.is_empty() {
+        return;
+    }
+    let names = step.alternatives.iter();
+    let names: Vec<String> = names.map(|c| c.effect.title(&machine.robot)).collect();
+    let told = format!(
+        "these data do not separate it from {}; {} would",
+        names.join(", "),
+        effect.law.entry.separate_by
+    );
+    terminal.note(MARGIN, &told, 7);
+    if let Some(command) = separating_command(effect, &machine.robot) {
+        terminal.line(&format!("{MARGIN}such a motion:"));
+        terminal.code(&command);
+    }
+}
+
+/// Relative errors joint by joint.
+fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("fitted", Align::Decimal),
+        ("after", Align::Decimal),
+        ("unseen", Align::Decimal),
+        ("after", Align::Decimal),
+        ("its 95 %", Align::Right),
+        ("above noise", Align::Decimal),
+    ])
+    .caption("relative torque error [%] on fitted and on unseen data, before and after");
+    let hundred = number::hundredths;
+    let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
+    for (j, joint) in machine.robot.joint_names().iter().enumerate() {
+        let of = |errors: &Errors| errors.joints[j].relative_error;
+        let unseen = |p: &SplitErrors| p.holdout.as_ref().map(of);
+        let interval = d.after.holdout.as_ref().map(|e| {
+            let [low, high] = e.joints[j].interval_95;
+            format!("{}..{}", hundred(low), hundred(high))
+        });
+        table.row([
+            joint.as_str(),
+            &hundred(of(&d.before.train)),
+            &hundred(of(&d.after.train)),
+            &known(unseen(&d.before)),
+            &known(unseen(&d.after)),
+            interval.as_deref().unwrap_or(number::ABSENT),
+            &hundred(d.unexplained[j].share),
+        ]);
+    }
+    table
+}
+
+/// Nothing is missing, or nothing that matters: in the model called so.
+fn nothing_missing(d: &Diagnosis, model: &str) -> String {
+    match d.remainder().next() {
+        None => format!("Nothing is missing{model}: what is left of the torque is noise."),
+        Some(_) => format!("Nothing that matters is missing{model}."),
+    }
+}
+
+/// Most candidates of a remainder that are named.
+const NAMED: usize = 3;
+
+/// Why what was found may stand in for something else, and what else is no chance; nothing where only noise
+/// is left.
+fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+    let d = &found.diagnosis;
+    let robot = &machine.robot;
+    let open: Vec<String> = d
+        .structured_joints()
+        .map(|j| match d.unexplained[j].over_floor {
+            Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
+            None => robot.joint_names()[j].clone(),
+        })
+        .collect();
+    let mut out = Vec::new();
+    if !open.is_empty() && !d.steps.is_empty() {
+        out.push(format!(
+            "structure is left on {}: what was found lowers the error, and may stand in for what no \
+             known effect explains",
+            open.join(", ")
+        ));
+    }
+    let mut remainder: Vec<&Candidate> = d.remainder().collect();
+    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
+    remainder.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let mut names: Vec<String> = remainder
+        .iter()
+        .take(NAMED)
+        .map(|c| c.effect.title(robot))
+        .collect();
+    if remainder.len() > NAMED {
+        names.push(format!("and {} more", remainder.len() - NAMED));
+    }
+    if !names.is_empty() {
+        let doubt = match d.steps.is_empty() {
+            true => "",
+            false => "; what was found may not be quite what is there",
+        };
+        out.push(format!(
+            "not added, and still no chance: {}{doubt}",
+            names.join(", ")
+        ));
+    }
+    out
+}
+
+/// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
+fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) -> String {
+    let words = found.told(machine, effect).into_iter().map(|t| {
+        let value = match t.std {
+            Some(std) if std > 0.0 => number::plus_minus(t.value, std),
+            _ => number::significant(t.value, 4),
+        };
+        format!("{} = {value} {}", t.key, t.unit)
+            .trim_end()
+            .to_owned()
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// The residual before and after, over the logs that were fitted.
+pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure, MotionError> {
+    let look = look(machine, found)?;
+    let fitted = found.diagnosis.fitted_logs;
+    let after = &found.diagnosis.model;
+    residual::figure(&look, &|log| log < fitted, &found.given, Some(after))
+}
+
+fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, MotionError> {
+    Look::new(machine, &found.held, found.logs.iter().cloned())
+}
+
+/// The verdict in words, and whether nothing calls for attention.
+pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
+    let d = &found.diagnosis;
+    let titles: Vec<String> = d
+        .steps
+        .iter()
+        .map(|s| d.model.effects[s.effect].title(&machine.robot))
+        .collect();
+    match found.verdict() {
+        DiagnosisVerdict::EffectsFound => {
+            let mut text = format!("The model lacks: {}.", titles.join("; "));
+            if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
+                text += &format!(
+                    " With it the error on data that decided nothing goes from {} to {}, as the \
+                     mean over the joints.",
+                    number::percent(before.overall.mean_relative_error),
+                    number::percent(after.overall.mean_relative_error)
+                );
+            }
+            (text, true)
+        }
+        DiagnosisVerdict::NothingMissing => (nothing_missing(d, ""), true),
+        _ => {
+            let mut text =
+                "A residual above the noise is left that no known effect explains.".to_owned();
+            if !titles.is_empty() {
+                text += &format!(
+                    " What comes near to it was added, and lowers the error: {}.",
+                    titles.join("; ")
+                );
+            }
+            (text, false)
+        }
+    }
+}
+
+/// What was added, the torque and the residual before and after, and what was not added.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn sections(
+    page: &mut Writer,
+    machine: &LoggedRobot,
+    found: &Diagnosed,
+    figure: &str,
+) -> Result<(), MotionError> {
+    let look = look(machine, found)?;
+    let d = &found.diagnosis;
+    if !d.steps.is_empty() {
+        page.heading("What was added");
+        steps(page, machine, found);
+    }
+    page.list(doubts(machine, found));
+    // logs that decided nothing, where there are any
+    let all: Vec<usize> = (0..look.names.len()).collect();
+    let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
+    let shown = if others.is_empty() { fitted } else { others };
+    let names: Vec<&str> = shown.iter().map(|log| look.names[*log].as_str()).collect();
+    let after = Drawn {
+        names: ["after", "residual after"],
+        styles: [TraceStyle::Model, TraceStyle::After],
+        model: &d.model,
+    };
+    let before = Drawn {
+        names: ["before", "residual before"],
+        styles: [TraceStyle::Before, TraceStyle::Before],
+        model: &found.given,
+    };
+    let models = match d.steps.is_empty() {
+        true => vec![Drawn::only(&found.given)],
+        false => vec![before, after],
+    };
+    torque::section(page, &look, shown, &models, &names.join(", "))?;
+    residual::section(page, figure);
+    candidates(page, machine, found);
+    Ok(())
+}
+
+fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
+    let all = found.diagnosis.candidates.iter();
+    let mut rest: Vec<_> = all.filter(|c| c.score.is_some()).collect();
+    rest.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let rows: Vec<Vec<String>> = rest
+        .iter()
+        .take(MOST)
+        .map(|c| {
+            vec![
+                c.effect.title(&machine.robot),
+                c.effect.family().name().to_owned(),
+                number::percent(gain(c)),
+                number::percent(c.score.as_ref().map_or(0.0, |s| s.unique_share)),
+                c.reason.clone(),
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    page.heading("Candidates that were not added");
+    page.rows(
+        "the best of them, of the last round",
+        &[
+            "effect",
+            "family",
+            "cross-validated gain",
+            "own share",
+            "why not",
+        ],
+        rows,
+    );
+}
+
+/// Errors of every joint before and after, on the logs that were fitted and on those that were not.
+pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    let d = &found.diagnosis;
+    let percent = |e: Option<f64>| e.map_or("-".to_owned(), number::percent);
+    let rows: Vec<Vec<String>> = machine
+        .robot
+        .joint_names()
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            let relative = |e: &Errors| e.joints[j].relative_error;
+            let unseen = |p: &SplitErrors| p.holdout.as_ref().map(relative);
+            let interval = d.after.holdout.as_ref().map_or("-".to_owned(), |e| {
+                let [low, high] = e.joints[j].interval_95;
+                format!("{} to {}", number::percent(low), number::percent(high))
+            });
+            let rms = d.after.holdout.as_ref().unwrap_or(&d.after.train).joints[j].rmse;
+            vec![
+                joint.clone(),
+                percent(Some(relative(&d.before.train))),
+                percent(Some(relative(&d.after.train))),
+                percent(unseen(&d.before)),
+                percent(unseen(&d.after)),
+                interval,
+                format!(
+                    "{} {}",
+                    number::significant(rms, 3),
+                    machine.file.torque_unit(j)
+                ),
+                number::percent(d.unexplained[j].share),
+            ]
+        })
+        .collect();
+    page.rows(
+        "relative torque error",
+        &[
+            "joint",
+            "fitted, before",
+            "after",
+            "unseen, before",
+            "after",
+            "95 % of it",
+            "rms after",
+            "torque power left above noise",
+        ],
+        rows,
+    );
+}
+
+fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    let d = &found.diagnosis;
+    let mut rows = Vec::new();
+    for step in &d.steps {
+        let effect = &d.model.effects[step.effect];
+        let unseen = step.holdout.map_or("-".to_owned(), |[before, after]| {
+            format!("{} to {}", number::percent(before), number::percent(after))
+        });
+        let alike: Vec<String> = step
+            .alternatives
+            .iter()
+            .map(|c| c.effect.title(&machine.robot))
+            .collect();
+        let score = step.candidate.score.as_ref();
+        let title = effect.title(&machine.robot);
+        rows.push(vec![
+            if d.assured() {
+                title
+            } else {
+                format!("{title}, or what it stands in for")
+            },
+            in_words(machine, found, step.effect),
+            score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
+            unseen,
+            if alike.is_empty() {
+                "separated from all others".to_owned()
+            } else {
+                format!("{}: {}", alike.join(", "), effect.law.entry.separate_by)
+            },
+        ]);
+    }
+    page.rows(
+        "in the order in which they were added; numbers of the last fit",
+        &[
+            "effect",
+            "parameters",
+            "cross-validated gain",
+            "unseen",
+            "not separated from; what would",
+        ],
+        rows,
+    );
+}

@@ -1,0 +1,206 @@
+//! The report of `identify`: the whole campaign.
+
+use super::{diagnose, friction as filter, lsq, validate};
+use crate::config::ModelFile;
+use crate::config::model_file::Parameter;
+use crate::identify::{Campaigned, DataFault, DiagnoseEnd, Diagnosed, LoggedRobot};
+use crate::log::{Provenance, escape};
+use crate::motion::MotionError;
+use crate::number;
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::torque::Drawn;
+use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::table::Table;
+use crate::report::{Report, Writer, summary};
+use crate::verdict::Verdict;
+
+/// What the report is made from.
+pub struct Identify<'a> {
+    pub machine: &'a LoggedRobot,
+    /// Name of the campaign.
+    pub campaign: &'a str,
+    pub found: &'a Campaigned,
+    /// Names of the logs that decided nothing.
+    pub unseen: &'a [String],
+    /// The true value of a parameter, where it is known.
+    pub truth: &'a dyn Fn(&Parameter) -> Option<f64>,
+    /// Limit that the user set on every joint's relative error.
+    pub limit: Option<f64>,
+}
+
+impl Identify<'_> {
+    fn model(&self) -> &ModelFile {
+        self.found.refined.as_ref().unwrap_or(&self.found.model)
+    }
+
+    fn diagnosed(&self) -> Option<&Diagnosed> {
+        match &self.found.diagnosed {
+            Ok(DiagnoseEnd::Diagnosed(found)) => Some(found),
+            _ => None,
+        }
+    }
+
+    fn fault(&self) -> Option<&DataFault> {
+        match &self.found.diagnosed {
+            Ok(DiagnoseEnd::DataFault(fault)) => Some(fault),
+            _ => None,
+        }
+    }
+
+    fn title(&self) -> String {
+        let names: Vec<String> = self.unseen.iter().map(|name| escape(name)).collect();
+        names.join(", ")
+    }
+
+    fn verdicts(&self, page: &mut Writer) {
+        if let Some(fault) = self.fault() {
+            let text = diagnose::at_fault(fault);
+            page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);
+        }
+        let (tally, mut good) = parameters::tally(self.model());
+        let mut text = format!("{tally}.");
+        if let Some(found) = self.diagnosed() {
+            let (words, named) = diagnose::words(self.machine, found);
+            text += &format!(" {words}");
+            good &= named;
+        }
+        page.verdict(&text, good);
+        match &self.found.validated {
+            Some(validated) => {
+                let validation = &validated.validation;
+                let (text, good) = validate::words(validation, self.limit, &self.title());
+                let declared = match self.found.refined {
+                    Some(_) => text.replacen("The model", "The declared model", 1),
+                    None => text,
+                };
+                page.verdict(&declared, good);
+            }
+            None => page.verdict(
+                "There is no validation log: the error on unseen data is not known.",
+                false,
+            ),
+        }
+    }
+}
+
+/// The parameters, the quality of the fit, the errors, and what the model lacks.
+pub fn identify(of: &Identify) -> Report {
+    let (machine, found) = (of.machine, of.found);
+    let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
+    let mut terminal = report.terminal();
+    terminal.table(beside_truth(of));
+    terminal.line("");
+    lsq::fit_quality(&mut terminal, &found.dynamics);
+    terminal.line("");
+    match &found.validated {
+        None => terminal.line("no validation log: the errors on unseen data are not known"),
+        Some(validated) => {
+            let caption = format!("torque on unseen data ({})", of.unseen.join(", "));
+            validate::told(&mut terminal, &validated.validation, &caption);
+        }
+    }
+    terminal.line("");
+    if let Some(fault) = of.fault() {
+        diagnose::fault_told(&mut terminal, fault);
+    }
+    if let Some(diagnosed) = of.diagnosed() {
+        diagnose::told(&mut terminal, machine, diagnosed, "model.toml");
+    }
+    let mut page = report.page();
+    of.verdicts(&mut page);
+    match (of.diagnosed(), &found.validated) {
+        (Some(diagnosed), _) => diagnose::errors(&mut page, machine, diagnosed),
+        (None, Some(validated)) => {
+            let caption = "errors of the reconstructed torque on unseen data";
+            validate::errors(&mut page, &validated.validation, caption);
+        }
+        (None, None) => lsq::residuals(&mut page, &found.dynamics),
+    }
+    parameters::section(&mut page, of.model(), of.truth);
+    report
+}
+
+/// Every parameter of the model, beside its truth where that is known.
+fn beside_truth(of: &Identify) -> Table {
+    let rows: Vec<summary::Parameter> = of
+        .model()
+        .parameters
+        .iter()
+        .map(|p| {
+            let unknown = p.verdict == Some(Verdict::NotIdentifiable);
+            summary::Parameter {
+                joint: p.joint.as_deref().unwrap_or(""),
+                name: &p.name,
+                theta: p.theta,
+                value: if unknown { f64::NAN } else { p.value },
+                std: p.std.filter(|_| !unknown).unwrap_or(f64::NAN),
+                unit: &p.unit,
+                verdict: p.verdict.map_or("", Verdict::word),
+                truth: (of.truth)(p),
+            }
+        })
+        .collect();
+    summary::parameters("identified parameters", &rows)
+}
+
+/// What the pages of a campaign come from.
+pub struct Origin<'a> {
+    /// Text of the campaign file.
+    pub campaign: &'a str,
+    pub inputs: &'a [Provenance],
+    pub warnings: &'a [String],
+    pub quality: &'a [Inspected],
+    pub command: &'a str,
+}
+
+/// What a page has room for besides; `residuals` is the picture of the diagnosis, where there was one,
+/// `look` holds the unseen logs where there was none.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Identify,
+    look: Option<&Look>,
+    residuals: &str,
+    origin: &Origin,
+) -> Result<(), MotionError> {
+    let (machine, found) = (of.machine, of.found);
+    if let Some((laws, _)) = &found.friction {
+        page.heading("Friction");
+        page.paragraph(
+            "From the one-joint logs, by the Kalman filter: the curve with its 95 % band over the \
+             speeds that the logs cover, and the mean torque of their plateaus, which took no part \
+             in the fit.",
+        );
+        page.figure(&filter::figure(machine, laws).svg());
+    } else if let Some(look) = look {
+        let figure = friction::figure(look, &found.model, &found.numbers);
+        friction::section(page, &figure);
+    }
+    if let Some(diagnosed) = of.diagnosed() {
+        diagnose::sections(page, machine, diagnosed, residuals)?;
+    } else if let Some(look) = look {
+        let logs: Vec<usize> = (0..of.unseen.len()).collect();
+        let drawn = [Drawn::only(&found.numbers)];
+        torque::section(page, look, &logs, &drawn, &of.title())?;
+        let figure = residual::figure(look, &|_| true, &found.numbers, None)?;
+        residual::section(page, &figure.svg());
+    }
+    fit::section(page, &found.dynamics, of.model());
+    quality::section(page, origin.quality, origin.warnings);
+    let (file, summary) = (&machine.file, Some(&found.dynamics.summary));
+    provenance::section(page, file, origin.inputs, &[], summary, origin.command);
+    page.details("campaign file", origin.campaign);
+    let names = machine.robot.joint_names().iter().enumerate();
+    let noise = names.filter_map(|(j, joint)| {
+        let std = of.model().residual_std.get(joint)?;
+        let unit = machine.file.torque_unit(j);
+        Some(format!("{joint} {} {unit}", number::significant(*std, 3)))
+    });
+    page.paragraph(&format!(
+        "Noise of the torque that is left, by joint: {}.",
+        noise.collect::<Vec<_>>().join(", ")
+    ));
+    Ok(())
+}
