@@ -103,7 +103,7 @@ impl AugmentedModel {
     }
 }
 
-/// x(t - d) in place, d in samples, by cubic interpolation; held at the ends.
+/// x(t - d) in place, d in samples, by cubic interpolation; constant beyond the ends.
 pub fn shifted(x: &mut [f64], d: f64) {
     if d == 0.0 || x.len() < 4 || !d.is_finite() {
         return;

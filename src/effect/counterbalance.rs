@@ -1,5 +1,5 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
-//! points, as a cubic B-spline over the travel that was seen; held at its end values beyond it.
+//! points, as a cubic B-spline over the travel that was seen; constant beyond it.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;

@@ -21,8 +21,8 @@ pub struct JointCover {
     pub friction_orders: Vec<f64>,
     /// Full travel of the joint, where the robot's limits say it [m or rad].
     pub full_range: Option<f64>,
-    /// The joint is held in every log.
-    pub held: bool,
+    /// The joint is stationary in every log.
+    pub stationary: bool,
 }
 
 /// What the logs cover.
@@ -49,15 +49,15 @@ impl Cover {
             dt: stretches.first().map_or(1.0, |s| s.dt),
             cutoff_hz,
         };
-        let held = stationary_joints(robot, stretches);
+        let stationary = stationary_joints(robot, stretches);
         for (j, joint) in cover.joints.iter_mut().enumerate() {
             let mut position = [f64::INFINITY, f64::NEG_INFINITY];
             let (mut square, mut count) = (0.0, 0usize);
-            joint.held = held.iter().all(|h| h[j]);
+            joint.stationary = stationary.iter().all(|s| s[j]);
             let moving: Vec<&Stretch> = stretches
                 .iter()
-                .zip(&held)
-                .filter(|(_, h)| joint.held || !h[j])
+                .zip(&stationary)
+                .filter(|(_, s)| joint.stationary || !s[j])
                 .map(|(s, _)| s)
                 .collect();
             for s in &moving {
@@ -131,11 +131,11 @@ impl JointCover {
     }
 }
 
-/// Travel below which a joint counts as held, over its travel in all logs or its full range: what a
+/// Travel below which a joint counts as stationary, over its travel in all logs or its full range: what a
 /// controller gives way, which friction at rest hides.
-const HELD: f64 = 0.01;
+const SMALL: f64 = 0.01;
 
-/// Whether each joint is held along each stretch, `[stretch][joint]`: one-joint logs are recognised
+/// Whether each joint is stationary along each stretch, `[stretch][joint]`: one-joint logs are recognised
 /// by it. A torque at rest is anything up to static friction, and no law of v says which.
 pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>> {
     let travel = |s: &Stretch, j: usize| {
@@ -156,8 +156,8 @@ pub fn stationary_joints(robot: &Robot, stretches: &[Stretch]) -> Vec<Vec<bool>>
         seen.max(robot.transmission().full_travel(j).unwrap_or(0.0))
     };
     let widest: Vec<f64> = (0..n).map(widest).collect();
-    let held = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < HELD * w).collect();
-    travels.iter().map(held).collect()
+    let small = |t: &Vec<f64>| t.iter().zip(&widest).map(|(t, w)| *t < SMALL * w).collect();
+    travels.iter().map(small).collect()
 }
 
 /// Share of a joint's range that a smooth function of position must be seen over.

@@ -1,5 +1,5 @@
 //! `gain`: torque constant or gear off by a factor, k tau on one joint. A fit that was free while
-//! carrying it absorbs it: it is looked for only with the model held.
+//! carrying it absorbs it: it is looked for only with the model kept.
 
 use super::entry::{Entry, Family, Key, Role};
 use super::law::Law;

@@ -1,6 +1,6 @@
 //! `payload` of the CFT robot and of a single joint: a body on the last link: mass, first moments, and its
 //! second moment about the vertical axis of the link's frame, about which alone a tool that stays level
-//! turns. A fit whose logs carried it absorbs it: it is looked for only with the model held.
+//! turns. A fit whose logs carried it absorbs it: it is looked for only with the model kept.
 
 use super::entry::{Entry, Family, Key, Role, Search};
 use super::law::{KeyValue, Law, Reparametrisation};

@@ -183,7 +183,7 @@ fn by_joint(
         let OneJointLog {
             motions,
             narrower,
-            held,
+            zero_order_hold,
             provenance,
             warnings: found,
         } = one_joint::read(machine, log, control)?;
@@ -199,7 +199,7 @@ fn by_joint(
             }
         };
         let group = groups.entry(moving).or_default();
-        group.held |= held;
+        group.zero_order_hold |= zero_order_hold;
         group.motions.extend(motions);
         group.narrower.extend(narrower);
         group.logs.push(log.name());
@@ -212,7 +212,7 @@ fn by_joint(
 struct Group {
     motions: Vec<SmoothedMotion>,
     narrower: Vec<SmoothedMotion>,
-    held: bool,
+    zero_order_hold: bool,
     logs: Vec<String>,
 }
 
@@ -240,7 +240,7 @@ fn one_joint(
     };
     let sensors = SensorModel {
         variance: &variance,
-        zero_order_hold: group.held,
+        zero_order_hold: group.zero_order_hold,
     };
     let prepared = prepare(&machine.robot, j, &group.motions, &sensors).ok_or_else(|| {
         undetermined(FrictionError::StandsStill {

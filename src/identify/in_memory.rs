@@ -8,7 +8,7 @@ use super::open_log::summary_warnings;
 use crate::log::{Instant, Provenance};
 use crate::motion::{Stretch, Summary, stretches};
 
-/// Most samples that are held in memory, over all logs: 2 GB for a robot of seven joints.
+/// Most samples that are taken into memory, over all logs: 2 GB for a robot of seven joints.
 const MOST_SAMPLES: usize = 9_000_000;
 
 /// Logs in memory, as stretches at full rate.
@@ -19,7 +19,7 @@ pub struct InMemory {
     pub summary: Summary,
     /// Instant from which the times of the first log are counted.
     pub origin: Instant,
-    /// Torques are means of two rows: they are held from row to row.
+    /// Torques are means of two rows: they come from a zero-order hold.
     pub averaged: bool,
 }
 

@@ -10,7 +10,7 @@ use crate::log::{Block, Provenance};
 use crate::motion::{Differences, FilterSettings};
 
 /// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
-/// file names none and the sampling rate allows it. Wide, because the acceleration of held joints
+/// file names none and the sampling rate allows it. Wide, because the acceleration of stationary joints
 /// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
 const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
 
@@ -24,8 +24,8 @@ pub struct OneJointLog {
     pub motions: Vec<SmoothedMotion>,
     /// The same with a narrower position filter.
     pub narrower: Vec<SmoothedMotion>,
-    /// The torque is held from row to row.
-    pub held: bool,
+    /// The torque comes from a zero-order hold.
+    pub zero_order_hold: bool,
     pub provenance: Provenance,
     /// What the reader left out, dropped or chose.
     pub warnings: Vec<String>,
@@ -55,7 +55,7 @@ pub fn read(
     log: &Log,
     control: &Control,
 ) -> Result<OneJointLog, IdentifyError> {
-    let (mut open, held) = machine.open_raw(log, control)?;
+    let (mut open, zero_order_hold) = machine.open_raw(log, control)?;
     let mut whole = Block::default();
     let mut block = Block::default();
     while open.read(&mut block)? {
@@ -83,7 +83,7 @@ pub fn read(
     Ok(OneJointLog {
         motions: smooth(&declared)?,
         narrower: smooth(&narrower)?,
-        held,
+        zero_order_hold,
         warnings: open.warnings(),
         provenance: open.provenance()?,
     })

@@ -13,7 +13,7 @@ use crate::robot::Robot;
 pub struct OpenLog<'a> {
     pub(super) reader: Reader,
     pub(super) control: &'a Control,
-    /// Brings held motor forces to the rows' own time and pose.
+    /// Brings motor forces by a zero-order hold to the rows' own time and pose.
     pub(super) centre: Option<(&'a Robot, ZeroOrderHold)>,
     pub(super) name: String,
     pub(super) gate: Arc<Gate>,
@@ -31,8 +31,8 @@ impl OpenLog<'_> {
                 return Err(ReadError::Interrupted);
             }
             let more = self.reader.read(block)?;
-            if let Some((robot, held)) = &mut self.centre {
-                held.centre(robot, block);
+            if let Some((robot, hold)) = &mut self.centre {
+                hold.centre(robot, block);
             }
             if block.tau.is_empty() {
                 // a log without torques moves with none
@@ -66,7 +66,7 @@ impl OpenLog<'_> {
         out
     }
 
-    /// Whether torques are held from row to row and so are means of two rows here.
+    /// Whether torques come from a zero-order hold and so are means of two rows here.
     pub fn is_centred(&self) -> bool {
         self.centre.is_some()
     }

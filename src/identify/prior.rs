@@ -55,7 +55,7 @@ pub(super) fn open(
     }
 }
 
-/// Joints that move in a log in which all others are held.
+/// Joints that move in a log in which all others are stationary.
 pub(super) fn moved_alone(
     given: &AugmentedModel,
     stretches: &[Stretch],
@@ -65,9 +65,9 @@ pub(super) fn moved_alone(
     let fitted = stretches.iter().filter(|s| roles[s.log] == LogRole::Train);
     let fitted: Vec<Stretch> = fitted.cloned().collect();
     let mut alone = vec![false; robot.joints()];
-    for held in stationary_joints(robot, &fitted) {
-        let mut moving = (0..held.len()).filter(|j| !held[*j]);
-        if let (Some(j), None, true) = (moving.next(), moving.next(), held.len() > 1) {
+    for stationary in stationary_joints(robot, &fitted) {
+        let mut moving = (0..stationary.len()).filter(|j| !stationary[*j]);
+        if let (Some(j), None, true) = (moving.next(), moving.next(), stationary.len() > 1) {
             alone[j] = true;
         }
     }
@@ -79,7 +79,7 @@ pub(super) fn moved_alone(
 const FRICTION_DOUBT: f64 = 3.0;
 
 /// Inverse covariance of what is known before: the friction stage's, and with `keep` all of it. The
-/// friction of a joint that is `alone` in a log of its own, the others held, is fitted from that log:
+/// friction of a joint that is `alone` in a log of its own, the others stationary, is fitted from that log:
 /// what the friction stage made of it would count twice, and without the effect that is looked for.
 pub(super) fn information(
     file: &ModelFile,
@@ -126,7 +126,7 @@ pub(super) fn information(
         }
     }
     if keep {
-        // what has no standard deviation is held firmly
+        // what has no standard deviation is fixed
         let values = values(model);
         for i in 0..size {
             if covariance[i * size + i] <= 0.0 {

@@ -144,7 +144,7 @@ impl Round<'_> {
     /// Why an effect is not tried at a place.
     fn refusal(&self, law: &'static Law, place: Place) -> Option<&'static str> {
         let mut touched = (0..self.at.weights.len()).filter(|j| place.touches(*j));
-        if touched.all(|j| self.problem.cover.joints[j].held) {
+        if touched.all(|j| self.problem.cover.joints[j].stationary) {
             return Some("the joint is held in these logs: move it to see what it does");
         }
         if law.entry.role == Role::Kept && !self.keep {
