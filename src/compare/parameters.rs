@@ -76,7 +76,7 @@ pub struct SideBySide {
 }
 
 /// A parameter, or a number of an effect.
-struct Entry {
+struct ParameterEntry {
     name: String,
     joint: Option<String>,
     theta: Option<u32>,
@@ -104,7 +104,10 @@ pub fn side_by_side(a: &ModelFile, b: &ModelFile) -> SideBySide {
     out
 }
 
-fn partner<'a>(entry: &Entry, among: &'a [Entry]) -> Result<&'a Entry, Reason> {
+fn partner<'a>(
+    entry: &ParameterEntry,
+    among: &'a [ParameterEntry],
+) -> Result<&'a ParameterEntry, Reason> {
     let mut same = among.iter();
     let found = same.find(|other| other.name == entry.name && other.joint == entry.joint);
     let other = found.ok_or(Reason::Absent)?;
@@ -117,7 +120,7 @@ fn partner<'a>(entry: &Entry, among: &'a [Entry]) -> Result<&'a Entry, Reason> {
     }
 }
 
-fn pair(a: &Entry, b: &Entry) -> ParameterPair {
+fn pair(a: &ParameterEntry, b: &ParameterEntry) -> ParameterPair {
     let difference = b.estimate.value - a.estimate.value;
     let difference_std = spread(&a.estimate)
         .zip(spread(&b.estimate))
@@ -144,7 +147,7 @@ fn spread(estimate: &ParameterEstimate) -> Option<f64> {
     }
 }
 
-fn apart(entry: &Entry, reason: Reason) -> Apart {
+fn apart(entry: &ParameterEntry, reason: Reason) -> Apart {
     Apart {
         name: entry.name.clone(),
         joint: entry.joint.clone(),
@@ -155,17 +158,17 @@ fn apart(entry: &Entry, reason: Reason) -> Apart {
     }
 }
 
-fn entries(model: &ModelFile) -> Vec<Entry> {
+fn entries(model: &ModelFile) -> Vec<ParameterEntry> {
     let robot = model.robot.robot();
     let meaning = |p: &Parameter| {
         let mut known = robot.parameters().iter();
         let inertial = known.find(|info| p.joint.is_none() && info.name == p.name);
         inertial.map_or(String::new(), |info| info.meaning.to_string())
     };
-    let mut out: Vec<Entry> = model
+    let mut out: Vec<ParameterEntry> = model
         .parameters
         .iter()
-        .map(|p| Entry {
+        .map(|p| ParameterEntry {
             name: p.name.clone(),
             joint: p.joint.clone(),
             theta: p.theta,
@@ -186,7 +189,7 @@ fn entries(model: &ModelFile) -> Vec<Entry> {
             0 => effect.name.clone(),
             n => format!("{}#{}", effect.name, n + 1),
         };
-        out.extend(effect.parameters.iter().map(|(key, p)| Entry {
+        out.extend(effect.parameters.iter().map(|(key, p)| ParameterEntry {
             name: format!("{name}.{key}"),
             joint: effect.joint.clone(),
             theta: None,

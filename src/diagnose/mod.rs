@@ -32,7 +32,7 @@ mod unexplained;
 pub use candidates::candidate::Candidate;
 pub use candidates::score::CandidateScore;
 pub use faults::channels::Suspicion;
-pub use faults::disturbance::Disturbance;
+pub use faults::disturbance::CutDisturbance;
 pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors};
 pub use problem::case::{Case, SelectionLimits};
 pub use problem::data_split::{LogRole, SetAside};

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::candidates::candidate::Candidate;
-use super::faults::disturbance::Disturbance;
+use super::faults::disturbance::CutDisturbance;
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
 use super::unexplained::errors::Errors;
@@ -51,7 +51,7 @@ pub struct Diagnosis {
     pub part_unexplained: Vec<f64>,
     pub set_aside: Vec<SetAside>,
     /// Disturbances that were cut out of the logs.
-    pub disturbances: Vec<Disturbance>,
+    pub disturbances: Vec<CutDisturbance>,
     /// Root mean square of the filtered residual per joint.
     pub residual_std: Vec<f64>,
     /// Logs that were fitted: the first ones.

@@ -9,11 +9,11 @@ use super::candidates::candidate::Candidate;
 use super::candidates::orders;
 use super::candidates::search::search;
 use super::faults::channels::{Suspicion, suspicion};
-use super::faults::disturbance::{self, Disturbance};
+use super::faults::disturbance::{self, CutDisturbance};
 use super::outcome::{AcceptedEffect, Diagnosis, SplitErrors};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, RowRole};
-use super::problem::fit::{Fitted, fit};
+use super::problem::fit::{FittedModel, fit};
 use super::problem::fit_problem::{FitProblem, inertial_of};
 use super::problem::unknowns::Unknowns;
 use super::selection::accept::accept;
@@ -82,13 +82,13 @@ struct Diagnosing<'a> {
     stretches: Vec<Stretch>,
     /// Number of unknowns of the declared model.
     unknowns: usize,
-    at: Fitted,
+    at: FittedModel,
     /// Squared residual of the declared model over the fitted rows, per joint.
     declared: Option<Vec<f64>>,
     /// The declared model refitted, then the model of each step.
     models: Vec<AugmentedModel>,
     steps: Vec<AcceptedEffect>,
-    disturbances: Vec<Disturbance>,
+    disturbances: Vec<CutDisturbance>,
     /// Candidates that came to nothing.
     candidates: Vec<Candidate>,
 }
@@ -225,7 +225,7 @@ impl<'a> Diagnosing<'a> {
     fn confirmed(
         &self,
         found: &mut [Candidate],
-    ) -> Result<Option<(usize, Vec<usize>, Fitted)>, MotionError> {
+    ) -> Result<Option<(usize, Vec<usize>, FittedModel)>, MotionError> {
         if self.steps.len() >= self.case.limits.steps {
             return Ok(None);
         }
@@ -235,7 +235,7 @@ impl<'a> Diagnosing<'a> {
             let mut model = at.model.clone();
             model.effects.push(found[chosen].effect.clone());
             let fitted = fit(&model, &self.problem)?;
-            let vetoing = |of: &Fitted| of.veto_squares(&fitted.weights, split);
+            let vetoing = |of: &FittedModel| of.veto_squares(&fitted.weights, split);
             let kept = !self.case.limits.vetoes(&vetoing(at), &vetoing(&fitted));
             if kept && fitted.square_with(&at.weights, split) < at.square {
                 return Ok(Some((chosen, others, fitted)));

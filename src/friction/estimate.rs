@@ -11,7 +11,7 @@ use super::plateau::{Plateau, plateaus};
 use super::prepare::Prepared;
 use super::problem::{FRICTION, FrictionProblem};
 use super::slope::{open_above, profile_slope};
-use super::start::{FrictionStart, constant_inertia, from_log};
+use super::start::{FilterStart, constant_inertia, from_log};
 use crate::math::descent::Ending;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
@@ -171,7 +171,7 @@ pub fn estimate(
         }
         starts.insert(
             0,
-            FrictionStart {
+            FilterStart {
                 parameters: p,
                 residual: f64::INFINITY,
             },

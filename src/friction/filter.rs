@@ -6,11 +6,11 @@
 //! alone.
 
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels};
-use super::propagate::{Interval, Law, Transition, with_sensitivities};
+use super::propagate::{SampleInterval, ScaledLaw, Transition, with_sensitivities};
 
 /// Estimate of the filter after a pass over all records.
 #[derive(Debug, Clone)]
-pub struct Pass {
+pub struct FilterPass {
     /// Parameters in the filter's coordinates.
     pub parameters: Vec<f64>,
     /// Their covariance, row-major.
@@ -56,7 +56,7 @@ impl ExtendedKalmanFilter {
         start: &[f64],
         spread: &[f64],
         noise: NoiseLevels,
-    ) -> Pass {
+    ) -> FilterPass {
         let np = self.n - 2;
         self.x[2..].copy_from_slice(start);
         self.p.fill(0.0);
@@ -72,7 +72,7 @@ impl ExtendedKalmanFilter {
                 record.r[0] * noise.position_factor,
             );
             for k in 0..record.tau.len() {
-                let interval = Interval::of(record, k, problem.nuisance);
+                let interval = SampleInterval::of(record, k, problem.nuisance);
                 self.predict(problem, &interval, noise);
                 let r = record.r[k + 1] * noise.position_factor;
                 let (innovation, s) = self.update(record.y[k + 1], r);
@@ -85,7 +85,7 @@ impl ExtendedKalmanFilter {
             let row = (2 + i) * self.n + 2;
             covariance[i * np..(i + 1) * np].copy_from_slice(&self.p[row..row + np]);
         }
-        Pass {
+        FilterPass {
             parameters: self.x[2..].to_vec(),
             covariance,
             log_likelihood,
@@ -107,9 +107,14 @@ impl ExtendedKalmanFilter {
         self.p[n + 1] = (0.1 * problem.velocity_scale).powi(2);
     }
 
-    fn predict(&mut self, problem: &FrictionProblem, interval: &Interval, noise: NoiseLevels) {
+    fn predict(
+        &mut self,
+        problem: &FrictionProblem,
+        interval: &SampleInterval,
+        noise: NoiseLevels,
+    ) {
         let n = self.n;
-        let law = Law::new(problem, &self.x[2..2 + FRICTION]);
+        let law = ScaledLaw::new(problem, &self.x[2..2 + FRICTION]);
         let (q, v) = with_sensitivities(
             &law,
             &self.x[2..],

@@ -13,10 +13,10 @@ use nalgebra::{DMatrix, DVector};
 use super::filter::ExtendedKalmanFilter;
 use super::inputs::Inputs;
 use super::prepare::Prepared;
-use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Parameters};
+use super::problem::{FRICTION, FilterParameters, FrictionProblem, NoiseLevels};
 use super::score::{LikelihoodScore, log_likelihood, score};
-use super::start::FrictionStart;
-use crate::math::descent::{Ending, StepControl, Tried, descend};
+use super::start::FilterStart;
+use crate::math::descent::{Ending, StepControl, Trial, descend};
 use crate::math::minimise;
 
 /// Factors on both noises in the annealed passes from a start that may be far off, and from one
@@ -65,7 +65,7 @@ pub struct GivenNoise {
 /// Maximum of the innovation likelihood of one joint.
 #[derive(Debug, Clone)]
 pub(super) struct Maximum {
-    pub parameters: Parameters,
+    pub parameters: FilterParameters,
     /// Covariance in the filter's coordinates, widened where the score is coloured.
     pub covariance: DMatrix<f64>,
     pub noise: NoiseLevels,
@@ -107,14 +107,14 @@ pub(super) fn first_noise(problem: &FrictionProblem, given: &GivenNoise) -> Nois
 /// Runs every start through the annealed passes, then refines the best.
 pub(super) fn maximise(
     prepared: &Prepared,
-    starts: &[FrictionStart],
+    starts: &[FilterStart],
     given: &GivenNoise,
 ) -> Option<Maximum> {
     let problem = &prepared.problem;
     let noise = first_noise(problem, given);
     let spread = spread(problem);
     let mut filter = ExtendedKalmanFilter::new(problem);
-    let mut ends: Vec<(Parameters, f64)> = Vec::new();
+    let mut ends: Vec<(FilterParameters, f64)> = Vec::new();
     for start in starts {
         let mut p = start.parameters.clone();
         problem.clamp(&mut p);
@@ -214,7 +214,7 @@ pub(super) fn bands(
 
 /// Parameters at which a refinement ended.
 pub(super) struct RefinedParameters {
-    pub parameters: Parameters,
+    pub parameters: FilterParameters,
     pub score: LikelihoodScore,
     pub ending: Ending,
 }
@@ -251,7 +251,7 @@ fn damped(
 /// Gauss-Newton with step control on the innovation likelihood.
 fn refine(
     problem: &FrictionProblem,
-    start: Parameters,
+    start: FilterParameters,
     noise: NoiseLevels,
     spread: &[f64],
     most: usize,
@@ -262,7 +262,7 @@ fn refine(
 /// The same with some parameters fixed.
 pub(super) fn refine_others(
     problem: &FrictionProblem,
-    start: Parameters,
+    start: FilterParameters,
     noise: NoiseLevels,
     spread: &[f64],
     most: usize,
@@ -274,21 +274,22 @@ pub(super) fn refine_others(
     let Ok(((parameters, score), ending, _)) =
         descend((start, first), &DAMPING, most, &mut |(p, at), damping| {
             let Some(step) = damped(at, spread, damping, fixed) else {
-                return Ok::<_, Infallible>(Tried::NoStep);
+                return Ok::<_, Infallible>(Trial::NoStep);
             };
             // no step longer than the prior: the Gauss-Newton model is local
             let parts = step.iter().zip(spread).map(|(d, s)| d.abs() / s);
             let shorten = 0.5 / parts.fold(0.5, f64::max);
-            let mut trial: Parameters = p.iter().zip(&step).map(|(x, d)| x + shorten * d).collect();
+            let mut trial: FilterParameters =
+                p.iter().zip(&step).map(|(x, d)| x + shorten * d).collect();
             problem.clamp(&mut trial);
             let next = score(&trial);
             let gain = next.log_likelihood - at.log_likelihood;
             let rounding = 1e-9 * at.log_likelihood.abs();
             Ok(match gain.is_finite() {
-                true if gain >= SETTLED => Tried::Accepted((trial, next)),
-                true if gain >= 0.0 => Tried::Last((trial, next)),
-                true if gain > -SETTLED * (1.0 + rounding) => Tried::Settled,
-                _ => Tried::Rejected,
+                true if gain >= SETTLED => Trial::Accepted((trial, next)),
+                true if gain >= 0.0 => Trial::Last((trial, next)),
+                true if gain > -SETTLED * (1.0 + rounding) => Trial::Settled,
+                _ => Trial::Rejected,
             })
         });
     RefinedParameters {

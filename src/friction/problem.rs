@@ -48,7 +48,7 @@ pub struct FrictionProblem {
 
 /// Friction and nuisance in the filter's coordinates: `[Bv, Bf1, Bf2]` relative to the scales, the
 /// logarithms of `w1, w2` times the velocity scale, then `eta` as it is.
-pub type Parameters = Vec<f64>;
+pub type FilterParameters = Vec<f64>;
 
 /// Levels of the two noises.
 #[derive(Debug, Clone, Copy, PartialEq)]

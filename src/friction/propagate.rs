@@ -41,7 +41,7 @@ impl Transition {
 
 /// Friction in SI units, unpacked once per parameter vector.
 #[derive(Debug, Clone, Copy)]
-pub struct Law {
+pub struct ScaledLaw {
     viscous: f64,
     coulomb: [f64; 2],
     slope: [f64; 2],
@@ -65,10 +65,10 @@ fn tanh(x: f64) -> f64 {
     1.0 - 2.0 / (1.0 + (2.0 * x).exp())
 }
 
-impl Law {
+impl ScaledLaw {
     pub fn new(problem: &FrictionProblem, p: &[f64]) -> Self {
         let (fs, vs) = (problem.torque_scale, problem.velocity_scale);
-        Law {
+        ScaledLaw {
             viscous: p[0] * fs / vs,
             coulomb: [p[1] * fs, p[2] * fs],
             slope: [p[3].exp() / vs, p[4].exp() / vs],
@@ -137,19 +137,19 @@ impl Law {
 
 /// What acts during one interval: torque, and the rows of the nuisance coefficients.
 #[derive(Debug, Clone, Copy)]
-pub struct Interval<'a> {
+pub struct SampleInterval<'a> {
     pub dt: f64,
     pub tau: f64,
     pub m: &'a [f64],
     pub h: &'a [f64],
 }
 
-impl<'a> Interval<'a> {
+impl<'a> SampleInterval<'a> {
     /// Interval k of a record with so many nuisance parameters.
     #[inline(always)]
     pub fn of(record: &'a Record, k: usize, nuisance: usize) -> Self {
         let row = k * nuisance..(k + 1) * nuisance;
-        Interval {
+        SampleInterval {
             dt: record.t[k + 1] - record.t[k],
             tau: record.tau[k],
             m: &record.m[row.clone()],
@@ -160,7 +160,7 @@ impl<'a> Interval<'a> {
 
 /// Inverse inertia and net known torque of one interval under the nuisance `eta`.
 #[inline(always)]
-fn known(interval: &Interval, eta: &[f64], least_inertia: f64) -> (f64, f64) {
+fn known(interval: &SampleInterval, eta: &[f64], least_inertia: f64) -> (f64, f64) {
     let mut inertia = 0.0;
     let mut load = 0.0;
     for ((m, h), e) in interval.m.iter().zip(interval.h).zip(eta) {
@@ -173,9 +173,9 @@ fn known(interval: &Interval, eta: &[f64], least_inertia: f64) -> (f64, f64) {
 /// Integrates the state alone over one interval; returns (q, v) at its end.
 #[inline]
 pub fn state(
-    law: &Law,
+    law: &ScaledLaw,
     eta: &[f64],
-    interval: &Interval,
+    interval: &SampleInterval,
     least: f64,
     q: f64,
     v: f64,
@@ -200,9 +200,9 @@ pub fn state(
 /// `out`. `p` are the parameters that `law` was made from.
 #[inline]
 pub fn with_sensitivities(
-    law: &Law,
+    law: &ScaledLaw,
     p: &[f64],
-    interval: &Interval,
+    interval: &SampleInterval,
     least: f64,
     q: f64,
     v: f64,
@@ -270,7 +270,7 @@ pub fn with_sensitivities(
     (q, v)
 }
 
-impl Law {
+impl ScaledLaw {
     /// dF/d(filter coordinate) for the five friction parameters.
     #[inline(always)]
     fn gradient(&self, x: &FrictionAt) -> [f64; FRICTION] {
@@ -302,8 +302,8 @@ mod tests {
     /// Bv, Bf1, Bf2, ln w1, ln w2 in the filter's coordinates, then an inertia and a constant.
     const P: [f64; 7] = [0.2, 0.8, -0.3, 3.2, 0.9, 0.7, 1.1];
 
-    fn interval<'a>(m: &'a [f64; 2], h: &'a [f64; 2]) -> Interval<'a> {
-        Interval {
+    fn interval<'a>(m: &'a [f64; 2], h: &'a [f64; 2]) -> SampleInterval<'a> {
+        SampleInterval {
             dt: 2e-3,
             tau: 3.0,
             m,
@@ -317,14 +317,14 @@ mod tests {
         let (m, h) = ([1.0, 0.0], [0.4, 1.0]);
         let interval = interval(&m, &h);
         let end = |p: &[f64], v: f64, tau: f64| {
-            let law = Law::new(&problem, p);
-            let interval = Interval { tau, ..interval };
+            let law = ScaledLaw::new(&problem, p);
+            let interval = SampleInterval { tau, ..interval };
             state(&law, &p[FRICTION..], &interval, 1e-6, 0.1, v)
         };
         // across standstill Simpson's rule meets the bend of the tanh with three points a step
         for (v, tolerance) in [(-1e-3, 1e-2), (0.02, 6e-3), (0.9, 1e-4)] {
             let mut t = Transition::new(7);
-            let law = Law::new(&problem, &P);
+            let law = ScaledLaw::new(&problem, &P);
             let x = with_sensitivities(&law, &P, &interval, 1e-6, 0.1, v, &mut t);
             assert_eq!(x, end(&P, v, 3.0));
             let near = |name: &str, found: f64, plus: f64, minus: f64, step: f64, size: f64| {
@@ -357,9 +357,9 @@ mod tests {
         let problem = problem();
         let mut p = P;
         p[3] = 6.0;
-        let law = Law::new(&problem, &p);
+        let law = ScaledLaw::new(&problem, &p);
         let (m, h) = ([1.0, 0.0], [0.0, 0.0]);
-        let whole = Interval {
+        let whole = SampleInterval {
             dt: 4e-3,
             tau: 0.3,
             m: &m,
@@ -368,7 +368,7 @@ mod tests {
         let one = state(&law, &p[FRICTION..], &whole, 1e-6, 0.0, 0.05);
         let mut many = (0.0, 0.05);
         for _ in 0..4000 {
-            let part = Interval { dt: 1e-6, ..whole };
+            let part = SampleInterval { dt: 1e-6, ..whole };
             many = state(&law, &p[FRICTION..], &part, 1e-6, many.0, many.1);
         }
         assert!((one.1 - many.1).abs() < 1e-5, "{one:?} {many:?}");

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
-use super::propagate::{Interval, Law, Transition, state, with_sensitivities};
+use super::propagate::{SampleInterval, ScaledLaw, Transition, state, with_sensitivities};
 
 /// Result of a pass at fixed parameters.
 #[derive(Debug, Clone)]
@@ -178,7 +178,7 @@ pub fn score(
     block: usize,
 ) -> LikelihoodScore {
     let np = problem.parameters();
-    let law = Law::new(problem, parameters);
+    let law = ScaledLaw::new(problem, parameters);
     let mut t = Transition::new(np);
     let mut out = LikelihoodScore::none(np);
     let mut windows = InnovationWindows::default();
@@ -197,7 +197,7 @@ pub fn score(
         w.v.fill(0.0);
         windows.cut();
         for k in 0..record.tau.len() {
-            let interval = Interval::of(record, k, problem.nuisance);
+            let interval = SampleInterval::of(record, k, problem.nuisance);
             let next = with_sensitivities(
                 &law,
                 parameters,
@@ -259,7 +259,7 @@ pub(super) fn log_likelihood(
     parameters: &[f64],
     noise: NoiseLevels,
 ) -> f64 {
-    let law = Law::new(problem, parameters);
+    let law = ScaledLaw::new(problem, parameters);
     let eta = &parameters[FRICTION..];
     let s2 = noise.torque * noise.torque;
     let mut sum = 0.0;
@@ -267,7 +267,7 @@ pub(super) fn log_likelihood(
         let (mut q, mut v) = (record.y[0], record.v0);
         let mut p = first_covariance(problem, record, noise);
         for k in 0..record.tau.len() {
-            let interval = Interval::of(record, k, problem.nuisance);
+            let interval = SampleInterval::of(record, k, problem.nuisance);
             let (start_v, dt) = (v, interval.dt);
             let minv = inverse_inertia(&interval, eta, problem.least_inertia);
             (q, v) = state(&law, eta, &interval, problem.least_inertia, q, v);
@@ -290,7 +290,7 @@ pub(super) fn log_likelihood(
     sum
 }
 
-fn inverse_inertia(interval: &Interval, eta: &[f64], least: f64) -> f64 {
+fn inverse_inertia(interval: &SampleInterval, eta: &[f64], least: f64) -> f64 {
     let inertia: f64 = interval.m.iter().zip(eta).map(|(m, e)| m * e).sum();
     1.0 / inertia.max(least)
 }

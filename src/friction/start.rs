@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::prepare::Prepared;
-use super::problem::{FRICTION, Parameters};
+use super::problem::{FRICTION, FilterParameters};
 
 /// Slopes of the ladder, geometric over the range.
 const LADDER: usize = 14;
@@ -20,8 +20,8 @@ const ROUNDS: usize = 10;
 
 /// A start of the filter.
 #[derive(Debug, Clone)]
-pub struct FrictionStart {
-    pub parameters: Parameters,
+pub struct FilterStart {
+    pub parameters: FilterParameters,
     /// Squared residual of the linear fit; infinite where there was none.
     pub residual: f64,
 }
@@ -129,7 +129,7 @@ impl WindowAverages {
 }
 
 /// The best `most` pairs of slopes with their linear fits, pairs apart from one another.
-pub fn from_log(prepared: &Prepared, most: usize) -> Vec<FrictionStart> {
+pub fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
     let problem = &prepared.problem;
     let windows = WindowAverages::new(prepared);
     let (lo, hi) = problem.slope_range;
@@ -157,11 +157,7 @@ pub fn from_log(prepared: &Prepared, most: usize) -> Vec<FrictionStart> {
 }
 
 /// Pattern search over the logarithms of the slopes.
-fn polish(
-    prepared: &Prepared,
-    windows: &WindowAverages,
-    slopes: [f64; 2],
-) -> Option<FrictionStart> {
+fn polish(prepared: &Prepared, windows: &WindowAverages, slopes: [f64; 2]) -> Option<FilterStart> {
     let problem = &prepared.problem;
     let (lo, hi) = problem.slope_range;
     let mut at = slopes;
@@ -194,7 +190,7 @@ fn polish(
     p[3] = (at[0] * problem.velocity_scale).ln();
     p[4] = (at[1] * problem.velocity_scale).ln();
     p[FRICTION..].copy_from_slice(&x.as_slice()[..e]);
-    Some(FrictionStart {
+    Some(FilterStart {
         parameters: p,
         residual: best.1,
     })

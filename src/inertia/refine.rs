@@ -13,7 +13,7 @@ use super::accumulate::BlockFactors;
 use super::columns::{GRADIENT, Own, RegressorColumns};
 use super::solution::{FitError, FitInputs, PriorRows};
 use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
-use crate::math::descent::{Ending, StepControl, Tried, descend};
+use crate::math::descent::{Ending, StepControl, Trial, descend};
 use crate::math::rank;
 use crate::robot::friction::DoubleTanh;
 
@@ -180,7 +180,7 @@ fn cost(
 }
 
 /// A point of the descent: the friction, the rows about it, and the least cost there.
-struct Point {
+struct DescentPoint {
     columns: RegressorColumns,
     /// The laws' changes are among the unknowns.
     factors: BlockFactors,
@@ -189,7 +189,7 @@ struct Point {
     cost: f64,
 }
 
-impl Point {
+impl DescentPoint {
     fn of(
         columns: RegressorColumns,
         factors: BlockFactors,
@@ -197,7 +197,7 @@ impl Point {
         linear: &Fit,
     ) -> Result<Self, FitError> {
         let weights = weights_of(&factors, &linear.residual_std);
-        Ok(Point {
+        Ok(DescentPoint {
             cost: cost(&factors, &weights, known.as_ref())?,
             columns,
             factors,
@@ -277,11 +277,11 @@ pub fn refine<E: From<FitError>>(
     let strength = (first.rows as f64 / first.effective_rows).max(1.0);
     let speed = speeds(&factors);
     let known = prior(&start, &columns, strength)?;
-    let begun = Point::of(columns, factors, known, &first)?;
+    let begun = DescentPoint::of(columns, factors, known, &first)?;
     let mut iterations = 1;
     let (at, ending, _) = descend(begun, &DAMPING, MOST - 1, &mut |at, damping| {
         let Some(step) = at.step(damping)? else {
-            return Ok::<_, E>(Tried::Settled);
+            return Ok::<_, E>(Trial::Settled);
         };
         let columns = sorted(moved(&at.columns, &step, &speed));
         let factors = pass(&columns)?.with_free_friction();
@@ -289,13 +289,13 @@ pub fn refine<E: From<FitError>>(
         let known = prior(&start, &columns, strength)?;
         let gained = at.cost - cost(&factors, &at.weights, known.as_ref())?;
         if gained.is_nan() || gained <= 0.0 {
-            return Ok(Tried::Rejected);
+            return Ok(Trial::Rejected);
         }
         let linear = linear_fit(&factors)?;
-        let next = Point::of(columns, factors, known, &linear)?;
+        let next = DescentPoint::of(columns, factors, known, &linear)?;
         Ok(match gained <= SETTLED * at.cost {
-            true => Tried::Last(next),
-            false => Tried::Accepted(next),
+            true => Trial::Last(next),
+            false => Trial::Accepted(next),
         })
     })?;
     Ok(RefinedFit {

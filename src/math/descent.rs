@@ -65,7 +65,7 @@ impl StepControl {
 }
 
 /// What became of a step that was tried.
-pub enum Tried<S> {
+pub enum Trial<S> {
     /// On from here.
     Accepted(S),
     /// The same, and further steps would bring nothing.
@@ -87,22 +87,22 @@ pub fn descend<S, E>(
     start: S,
     control: &StepControl,
     most: usize,
-    step: &mut dyn FnMut(&S, f64) -> Result<Tried<S>, E>,
+    step: &mut dyn FnMut(&S, f64) -> Result<Trial<S>, E>,
 ) -> Result<(S, Ending, usize), E> {
     let (mut at, mut number) = (start, control.start);
     for tried in 1..=most {
         match step(&at, number)? {
-            Tried::Accepted(next) => {
+            Trial::Accepted(next) => {
                 at = next;
                 number = (number * control.accepted).clamp(control.range[0], control.range[1]);
             }
-            Tried::Rejected => match control.after_rejection(number) {
+            Trial::Rejected => match control.after_rejection(number) {
                 Some(shorter) => number = shorter,
                 None => return Ok((at, Ending::Converged, tried)),
             },
-            Tried::Last(next) => return Ok((next, Ending::Converged, tried)),
-            Tried::Settled => return Ok((at, Ending::Converged, tried)),
-            Tried::NoStep => return Ok((at, Ending::Diverged, tried)),
+            Trial::Last(next) => return Ok((next, Ending::Converged, tried)),
+            Trial::Settled => return Ok((at, Ending::Converged, tried)),
+            Trial::NoStep => return Ok((at, Ending::Diverged, tried)),
         }
     }
     Ok((at, Ending::IterationLimit, most))
@@ -127,9 +127,9 @@ mod tests {
             };
             let next = x + step;
             Ok::<_, Infallible>(match cost(*x) - cost(next) {
-                gain if gain > 1e-12 => Tried::Accepted(next),
-                gain if gain >= 0.0 => Tried::Last(next),
-                _ => Tried::Rejected,
+                gain if gain > 1e-12 => Trial::Accepted(next),
+                gain if gain >= 0.0 => Trial::Last(next),
+                _ => Trial::Rejected,
             })
         });
         let Ok(found) = found;
@@ -152,7 +152,7 @@ mod tests {
             let mut numbers = Vec::new();
             let Ok((_, ending, tried)) = descend((), control, 99, &mut |(), number| {
                 numbers.push(number);
-                Ok::<_, Infallible>(Tried::Rejected)
+                Ok::<_, Infallible>(Trial::Rejected)
             });
             assert_eq!((ending, tried), (Ending::Converged, numbers.len()));
             numbers

@@ -161,11 +161,11 @@ mod tests {
     #[derive(Deserialize)]
     struct Oracle {
         rate_hz: f64,
-        cases: Vec<Case>,
+        cases: Vec<OracleCase>,
     }
 
     #[derive(Deserialize)]
-    struct Case {
+    struct OracleCase {
         kind: String,
         order: usize,
         ripple_db: Option<f64>,
@@ -178,7 +178,7 @@ mod tests {
         output: Vec<f64>,
     }
 
-    impl Case {
+    impl OracleCase {
         fn filter(&self, rate_hz: f64) -> ZeroPhase {
             let sos = match self.ripple_db {
                 Some(ripple) => Sos::chebyshev(self.order, ripple, self.cutoff_hz, rate_hz),

@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::columns::CandidateColumns;
 use crate::diagnose::problem::data_split::{Piece, RowRole};
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::normal_equations::{NormalEquations, dot};
 use crate::math::long_run::long_run;
@@ -74,7 +74,7 @@ pub struct CandidateScore {
 
 /// The fitted model, prepared for many candidates.
 pub struct CandidateTest<'a> {
-    at: &'a Fitted,
+    at: &'a FittedModel,
     problem: &'a FitProblem<'a>,
     inverse: RankRevealingInverse,
     folds: Vec<Fold>,
@@ -95,7 +95,7 @@ struct Fold {
 
 impl<'a> CandidateTest<'a> {
     /// Prepares the folds.
-    pub fn new(at: &'a Fitted, problem: &'a FitProblem<'a>) -> Self {
+    pub fn new(at: &'a FittedModel, problem: &'a FitProblem<'a>) -> Self {
         let sum =
             |wanted: &dyn Fn(RowRole) -> bool| at.base.total(&problem.split, &at.weights, wanted);
         let all = sum(&RowRole::fitted);

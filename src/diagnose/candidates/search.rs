@@ -8,7 +8,7 @@ use super::columns::{CandidateColumns, columns, kept_by_filter};
 use super::orders::SCANNED;
 use super::score::CandidateTest;
 use crate::diagnose::problem::case::Case;
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::effect::{Added, LAWS, Law, Place, Role, Search, Torques, order_is_whole};
 use crate::math::minimise::nelder_mead;
@@ -26,14 +26,14 @@ const LEAST_KEPT: f64 = 0.2;
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn search(
-    at: &Fitted,
+    at: &FittedModel,
     problem: &FitProblem,
     case: &Case,
     baseline: &Baseline,
     torques: &[Torques],
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Vec<Candidate>, usize), MotionError> {
-    let round = Round {
+    let round = SearchRound {
         at,
         problem,
         test: CandidateTest::new(at, problem),
@@ -63,8 +63,8 @@ pub fn search(
 }
 
 /// What every candidate of a round is tried against.
-struct Round<'a> {
-    at: &'a Fitted,
+struct SearchRound<'a> {
+    at: &'a FittedModel,
     problem: &'a FitProblem<'a>,
     test: CandidateTest<'a>,
     torques: &'a [Torques],
@@ -72,7 +72,7 @@ struct Round<'a> {
     keep: bool,
 }
 
-impl Round<'_> {
+impl SearchRound<'_> {
     /// One effect at one place: the best of its shapes, refined where it removes more than `least`; and how many
     /// shapes were tried.
     fn tried(

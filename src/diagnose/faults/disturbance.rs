@@ -3,14 +3,14 @@
 //! out, and said so: no law is fitted to it.
 
 use crate::diagnose::problem::data_split::{DataSplit, RowRole};
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::rests::near_rests;
 use crate::motion::{Parallel, Stretch};
 
 /// An episode that was cut out.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Disturbance {
+pub struct CutDisturbance {
     pub log: usize,
     /// The joint on which it stands out most.
     pub joint: usize,
@@ -34,7 +34,7 @@ const RUNS: usize = 3;
 
 /// Pieces that stand out, with joint and by how much: index in the split. What friction at rest does alone, of
 /// which a law that jumps says too much, is no episode.
-pub fn find(at: &Fitted, problem: &FitProblem, cutoff_hz: f64) -> Vec<(usize, usize, f64)> {
+pub fn find(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64) -> Vec<(usize, usize, f64)> {
     let (base, split) = (&at.base, &problem.split);
     let joints = base.unknowns.columns.len();
     let mut found: Vec<(usize, usize, f64)> = Vec::new();
@@ -95,8 +95,8 @@ pub fn cut(
     split: &mut DataSplit,
     stretches: &[Stretch],
     parallel: &Parallel,
-) -> Vec<Disturbance> {
-    let mut episodes: Vec<Disturbance> = Vec::new();
+) -> Vec<CutDisturbance> {
+    let mut episodes: Vec<CutDisturbance> = Vec::new();
     let mut last = None;
     for &(i, joint, over) in found {
         let piece = split.pieces[i].clone();
@@ -108,7 +108,7 @@ pub fn cut(
                 e.to_s = to_s;
                 e.over = e.over.max(over);
             }
-            _ => episodes.push(Disturbance {
+            _ => episodes.push(CutDisturbance {
                 log: stretch.log,
                 joint,
                 from_s,

@@ -8,12 +8,12 @@ use super::fit_problem::FitProblem;
 use super::normal_equations::{Base, PieceSums};
 use super::unknowns::{Unknown, Unknowns, step};
 use crate::effect::AugmentedModel;
-use crate::math::descent::{StepControl, Tried, descend};
+use crate::math::descent::{StepControl, Trial, descend};
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::MotionError;
 
 /// A fitted model with the linear system at its solution.
-pub struct Fitted {
+pub struct FittedModel {
     pub model: AugmentedModel,
     pub base: Base,
     /// 1 / residual rms of each joint.
@@ -41,7 +41,7 @@ const SETTLED: f64 = 1e-9;
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn fit(start: &AugmentedModel, problem: &FitProblem) -> Result<Fitted, MotionError> {
+pub fn fit(start: &AugmentedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
     gauss_newton(evaluate(start.clone(), problem, None)?, problem, None)
 }
 
@@ -49,7 +49,7 @@ pub fn fit(start: &AugmentedModel, problem: &FitProblem) -> Result<Fitted, Motio
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn refit(at: &Fitted, problem: &FitProblem) -> Result<Fitted, MotionError> {
+pub fn refit(at: &FittedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
     let begun = at.with(at.model.clone(), problem)?;
     let known = RankRevealingInverse::of(&at.normal);
     gauss_newton(begun, problem, Some(&known))
@@ -57,10 +57,10 @@ pub fn refit(at: &Fitted, problem: &FitProblem) -> Result<Fitted, MotionError> {
 
 /// Gauss-Newton steps to the least square; `known` says what stays where it is, and that the weights do.
 fn gauss_newton(
-    begun: Fitted,
+    begun: FittedModel,
     problem: &FitProblem,
     known: Option<&RankRevealingInverse>,
-) -> Result<Fitted, MotionError> {
+) -> Result<FittedModel, MotionError> {
     let control = StepControl::halving(LENGTHS);
     let most = STEPS * LENGTHS as usize;
     let ((at, _), ..) = descend((begun, 0), &control, most, &mut |(at, k), length| {
@@ -77,10 +77,10 @@ fn gauss_newton(
         let lower = tried.objective(problem) <= highest;
         let last = gain <= SETTLED * at.square.max(f64::MIN_POSITIVE) || k + 1 == STEPS;
         Ok::<_, MotionError>(match (lower, *k < EARLY) {
-            (false, _) => Tried::Rejected,
-            (true, true) if known.is_none() => Tried::Accepted((tried.reweighted(problem), k + 1)),
-            (true, false) if last => Tried::Last((tried, k + 1)),
-            (true, _) => Tried::Accepted((tried, k + 1)),
+            (false, _) => Trial::Rejected,
+            (true, true) if known.is_none() => Trial::Accepted((tried.reweighted(problem), k + 1)),
+            (true, false) if last => Trial::Last((tried, k + 1)),
+            (true, _) => Trial::Accepted((tried, k + 1)),
         })
     })?;
     Ok(at)
@@ -91,7 +91,7 @@ fn evaluate(
     model: AugmentedModel,
     problem: &FitProblem,
     weights: Option<&[f64]>,
-) -> Result<Fitted, MotionError> {
+) -> Result<FittedModel, MotionError> {
     let unknowns = Unknowns::of(&model, problem.open, &problem.cover);
     let base = Base::of(
         &model,
@@ -104,7 +104,7 @@ fn evaluate(
         Some(w) => w.to_vec(),
         None => weights_of(&base, problem),
     };
-    Ok(Fitted::of(model, base, weights, problem))
+    Ok(FittedModel::of(model, base, weights, problem))
 }
 
 fn weights_of(base: &Base, problem: &FitProblem) -> Vec<f64> {
@@ -112,11 +112,11 @@ fn weights_of(base: &Base, problem: &FitProblem) -> Vec<f64> {
     rms.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect()
 }
 
-impl Fitted {
+impl FittedModel {
     fn of(model: AugmentedModel, base: Base, weights: Vec<f64>, problem: &FitProblem) -> Self {
         let total = base.total(&problem.split, &weights, &RowRole::fitted);
         let (information, pull) = problem.prior.over(&base.unknowns, &model);
-        Fitted {
+        FittedModel {
             normal: total.normal + &information,
             pull: pull + total.score,
             information,
@@ -131,13 +131,17 @@ impl Fitted {
     ///
     /// # Errors
     /// [`MotionError`] of the filter.
-    pub fn with(&self, model: AugmentedModel, problem: &FitProblem) -> Result<Fitted, MotionError> {
+    pub fn with(
+        &self,
+        model: AugmentedModel,
+        problem: &FitProblem,
+    ) -> Result<FittedModel, MotionError> {
         evaluate(model, problem, Some(&self.weights))
     }
 
     fn reweighted(self, problem: &FitProblem) -> Self {
         let weights = weights_of(&self.base, problem);
-        Fitted::of(self.model, self.base, weights, problem)
+        FittedModel::of(self.model, self.base, weights, problem)
     }
 
     /// Weighted squares and the prior's share.

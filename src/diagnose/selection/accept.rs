@@ -5,7 +5,7 @@ use crate::diagnose::candidates::candidate::Candidate;
 use crate::diagnose::candidates::score::spread;
 use crate::diagnose::problem::case::SelectionLimits;
 use crate::diagnose::problem::data_split::DataSplit;
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 
 /// Standard errors by which the error on the veto pieces may grow by chance.
 const VETO_CHANCE: f64 = 1.0;
@@ -35,7 +35,7 @@ pub fn accept(
     found: &mut [Candidate],
     shapes: usize,
     limits: &SelectionLimits,
-    (at, split): (&Fitted, &DataSplit),
+    (at, split): (&FittedModel, &DataSplit),
     baseline: &Baseline,
 ) {
     for candidate in found {
@@ -167,8 +167,8 @@ mod tests {
         assert!(!found.accepted && found.significant);
         assert!(found.reason.starts_with("too small"), "{}", found.reason);
         // what fails another test too is no remainder, whichever reason is told
-        type Change = fn(&mut CandidateScore);
-        let failures: [(Change, &str); 6] = [
+        type ScoreChange = fn(&mut CandidateScore);
+        let failures: [(ScoreChange, &str); 6] = [
             (|s| s.unique_share = 1e-4, "only 0.01 %"),
             (|s| s.p_value = 1e-3, "chance"),
             (|s| s.delta_bic = -1.0, "not worth"),

@@ -3,7 +3,7 @@
 use crate::diagnose::candidates::columns::columns;
 use crate::diagnose::candidates::score::CandidateTest;
 use crate::diagnose::problem::case::SelectionLimits;
-use crate::diagnose::problem::fit::{Fitted, fit};
+use crate::diagnose::problem::fit::{FittedModel, fit};
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::motion::MotionError;
 
@@ -12,7 +12,7 @@ use crate::motion::MotionError;
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn superfluous(
-    at: &Fitted,
+    at: &FittedModel,
     problem: &FitProblem,
     limits: &SelectionLimits,
 ) -> Result<Option<usize>, MotionError> {

@@ -4,7 +4,7 @@
 
 use nalgebra::DVector;
 
-use crate::diagnose::problem::fit::{Fitted, refit};
+use crate::diagnose::problem::fit::{FittedModel, refit};
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::prior::value;
 use crate::diagnose::problem::rests::near_rests;
@@ -16,7 +16,7 @@ use crate::motion::{MotionError, Stretch};
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn from_smoothing(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+pub fn from_smoothing(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
     let none = DVector::zeros(at.base.unknowns.len());
     let mut again = Vec::with_capacity(problem.stretches.len());
     for (i, stretch) in problem.stretches.iter().enumerate() {
@@ -38,7 +38,7 @@ pub fn from_smoothing(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>,
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn from_noise(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+pub fn from_noise(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
     let mut sum = DVector::zeros(at.base.unknowns.len());
     for sign in [1.0, -1.0] {
         let noisier = |(i, stretch): (usize, &Stretch)| match problem.split.idle(i) {
@@ -56,7 +56,7 @@ pub fn from_noise(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, Mot
 /// friction at rest takes any torque up to its limit, and where the speed is nearly none the law says too much.
 /// As the unknowns rest where all rows together pull them nowhere, it is what those rows pull against the others;
 /// where there are next to no others, nothing tells.
-pub fn from_rests(at: &Fitted, problem: &FitProblem, cutoff_hz: f64) -> DVector<f64> {
+pub fn from_rests(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64) -> DVector<f64> {
     let unknowns = &at.base.unknowns;
     let mut pull = DVector::zeros(unknowns.len());
     for (i, (stretch, rows)) in problem.stretches.iter().zip(&at.base.stretches).enumerate() {
@@ -77,7 +77,7 @@ pub fn from_rests(at: &Fitted, problem: &FitProblem, cutoff_hz: f64) -> DVector<
 }
 
 /// How far a fit of another problem moves the unknowns.
-fn refitted(at: &Fitted, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+fn refitted(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
     let other = refit(at, problem)?.model;
     let list = at.base.unknowns.list.iter();
     let moved = list.map(|u| value(&other, *u) - value(&at.model, *u));
@@ -145,7 +145,7 @@ mod tests {
     /// What `told` says of a fit of the mass along a stretch, and the fit's own value.
     fn of_mass(
         stretch: Stretch,
-        told: impl Fn(&Fitted, &FitProblem) -> DVector<f64>,
+        told: impl Fn(&FittedModel, &FitProblem) -> DVector<f64>,
     ) -> (f64, DVector<f64>) {
         let robot = Robot::single_joint("slide", JointKind::Prismatic);
         let law = ViscousCoulomb {
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn rests_pull_where_friction_there_is_not_what_the_law_says() {
-        let pulled = |at: &Fitted, problem: &FitProblem| from_rests(at, problem, 30.0);
+        let pulled = |at: &FittedModel, problem: &FitProblem| from_rests(at, problem, 30.0);
         let (_, honest) = of_mass(slide(0.0), pulled);
         // friction sticks for some time after every reversal
         let mut sticking = slide(0.0);

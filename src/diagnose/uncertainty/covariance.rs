@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{bias, profile};
 use crate::diagnose::candidates::score::LAG;
 use crate::diagnose::problem::data_split::{Piece, RowRole};
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::normal_equations::{NormalEquations, PieceSums};
 use crate::math::long_run::long_run;
@@ -19,7 +19,7 @@ use crate::motion::MotionError;
 /// # Errors
 /// [`MotionError`] of the filters.
 pub fn covariance(
-    at: &Fitted,
+    at: &FittedModel,
     problem: &FitProblem,
     cutoff_hz: f64,
 ) -> Result<DMatrix<f64>, MotionError> {
@@ -37,7 +37,7 @@ pub fn covariance(
 
 /// What correlated residuals leave open: the sandwich over pieces (Newey and West 1987), at least that of
 /// independent rows.
-fn of_residual(at: &Fitted, problem: &FitProblem) -> DMatrix<f64> {
+fn of_residual(at: &FittedModel, problem: &FitProblem) -> DMatrix<f64> {
     let base = &at.base;
     let u = base.unknowns.len();
     let inverse = RankRevealingInverse::of(&at.normal);

@@ -9,7 +9,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::diagnose::problem::fit::Fitted;
+use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::unknowns::Unknown;
 use crate::math::rank_revealing::RankRevealingInverse;
@@ -29,7 +29,7 @@ const FIRST: f64 = 1e-4;
 /// # Errors
 /// [`MotionError`] of the filter.
 pub fn widen(
-    at: &Fitted,
+    at: &FittedModel,
     problem: &FitProblem,
     covariance: &mut DMatrix<f64>,
 ) -> Result<(), MotionError> {

@@ -11,7 +11,7 @@ mod log_cholesky;
 use nalgebra::{DMatrix, DVector};
 
 use super::solution::FitError;
-use crate::math::descent::{Ending, StepControl, Tried, descend};
+use crate::math::descent::{Ending, StepControl, Trial, descend};
 use crate::math::rfactor::RFactor;
 use crate::robot::bodies::StandardMap;
 use crate::robot::standard::{Body, STANDARD, pseudo_inertia};
@@ -105,9 +105,9 @@ pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
                 let step = damped_step(jacobian, residual, d);
                 let next = at(x + step.map(|s| s.clamp(-FARTHEST, FARTHEST)));
                 Ok::<_, FitError>(match next.1 {
-                    cost if cost < *lowest && lowest - cost <= SETTLED * cost => Tried::Last(next),
-                    cost if cost < *lowest => Tried::Accepted(next),
-                    _ => Tried::Rejected,
+                    cost if cost < *lowest && lowest - cost <= SETTLED * cost => Trial::Last(next),
+                    cost if cost < *lowest => Trial::Accepted(next),
+                    _ => Trial::Rejected,
                 })
             },
         )?;
