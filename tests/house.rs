@@ -24,7 +24,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("diagnose", &["math", "robot", "log", "motion", "effect"]),
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
     ("inspect", &["math", "log"]),
-    ("simulate", &["math", "robot", "log", "config"]),
+    ("simulate", &["math", "robot", "log", "config", "effect"]),
     (
         "excite",
         &[
@@ -148,10 +148,71 @@ fn the_plan_itself_has_no_way_back() {
 #[test]
 fn estimators_know_nothing_of_the_simulator() {
     for room in [
-        "motion", "friction", "inertia", "validate", "inspect", "log", "report",
+        "motion", "effect", "friction", "inertia", "diagnose", "validate", "inspect", "log",
+        "report",
     ] {
         let (_, may) = ROOMS.iter().find(|(name, _)| *name == room).unwrap();
         assert!(!may.contains(&"simulate"), "{room}");
+    }
+}
+
+#[test]
+fn simulator_and_estimator_share_entries_of_effects_and_no_law() {
+    let shared = ["Entry", "Key", "Place", "Places", "Range", "Role", "Unit"];
+    for source in sources() {
+        if source.room() != Some("simulate") {
+            continue;
+        }
+        for path in code(&source.text).split("crate::effect::").skip(1) {
+            let path = path.split(';').next().unwrap();
+            let names = path.split(|c: char| "{},".contains(c)).map(str::trim);
+            for name in names.filter(|name| !name.is_empty()) {
+                let entry = name.ends_with("::ENTRY") || shared.contains(&name);
+                assert!(entry, "{}: {name}", source.file);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_code_asks_for_an_effect_by_its_name() {
+    let sources = sources();
+    let effect = |source: &&Source| source.text.contains("static ENTRY");
+    let files = sources.iter().filter(effect);
+    let names = files.filter_map(|source| source.module.last().map(|name| name.replace('_', "-")));
+    // of one word they name other things too
+    let quoted = names.filter(|name| name.contains('-'));
+    let quoted: Vec<String> = quoted.map(|name| format!("\"{name}\"")).collect();
+    assert!(quoted.len() > 10);
+    for source in &sources {
+        let text = source.text.split("#[cfg(test)]").next().unwrap();
+        let found = quoted.iter().find(|name| text.contains(*name));
+        // the faults of a log, some of which the simulator makes
+        let own = source.room() == Some("effect") || source.file == "inspect/fault.rs";
+        assert!(own || found.is_none(), "{}: {found:?}", source.file);
+    }
+}
+
+#[test]
+fn files_that_a_list_declares_are_formatted_too() {
+    // rustfmt follows `mod`, and not what a macro makes of a list
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let listed = |source: &Source| {
+        let [folder @ .., _] = source.module.as_slice() else {
+            return false;
+        };
+        let folder = folder.join("/");
+        ["effect", "simulate/effects"].contains(&folder.as_str())
+            && !source.file.ends_with("/mod.rs")
+    };
+    let files = sources().into_iter().filter(listed);
+    let files = files.map(|source| root.join(source.file));
+    let mut rustfmt = std::process::Command::new("rustfmt");
+    rustfmt.args(["--edition", "2024", "--check"]).args(files);
+    // where there is no rustfmt nothing is written either
+    if let Ok(done) = rustfmt.output() {
+        let said = String::from_utf8_lossy(&done.stdout);
+        assert!(done.status.success(), "{said}");
     }
 }
 

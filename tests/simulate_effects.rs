@@ -18,7 +18,7 @@ mod static_torques;
 use cft_ident::robot::cft::pantograph::reference_jacobian;
 use cft_ident::robot::cft::{Coefficients, Setup, dynamics};
 use cft_ident::simulate::cft::{effects, excitation, follow};
-use cft_ident::simulate::effects::{Effect, KINDS, Motion};
+use cft_ident::simulate::effects::{Effect, LAWS, Motion};
 use cft_ident::simulate::moving::Moving;
 use cft_ident::simulate::{
     CftTruth, Drive, EffectSpec, Effects, Sensors, Settings, SimulateError, Start, VoltSeries, run,
@@ -111,10 +111,11 @@ fn resolved_effects_name_every_value_with_its_unit() {
 
 #[test]
 fn names_of_effects_are_unique_and_their_keys_too() {
-    for (i, kind) in KINDS.iter().enumerate() {
-        assert!(KINDS[..i].iter().all(|other| other.name != kind.name));
-        for (j, key) in kind.keys.iter().enumerate() {
-            assert!(kind.keys[..j].iter().all(|other| other.name != key.name));
+    for (i, law) in LAWS.iter().enumerate() {
+        let (entry, before) = (law.entry, &LAWS[..i]);
+        assert!(before.iter().all(|other| other.entry.name != entry.name));
+        for (j, key) in entry.keys.iter().enumerate() {
+            assert!(entry.keys[..j].iter().all(|other| other.name != key.name));
         }
     }
 }

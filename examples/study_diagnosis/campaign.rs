@@ -22,7 +22,7 @@ use cft_ident::simulate::{CftTruth, EffectSpec, OneJointMove, Reference, Simulat
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
-use crate::catalogue::{Kind, Put, Setting};
+use crate::catalogue::{Planted, Put, Setting};
 use crate::drive;
 use crate::study::{JOINTS, along, block, estimated, noisy, processing, series, source};
 
@@ -142,7 +142,7 @@ fn put_in(setting: &Setting, put: &[Truth]) -> Vec<Value> {
     pairs
         .map(|(p, truth)| {
             json!({
-                "effect": p.kind.name, "family": p.kind.family, "place": p.place, "size": p.size,
+                "effect": p.kind.name, "family": p.kind.entry().family().name(), "place": p.place, "size": p.size,
                 "values": truth.spec.values,
             })
         })
@@ -179,7 +179,7 @@ fn on_arm(setting: &Setting, seed: u64) -> (Lab, Vec<Truth>, Campaign) {
         .map(|p| lab.truth_of(&truth, p, &clean[0], seed))
         .collect();
     let specs: Vec<EffectSpec> = put.iter().map(|t| t.spec.clone()).collect();
-    let keep = setting.put.iter().any(|p| p.kind.kept);
+    let keep = setting.put.iter().any(|p| p.kind.kept());
     let campaign = Campaign::made(&lab, &truth, &specs, seed, keep);
     (lab, put, campaign)
 }
@@ -195,12 +195,11 @@ fn on_drive(setting: &Setting, name: &str, seed: u64) -> (Lab, Vec<Truth>, Campa
     let quiet = drive::log(&truth, &[], 0.0, 10 * seed);
     let quiet = held(0, 1, &lab.processing, &quiet).swap_remove(0);
     let put = setting.put.iter().map(|p| {
-        let values = |scale: f64| match p.kind.size {
-            [] => drive::values(p.kind.name, &truth, scale),
-            _ => values_of(p.kind, scale),
+        let values = |scale: f64| match p.kind.on_drive {
+            Some(own) => (own.values)(&truth, scale),
+            None => values_of(p.kind, scale),
         };
-        // the bend of bristles has no size without the motion at rest: thousandths of the travel
-        if p.kind.name == "presliding" {
+        if p.kind.on_drive.is_some_and(|own| own.as_given) {
             let values = values(p.size);
             return Truth {
                 added: lab.added(p.kind, p.place, &values),
@@ -400,12 +399,11 @@ impl Lab {
         }
     }
 
-    fn added(&self, kind: &Kind, place: &str, values: &BTreeMap<String, f64>) -> Option<Added> {
+    fn added(&self, kind: &Planted, place: &str, values: &BTreeMap<String, f64>) -> Option<Added> {
         let mut values = values.clone();
-        if kind.name == "rigid-body-terms" {
-            for key in ["BB", "EE", "CC", "AC", "BE", "S", "OC", "OE", "OA", "OB"] {
-                values.entry(key.to_owned()).or_insert(0.0);
-            }
+        // where one size is given the others are zero
+        for key in kind.entry().keys.iter().filter(|key| key.size) {
+            values.entry(key.name.to_owned()).or_insert(0.0);
         }
         let place = (!place.is_empty()).then_some(place);
         effect::read(&self.robot, kind.name, place, &values).ok()
@@ -449,7 +447,7 @@ impl Lab {
 }
 
 /// Values of an effect's keys at a scale.
-fn values_of(kind: &Kind, scale: f64) -> BTreeMap<String, f64> {
+fn values_of(kind: &Planted, scale: f64) -> BTreeMap<String, f64> {
     let shape = kind.shape.iter().copied();
     let sized = kind.size.iter().map(|(key, x)| (*key, 1e-3 * scale * x));
     let all = shape.chain(sized);

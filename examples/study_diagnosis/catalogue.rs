@@ -1,159 +1,148 @@
 //! What the study puts into its plants: every effect that has a joint to sit on, at two places; on the
 //! CFT robot, or on single drives where its declared friction law leaves no place for the effect.
 
-use crate::drive::{SLIDE, WHEEL};
+use std::collections::BTreeMap;
+
+use cft_ident::effect::{self, Entry, Role};
+use cft_ident::simulate::SingleJointTruth;
+
+use crate::drive::{self, SLIDE, WHEEL};
 
 /// An effect at its places: its fixed keys, and the keys that carry its size.
-pub struct Kind {
+pub struct Planted {
     pub name: &'static str,
-    pub family: &'static str,
     /// Joints, screws or drives; empty for the robot as a whole.
     pub places: [&'static str; 2],
     pub shape: &'static [(&'static str, f64)],
     pub size: &'static [(&'static str, f64)],
-    /// Found with the model held only: it is identified on logs without the effect.
-    pub kept: bool,
+    /// On single drives, the keys at a scale.
+    pub on_drive: Option<OnDrive>,
 }
 
-const fn kind(
-    name: &'static str,
-    family: &'static str,
-    places: [&'static str; 2],
-    shape: &'static [(&'static str, f64)],
-    size: &'static [(&'static str, f64)],
-) -> Kind {
-    Kind {
-        name,
-        family,
-        places,
-        shape,
-        size,
-        kept: false,
+/// Keys of an effect on a single drive that do not grow in proportion to its size.
+#[derive(Clone, Copy)]
+pub struct OnDrive {
+    pub values: fn(&SingleJointTruth, f64) -> BTreeMap<String, f64>,
+    /// Whether the scale is its size; else that of its torque.
+    pub as_given: bool,
+}
+
+impl Planted {
+    /// What the program knows of it.
+    pub fn entry(&self) -> &'static Entry {
+        effect::entry(self.name).expect("an effect")
+    }
+
+    /// Found with the model fixed only: it is identified on logs without the effect.
+    pub fn kept(&self) -> bool {
+        self.entry().role == Role::Kept
     }
 }
 
-const fn kept(kind: Kind) -> Kind {
-    Kind { kept: true, ..kind }
+const fn planted(
+    name: &'static str,
+    places: [&'static str; 2],
+    shape: &'static [(&'static str, f64)],
+    size: &'static [(&'static str, f64)],
+) -> Planted {
+    Planted {
+        name,
+        places,
+        shape,
+        size,
+        on_drive: None,
+    }
+}
+
+const fn on_drives(
+    name: &'static str,
+    as_given: bool,
+    values: fn(&SingleJointTruth, f64) -> BTreeMap<String, f64>,
+) -> Planted {
+    Planted {
+        on_drive: Some(OnDrive { values, as_given }),
+        ..planted(name, [SLIDE, WHEEL], &[], &[])
+    }
 }
 
 /// All effects of the study. Sizes of one place are in proportion to the numbers here.
-pub const KINDS: &[Kind] = &[
-    kind("torque-offset", "offset", ["q1", "q2"], &[], &[("c", 1.0)]),
-    kind(
+pub const PLANTED: &[Planted] = &[
+    planted("torque-offset", ["q1", "q2"], &[], &[("c", 1.0)]),
+    planted(
         "asymmetric-friction",
-        "velocity",
         ["q1", "q2"],
         &[],
         &[("coulomb", 1.0), ("viscous", 1.0)],
     ),
-    kind("stribeck", "velocity", [SLIDE, WHEEL], &[], &[]),
-    kind(
+    on_drives("stribeck", false, drive::hump),
+    planted(
         "nonlinear-viscous",
-        "velocity",
         ["q1", "q2"],
         &[("p", 2.0)],
         &[("c", 1.0)],
     ),
-    kind(
+    planted(
         "actuator-friction",
-        "velocity",
         ["x_r", "y_r"],
         &[("slope", 200.0)],
         &[("viscous", 1.0), ("coulomb", 0.3)],
     ),
-    kind(
+    planted(
         "load-friction",
-        "load",
         ["q4", "q5"],
         &[("w", 100.0)],
         &[("mu_c", 1.0), ("mu_v", 0.0)],
     ),
-    kind("drive-efficiency", "load", ["q4", "q5"], &[], &[("k", 1.0)]),
-    kept(kind("gain", "load", ["q1", "q4"], &[], &[("k", 1.0)])),
-    kind(
+    planted("drive-efficiency", ["q4", "q5"], &[], &[("k", 1.0)]),
+    planted("gain", ["q1", "q4"], &[], &[("k", 1.0)]),
+    planted(
         "position-friction",
-        "position",
         ["q1", "q2"],
         &[("order", 10.0)],
         &[("sin", 1.0), ("cos", 0.5)],
     ),
-    kind(
+    planted(
         "ripple",
-        "position",
         ["q1", "q2"],
         &[("order", 14.0)],
         &[("sin", 1.0), ("cos", 0.5)],
     ),
-    kind(
+    planted(
         "spring",
-        "position",
         ["q1", "q2"],
         &[("q0", 0.4)],
         &[("k", 1.0), ("k3", 0.0)],
     ),
-    kind(
-        "counterbalance",
-        "position",
-        ["q2", "q5"],
-        &[],
-        &[("stiffness", 1e3)],
-    ),
-    kind(
-        "backlash",
-        "memory",
-        ["q1", "q2"],
-        &[("gap", 0.01)],
-        &[("c", 1.0)],
-    ),
-    kind("presliding", "memory", [SLIDE, WHEEL], &[], &[]),
-    kind("delay", "timing", ["q1", "q2"], &[], &[("d", 1.0)]),
-    kind("elasticity", "timing", [SLIDE, WHEEL], &[], &[]),
-    kind(
-        "rotor-inertia",
-        "inertia",
-        ["x_r", "y_r"],
-        &[],
-        &[("J", 1.0)],
-    ),
-    kind(
+    planted("counterbalance", ["q2", "q5"], &[], &[("stiffness", 1e3)]),
+    planted("backlash", ["q1", "q2"], &[("gap", 0.01)], &[("c", 1.0)]),
+    // the bend of bristles has no size without the motion at rest: thousandths of the travel
+    on_drives("presliding", true, drive::bristles),
+    planted("delay", ["q1", "q2"], &[], &[("d", 1.0)]),
+    on_drives("elasticity", false, drive::soft),
+    planted("rotor-inertia", ["x_r", "y_r"], &[], &[("J", 1.0)]),
+    planted(
         "rigid-body-terms",
-        "inertia",
         ["", ""],
         &[],
         &[("AC", 1.0), ("OB", 0.5), ("BE", -0.5)],
     ),
-    kept(kind(
+    planted(
         "payload",
-        "inertia",
         ["", ""],
         &[],
         &[("mass", 1.0), ("mx", 0.4), ("my", 0.0), ("mz", 0.0)],
-    )),
-    kind(
-        "gravity-tilt",
-        "offset",
-        ["", ""],
-        &[],
-        &[("gx", 1.0), ("gy", 0.5)],
     ),
-    kind(
+    planted("gravity-tilt", ["", ""], &[], &[("gx", 1.0), ("gy", 0.5)]),
+    planted(
         "coupling",
-        "cross",
         ["q1", "q2"],
         &[("from", 3.0), ("r", 1.0)],
         &[("viscous", 1.0), ("coulomb", 0.0), ("inertia", 0.0)],
     ),
-    kind(
-        "warm-up",
-        "slow",
-        ["q1", "q2"],
-        &[("T", 8.0)],
-        &[("k", -1.0)],
-    ),
-    kind("drift", "slow", ["q1", "q4"], &[], &[("c", 1.0)]),
-    kind(
+    planted("warm-up", ["q1", "q2"], &[("T", 8.0)], &[("k", -1.0)]),
+    planted("drift", ["q1", "q4"], &[], &[("c", 1.0)]),
+    planted(
         "disturbance",
-        "event",
         ["q1", "q4"],
         &[("at", 8.0), ("seconds", 0.3)],
         &[("c", 1.0)],
@@ -184,7 +173,7 @@ pub const SIZES: [f64; 3] = [6.0, 2.0, 0.5];
 /// What is put into one campaign.
 #[derive(Clone)]
 pub struct Put {
-    pub kind: &'static Kind,
+    pub kind: &'static Planted,
     pub place: &'static str,
     pub size: f64,
 }
@@ -225,7 +214,7 @@ pub fn settings() -> Vec<Setting> {
         withheld,
     };
     let single = |size: f64| {
-        let places = KINDS.iter().flat_map(|kind| {
+        let places = PLANTED.iter().flat_map(|kind| {
             // the robot as a whole is one place
             let count = if kind.places[0].is_empty() { 1 } else { 2 };
             kind.places.into_iter().take(count).map(move |p| (kind, p))
@@ -235,14 +224,16 @@ pub fn settings() -> Vec<Setting> {
     let mut out: Vec<Setting> = single(SIZES[0]).collect();
     out.extend(PAIRS.iter().map(|pair| {
         let put = pair.map(|(name, place)| Put {
-            kind: KINDS.iter().find(|k| k.name == name).expect("a kind"),
+            kind: PLANTED.iter().find(|k| k.name == name).expect("a kind"),
             place,
             size: TOGETHER,
         });
         setting("two", put.to_vec(), false)
     }));
     // what is held, and what is cut out, is no candidate to withhold
-    let candidates = KINDS.iter().filter(|k| !k.kept && k.name != "disturbance");
+    let candidates = PLANTED
+        .iter()
+        .filter(|k| !k.kept() && k.entry().role != Role::Fault);
     out.extend(candidates.map(|kind| {
         let put = Put {
             kind,

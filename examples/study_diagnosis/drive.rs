@@ -173,27 +173,45 @@ fn model(robot: &Robot, [inertia, viscous, coulomb]: [f64; 3]) -> Model {
     }
 }
 
-/// Values of an effect's keys that do not grow in proportion to its size.
-pub fn values(name: &str, truth: &SingleJointTruth, scale: f64) -> BTreeMap<String, f64> {
-    let level = match truth.friction {
+/// Coulomb level of its friction, N or N m.
+fn level(truth: &SingleJointTruth) -> f64 {
+    match truth.friction {
         SmoothFriction::ViscousCoulomb { law, .. } => law.coulomb,
         SmoothFriction::DoubleTanh(law) => law.coulomb_1 + law.coulomb_2,
-    };
-    let travel = truth.limits.1 - truth.limits.0;
-    let keys: &[(&str, f64)] = match name {
-        // bristles in place of the whole Coulomb level, the softer the more they show
-        "presliding" => &[
-            ("fc", level),
-            ("sigma0", level / (1e-3 * scale * travel)),
-            ("sigma1", 0.0),
-        ],
-        "elasticity" => &[
-            ("stiffness", truth.inertia * 4e4 / scale),
-            ("inertia", 0.8 * truth.inertia),
-            ("damping", 0.025),
-        ],
-        "stribeck" => &[("c", 1e-3 * scale * level), ("vs", 0.05 * travel)],
-        _ => &[],
-    };
-    keys.iter().map(|(k, x)| ((*k).to_owned(), *x)).collect()
+    }
+}
+
+fn travel(truth: &SingleJointTruth) -> f64 {
+    truth.limits.1 - truth.limits.0
+}
+
+fn keys<const N: usize>(keys: [(&str, f64); N]) -> BTreeMap<String, f64> {
+    keys.map(|(key, x)| (key.to_owned(), x)).into()
+}
+
+/// Bristles in place of the whole Coulomb level, the softer the more they show.
+pub fn bristles(truth: &SingleJointTruth, scale: f64) -> BTreeMap<String, f64> {
+    let level = level(truth);
+    keys([
+        ("fc", level),
+        ("sigma0", level / (1e-3 * scale * travel(truth))),
+        ("sigma1", 0.0),
+    ])
+}
+
+/// A spring between motor and link, the softer the more it shows.
+pub fn soft(truth: &SingleJointTruth, scale: f64) -> BTreeMap<String, f64> {
+    keys([
+        ("stiffness", truth.inertia * 4e4 / scale),
+        ("inertia", 0.8 * truth.inertia),
+        ("damping", 0.025),
+    ])
+}
+
+/// More friction at low speed.
+pub fn hump(truth: &SingleJointTruth, scale: f64) -> BTreeMap<String, f64> {
+    keys([
+        ("c", 1e-3 * scale * level(truth)),
+        ("vs", 0.05 * travel(truth)),
+    ])
 }

@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use cft_ident::effect::{Family, Role, entry};
 use serde_json::{Value, json};
 use statrs::distribution::{Beta, ContinuousCDF};
 
-use crate::catalogue::{KINDS, SIZES};
+use crate::catalogue::{PLANTED, SIZES};
 use crate::study::{percent, quantile};
 
 /// Power over the noise's below which nothing is looked for: the declared parameters stand in for it.
@@ -92,10 +93,12 @@ fn names(step: &Value, effect: &str) -> bool {
 fn right(row: &Value) -> [bool; 2] {
     let put = &row["put"][0];
     let steps = list(&row["steps"]);
-    match (text(&put["effect"]), steps, list(&row["cut"])) {
-        ("disturbance", [], [_, ..]) => [true, true],
-        ("disturbance", ..) | (_, _, [_, ..]) => [false, false],
-        (effect, [step], _) => {
+    let effect = text(&put["effect"]);
+    let is_fault = entry(effect).is_some_and(|entry| entry.role == Role::Fault);
+    match (is_fault, steps, list(&row["cut"])) {
+        (true, [], [_, ..]) => [true, true],
+        (true, ..) | (_, _, [_, ..]) => [false, false],
+        (_, [step], _) => {
             let member = names(step, effect);
             let found = families(text(&step["effect"]));
             let family = families(effect).iter().any(|f| found.contains(f));
@@ -148,7 +151,7 @@ fn tally(rows: &[&Value]) -> String {
 fn by_kind(rows: &[Value]) -> Vec<Value> {
     let single = of(rows, "one");
     let mut lines = Vec::new();
-    for kind in KINDS {
+    for kind in PLANTED {
         for size in SIZES {
             let own: Vec<&Value> = single
                 .iter()
@@ -328,7 +331,7 @@ fn rates(rows: &[Value]) -> Vec<Value> {
 fn numbers(rows: &[Value]) -> Vec<Value> {
     let single = of(rows, "one");
     let mut lines = Vec::new();
-    for kind in KINDS {
+    for kind in PLANTED {
         let mut by_key: BTreeMap<&str, (Vec<f64>, Vec<f64>)> = BTreeMap::new();
         let own = single.iter().filter(|r| r["put"][0]["effect"] == kind.name);
         let steps = own.flat_map(|r| {
@@ -385,16 +388,9 @@ fn both(row: &Value) -> bool {
     list(&row["put"]).iter().all(found)
 }
 
-/// Families of an effect, by the table of effects; some belong to two.
-fn families(effect: &str) -> &'static [&'static str] {
-    match effect {
-        "asymmetric-friction" => &["velocity", "offset"],
-        "actuator-friction" => &["velocity", "cross"],
-        _ => KINDS
-            .iter()
-            .find(|k| k.name == effect)
-            .map_or(&[], |k| std::slice::from_ref(&k.family)),
-    }
+/// Families of an effect; some belong to two.
+fn families(effect: &str) -> &'static [Family] {
+    entry(effect).map_or(&[], |entry| entry.families)
 }
 
 /// Whether a step is of the family of what was put in.
@@ -468,7 +464,7 @@ fn withheld(rows: &[Value]) -> Vec<Value> {
         let with = all.iter().copied();
         with.filter(|r| r["put"][0]["effect"] == kind).collect()
     };
-    KINDS
+    PLANTED
         .iter()
         .map(|kind| (kind, own(kind.name)))
         .filter(|(_, own)| !own.is_empty())

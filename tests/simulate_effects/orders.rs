@@ -5,14 +5,25 @@ use std::path::Path;
 
 use cft_ident::config::model_file::{Effect, EffectParameter};
 use cft_ident::config::{ModelFile, RobotFile};
+use cft_ident::effect::{Places, Unit};
+use cft_ident::robot::JointKind;
 use cft_ident::robot::cft::Setup;
 use cft_ident::simulate::cft::effects;
-use cft_ident::simulate::effects::{KINDS, Places, Unit};
+use cft_ident::simulate::effects::LAWS;
 use cft_ident::simulate::{
     CftTruth, EffectSpec, Experiment, Order, SimulateError, SimulatedLog, TruthFile, simulate,
 };
 
 use super::missing::{axis, pushed, specs, table_3};
+
+/// The unit at a joint that turns or slides; `from` is whether the joint of the key `from` turns.
+fn unit(unit: Unit, turns: bool, from: bool) -> String {
+    let kind = |turns| match turns {
+        true => JointKind::Revolute,
+        false => JointKind::Prismatic,
+    };
+    unit.text(kind(turns), kind(from), if turns { "Nm" } else { "N" })
+}
 
 fn robot() -> RobotFile {
     RobotFile::load(Path::new("configs/cft.toml")).expect("embedded")
@@ -34,29 +45,29 @@ fn ordered(robot: &RobotFile, texts: &[&str], seed: u64) -> SimulatedLog {
 fn every_effect_changes_the_log_of_the_cft_robot_at_its_defaults() {
     let robot = robot();
     let sound = ordered(&robot, &[], 1);
-    for kind in KINDS {
-        let text = match (kind.places, kind.name) {
-            (Places::Joints, "disturbance") => "disturbance:q4:at=0.5".to_owned(),
-            (Places::Joints, "stuck-channel") => "stuck-channel:q4:at=0.5".to_owned(),
-            (Places::Joints, name) => format!("{name}:q4"),
+    for kind in LAWS.iter().map(|law| law.entry) {
+        let expected = match kind.places {
+            Places::Joints | Places::JointsOrAll | Places::Pairs => vec![Some("q4")],
+            Places::Actuators | Places::JointsAndActuators => vec![Some("x_r"), Some("y_r")],
+            Places::Whole => vec![None],
+        };
+        let text = match (expected[0], kind.name) {
+            (Some("q4"), "disturbance") => "disturbance:q4:at=0.5".to_owned(),
+            (Some("q4"), "stuck-channel") => "stuck-channel:q4:at=0.5".to_owned(),
+            (Some("q4"), name) => format!("{name}:q4"),
             (_, name) => name.to_owned(),
         };
         let log = ordered(&robot, &[&text], 1);
         assert_eq!(log.rows().len(), sound.rows().len(), "{text}");
         assert!(log.values.iter().all(|x| x.is_finite()), "{text}");
         assert_ne!(log.values, sound.values, "{text}");
-        let expected = match kind.places {
-            Places::Joints => vec![Some("q4")],
-            Places::Screws | Places::JointsAndScrews => vec![Some("x_r"), Some("y_r")],
-            Places::Whole => vec![None],
-        };
         let effects = &log.truth.effects;
         let joints: Vec<Option<&str>> = effects.iter().map(|e| e.joint.as_deref()).collect();
         assert_eq!(joints, expected, "{text}");
         let own = &effects[0];
         assert_eq!(
             (own.effect.as_str(), own.family.as_str()),
-            (kind.name, kind.family)
+            (kind.name, kind.family().name())
         );
         assert_eq!(own.parameters.len(), kind.keys.len());
         for key in kind.keys {
@@ -64,7 +75,7 @@ fn every_effect_changes_the_log_of_the_cft_robot_at_its_defaults() {
             let place = matches!(expected[0], Some("q4"));
             assert_eq!(
                 written.unit,
-                key.unit.text(place, true),
+                unit(key.unit, place, true),
                 "{text}, {}",
                 key.name
             );
@@ -193,17 +204,15 @@ fn one_size_that_is_given_silences_the_other_sizes() {
 
 #[test]
 fn units_follow_the_joint() {
-    for (unit, slides, turns) in [
+    for (of, slides, turns) in [
         (Unit::Torque, "N", "Nm"),
         (Unit::Order, "1/m", "1/rev"),
         (Unit::Viscous, "N s/m", "Nm s/rad"),
         (Unit::Inertia, "kg", "kg m^2"),
         (Unit::Fixed("Hz"), "Hz", "Hz"),
     ] {
-        assert_eq!(
-            (unit.text(false, true), unit.text(true, true)),
-            (slides, turns)
-        );
+        let told = [unit(of, false, true), unit(of, true, true)];
+        assert_eq!(told, [slides, turns]);
     }
     let truth = CftTruth::synthetic(Setup::Tuedacs);
     let (_, values) = effects(&truth, &specs(&["coupling:q2:from=1"])).expect("known");
@@ -326,16 +335,18 @@ fn the_page_of_effects_says_what_the_simulator_takes() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    assert_eq!(rows.len(), KINDS.len());
-    for (kind, row) in KINDS.iter().zip(rows) {
+    assert_eq!(rows.len(), LAWS.len());
+    for (law, row) in LAWS.iter().zip(rows) {
+        let kind = law.entry;
         let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
         assert_eq!(cells[0], format!("`{}`", kind.name));
-        assert_eq!(cells[1], kind.family);
+        assert_eq!(cells[1], kind.family().name());
+        assert_eq!(cells[3], kind.formula);
         let keys: Vec<String> = kind
             .keys
             .iter()
             .map(|key| {
-                let (slides, turns) = (key.unit.text(false, true), key.unit.text(true, true));
+                let (slides, turns) = (unit(key.unit, false, true), unit(key.unit, true, true));
                 let unit = if slides == turns {
                     slides.to_owned()
                 } else {
@@ -346,9 +357,9 @@ fn the_page_of_effects_says_what_the_simulator_takes() {
             .collect();
         assert_eq!(cells[2], keys.join("; "), "{}", kind.name);
         let cft = match kind.places {
-            Places::Joints => "joints",
-            Places::Screws => "x_r, y_r",
-            Places::JointsAndScrews => "joints, x_r, y_r",
+            Places::Joints | Places::JointsOrAll | Places::Pairs => "joints",
+            Places::Actuators => "x_r, y_r",
+            Places::JointsAndActuators => "joints, x_r, y_r",
             Places::Whole => "whole",
         };
         assert_eq!(cells[4], cft, "{}", kind.name);

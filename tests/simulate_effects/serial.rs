@@ -2,10 +2,11 @@
 //! with them.
 
 use cft_ident::config::RobotFile;
+use cft_ident::effect::{Entry, Places};
 use cft_ident::robot::Robot;
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::standard::{Body, STANDARD};
-use cft_ident::simulate::effects::{Kind, Places, Sites};
+use cft_ident::simulate::effects::Sites;
 use cft_ident::simulate::moving::Moving;
 use cft_ident::simulate::{Effects, Mechanism, Plant, SimulateError, SmoothFriction};
 
@@ -88,14 +89,14 @@ fn built(truth: &Plant<3>, texts: &[&str]) -> Result<Effects, SimulateError> {
     Ok(Effects::build(&specs(texts), &Sites::of(truth)?)?.0)
 }
 
-/// Where a kind has a place, in the words of docs/effects.md.
-pub fn places(kind: &Kind) -> &'static str {
+/// Where an effect has a place, in the words of docs/effects.md.
+pub fn places(entry: &Entry) -> &'static str {
     let truth = truth([0.0, 0.0, -9.81], [0.0; STANDARD]);
     let fits = |text: &str| built(&truth, &[text]).is_ok();
-    if kind.places == Places::Whole {
-        return if fits(kind.name) { "whole" } else { "no" };
+    if entry.places == Places::Whole {
+        return if fits(entry.name) { "whole" } else { "no" };
     }
-    let [turns, slides] = ["second", "slide"].map(|joint| fits(&format!("{}:{joint}", kind.name)));
+    let [turns, slides] = ["second", "slide"].map(|joint| fits(&format!("{}:{joint}", entry.name)));
     match (turns, slides) {
         (true, true) => "joints",
         (true, false) => "turning",
@@ -167,16 +168,16 @@ fn what_the_diagnosis_looks_for_on_a_serial_robot_the_simulator_can_build() {
     let mut found = 0;
     for law in cft_ident::effect::LAWS {
         let sought = !law.places(robot, &laws).is_empty();
-        let built = cft_ident::simulate::effects::KINDS
+        let built = cft_ident::simulate::effects::LAWS
             .iter()
-            .find(|k| k.name == law.entry.name)
+            .find(|built| built.entry.name == law.entry.name)
             .expect("both rooms know it");
         if sought {
             found += 1;
-            assert_ne!(places(built), "no", "{}", law.entry.name);
+            assert_ne!(places(built.entry), "no", "{}", law.entry.name);
             // what is found can be simulated: the same keys
             for key in law.key_names() {
-                let known = built.keys.iter().any(|k| k.name == key);
+                let known = built.entry.keys.iter().any(|k| k.name == key);
                 assert!(known, "{}: {key}", law.entry.name);
             }
         }

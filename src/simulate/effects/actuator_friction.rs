@@ -3,27 +3,21 @@
 //! With the speed v_a = J_4 v4 + J_5 v5 of x_r or y_r and the force f = viscous v_a + coulomb tanh(slope v_a)
 //! the joints q4 and q5 feel J_4 f and J_5 f: their friction depends on the pose and couples them.
 
-use super::{Built, Effect, Key, Kind, Motion, Place, Places, Site, Unit};
+use super::{Built, Effect, Motion, PlantLaw, Site};
+use crate::effect::Place;
+use crate::effect::actuator_friction::ENTRY;
 use crate::robot::cft::pantograph::reference_jacobian;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "actuator-friction",
-    family: "velocity",
-    places: Places::Screws,
-    keys: &[
-        Key::size("viscous", Unit::Viscous, |site| {
-            0.2 * site.scale / site.speed
-        }),
-        Key::size("coulomb", Unit::Torque, |site| 0.3 * site.scale),
-        Key::shape("slope", Unit::Slope, |_| 1200.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.2 * site.scale / site.speed, 0.3 * site.scale, 1200.0],
     build,
 };
 
 fn build(site: &Site, _: &super::Machine, values: &[f64]) -> Result<Built, SimulateError> {
-    let Place::Screw(row) = site.place else {
-        return Err(site.refuse(KIND.name, "it sits at the screws x_r and y_r"));
+    let Place::Actuator(row) = site.place else {
+        return Err(site.refuse(ENTRY.name, "it sits at the screws x_r and y_r"));
     };
     Built::plant(ActuatorFriction {
         row,

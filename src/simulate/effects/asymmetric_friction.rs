@@ -2,18 +2,12 @@
 //!
 //! E(v) = (coulomb + viscous v) H(v), with H a step as steep as the joint allows.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit, step};
+use super::{Built, Effect, Motion, PlantLaw, step};
+use crate::effect::asymmetric_friction::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "asymmetric-friction",
-    family: "velocity",
-    places: Places::Joints,
-    keys: &[
-        Key::size("coulomb", Unit::Torque, |site| 0.1 * site.scale),
-        Key::size("viscous", Unit::Viscous, |site| {
-            0.1 * site.scale / site.speed
-        }),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.1 * site.scale, 0.1 * site.scale / site.speed],
     build: |site, _, values| {
         Built::plant(AsymmetricFriction {
             joint: site.joint(),

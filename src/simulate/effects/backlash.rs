@@ -7,26 +7,13 @@
 //! but continuous contact that the error control steps through. Where it opens, at a reversal, c sgn(v) passes
 //! through zero of itself.
 
-use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Unit, sign};
-use crate::simulate::SimulateError;
+use super::{Beginning, Built, Effect, Motion, PlantLaw, sign};
+use crate::effect::backlash::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "backlash",
-    family: "memory",
-    places: Places::Joints,
-    keys: &[
-        Key::shape("gap", Unit::Position, |site| 0.01 * site.half_travel()),
-        Key::size("c", Unit::Torque, |site| 0.3 * site.scale),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.01 * site.half_travel(), 0.3 * site.scale],
     build: |site, _, values| {
-        if values[0] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "gap".to_owned(),
-                value: values[0],
-                rule: "must be above 0".to_owned(),
-            });
-        }
         Built::plant(Backlash {
             joint: site.joint(),
             half: 0.5 * values[0],

@@ -5,7 +5,8 @@
 //! supplies d/dq of stiffness (l - free_length)^2/2. A moment that was found and not built is a cubic B-spline
 //! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, held beyond them.
 
-use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use crate::effect::counterbalance::ENTRY;
 use crate::simulate::SimulateError;
 
 /// Coefficients of the spline.
@@ -16,39 +17,21 @@ const PIECES: usize = COUNT - 3;
 const LONG: f64 = 0.4;
 const SHORT: f64 = 0.1;
 
-const fn coefficient(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque, |_| 0.0)
-}
-
-pub const KIND: Kind = Kind {
-    name: "counterbalance",
-    family: "position",
-    places: Places::Joints,
-    keys: &[
-        Key::size("stiffness", Unit::Fixed("N/m"), |site| {
-            0.4 * site.scale / (LONG * SHORT)
-        }),
-        Key::shape("free_length", Unit::Fixed("m"), |_| 0.5 * LONG),
-        Key::shape("a", Unit::Fixed("m"), |_| LONG),
-        Key::shape("b", Unit::Fixed("m"), |_| SHORT),
-        Key::shape("angle", Unit::Fixed("rad"), |site| {
-            site.middle() - std::f64::consts::FRAC_PI_2
-        }),
-        Key::shape("from", Unit::Position, |site| site.travel.0),
-        Key::shape("to", Unit::Position, |site| site.travel.1),
-        coefficient("m_1"),
-        coefficient("m_2"),
-        coefficient("m_3"),
-        coefficient("m_4"),
-        coefficient("m_5"),
-        coefficient("m_6"),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| {
+        let mut defaults = vec![0.4 * site.scale / (LONG * SHORT), 0.5 * LONG, LONG, SHORT];
+        let (from, to) = site.travel;
+        defaults.extend([site.middle() - std::f64::consts::FRAC_PI_2, from, to]);
+        defaults.extend([0.0; COUNT]);
+        defaults
+    },
     build,
 };
 
 fn build(site: &Site, _: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
-        effect: KIND.name.to_owned(),
+        effect: ENTRY.name.to_owned(),
         key: key.to_owned(),
         value,
         rule: rule.to_owned(),
@@ -56,7 +39,7 @@ fn build(site: &Site, _: &Machine, values: &[f64]) -> Result<Built, SimulateErro
     let (stiffness, a, b) = (values[0], values[2], values[3]);
     if stiffness != 0.0 && !site.turns {
         return Err(site.refuse(
-            KIND.name,
+            ENTRY.name,
             "its lever turns about an axis, and this joint slides; use `spring`, or give m_1..m_6 without a \
              stiffness",
         ));

@@ -3,35 +3,29 @@
 //! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
 //! symmetric, and the plant solves it by elimination.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit, sign};
+use super::{Built, Effect, Motion, PlantLaw, sign};
+use crate::effect::coupling::ENTRY;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "coupling",
-    family: "cross",
-    places: Places::Joints,
-    keys: &[
-        // The neighbour towards the base, and of the first joint the next.
-        Key::shape("from", Unit::Fixed("1"), |site| match site.joint() {
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    // the neighbour towards the base, and of the first joint the next
+    defaults: |site| {
+        let from = match site.joint() {
             0 => 2.0,
             joint => joint as f64,
-        }),
-        Key::size("viscous", Unit::CoupledViscous, |site| {
-            0.2 * site.scale / site.speed
-        }),
-        Key::size("coulomb", Unit::Torque, |_| 0.0),
-        Key::size("inertia", Unit::CoupledInertia, |_| 0.0),
-        Key::shape("r", Unit::CoupledRatio, |_| 1.0),
-    ],
+        };
+        vec![from, 0.2 * site.scale / site.speed, 0.0, 0.0, 1.0]
+    },
     build: |site, machine, values| {
         if machine.joints() < 2 {
-            return Err(site.refuse(KIND.name, "there is no other joint to follow"));
+            return Err(site.refuse(ENTRY.name, "there is no other joint to follow"));
         }
         let from = values[0];
         let known = (1..=machine.joints()).any(|number| number as f64 == from);
         if !known || from == (site.joint() + 1) as f64 {
             return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
+                effect: ENTRY.name.to_owned(),
                 key: "from".to_owned(),
                 value: from,
                 rule: format!(

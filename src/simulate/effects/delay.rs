@@ -4,13 +4,12 @@
 //! t_k - d and the same time of the next row: a share of a step is a share of two rows. The plant knows
 //! nothing of it; the noise of the torque comes after it.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::delay::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "delay",
-    family: "timing",
-    places: Places::Joints,
-    keys: &[Key::size("d", Unit::Fixed("s"), |_| 0.005)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![0.005],
     build: |site, _, values| {
         Built::log(Delay {
             joint: site.joint(),

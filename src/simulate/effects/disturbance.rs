@@ -3,27 +3,13 @@
 //! The torque jumps in time: the step across an edge is refused by the error control until it is so short
 //! that the edge does not show.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::disturbance::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "disturbance",
-    family: "event",
-    places: Places::Joints,
-    keys: &[
-        Key::shape("at", Unit::Fixed("s"), |_| 5.0),
-        Key::shape("seconds", Unit::Fixed("s"), |_| 0.5),
-        Key::size("c", Unit::Torque, |site| 0.5 * site.scale),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![5.0, 0.5, 0.5 * site.scale],
     build: |site, _, values| {
-        if values[1] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "seconds".to_owned(),
-                value: values[1],
-                rule: "must be above 0 s".to_owned(),
-            });
-        }
         Built::plant(Disturbance {
             joint: site.joint(),
             from: values[0],

@@ -6,17 +6,13 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Unit};
+use super::{Beginning, Built, Effect, Motion, PlantLaw};
+use crate::effect::drift::ENTRY;
 use crate::simulate::chance::{Purpose, stream_of};
 
-pub const KIND: Kind = Kind {
-    name: "drift",
-    family: "slow",
-    places: Places::Joints,
-    keys: &[
-        Key::size("c", Unit::TorqueRate, |site| 0.01 * site.scale),
-        Key::size("walk", Unit::TorqueWalk, |_| 0.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.01 * site.scale, 0.0],
     build: |site, _, values| {
         Built::plant(Drift {
             joint: site.joint(),

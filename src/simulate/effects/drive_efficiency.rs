@@ -3,23 +3,13 @@
 //! E = k tau_l H(tau_l v) with tau_l = M a + C v + G, solved with the balance as in `load-friction`; the step
 //! is as steep in v as the joint allows and exact in tau_l, where the torque is continuous.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit, step};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw, step};
+use crate::effect::drive_efficiency::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "drive-efficiency",
-    family: "load",
-    places: Places::Joints,
-    keys: &[Key::size("k", Unit::Fixed("1"), |_| 0.1)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![0.1],
     build: |site, _, values| {
-        if !(-0.9..=9.0).contains(&values[0]) {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "k".to_owned(),
-                value: values[0],
-                rule: "must lie in -0.9..9 (k = 1/efficiency - 1)".to_owned(),
-            });
-        }
         Built::plant(DriveEfficiency {
             joint: site.joint(),
             k: values[0],

@@ -7,36 +7,29 @@
 //! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
 //! motor's side. Both sides are integrated.
 
-use super::{Beginning, Built, Effect, Key, Kind, Motion, Places, Site, Twist, Unit};
+use super::{Beginning, Built, Effect, Motion, PlantLaw, Site, Twist};
+use crate::effect::elasticity::ENTRY;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "elasticity",
-    family: "timing",
-    places: Places::Joints,
-    keys: &[
-        Key::size("stiffness", Unit::Stiffness, |site| {
-            (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia
-        }),
-        Key::shape("inertia", Unit::Inertia, |site| site.inertia - rotor(site)),
-        Key::shape("damping", Unit::Fixed("1"), |_| DAMPING),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| {
+        vec![
+            (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia,
+            site.inertia - rotor(site),
+            DAMPING,
+        ]
+    },
     build: |site, _, values| {
         let &[stiffness, inertia, damping] = values else {
-            return Err(site.refuse(KIND.name, "it takes stiffness, inertia and damping"));
+            return Err(site.refuse(ENTRY.name, "it takes stiffness, inertia and damping"));
         };
         let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
-            effect: KIND.name.to_owned(),
+            effect: ENTRY.name.to_owned(),
             key: key.to_owned(),
             value,
             rule: rule.to_owned(),
         };
-        if stiffness <= 0.0 {
-            return Err(refuse("stiffness", stiffness, "must be above 0"));
-        }
-        if damping < 0.0 {
-            return Err(refuse("damping", damping, "must not be below 0"));
-        }
         let rotor = site.inertia - inertia;
         if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
             return Err(refuse(

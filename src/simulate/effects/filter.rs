@@ -3,27 +3,13 @@
 //! dy/dt = 2 pi cutoff (x - y) with the input straight from row to row and the output settled at the first
 //! row, solved exactly.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::filter::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "filter",
-    family: "data",
-    places: Places::Joints,
-    keys: &[
-        Key::shape("cutoff", Unit::Fixed("Hz"), |_| 10.0),
-        // 1 the torque, 0 the position.
-        Key::shape("torque", Unit::Fixed("1"), |_| 1.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![10.0, 1.0],
     build: |site, _, values| {
-        if values[0] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "cutoff".to_owned(),
-                value: values[0],
-                rule: "must be above 0 Hz".to_owned(),
-            });
-        }
         Built::log(Filter {
             joint: site.joint(),
             rate: std::f64::consts::TAU * values[0],

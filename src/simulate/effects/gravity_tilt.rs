@@ -10,21 +10,17 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use crate::effect::gravity_tilt::ENTRY;
 use crate::robot::cft::dynamics::Coefficients;
 use crate::robot::standard::STANDARD;
 use crate::robot::tree::Tree;
 use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "gravity-tilt",
-    family: "offset",
-    places: Places::Whole,
-    keys: &[
-        Key::size("gx", Unit::Fixed("m/s^2"), |_| 0.1),
-        Key::size("gy", Unit::Fixed("m/s^2"), |_| 0.1),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![0.1, 0.1],
     build,
 };
 
@@ -47,7 +43,7 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
             force: -theta[0] * gx,
         }),
         JointKind::Revolute => Err(site.refuse(
-            KIND.name,
+            ENTRY.name,
             "a single turning joint has an inertia and no centre of gravity; use `torque-offset` or \
              `ripple` with order 1",
         )),

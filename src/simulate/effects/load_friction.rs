@@ -4,23 +4,18 @@
 //! As the friction is piecewise linear in tau_l, the plant solves tau_l (1 + s) = what is left of the motor's
 //! torque in closed form, without iteration ([`super::Effect::load`]).
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::load_friction::ENTRY;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "load-friction",
-    family: "load",
-    places: Places::Joints,
-    keys: &[
-        Key::size("mu_c", Unit::Fixed("1"), |_| 0.05),
-        Key::size("mu_v", Unit::Slope, |_| 0.0),
-        Key::shape("w", Unit::Slope, |site| site.slope().min(40.0 / site.speed)),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.05, 0.0, site.slope().min(40.0 / site.speed)],
     build: |site, _, values| {
         let most = values[0].abs() + values[1].abs() * 4.0 * site.speed;
         if most >= MOST {
             return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
+                effect: ENTRY.name.to_owned(),
                 key: "mu_c + mu_v |v|".to_owned(),
                 value: most,
                 rule: format!(

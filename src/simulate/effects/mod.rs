@@ -3,50 +3,21 @@
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
 //! every joint, and a key that is left out takes a default that scales with the joint (docs/effects.md).
 //! Most effects are torques or states of the plant ([`Effect`]); delays and faults of the data are put
-//! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`KINDS`].
+//! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`].
 //!
 //! A jump in speed would leave the differential equation without a solution at rest. Signs and steps of
 //! the speed are therefore tanh(w v) and (1 + tanh(w v))/2, with w as steep as the joint's inertia lets an
 //! explicit integrator follow ([`Site::slope`]).
 
-mod actuator_friction;
-mod asymmetric_friction;
-mod backlash;
-mod counterbalance;
-mod coupling;
-mod delay;
-mod disturbance;
-mod drift;
-mod drive_efficiency;
-mod elasticity;
 mod fault;
-mod filter;
 mod frames;
-mod gain;
-mod gravity_tilt;
-mod kind;
-mod load_friction;
-mod nonlinear_viscous;
-mod payload;
-mod position_friction;
-mod presliding;
-mod quantisation;
-mod rigid_body_terms;
-mod ripple;
-mod rotor_inertia;
-mod saturation;
+mod plant_law;
 mod site;
 mod spec;
-mod spring;
-mod stribeck;
-mod stuck_channel;
-mod torque_offset;
-mod warm_up;
-mod wrong_sign_or_order;
 
 pub use fault::{Fault, Log};
-pub use kind::{Built, Key, Kind, Places, Unit};
-pub use site::{Machine, Place, Site, Sites};
+pub use plant_law::{Built, PlantLaw};
+pub use site::{Machine, Site, Sites};
 pub use spec::{EffectParameter, EffectSpec, EffectValue};
 
 use super::SimulateError;
@@ -130,38 +101,48 @@ pub trait Effect: std::fmt::Debug + Send {
     }
 }
 
-/// All effects that the simulator knows, in the order of docs/effects.md.
-pub const KINDS: &[&Kind] = &[
-    &torque_offset::KIND,
-    &asymmetric_friction::KIND,
-    &gravity_tilt::KIND,
-    &stribeck::KIND,
-    &nonlinear_viscous::KIND,
-    &actuator_friction::KIND,
-    &load_friction::KIND,
-    &drive_efficiency::KIND,
-    &gain::KIND,
-    &position_friction::KIND,
-    &ripple::KIND,
-    &spring::KIND,
-    &counterbalance::KIND,
-    &backlash::KIND,
-    &presliding::KIND,
-    &delay::KIND,
-    &elasticity::KIND,
-    &rotor_inertia::KIND,
-    &rigid_body_terms::KIND,
-    &payload::KIND,
-    &coupling::KIND,
-    &warm_up::KIND,
-    &drift::KIND,
-    &disturbance::KIND,
-    &saturation::KIND,
-    &quantisation::KIND,
-    &stuck_channel::KIND,
-    &wrong_sign_or_order::KIND,
-    &filter::KIND,
-];
+/// Files of effects, and the law of each in the list.
+macro_rules! catalogue {
+    ($(#[$doc:meta])* $list:ident of $($file:ident,)*) => {
+        $(mod $file;)*
+        $(#[$doc])*
+        pub static $list: &[&PlantLaw] = &[$(&$file::LAW),*];
+    };
+}
+
+catalogue! {
+    /// All effects that the simulator knows, in the order of docs/effects.md.
+    LAWS of
+    torque_offset,
+    asymmetric_friction,
+    gravity_tilt,
+    stribeck,
+    nonlinear_viscous,
+    actuator_friction,
+    load_friction,
+    drive_efficiency,
+    gain,
+    position_friction,
+    ripple,
+    spring,
+    counterbalance,
+    backlash,
+    presliding,
+    delay,
+    elasticity,
+    rotor_inertia,
+    rigid_body_terms,
+    payload,
+    coupling,
+    warm_up,
+    drift,
+    disturbance,
+    saturation,
+    quantisation,
+    stuck_channel,
+    wrong_sign_or_order,
+    filter,
+}
 
 /// The effects of one plant, each with its slice of the extra states, and the faults of its log.
 #[derive(Debug, Default)]
@@ -184,14 +165,14 @@ impl Effects {
         let mut effects = Self::default();
         let mut values = Vec::new();
         for spec in specs {
-            let kind = spec.kind()?;
-            for site in spec.sites(kind, sites)? {
-                let numbers = spec.numbers(kind, site)?;
-                match (kind.build)(site, &sites.machine, &numbers)? {
+            let law = spec.law()?;
+            for site in spec.sites(law.entry, sites)? {
+                let numbers = spec.numbers(law, site)?;
+                match law.built(site, &sites.machine, &numbers)? {
                     Built::Plant(effect) => effects.push(effect),
-                    Built::Log(fault) => effects.faults.push((kind.name, fault)),
+                    Built::Log(fault) => effects.faults.push((law.entry.name, fault)),
                 }
-                values.push(EffectValue::new(kind, site, &sites.machine, &numbers));
+                values.push(EffectValue::new(law.entry, site, &sites.machine, &numbers));
             }
         }
         Ok((effects, values))

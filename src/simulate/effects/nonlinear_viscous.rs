@@ -3,30 +3,14 @@
 //! Below p = 1 the slope at rest is infinite: the law is then c v (v^2 + v0^2)^((p - 1)/2), which is the
 //! power beyond the small speed v0 = 1/w within which signs change.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::nonlinear_viscous::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "nonlinear-viscous",
-    family: "velocity",
-    places: Places::Joints,
-    keys: &[
-        Key::size("c", Unit::Power, |site| {
-            0.05 * site.scale / site.speed.powi(2)
-        }),
-        Key::shape("p", Unit::Fixed("1"), |_| 2.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.05 * site.scale / site.speed.powi(2), 2.0],
     build: |site, _, values| {
         let p = values[1];
-        if !(0.1..=5.0).contains(&p) {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "p".to_owned(),
-                value: p,
-                rule: "must lie in 0.1..5; 0 is `asymmetric-friction` or Coulomb friction"
-                    .to_owned(),
-            });
-        }
         Built::plant(NonlinearViscous {
             joint: site.joint(),
             c: values[0],

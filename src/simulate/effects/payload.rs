@@ -9,39 +9,24 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use crate::effect::payload::ENTRY;
 use crate::robot::JointKind;
 use crate::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
 use crate::robot::tree::Tree;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "payload",
-    family: "inertia",
-    places: Places::Whole,
-    keys: &[
-        Key::size("mass", Unit::Fixed("kg"), |_| 1.0),
-        Key::size("mx", Unit::Fixed("kg m"), |_| L8),
-        Key::size("my", Unit::Fixed("kg m"), |_| 0.0),
-        Key::size("mz", Unit::Fixed("kg m"), |_| 0.0),
-        Key::size("inertia", Unit::Fixed("kg m^2"), |_| 0.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![1.0, L8, 0.0, 0.0, 0.0],
     build,
 };
 
 fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
-    if mass <= 0.0 {
-        return Err(SimulateError::EffectNumber {
-            effect: KIND.name.to_owned(),
-            key: "mass".to_owned(),
-            value: mass,
-            rule: "must be above 0".to_owned(),
-        });
-    }
     let robot = machine.robot;
     if !robot.knows_links() {
-        return Built::plant(Added {
+        return Built::plant(AtOneJoint {
             inertia: match robot.joint_kind(0) {
                 JointKind::Prismatic => mass,
                 JointKind::Revolute => (mx * mx + my * my) / mass + inertia,
@@ -117,11 +102,11 @@ impl Effect for Carried {
 }
 
 #[derive(Debug)]
-struct Added {
+struct AtOneJoint {
     inertia: f64,
 }
 
-impl Effect for Added {
+impl Effect for AtOneJoint {
     fn inertia(&self, _motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
         if let Some(mass) = mass.first_mut() {
             *mass += self.inertia;

@@ -2,21 +2,15 @@
 //!
 //! E = sgn(v) (sin sin(k q) + cos cos(k q)), k as in `ripple`, the sign as steep as the joint allows.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit, ripple, sign};
+use super::{Built, Effect, Motion, PlantLaw, ripple, sign};
+use crate::effect::position_friction::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "position-friction",
-    family: "position",
-    places: Places::Joints,
-    keys: &[
-        Key::shape(
-            "order",
-            Unit::Order,
-            |site| if site.turns { 2.0 } else { 4.0 },
-        ),
-        Key::size("sin", Unit::Torque, |site| 0.1 * site.scale),
-        Key::size("cos", Unit::Torque, |_| 0.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| {
+        let order = if site.turns { 2.0 } else { 4.0 };
+        vec![order, 0.1 * site.scale, 0.0]
+    },
     build: |site, _, values| {
         Built::plant(PositionFriction {
             joint: site.joint(),

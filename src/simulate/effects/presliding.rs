@@ -4,42 +4,27 @@
 //! constant level), where the level Fc is `fc`, by default that of the joint's law at speed. The law's own Coulomb part
 //! F(v) - viscous v is taken out. The state is integrated with the plant; |v| has a kink and no jump.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::presliding::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "presliding",
-    family: "memory",
-    places: Places::Joints,
-    keys: &[
-        Key::size("sigma0", Unit::Stiffness, |site| {
-            site.coulomb / bend(site.turns)
-        }),
-        Key::size("sigma1", Unit::Viscous, |site| {
-            0.002 * site.coulomb / bend(site.turns)
-        }),
-        Key::shape("fc", Unit::Torque, |site| site.coulomb),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| {
+        let sigma0 = site.coulomb / bend(site.turns);
+        vec![
+            sigma0,
+            0.002 * site.coulomb / bend(site.turns),
+            site.coulomb,
+        ]
+    },
     build: |site, _, values| {
         let level = values[2];
         if level <= 0.0 {
             return Err(site.refuse(
-                KIND.name,
+                ENTRY.name,
                 "it takes the place of Coulomb friction, and this joint's law has none at speed; give the \
                  level fc above 0",
             ));
-        }
-        let refused = [
-            ("sigma0", values[0], values[0] > 0.0),
-            ("sigma1", values[1], values[1] >= 0.0),
-        ];
-        if let Some((key, value, _)) = refused.into_iter().find(|(_, _, good)| !good) {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: key.to_owned(),
-                value,
-                rule: "sigma0 must be above 0 and sigma1 not negative".to_owned(),
-            });
         }
         Built::plant(Presliding {
             joint: site.joint(),

@@ -1,22 +1,12 @@
 //! `quantisation`: the logged torque of a joint is rounded to whole steps.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::quantisation::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "quantisation",
-    family: "data",
-    places: Places::Joints,
-    keys: &[Key::size("step", Unit::Torque, |site| 0.1 * site.scale)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.1 * site.scale],
     build: |site, _, values| {
-        if values[0] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "step".to_owned(),
-                value: values[0],
-                rule: "must be above 0".to_owned(),
-            });
-        }
         Built::log(Quantisation {
             joint: site.joint(),
             step: values[0],

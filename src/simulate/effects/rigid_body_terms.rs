@@ -2,40 +2,26 @@
 //!
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
-use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use crate::effect::rigid_body_terms::ENTRY;
 use crate::robot::cft::dynamics::{Coefficients, inertia_and_bias};
 use crate::simulate::SimulateError;
 
-/// One of the ten, with its value on a chain of eight tubes and plates.
-macro_rules! term {
-    ($name:literal, $value:literal) => {
-        Key::size($name, Unit::Fixed("kg m^2"), |_| $value)
-    };
-}
-
-pub const KIND: Kind = Kind {
-    name: "rigid-body-terms",
-    family: "inertia",
-    places: Places::Whole,
-    keys: &[
-        term!("BB", -0.25),
-        term!("EE", 0.002),
-        term!("CC", 0.003),
-        term!("AC", 0.0005),
-        term!("BE", -0.001),
-        term!("S", -0.12),
-        term!("OC", 0.002),
-        term!("OE", -0.002),
-        term!("OA", -0.02),
-        term!("OB", 0.03),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    // on a chain of eight tubes and plates
+    defaults: |_| {
+        vec![
+            -0.25, 0.002, 0.003, 0.0005, -0.001, -0.12, 0.002, -0.002, -0.02, 0.03,
+        ]
+    },
     build,
 };
 
 fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
     if machine.robot.coefficients(machine.theta).is_none() {
         return Err(site.refuse(
-            KIND.name,
+            ENTRY.name,
             "a single joint has one inertia and nothing that its structure drops",
         ));
     }

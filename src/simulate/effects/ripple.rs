@@ -3,29 +3,15 @@
 //! E(q) = sum over h = 1, 2, 3 of sin_h sin(h k q) + cos_h cos(h k q), with k = order per radian of a
 //! joint that turns (order 1/rev) and k = 2 pi order per metre of one that slides (order 1/m).
 
-use super::{Built, Effect, Key, Kind, Machine, Motion, Places, Site, Unit};
+use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use crate::effect::ripple::ENTRY;
 use crate::simulate::SimulateError;
 
 const HARMONICS: usize = 3;
 
-/// A harmonic that is not there unless it is asked for.
-const fn absent(name: &'static str) -> Key {
-    Key::size(name, Unit::Torque, |_| 0.0)
-}
-
-pub const KIND: Kind = Kind {
-    name: "ripple",
-    family: "position",
-    places: Places::Joints,
-    keys: &[
-        Key::shape("order", Unit::Order, |_| 12.0),
-        Key::size("sin", Unit::Torque, |site| 0.1 * site.scale),
-        absent("cos"),
-        absent("sin2"),
-        absent("cos2"),
-        absent("sin3"),
-        absent("cos3"),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![12.0, 0.1 * site.scale, 0.0, 0.0, 0.0, 0.0, 0.0],
     build,
 };
 

@@ -3,20 +3,20 @@
 //! At x_r or y_r, J is a mass in kg on the screw's nut and the joints feel J_a^T J (J_a a + dJ_a/dt v) with the
 //! Jacobian J_a of the pantograph; at a joint they feel J a.
 
-use super::{Built, Effect, Key, Kind, Motion, Place, Places, Unit};
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::Place;
+use crate::effect::rotor_inertia::ENTRY;
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
 
-pub const KIND: Kind = Kind {
-    name: "rotor-inertia",
-    family: "inertia",
-    places: Places::JointsAndScrews,
-    keys: &[Key::size("J", Unit::Inertia, |site| 0.25 * site.inertia)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.25 * site.inertia],
     build: |site, _, values| match site.place {
-        Place::Screw(row) => Built::plant(AtScrew {
+        Place::Actuator(row) => Built::plant(AtScrew {
             row,
             mass: values[0],
         }),
-        Place::Joint(_) | Place::Whole => Built::plant(AtJoint {
+        _ => Built::plant(AtJoint {
             joint: site.joint(),
             inertia: values[0],
         }),

@@ -1,22 +1,12 @@
 //! `saturation`: the logged torque of a joint stops at a limit.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::saturation::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "saturation",
-    family: "data",
-    places: Places::Joints,
-    keys: &[Key::size("limit", Unit::Torque, |site| site.scale)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![site.scale],
     build: |site, _, values| {
-        if values[0] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "limit".to_owned(),
-                value: values[0],
-                rule: "must be above 0".to_owned(),
-            });
-        }
         Built::log(Saturation {
             joint: site.joint(),
             limit: values[0],

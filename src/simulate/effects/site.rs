@@ -1,6 +1,7 @@
 //! Where effects sit: the joints of a robot, the screws of the CFT robot, the robot as a whole, with the
 //! scales that default sizes are fractions of.
 
+use crate::effect::Place;
 use crate::robot::cft::geometry::L4;
 use crate::robot::cft::pantograph;
 use crate::robot::{JointKind, Robot};
@@ -15,17 +16,6 @@ const SCREW_SPEED: f64 = 0.05;
 /// Rate at which a torque of [`Site::scale`] that changes sign with the speed brings the joint to rest
 /// within its steep part \[1/s\]: steps of 0.3 ms stay stable.
 const SIGN_RATE: f64 = 10_000.0;
-
-/// The place of an effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// A joint, by its index.
-    Joint(usize),
-    /// x_r or y_r of the CFT robot, by its row in the Jacobian.
-    Screw(usize),
-    /// The robot as a whole.
-    Whole,
-}
 
 /// What an effect is built for.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,10 +44,7 @@ pub struct Site {
 impl Site {
     /// Index of the joint; 0 where the place is none.
     pub fn joint(&self) -> usize {
-        match self.place {
-            Place::Joint(index) => index,
-            Place::Screw(_) | Place::Whole => 0,
-        }
+        self.place.joint().unwrap_or(0)
     }
 
     /// Slope w of tanh(w v) where the definition has the sign of v, s/m or s/rad.
@@ -134,7 +121,7 @@ impl<'a> Sites<'a> {
         };
         let screws = screws(plant, &joints)?;
         let whole = joints.first().map(|first| Site {
-            place: Place::Whole,
+            place: Place::All,
             name: String::new(),
             ..first.clone()
         });
@@ -283,7 +270,7 @@ fn screws<const J: usize>(plant: &Plant<J>, joints: &[Site]) -> Result<Vec<Site>
         let mut direction = [0.0; J];
         direction[2..4].copy_from_slice(&jacobian[row]);
         screws.push(Site {
-            place: Place::Screw(row),
+            place: Place::Actuator(row),
             name: (*name).to_owned(),
             turns: false,
             // A force on the crank of length L4 that takes the torque of the joint.

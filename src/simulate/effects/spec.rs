@@ -5,7 +5,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{KINDS, Key, Kind, Machine, Place, Places, Site, Sites};
+use super::{LAWS, Machine, PlantLaw, Site, Sites};
+use crate::effect::{Entry, Key, Place, Places};
+use crate::robot::JointKind;
 use crate::simulate::SimulateError;
 
 /// An effect as it is asked for.
@@ -83,19 +85,22 @@ impl FromStr for EffectSpec {
 }
 
 impl EffectSpec {
-    /// The kind that the name stands for.
-    pub(super) fn kind(&self) -> Result<&'static Kind, SimulateError> {
-        let found = KINDS.iter().find(|kind| kind.name == self.name);
-        found.copied().ok_or_else(|| SimulateError::UnknownEffect {
-            name: self.name.clone(),
-            known: KINDS.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
+    /// The law that the name stands for.
+    pub(super) fn law(&self) -> Result<&'static PlantLaw, SimulateError> {
+        let found = LAWS.iter().find(|law| law.entry.name == self.name);
+        found.copied().ok_or_else(|| {
+            let known: Vec<&str> = LAWS.iter().map(|law| law.entry.name).collect();
+            SimulateError::UnknownEffect {
+                name: self.name.clone(),
+                known: known.join(", "),
+            }
         })
     }
 
-    /// The sites that the effect acts on: the one that is named, or all that the kind may sit at.
+    /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        kind: &Kind,
+        entry: &Entry,
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
@@ -106,19 +111,19 @@ impl EffectSpec {
                     name: String::new(),
                     known: String::new(),
                 },
-                |site| site.refuse(kind.name, why),
+                |site| site.refuse(entry.name, why),
             )
         };
-        let (joints, screws): (&[Site], &[Site]) = match kind.places {
-            Places::Joints => (&sites.joints, &[]),
-            Places::Screws if sites.screws.is_empty() => {
+        let (joints, screws): (&[Site], &[Site]) = match entry.places {
+            Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
+            Places::Actuators if sites.screws.is_empty() => {
                 return Err(refuse(
                     "it sits at the screws of the CFT robot, x_r and y_r; a single joint's own \
                      friction is `nonlinear-viscous`, `asymmetric-friction` or `stribeck`",
                 ));
             }
-            Places::Screws => (&[], &sites.screws),
-            Places::JointsAndScrews => (&sites.joints, &sites.screws),
+            Places::Actuators => (&[], &sites.screws),
+            Places::JointsAndActuators => (&sites.joints, &sites.screws),
             Places::Whole if self.joint.is_some() => {
                 return Err(refuse(
                     "it concerns all joints together; leave the joint out",
@@ -142,52 +147,52 @@ impl EffectSpec {
         })
     }
 
-    /// One number per key of the kind.
-    pub(super) fn numbers(&self, kind: &Kind, site: &Site) -> Result<Vec<f64>, SimulateError> {
+    /// One number per key of the effect.
+    pub(super) fn numbers(&self, law: &PlantLaw, site: &Site) -> Result<Vec<f64>, SimulateError> {
+        let keys = law.entry.keys;
         for (key, _) in &self.values {
-            if !kind.keys.iter().any(|known| known.name == key) {
+            if law.entry.key(key).is_none() {
                 return Err(SimulateError::UnknownKey {
-                    effect: kind.name.to_owned(),
+                    effect: law.entry.name.to_owned(),
                     key: key.clone(),
-                    known: kind
-                        .keys
-                        .iter()
-                        .map(|k| k.name)
-                        .collect::<Vec<_>>()
-                        .join(", "),
+                    known: keys.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
                 });
             }
         }
         let given = |key: &Key| self.values.iter().find(|(k, _)| k == key.name);
-        let sized = kind.keys.iter().any(|key| key.size && given(key).is_some());
-        let number = |key: &Key| match given(key) {
+        let sized = keys.iter().any(|key| key.size && given(key).is_some());
+        let number = |(key, default): (&Key, f64)| match given(key) {
             Some((_, number)) => *number,
             None if key.size && sized => 0.0,
-            None => (key.default)(site),
+            None => default,
         };
-        Ok(kind.keys.iter().map(number).collect())
+        let defaults = (law.defaults)(site);
+        Ok(keys.iter().zip(defaults).map(number).collect())
     }
 }
 
 impl EffectValue {
-    pub(super) fn new(kind: &Kind, site: &Site, machine: &Machine, numbers: &[f64]) -> Self {
-        let pairs = || kind.keys.iter().zip(numbers);
+    pub(super) fn new(entry: &Entry, site: &Site, machine: &Machine, numbers: &[f64]) -> Self {
+        let pairs = || entry.keys.iter().zip(numbers);
+        let kind = |turns: bool| match turns {
+            true => JointKind::Revolute,
+            false => JointKind::Prismatic,
+        };
+        let own = kind(site.turns);
         // Joints are counted from one; `from` is a joint where units follow it.
-        let joint = |(key, _): &(&Key, &f64)| key.name == "from" && kind.name == "coupling";
-        let from = pairs()
-            .find(joint)
-            .is_some_and(|(_, number)| machine.turns((*number - 1.0).max(0.0) as usize));
+        let from = pairs().find(|(key, _)| entry.places == Places::Pairs && key.name == "from");
+        let from = from.map_or(own, |(_, number)| {
+            kind(machine.turns((*number - 1.0).max(0.0) as usize))
+        });
+        let torque = if site.turns { "Nm" } else { "N" };
         let parameter = |(key, &value): (&Key, &f64)| {
-            let parameter = EffectParameter {
-                value,
-                unit: key.unit.text(site.turns, from).to_owned(),
-            };
-            (key.name.to_owned(), parameter)
+            let unit = key.unit.text(own, from, torque);
+            (key.name.to_owned(), EffectParameter { value, unit })
         };
         Self {
-            effect: kind.name.to_owned(),
-            family: kind.family.to_owned(),
-            joint: (site.place != Place::Whole).then(|| site.name.clone()),
+            effect: entry.name.to_owned(),
+            family: entry.family().name().to_owned(),
+            joint: (site.place != Place::All).then(|| site.name.clone()),
             parameters: pairs().map(parameter).collect(),
         }
     }

@@ -1,18 +1,11 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3, a cable or a return spring.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::spring::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "spring",
-    family: "position",
-    places: Places::Joints,
-    keys: &[
-        Key::size("k", Unit::Stiffness, |site| {
-            0.3 * site.scale / site.half_travel()
-        }),
-        Key::shape("q0", Unit::Position, |site| site.middle()),
-        Key::size("k3", Unit::Cubic, |_| 0.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.3 * site.scale / site.half_travel(), site.middle(), 0.0],
     build: |site, _, values| {
         Built::plant(Spring {
             joint: site.joint(),

@@ -1,25 +1,12 @@
 //! `stribeck`: more friction near standstill, c sgn(v) exp(-(v/vs)^2).
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit, sign};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw, sign};
+use crate::effect::stribeck::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "stribeck",
-    family: "velocity",
-    places: Places::Joints,
-    keys: &[
-        Key::size("c", Unit::Torque, |site| 0.2 * site.scale),
-        Key::shape("vs", Unit::Speed, |site| 0.2 * site.speed),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.2 * site.scale, 0.2 * site.speed],
     build: |site, _, values| {
-        if values[1] <= 0.0 {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: "vs".to_owned(),
-                value: values[1],
-                rule: "must be above 0".to_owned(),
-            });
-        }
         Built::plant(Stribeck {
             joint: site.joint(),
             c: values[0],

@@ -1,17 +1,11 @@
 //! `stuck-channel`: a channel shows its last value from the time `at` on for `seconds`.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::stuck_channel::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "stuck-channel",
-    family: "data",
-    places: Places::Joints,
-    keys: &[
-        Key::shape("at", Unit::Fixed("s"), |_| 5.0),
-        Key::shape("seconds", Unit::Fixed("s"), |_| 1.0),
-        // 1 the torque, 0 the position.
-        Key::shape("torque", Unit::Fixed("1"), |_| 1.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![5.0, 1.0, 1.0],
     build: |site, _, values| {
         Built::log(StuckChannel {
             joint: site.joint(),

@@ -1,12 +1,11 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::torque_offset::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "torque-offset",
-    family: "offset",
-    places: Places::Joints,
-    keys: &[Key::size("c", Unit::Torque, |site| 0.1 * site.scale)],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.1 * site.scale],
     build: |site, _, values| {
         Built::plant(TorqueOffset {
             joint: site.joint(),

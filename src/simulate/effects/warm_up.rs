@@ -1,36 +1,12 @@
 //! `warm-up`: the joint's friction times 1 + k (1 - exp(-t/T)), with k < 0 when it falls.
 
-use super::{Built, Effect, Key, Kind, Motion, Places, Unit};
-use crate::simulate::SimulateError;
+use super::{Built, Effect, Motion, PlantLaw};
+use crate::effect::warm_up::ENTRY;
 
-pub const KIND: Kind = Kind {
-    name: "warm-up",
-    family: "slow",
-    places: Places::Joints,
-    keys: &[
-        Key::size("k", Unit::Fixed("1"), |_| -0.2),
-        Key::shape("T", Unit::Fixed("s"), |_| 20.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![-0.2, 20.0],
     build: |site, _, values| {
-        let bad = if values[0] < -1.0 {
-            Some((
-                "k",
-                values[0],
-                "must be at least -1, or friction drives the joint",
-            ))
-        } else if values[1] <= 0.0 {
-            Some(("T", values[1], "must be above 0 s"))
-        } else {
-            None
-        };
-        if let Some((key, value, rule)) = bad {
-            return Err(SimulateError::EffectNumber {
-                effect: KIND.name.to_owned(),
-                key: key.to_owned(),
-                value,
-                rule: rule.to_owned(),
-            });
-        }
         Built::plant(WarmUp {
             joint: site.joint(),
             k: values[0],

@@ -3,21 +3,17 @@
 //! `sign=1` turns the sign, `swap` is the number of the joint, counted from one, whose torque channel changes
 //! places with this one's.
 
-use super::{Built, Fault, Key, Kind, Log, Places, Unit};
+use super::{Built, Fault, Log, PlantLaw};
+use crate::effect::wrong_sign_or_order::ENTRY;
 use crate::simulate::SimulateError;
 
-pub const KIND: Kind = Kind {
-    name: "wrong-sign-or-order",
-    family: "data",
-    places: Places::Joints,
-    keys: &[
-        Key::size("sign", Unit::Fixed("1"), |_| 1.0),
-        Key::size("swap", Unit::Fixed("1"), |_| 0.0),
-    ],
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![1.0, 0.0],
     build: |site, machine, values| {
         let (sign, swap) = (values[0], values[1]);
         let refuse = |key: &str, value: f64, rule: String| SimulateError::EffectNumber {
-            effect: KIND.name.to_owned(),
+            effect: ENTRY.name.to_owned(),
             key: key.to_owned(),
             value,
             rule,
