@@ -68,15 +68,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .map(|s| s.given.provenance.clone())
         .collect();
     if let Some(tried) = &of.tried {
-        read.extend(tried.held.inputs.iter().cloned());
+        read.extend(tried.in_memory.inputs.iter().cloned());
     }
     let document = Document::new("compare", &read, &of.warnings, &of.result())?;
     let names = names_of(&args.logs);
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));
     if args.report.is_some() {
-        let held = of.tried.as_ref().map(|tried| &tried.held);
-        let look = pictures::look(&of.machine, held, &names)?;
+        let in_memory = of.tried.as_ref().map(|tried| &tried.in_memory);
+        let look = pictures::look(&of.machine, in_memory, &names)?;
         let quality = pictures::inspected(&args.logs, &of.machine, context)?;
         let (mut page, command) = (report.page(), context.command());
         stages::compare::pictures(&mut page, &of, &read, look.as_ref(), &quality, command)

@@ -94,7 +94,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             });
         }
     };
-    let (inputs, warnings) = (&found.held.inputs, &found.held.warnings);
+    let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
     let document = Document::new("diagnose", inputs, warnings, &found.result(&machine))?;
     let of = stages::diagnose::Diagnose {
         machine: &machine,

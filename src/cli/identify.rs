@@ -162,11 +162,11 @@ fn execute(
         limit: campaign.settings.max_relative_error,
     };
     let mut report = stages::identify::identify(&of);
-    let held = match residuals.as_str() {
+    let in_memory = match residuals.as_str() {
         "" if !unseen.is_empty() => pictures::in_memory(&machine, &role_logs.validation, context)?,
         _ => None,
     };
-    let look = pictures::look(&machine, held.as_ref(), &unseen_names)?;
+    let look = pictures::look(&machine, in_memory.as_ref(), &unseen_names)?;
     let all = one_joint.iter().chain(&training).chain(&unseen);
     let origin = stages::identify::Origin {
         campaign: &toml::to_string(campaign).unwrap_or_default(),

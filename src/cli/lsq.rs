@@ -89,8 +89,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let held = pictures::in_memory(&machine, &logs, context)?;
-        let look = pictures::look(&machine, held.as_ref(), &names)?;
+        let in_memory = pictures::in_memory(&machine, &logs, context)?;
+        let look = pictures::look(&machine, in_memory.as_ref(), &names)?;
         let numbers = refined(&model, &args.output.to_string_lossy())?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         stages::lsq::pictures(

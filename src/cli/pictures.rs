@@ -17,7 +17,7 @@ pub(super) fn in_memory(
     context: &Context,
 ) -> Result<Option<InMemory>, CliError> {
     match identify::read_whole(machine, logs, context.control()) {
-        Ok(held) => Ok(Some(held)),
+        Ok(in_memory) => Ok(Some(in_memory)),
         Err(IdentifyError::TooManySamples { .. } | IdentifyError::SampledUnlike { .. }) => Ok(None),
         Err(error) => Err(error.into()),
     }
@@ -29,10 +29,10 @@ pub(super) fn in_memory(
 /// Settings that the sampling rate does not carry.
 pub(super) fn look<'a>(
     machine: &'a LoggedRobot,
-    held: Option<&'a InMemory>,
+    in_memory: Option<&'a InMemory>,
     names: &[String],
 ) -> Result<Option<Look<'a>>, CliError> {
-    let look = held.map(|held| Look::new(machine, held, names.iter().cloned()));
+    let look = in_memory.map(|in_memory| Look::new(machine, in_memory, names.iter().cloned()));
     look.transpose().map_err(CliError::input)
 }
 

@@ -134,8 +134,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::validate::validate(&of);
     if args.report.is_some() {
-        let held = pictures::in_memory(&machine, &logs, context)?;
-        let look = pictures::look(&machine, held.as_ref(), &names)?;
+        let in_memory = pictures::in_memory(&machine, &logs, context)?;
+        let look = pictures::look(&machine, in_memory.as_ref(), &names)?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();
         stages::validate::pictures(&mut page, &of, look.as_ref(), &quality, context.command())

@@ -41,7 +41,7 @@ pub struct Side {
 
 /// Both models on the same logs.
 pub struct Tried {
-    pub held: InMemory,
+    pub in_memory: InMemory,
     pub validations: [Validation; 2],
     pub differences: ErrorDifferences,
 }
@@ -162,7 +162,7 @@ impl Tried {
                 b: b.overall,
                 difference: self.differences.overall,
             },
-            processing: self.held.summary.clone(),
+            processing: self.in_memory.summary.clone(),
         }
     }
 }
@@ -250,7 +250,7 @@ pub fn compare(
         logs => Some(on_logs(&machine, &sides, logs, control)?),
     };
     if let Some(tried) = &tried {
-        warnings.extend(tried.held.warnings.iter().cloned());
+        warnings.extend(tried.in_memory.warnings.iter().cloned());
     }
     Ok(Compared {
         table: compare::side_by_side(&sides[0].given.file, &sides[1].given.file),
@@ -268,27 +268,28 @@ fn on_logs(
     logs: &[Log],
     control: &Control,
 ) -> Result<Tried, IdentifyError> {
-    let held = read_whole(machine, logs, control)?;
+    let in_memory = read_whole(machine, logs, control)?;
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);
     let validation = |side: &Side| {
         let mut all = Reconstruction::new(&side.model.model);
-        for (segment, stretch) in held.stretches.iter().enumerate() {
+        for (segment, stretch) in in_memory.stretches.iter().enumerate() {
             let hat = side.model.reconstruct(stretch);
             all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})
                 .map_err(named)?;
         }
-        let mut validation = all.finish(held.summary.clone());
+        let mut validation = all.finish(in_memory.summary.clone());
         machine.name_units(&mut validation);
         Ok::<_, IdentifyError>(validation)
     };
     let validations = [validation(&sides[0])?, validation(&sides[1])?];
     control.check()?;
-    let parallel = Parallel::design(&settings, held.summary.dt).map_err(named)?;
+    let parallel = Parallel::design(&settings, in_memory.summary.dt).map_err(named)?;
     let models = sides.each_ref().map(|side| &side.model);
-    let differences = compare::differences(models, &held.stretches, &parallel).map_err(named)?;
+    let differences =
+        compare::differences(models, &in_memory.stretches, &parallel).map_err(named)?;
     Ok(Tried {
-        held,
+        in_memory,
         validations,
         differences,
     })
@@ -306,7 +307,7 @@ fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Ve
             });
             laws.iter().flatten().next()?;
             let seen = tried.and_then(|tried| {
-                let all = tried.held.stretches.iter().filter_map(|s| s.v.get(j));
+                let all = tried.in_memory.stretches.iter().filter_map(|s| s.v.get(j));
                 let most = all.flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
                 (most > 0.0).then_some(most)
             });

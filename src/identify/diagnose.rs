@@ -54,7 +54,7 @@ pub enum DiagnoseEnd {
 pub struct Diagnosed {
     pub diagnosis: Diagnosis,
     /// The logs that it looked at.
-    pub held: InMemory,
+    pub in_memory: InMemory,
     /// Names of the logs, in order: fitted, veto, holdout.
     pub logs: Vec<String>,
     /// The model as it was given.
@@ -95,8 +95,14 @@ pub fn diagnose(
     let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
-    let mut held = read_whole(machine, &all, control)?;
-    let case = case(machine, (name, file), given, &mut held, (roles, settings))?;
+    let mut in_memory = read_whole(machine, &all, control)?;
+    let case = case(
+        machine,
+        (name, file),
+        given,
+        &mut in_memory,
+        (roles, settings),
+    )?;
     let work = control.begin("search", None);
     let found = diagnose::diagnose(
         &case,
@@ -112,7 +118,7 @@ pub fn diagnose(
         Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
         Err(error) => return Err(IdentifyError::Diagnose(error)),
     };
-    held.stretches = case.stretches;
+    in_memory.stretches = case.stretches;
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -125,7 +131,7 @@ pub fn diagnose(
     }
     Ok(DiagnoseEnd::Diagnosed(Box::new(Diagnosed {
         diagnosis,
-        held,
+        in_memory,
         logs,
         given: case.given,
         parallel: case.parallel,
@@ -157,15 +163,15 @@ fn case(
     machine: &LoggedRobot,
     (name, file): (&str, &ModelFile),
     given: AugmentedModel,
-    held: &mut InMemory,
+    in_memory: &mut InMemory,
     (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
 ) -> Result<Case, IdentifyError> {
     let processing = machine.settings();
-    let parallel = Parallel::design(&processing, held.summary.dt)
+    let parallel = Parallel::design(&processing, in_memory.summary.dt)
         .map_err(|error| IdentifyError::motion(name, error))?;
     let open = open(machine, file, &given);
-    let rate = 1.0 / (held.summary.dt * parallel.decimation as f64);
-    let alone = moved_alone(&given, &held.stretches, &roles);
+    let rate = 1.0 / (in_memory.summary.dt * parallel.decimation as f64);
+    let alone = moved_alone(&given, &in_memory.stretches, &roles);
     let prior = ParameterPrior {
         information: information(file, &given, &open, settings.keep, &alone),
         centre: given.clone(),
@@ -175,14 +181,14 @@ fn case(
         given,
         prior,
         open,
-        stretches: std::mem::take(&mut held.stretches),
+        stretches: std::mem::take(&mut in_memory.stretches),
         roles,
         parallel,
         cutoff_hz: processing.cutoff_hz,
         units: (0..machine.robot.joints())
             .map(|j| machine.file.torque_unit(j).to_owned())
             .collect(),
-        averaged: held.averaged,
+        averaged: in_memory.averaged,
         keep: settings.keep,
         without: Vec::new(),
         limits: settings.limits,
@@ -234,7 +240,7 @@ impl Diagnosed {
     /// The refined model, where `file` is the one that was given.
     pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
         let diagnosis = &self.diagnosis;
-        let mut model = new_model(machine, "diagnose", &self.held.inputs);
+        let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();

@@ -241,7 +241,7 @@ impl Diagnosed {
             candidates: candidates.map(|c| candidate(machine, c)).collect(),
             set_aside: Some(aside.collect()),
             episodes: Some(episodes.collect()),
-            processing: Some(self.held.summary.clone()),
+            processing: Some(self.in_memory.summary.clone()),
             faults: Vec::new(),
         }
     }

@@ -118,15 +118,15 @@ impl LoggedRobot {
         })
     }
 
-    /// Opens a log, its torques as logged, and says whether they are held from row to row.
+    /// Opens a log, its torques as logged, and says whether each holds until the next row.
     pub(super) fn open_raw<'a>(
         &self,
         log: &Log,
         control: &'a Control,
     ) -> Result<(OpenLog<'a>, bool), IdentifyError> {
         let open = self.open_as(log, &self.file.layout(), control)?;
-        let held = self.file.zero_order_hold(open.reader.layout().channels);
-        Ok((open, held))
+        let zero_order_hold = self.file.zero_order_hold(open.reader.layout().channels);
+        Ok((open, zero_order_hold))
     }
 
     /// Opens a log for its positions alone: it needs no torque channels.
@@ -171,8 +171,9 @@ impl LoggedRobot {
         log: &Log,
         control: &'a Control,
     ) -> Result<OpenLog<'a>, IdentifyError> {
-        let (mut open, held) = self.open_raw(log, control)?;
-        open.centre = held.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
+        let (mut open, zero_order_hold) = self.open_raw(log, control)?;
+        open.centre =
+            zero_order_hold.then(|| (&self.robot, ZeroOrderHold::new(self.robot.joints())));
         Ok(open)
     }
 
@@ -206,7 +207,7 @@ impl LoggedRobot {
                 Some(DifferencesKind::Central) => Differences::Central,
                 Some(DifferencesKind::HighOrder) | None => Differences::HighOrder,
             },
-            // held torques are brought to their rows' time as the log is read
+            // torques that hold are brought to their rows' time as the log is read
             torque: TorqueTiming::Sampled,
             gap_factor: f.gap_factor.unwrap_or(plain.gap_factor),
             q_trim_s: f.position_trim_s,

@@ -1,4 +1,4 @@
-//! Logs held in memory beside the models that are looked at on them.
+//! Logs in memory beside the models that are looked at on them.
 
 use crate::diagnose::{JointEvidence, evidence};
 use crate::effect::AugmentedModel;
@@ -23,14 +23,14 @@ impl<'a> Look<'a> {
     /// Settings that the sampling rate does not carry.
     pub fn new(
         machine: &'a LoggedRobot,
-        held: &'a InMemory,
+        in_memory: &'a InMemory,
         logs: impl Iterator<Item = String>,
     ) -> Result<Self, MotionError> {
         let settings = machine.settings();
-        let parallel = Parallel::design(&settings, held.summary.dt)?;
+        let parallel = Parallel::design(&settings, in_memory.summary.dt)?;
         Ok(Look {
             machine,
-            stretches: &held.stretches,
+            stretches: &in_memory.stretches,
             names: logs.map(|name| escape(&name)).collect(),
             parallel,
             cutoff_hz: settings.cutoff_hz,

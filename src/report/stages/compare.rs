@@ -34,7 +34,7 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
         let mut page = report.page();
         page.list(&of.warnings);
         page.table(errors);
-        used_before(&mut page, of, &tried.held.inputs);
+        used_before(&mut page, of, &tried.in_memory.inputs);
     } else {
         report.page().list(&of.warnings);
     }
@@ -80,7 +80,7 @@ pub fn pictures(
         torque::section(page, look, &all, &models, &look.names.join(", "))?;
         quality::section(page, quality, &[]);
     }
-    let summary = of.tried.as_ref().map(|tried| &tried.held.summary);
+    let summary = of.tried.as_ref().map(|tried| &tried.in_memory.summary);
     let made_from = of.sides.iter();
     let made_from = made_from.flat_map(|side| side.given.file.provenance.inputs.iter().cloned());
     let mut made_from: Vec<Provenance> = made_from.collect();

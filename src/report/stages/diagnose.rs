@@ -63,10 +63,10 @@ pub fn pictures(
     friction::section(page, &curves);
     page.heading("What the model hardly tells apart");
     fit::pairs(page, &refined);
-    quality::section(page, quality, &found.held.warnings);
+    quality::section(page, quality, &found.in_memory.warnings);
     let mut inputs = vec![of.given.clone()];
-    inputs.extend(found.held.inputs.iter().cloned());
-    let (summary, made_from) = (Some(&found.held.summary), &of.file.provenance.inputs);
+    inputs.extend(found.in_memory.inputs.iter().cloned());
+    let (summary, made_from) = (Some(&found.in_memory.summary), &of.file.provenance.inputs);
     provenance::section(page, &machine.file, &inputs, made_from, summary, command);
     Ok(())
 }
@@ -296,7 +296,7 @@ pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure
 }
 
 fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, MotionError> {
-    Look::new(machine, &found.held, found.logs.iter().cloned())
+    Look::new(machine, &found.in_memory, found.logs.iter().cloned())
 }
 
 /// The verdict in words, and whether nothing calls for attention.

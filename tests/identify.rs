@@ -1,0 +1,125 @@
+//! The library below the command line: arrays in memory give what a file gives, a callback stops a
+//! stage and hears of its progress, and errors say what they are about.
+
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
+
+use cft_ident::config::RobotFile;
+use cft_ident::identify::{
+    Control, ErrorKind, IdentifiedDynamics, IdentifyError, Log, LoggedRobot, LsqSettings, Progress,
+    lsq, refined, validate,
+};
+use cft_ident::log::LogSpec;
+use nalgebra::DMatrix;
+
+/// A carriage on a screw: 3 kg, viscous 5 N s/m, Coulomb 2 N.
+const ROBOT: &str = r#"
+    robot = { model = "single-joint", joint = "q1", kind = "prismatic" }
+    friction = { law = "viscous-coulomb", fitted_with_inertias = true }
+"#;
+
+fn robot() -> LoggedRobot {
+    LoggedRobot::new("screw.toml", RobotFile::parse("screw.toml", ROBOT).unwrap())
+}
+
+/// Time, position and force, 8 s at 500 Hz.
+fn motion() -> [Vec<f64>; 3] {
+    let t: Vec<f64> = (0..4000).map(|k| 0.002 * f64::from(k)).collect();
+    let waves = [(0.1, 2.1), (0.02, 7.3)];
+    let sum = |of: &dyn Fn(f64, f64, f64) -> f64| -> Vec<f64> {
+        t.iter()
+            .map(|t| waves.iter().map(|(a, w)| of(*a, *w, *t)).sum())
+            .collect()
+    };
+    let q = sum(&|a, w, t| a * (w * t).sin());
+    let v = sum(&|a, w, t| a * w * (w * t).cos());
+    let a = sum(&|a, w, t| -a * w * w * (w * t).sin());
+    let force = v
+        .iter()
+        .zip(&a)
+        .map(|(v, a)| 3.0 * a + 5.0 * v + 2.0 * v.signum());
+    let force = force.collect();
+    [t, q, force]
+}
+
+fn fitted(log: Log) -> Result<IdentifiedDynamics, IdentifyError> {
+    lsq(
+        &robot(),
+        &[log],
+        &LsqSettings::default(),
+        &Control::default(),
+    )
+}
+
+#[test]
+fn arrays_in_memory_give_what_a_file_of_them_gives() {
+    let [t, q, tau] = motion();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("screw.csv");
+    let mut text = "t,q_q1,tau_q1\n".to_owned();
+    for ((t, q), tau) in t.iter().zip(&q).zip(&tau) {
+        writeln!(text, "{t:?},{q:?},{tau:?}").unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let of_file = fitted(LogSpec::whole(&path).into()).unwrap();
+    let of_rows = fitted(Log::of_rows("screw", &t, &q, &tau).unwrap()).unwrap();
+    let column = |x: &[f64]| DMatrix::from_column_slice(x.len(), 1, x);
+    let of_matrices = Log::of_matrices("screw", &t, &column(&q), &column(&tau)).unwrap();
+    let of_matrices = fitted(of_matrices).unwrap();
+    assert_eq!(of_file.unknowns, of_rows.unknowns);
+    assert_eq!(of_file.unknowns, of_matrices.unknowns);
+    let mass = of_file.unknowns[0].fitted;
+    assert!((mass - 3.0).abs() < 0.01, "{mass}");
+    let [input] = of_rows.inputs.as_slice() else {
+        panic!("one log, one input")
+    };
+    assert_eq!((input.name.as_str(), input.samples), ("screw", 4000));
+    assert_eq!(input.sha256.len(), 64);
+}
+
+#[test]
+fn a_model_that_was_fitted_is_validated_without_a_file() {
+    let [t, q, tau] = motion();
+    let robot = robot();
+    let log = [Log::of_rows("screw", &t, &q, &tau).unwrap()];
+    let control = Control::default();
+    let found = lsq(&robot, &log, &LsqSettings::default(), &control).unwrap();
+    let model = refined(&found.model(&robot, None), "model").unwrap();
+    let mut rows = 0;
+    let validated = validate(&robot, &model, &log, &control, &mut |_, _| rows += 1).unwrap();
+    assert!(validated.validation.joints[0].relative_error < 0.01);
+    assert!(rows > 3000, "{rows}");
+}
+
+#[test]
+fn a_callback_stops_a_stage_and_hears_of_its_progress() {
+    let [t, q, tau] = motion();
+    let log = [Log::of_rows("screw", &t, &q, &tau).unwrap()];
+    let said = Arc::new(Mutex::new(Vec::new()));
+    let heard = Arc::clone(&said);
+    let control = Control::default().told_to(move |progress| {
+        if let Progress::Begin(work, _) = progress {
+            heard.lock().unwrap().push(work.to_owned());
+        }
+    });
+    lsq(&robot(), &log, &LsqSettings::default(), &control).unwrap();
+    assert_eq!(*said.lock().unwrap(), ["least squares"]);
+    let stopped = Control::default().stopped_by(|| true);
+    let error = lsq(&robot(), &log, &LsqSettings::default(), &stopped)
+        .err()
+        .unwrap();
+    assert_eq!(error.kind(), ErrorKind::Interrupted);
+}
+
+#[test]
+fn errors_know_what_they_are_about() {
+    let [t, q, tau] = motion();
+    let kind = |log: Log| fitted(log).err().unwrap().kind();
+    let mut wrong = q.clone();
+    wrong[7] = f64::NAN;
+    let log = Log::of_rows("screw", &t, &wrong, &tau).unwrap();
+    assert_eq!(kind(log), ErrorKind::Input);
+    let none = lsq(&robot(), &[], &LsqSettings::default(), &Control::default());
+    assert_eq!(none.err().unwrap().kind(), ErrorKind::Usage);
+    assert!(Log::of_rows("screw", &t, &q, &tau[1..]).is_err());
+}
