@@ -5,15 +5,15 @@
 //! x = x0 + B' (B B')^-1 (theta - B x0); the diagonal of B' (B B')^-1 B is 1 where the data determine
 //! a parameter by itself, and 0 where they say nothing of it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::config::serial_section::InertialSection;
 use crate::robot::Robot;
 use crate::robot::standard::STANDARD;
 
-/// What torques say of a standard parameter.
+/// What torques tell of a standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Told {
+pub enum Identifiability {
     /// Its value.
     Alone,
     /// Only the sum of it and others.
@@ -25,11 +25,11 @@ pub enum Told {
 /// Mass that is taken for a link whose mass nothing tells [kg].
 pub const UNTOLD_MASS: f64 = 1.0;
 
-/// Standard parameters of every link, then of the drives, and what is told of each.
+/// Standard parameters of every link, then of the drives, and whether torques tell them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standard {
     pub values: Vec<f64>,
-    pub told: Vec<Told>,
+    pub identifiability: Vec<Identifiability>,
     /// Whether the priors give these torques as they are.
     pub is_prior: bool,
 }
@@ -62,19 +62,13 @@ pub fn nearest(
         }
     }
     let prior = x.clone();
-    let groupings = robot.groupings();
-    let mut b = DMatrix::zeros(groupings.len(), p);
-    for (row, grouping) in groupings.iter().enumerate() {
-        b[(row, grouping.kept)] = 1.0;
-        for (column, c) in &grouping.terms {
-            b[(row, *column)] += c;
-        }
-    }
-    let theta =
-        DVector::from_iterator(groupings.len(), theta.iter().copied().take(groupings.len()));
+    // couplings are no part of a link
+    let rows = robot.groupings().len();
+    let b = robot.standard_map().matrix.rows(0, rows).into_owned();
+    let theta = DVector::from_column_slice(&theta[..rows]);
     // every row has a column of its own, so that B B' is positive definite
     let gram = &b * b.transpose();
-    let mut told = vec![Told::Nothing; p];
+    let mut told = vec![Identifiability::Nothing; p];
     if let Some(factor) = gram.cholesky() {
         // once more, for the last digits
         for _ in 0..2 {
@@ -85,16 +79,16 @@ pub fn nearest(
         for (i, told) in told.iter_mut().enumerate() {
             let share = b.column(i).dot(&shares.column(i));
             *told = match share {
-                share if share > 1.0 - 1e-9 => Told::Alone,
-                share if share > 1e-9 => Told::InSum,
-                _ => Told::Nothing,
+                share if share > 1.0 - 1e-9 => Identifiability::Alone,
+                share if share > 1e-9 => Identifiability::InSum,
+                _ => Identifiability::Nothing,
             };
         }
     }
     let moved = (&x - &prior).amax() / prior.amax().max(f64::MIN_POSITIVE);
     Standard {
         values: x.iter().copied().collect(),
-        told,
+        identifiability: told,
         is_prior: moved < SAME,
     }
 }

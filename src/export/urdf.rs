@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::standard::{Standard, Told, nearest};
+use super::standard::{Identifiability, Standard, nearest};
 use super::{ExportError, single};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
-use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::InertialSection;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::{Body, STANDARD, STANDARD_NAMES};
-use crate::robot::tree::space::{about, add, product, roll_pitch_yaw, times, turn};
+use crate::robot::tree::space::{Vector, about, add, product, roll_pitch_yaw, times, turn};
 use crate::robot::tree::{Coordinate, Link};
 use crate::robot::{JointKind, Robot};
 
@@ -72,7 +71,7 @@ pub fn urdf(
         root(robot, file)
     );
     for (i, link) in robot.tree().links().iter().enumerate() {
-        joint(&mut out, robot, model, file, i, link)?;
+        joint(&mut out, model, file, i, link)?;
         body(&mut out, i, link, &standard)?;
     }
     frames(&mut out, robot, file);
@@ -181,52 +180,82 @@ fn words(values: &[f64]) -> String {
     all.join(" ")
 }
 
+/// What moves a link, in the words of a URDF.
+enum Drive {
+    /// The independent joint of this index.
+    Joint(usize),
+    /// A multiple of one: its name, the factor, an offset.
+    Mimic(String, f64, f64),
+    /// Nothing: the link is at rest at this offset.
+    Rest(f64),
+}
+
+fn drive(robot: &Robot, link: &Link) -> Result<Drive, ExportError> {
+    let follows = match &link.coordinate {
+        Coordinate::Joint(j) => return Ok(Drive::Joint(*j)),
+        Coordinate::Follows(follows) => follows,
+    };
+    match (&follows.linear[..], &follows.sines[..]) {
+        ([], []) => Ok(Drive::Rest(follows.offset)),
+        ([(j, factor)], []) => {
+            let joint = robot.joint_names()[*j].clone();
+            Ok(Drive::Mimic(joint, *factor, follows.offset))
+        }
+        _ => Err(ExportError::NotInUrdf {
+            what: format!(
+                "link `{}`, which follows several joints or the sine of one",
+                link.name
+            ),
+            remedy: "export it with --c or --rust",
+        }),
+    }
+}
+
+/// Where a joint sits: position, then roll, pitch and yaw.
+fn placement(file: &ModelFile, i: usize, link: &Link, drive: &Drive) -> [Vector; 2] {
+    // what the robot file says in these words is kept to the last digit
+    let section = file.robot.robot.link.get(i);
+    let said = section.filter(|s| s.xyz.is_some() || s.rpy.is_some());
+    let (xyz, rpy) = match said {
+        Some(s) => (s.xyz.unwrap_or_default(), s.rpy.unwrap_or_default()),
+        None => (link.origin, roll_pitch_yaw(&link.rotation)),
+    };
+    match (drive, link.kind) {
+        (Drive::Rest(at), JointKind::Revolute) => {
+            let turned = product(&link.rotation, &about(&link.axis, *at));
+            [xyz, roll_pitch_yaw(&turned)]
+        }
+        (Drive::Rest(at), JointKind::Prismatic) => {
+            let moved = turn(&link.rotation, &times(*at, &link.axis));
+            [add(&xyz, &moved), rpy]
+        }
+        _ => [xyz, rpy],
+    }
+}
+
+/// The joint before a link.
 fn joint(
     out: &mut String,
-    robot: &Robot,
     model: &Model,
     file: &ModelFile,
     i: usize,
     link: &Link,
 ) -> Result<(), ExportError> {
+    let robot = &model.robot;
     let names = robot.joint_names();
-    let section = file.robot.robot.link.get(i);
-    let mut mimic = None;
-    let mut driven = None;
-    let name = match &link.coordinate {
-        Coordinate::Joint(j) => {
-            driven = Some(*j);
-            names[*j].clone()
-        }
-        Coordinate::Follows(d) => {
-            let several = d.linear.len() > 1 || !d.sines.is_empty();
-            match (&d.linear[..], several) {
-                ([(j, c)], false) => mimic = Some((names[*j].clone(), *c, d.offset)),
-                ([], false) => {}
-                _ => {
-                    return Err(ExportError::NotInUrdf {
-                        what: format!(
-                            "link `{}`, which follows several joints or the sine of one",
-                            link.name
-                        ),
-                        remedy: "export it with --c or --rust",
-                    });
-                }
-            }
-            let mut name = format!("{}_joint", link.name);
-            while names.contains(&name) {
-                name.push_str("_follows");
-            }
-            name
-        }
-    };
-    let limits = driven.and_then(|j| file.robot.limits.get(&names[j]));
-    let none = CoordinateLimits::default();
-    let limits = limits.unwrap_or(&none);
-    // a link that follows nothing is at rest at its offset
-    let rests = driven.is_none() && mimic.is_none();
-    let kind = match (rests, link.kind, limits.position) {
-        (true, ..) => "fixed",
+    let drive = drive(robot, link)?;
+    let mut name = format!("{}_joint", link.name);
+    while names.contains(&name) {
+        name.push_str("_follows");
+    }
+    let mut limits = None;
+    if let Drive::Joint(j) = drive {
+        name = names[j].clone();
+        limits = file.robot.limits.get(&name);
+    }
+    let limits = limits.cloned().unwrap_or_default();
+    let kind = match (&drive, link.kind, limits.position) {
+        (Drive::Rest(_), ..) => "fixed",
         (_, JointKind::Prismatic, _) => "prismatic",
         (_, JointKind::Revolute, Some(_)) => "revolute",
         (_, JointKind::Revolute, None) => "continuous",
@@ -235,22 +264,7 @@ fn joint(
         None => root(robot, file),
         Some(parent) => robot.tree().links()[parent].name.clone(),
     };
-    // what the robot file says in these words is kept to the last digit
-    let said = section.filter(|s| s.xyz.is_some() || s.rpy.is_some());
-    let (mut xyz, mut rpy) = match said {
-        Some(s) => (s.xyz.unwrap_or_default(), s.rpy.unwrap_or_default()),
-        None => (link.origin, roll_pitch_yaw(&link.rotation)),
-    };
-    if rests && let Coordinate::Follows(d) = &link.coordinate {
-        match link.kind {
-            JointKind::Revolute => {
-                rpy = roll_pitch_yaw(&product(&link.rotation, &about(&link.axis, d.offset)));
-            }
-            JointKind::Prismatic => {
-                xyz = add(&xyz, &turn(&link.rotation, &times(d.offset, &link.axis)));
-            }
-        }
-    }
+    let [xyz, rpy] = placement(file, i, link, &drive);
     let _ = write!(
         out,
         "\n  <joint name=\"{}\" type=\"{kind}\">\n    <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    \
@@ -261,7 +275,7 @@ fn joint(
         words(&xyz),
         words(&rpy)
     );
-    if !rests {
+    if kind != "fixed" {
         let _ = writeln!(out, "    <axis xyz=\"{}\"/>", words(&link.axis));
         if kind != "continuous" || limits.speed.is_some() || limits.torque.is_some() {
             let ends = limits.position.map_or(String::new(), |[low, high]| {
@@ -275,19 +289,24 @@ fn joint(
             );
         }
     }
-    if let Some(JointFriction::ViscousCoulomb(law)) = driven.map(|j| &model.friction[j]) {
-        let _ = writeln!(
-            out,
-            "    <dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
-            law.viscous, law.coulomb
-        );
-    }
-    if let Some((joint, factor, offset)) = mimic {
-        let _ = writeln!(
-            out,
-            "    <mimic joint=\"{}\" multiplier=\"{factor:?}\" offset=\"{offset:?}\"/>",
-            quoted(&joint)
-        );
+    match drive {
+        Drive::Joint(j) => {
+            if let JointFriction::ViscousCoulomb(law) = &model.friction[j] {
+                let _ = writeln!(
+                    out,
+                    "    <dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
+                    law.viscous, law.coulomb
+                );
+            }
+        }
+        Drive::Mimic(joint, factor, offset) => {
+            let _ = writeln!(
+                out,
+                "    <mimic joint=\"{}\" multiplier=\"{factor:?}\" offset=\"{offset:?}\"/>",
+                quoted(&joint)
+            );
+        }
+        Drive::Rest(_) => {}
     }
     out.push_str("  </joint>\n");
     Ok(())
@@ -296,8 +315,8 @@ fn joint(
 fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<(), ExportError> {
     let range = i * STANDARD..(i + 1) * STANDARD;
     let values: [f64; STANDARD] = std::array::from_fn(|k| standard.values[range.start + k]);
-    let told = &standard.told[range];
-    let of = |what: Told| -> String {
+    let told = &standard.identifiability[range];
+    let of = |what: Identifiability| -> String {
         let names = STANDARD_NAMES.iter().zip(told);
         let list: Vec<&str> = names
             .filter(|(_, t)| **t == what)
@@ -330,9 +349,9 @@ fn body(out: &mut String, i: usize, link: &Link, standard: &Standard) -> Result<
         "  <!-- about the origin of the link: determined {}; only in sums with others {}; not at all {} -->\n  \
          <link name=\"{}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      \
          <mass value=\"{m:?}\"/>\n      <inertia {}/>\n    </inertial>\n  </link>\n",
-        of(Told::Alone),
-        of(Told::InSum),
-        of(Told::Nothing),
+        of(Identifiability::Alone),
+        of(Identifiability::InSum),
+        of(Identifiability::Nothing),
         quoted(&link.name),
         words(&body.centre),
         inertia.join(" ")
