@@ -71,7 +71,7 @@ fn prior(file: &RobotFile) -> Vec<f64> {
 }
 
 /// Largest difference of torques and regressor entries, over the largest of the same joint.
-fn compare(file: &RobotFile, oracle: &str) -> f64 {
+fn compare(file: &RobotFile, oracle: &str, count: usize) -> f64 {
     let text = std::fs::read_to_string(fixture("oracle").join(oracle)).unwrap();
     let oracle: Value = serde_json::from_str(&text).unwrap();
     let robot = file.robot();
@@ -97,7 +97,7 @@ fn compare(file: &RobotFile, oracle: &str) -> f64 {
     let theta = robot.base_of(&standard);
     let mut worst: f64 = 0.0;
     let states = oracle["states"].as_array().unwrap();
-    assert_eq!(states.len(), 20);
+    assert_eq!(states.len(), count);
     for state in states {
         let ours = |key: &str| -> Vec<f64> {
             let theirs = numbers(&state[key]);
@@ -132,7 +132,7 @@ fn compare(file: &RobotFile, oracle: &str) -> f64 {
 #[test]
 fn a_made_up_arm_moves_as_pinocchio_says() {
     let file = file_of(&fixture("urdf/gantry.urdf"), "");
-    let worst = compare(&file, "serial_gantry.json");
+    let worst = compare(&file, "serial_gantry.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
 }
 
@@ -141,7 +141,7 @@ fn the_tx40_moves_as_pinocchio_says() {
     let Some(urdf) = shared("tx40/tx40_mdh_modified.urdf") else {
         return;
     };
-    let worst = compare(&file_of(&urdf, ""), "serial_tx40.json");
+    let worst = compare(&file_of(&urdf, ""), "serial_tx40.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
 }
 
@@ -150,8 +150,53 @@ fn the_ur10_moves_as_pinocchio_says() {
     let Some(urdf) = shared("ur10/ur10_robot.urdf") else {
         return;
     };
-    let worst = compare(&file_of(&urdf, ""), "serial_ur10.json");
+    let worst = compare(&file_of(&urdf, ""), "serial_ur10.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
+}
+
+#[test]
+fn a_pair_of_arms_moves_as_pinocchio_says() {
+    let file = file_of(&fixture("urdf/two_arms.urdf"), "");
+    assert_eq!(file.joint_names().len(), 14);
+    let worst = compare(&file, "serial_two_arms.json", 6);
+    assert!(worst < 1e-11, "{worst:e}");
+}
+
+#[test]
+fn a_pair_of_arms_on_a_torso_that_turns_moves_as_pinocchio_says() {
+    let urdf = std::fs::read_to_string(fixture("urdf/two_arms.urdf")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("turning.urdf");
+    let turning = urdf.replace(
+        "name=\"stand\" type=\"fixed\"",
+        "name=\"stand\" type=\"continuous\"",
+    );
+    std::fs::write(&path, turning).unwrap();
+    let file = file_of(&path, "");
+    assert_eq!(file.joint_names().len(), 15);
+    let worst = compare(&file, "serial_two_arms_turning.json", 6);
+    assert!(worst < 1e-11, "{worst:e}");
+}
+
+#[test]
+fn what_a_joint_does_not_move_has_no_part_in_its_torque() {
+    let robot = file_of(&fixture("urdf/two_arms.urdf"), "").robot();
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let mut y = vec![f64::NAN; n * p];
+    robot.regressor(&[0.4; 14], &[0.7; 14], &[-0.9; 14], &mut y);
+    let links = robot.groupings().iter().map(|g| g.kept / STANDARD);
+    for (column, link) in links.enumerate() {
+        for joint in 0..n {
+            let moved = robot.tree().upstream(link).contains(&joint);
+            assert!(moved || y[joint * p + column] == 0.0, "{joint} {link}");
+        }
+    }
+    // an arm has the base parameters that it has alone
+    let left = file_of(
+        &fixture("urdf/two_arms.urdf"),
+        "tip = \"left_wrist_turn_link\"\n",
+    );
+    assert_eq!(2 * left.robot().parameters().len(), p);
 }
 
 #[test]

@@ -73,7 +73,8 @@ pub fn walk(
 const FEW_STATES: usize = 4;
 const FEW_JOINTS: usize = 8;
 
-#[inline(always)]
+// a frame of its own: the stack that the largest tree needs is not asked for by the smaller ones
+#[inline(never)]
 fn walk_within<const STATES: usize, const DEPTH: usize>(
     tree: &Tree,
     q: &[f64],
