@@ -143,14 +143,14 @@ impl RegressorColumns {
         out: &mut [f64],
     ) {
         let (n, p) = (self.joints, self.shared);
-
-        let mut y = [0.0; MOST];
-        let y = &mut y[..n * p];
-        robot.regressor(q, v, a, y);
-        let mut at = 0;
-        for j in 0..n {
-            out[at..at + p].copy_from_slice(&y[j * p..(j + 1) * p]);
-            at += p;
+        robot.regressor(q, v, a, &mut out[..n * p]);
+        let mut end = self.offset(n);
+        out[end..end + n].copy_from_slice(tau);
+        // from the last joint to the first: rows only move up
+        for j in (0..n).rev() {
+            let first = end - self.row_width(j);
+            out.copy_within(j * p..(j + 1) * p, first);
+            let mut at = first + p;
             for own in &self.own[j] {
                 out[at] = own.column(v[j]);
                 at += 1;
@@ -162,11 +162,7 @@ impl RegressorColumns {
                 at += GRADIENT;
             }
             out[at] = b;
-            at += 1;
+            end = first;
         }
-        out[at..at + n].copy_from_slice(tau);
     }
 }
-
-/// Most entries of a regressor that fit the buffer on the stack: 8 joints x 104 columns.
-const MOST: usize = 832;

@@ -8,6 +8,8 @@
 //! A log is read twice at once: a first pass smooths the reference and simulates, a second one
 //! computes X from the measured and Z from the simulated positions, filtered alike.
 
+use std::cell::RefCell;
+
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -204,24 +206,27 @@ fn fill(
 ) {
     let n = columns.joints;
     let half = columns.channels();
-    let mut buffer = [0.0; MOST_CHANNELS];
-    let (z, rest) = buffer.split_at_mut(half);
-    let x = &mut rest[..half];
-    columns.fill(robot, &s.q[n..], &s.v[n..], &s.a[n..], &s.tau[n..], z);
-    columns.fill(robot, &s.q[..n], &s.v[..n], &s.a[..n], &s.tau[..n], x);
-    for j in 0..n {
-        let own = columns.unknowns_of(j);
-        let (from, whole) = (columns.offset(j), columns.row_width(j));
-        let at = wide.offset(j);
-        out[at..at + own].copy_from_slice(&z[from..from + own]);
-        out[at + own..at + own + whole].copy_from_slice(&x[from..from + whole]);
-    }
+    CHANNELS.with_borrow_mut(|buffer| {
+        buffer.resize(2 * half, 0.0);
+        let (z, x) = buffer.split_at_mut(half);
+        columns.fill(robot, &s.q[n..], &s.v[n..], &s.a[n..], &s.tau[n..], z);
+        columns.fill(robot, &s.q[..n], &s.v[..n], &s.a[..n], &s.tau[..n], x);
+        for j in 0..n {
+            let own = columns.unknowns_of(j);
+            let (from, whole) = (columns.offset(j), columns.row_width(j));
+            let at = wide.offset(j);
+            out[at..at + own].copy_from_slice(&z[from..from + own]);
+            out[at + own..at + own + whole].copy_from_slice(&x[from..from + whole]);
+        }
+    });
     let last = out.len() - n;
     out[last..].copy_from_slice(&s.tau[..n]);
 }
 
-/// Twice the channels of the largest robot: 8 joints with 104 columns and 9 of their own.
-const MOST_CHANNELS: usize = 2 * 8 * 115;
+thread_local! {
+    /// The channels of instruments and of the regressor of one sample, allocated once a thread.
+    static CHANNELS: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
+}
 
 /// Z'WX theta = Z'Wb, and Z'W^2 Z times the residual's variance.
 struct InstrumentSystem {
