@@ -3,7 +3,7 @@
 mod robot_oracle;
 
 use cft_ident::robot::cft::cartesian::{CartesianDynamics, Space, forces_of_torques};
-use cft_ident::robot::cft::links::{Link, PseudoInertia};
+use cft_ident::robot::cft::links::{MassProperties, PseudoInertia};
 use cft_ident::robot::cft::{Coefficients, Setup, actuation, dynamics, pantograph};
 use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
 use robot_oracle::{Draw, Oracle, assert_close, assert_close_rows};
@@ -290,7 +290,7 @@ fn a_links_pseudo_inertia_is_the_integral_over_its_points() {
             .sum()
     };
     let (xx, yy, zz) = (about(0, 0), about(1, 1), about(2, 2));
-    let link = Link {
+    let link = MassProperties {
         mass,
         centre,
         moments: [yy + zz, xx + zz, xx + yy],
@@ -308,7 +308,7 @@ fn a_links_pseudo_inertia_is_the_integral_over_its_points() {
     let got = PseudoInertia::from(&link);
     assert_close_rows(&got.0, &want, 1e-12, "J");
     assert!(got.smallest_eigenvalue() > 0.0);
-    let rod = Link {
+    let rod = MassProperties {
         mass: 1.0,
         centre: [0.0; 3],
         moments: [3.0, 1.0, 1.0],

@@ -19,7 +19,7 @@ pub enum ModelKind {
     Cft,
     /// One prismatic or revolute joint.
     SingleJoint,
-    /// Any chain of links on revolute and prismatic joints.
+    /// Any tree of links on revolute and prismatic joints; a chain is one.
     Serial,
 }
 
@@ -62,7 +62,7 @@ pub struct RobotSection {
     /// URDF file of a serial chain, beside the robot file; it is read into `link`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub urdf: Option<String>,
-    /// Link of the URDF where the chain ends; needed where it branches.
+    /// Link of the URDF where the chain ends; every branch is read where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
     /// Coupled gear trains of a serial chain.

@@ -177,7 +177,7 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::cft::links::Link as Body;
+    use crate::robot::cft::links::MassProperties;
     use crate::robot::cft::{Setup, Structure};
     use crate::robot::standard::standard_of;
     use crate::robot::tree::{Coordinate, Link, Tree, space};
@@ -262,13 +262,13 @@ mod tests {
 
     #[test]
     fn the_map_of_the_cft_robot_gives_its_base_parameters() {
-        let link = |i: f64| Body {
+        let link = |i: f64| MassProperties {
             mass: 2.0 + i,
             centre: [0.1 * i, -0.03, 0.02 * i],
             moments: [0.2 + 0.01 * i, 0.3, 0.25],
             products: [0.01, -0.02 * i, 0.004],
         };
-        let links: [Body; linkage::LINKS] = std::array::from_fn(|i| link(i as f64));
+        let links: [MassProperties; linkage::LINKS] = std::array::from_fn(|i| link(i as f64));
         let pseudo: [PseudoInertia; linkage::LINKS] = std::array::from_fn(|i| (&links[i]).into());
         let robot = Robot::cft(Setup::default(), Structure::Full22);
         let mut standard = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use cft_ident::robot::cft::links::{Link, PseudoInertia, base_parameters};
+use cft_ident::robot::cft::links::{MassProperties, PseudoInertia, base_parameters};
 use cft_ident::robot::cft::pantograph::references_of_joints;
 use cft_ident::robot::cft::{Setup, chain, regressor};
 use cft_ident::simulate::CftTruth;
@@ -215,7 +215,7 @@ fn a_payload_is_a_point_mass_on_the_last_link() {
     let (mass, [mx, my, mz]) = (1.5, [0.6, -0.2, 0.15]);
     let nothing = PseudoInertia([[0.0; 4]; 4]);
     let mut links = [nothing; 8];
-    links[7] = PseudoInertia::from(&Link {
+    links[7] = PseudoInertia::from(&MassProperties {
         mass,
         centre: [mx / mass, my / mass, mz / mass],
         moments: [0.0; 3],
@@ -263,13 +263,13 @@ fn rotor_inertia_is_felt_along_the_motor_motion() {
 #[test]
 fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     // Eight links with known masses; the potential by their frames, its slope by differences.
-    let link = |number: usize| Link {
+    let link = |number: usize| MassProperties {
         mass: 0.8 + 0.3 * number as f64,
         centre: [0.03 * number as f64, 0.05 - 0.01 * number as f64, 0.02],
         moments: [0.05, 0.06, 0.07],
         products: [0.0; 3],
     };
-    let links: [Link; 8] = std::array::from_fn(link);
+    let links: [MassProperties; 8] = std::array::from_fn(link);
     let truth = CftTruth {
         theta: base_parameters(&links.map(|link| PseudoInertia::from(&link))),
         ..CftTruth::synthetic(Setup::Tuedacs)
@@ -277,7 +277,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     let (gx, gy) = (0.7, -0.4);
     let potential = |q: &[f64; 4]| -> f64 {
         let frames = chain::frames(q);
-        let pull = |(link, frame): (&Link, &chain::Frame)| {
+        let pull = |(link, frame): (&MassProperties, &chain::Frame)| {
             let p = frame.point(&link.centre);
             -link.mass * (gx * p[0] + gy * p[1])
         };

@@ -9,7 +9,7 @@ use nalgebra::Matrix4;
 
 /// Mass, centre of gravity and moments of inertia of one link.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Link {
+pub struct MassProperties {
     /// m in kg.
     pub mass: f64,
     /// Centre of gravity l in the link's frame, in m.
@@ -24,9 +24,9 @@ pub struct Link {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PseudoInertia(pub [[f64; 4]; 4]);
 
-impl From<&Link> for PseudoInertia {
+impl From<&MassProperties> for PseudoInertia {
     /// Eq. (8) about the centre of gravity, moved to the origin of the link's frame.
-    fn from(link: &Link) -> Self {
+    fn from(link: &MassProperties) -> Self {
         let [ixx, iyy, izz] = link.moments;
         let [xy, xz, yz] = link.products;
         let trace = 0.5 * (ixx + iyy + izz);
