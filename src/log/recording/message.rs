@@ -85,3 +85,6 @@ pub(super) trait MessageReader: Send {
     /// Names that the message which was read last lists: those of its joints, or of its fields.
     fn names(&self, data: &[u8]) -> Vec<String>;
 }
+
+/// A reader of some fields, or why messages of their schema cannot be read, for the user.
+pub(super) type OpenedReader = Result<Box<dyn MessageReader>, String>;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::encoding::reader_of;
 use super::fields::{RobotFields, TimeSource};
-use super::message::{MessageReader, Schema, Wanted};
+use super::message::{OpenedReader, Schema, Wanted};
 use super::pairing::{Pairing, Sample};
 use super::parts::{Message, MessageFiles};
 use super::survey::{self, Choice};
@@ -34,7 +34,7 @@ struct SampleReader {
     layout: Layout,
     fields: RobotFields,
     choice: Choice,
-    readers: Vec<(Arc<Schema>, Result<Box<dyn MessageReader>, String>)>,
+    readers: Vec<(Arc<Schema>, OpenedReader)>,
     values: Vec<Value>,
     /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
     incomplete: LeftOut,
