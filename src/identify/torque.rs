@@ -12,6 +12,7 @@ use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
 use crate::motion::{self, FilterSettings, Summary};
+use crate::robot::model::Model;
 
 /// The torque along a motion.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -56,12 +57,7 @@ pub fn torque(
 ) -> Result<FeedForward, IdentifyError> {
     let model = &refined.model;
     let n = machine.robot.joints();
-    let p = model.parameters();
-    let covariance = file.model_covariance(model);
-    let joints = machine.robot.joint_names().iter();
-    let residual: Vec<f64> = joints
-        .map(|j| file.residual_std.get(j).copied().unwrap_or(0.0))
-        .collect();
+    let band = Band::new(machine, file, model);
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
     let settings = FilterSettings {
         decimation: Some(1),
@@ -81,22 +77,13 @@ pub fn torque(
         }
         row(t, values, origin);
     };
-    let band = |q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]| {
-        GRADIENT.with_borrow_mut(|g| {
-            g.resize(p, 0.0);
-            for (j, out) in out.iter_mut().enumerate() {
-                model.gradient(j, q, v, a, g);
-                *out = (quadratic(&covariance, g) + residual[j] * residual[j]).sqrt();
-            }
-        });
-    };
     let mut read = |block: &mut _| open.read(block);
     let failed = |e| IdentifyError::of_run(&log.name(), e);
     let summary = if refined.effects.is_empty() {
         let compute = |s: &motion::MotionSample, out: &mut [f64]| {
             let (tau, std) = out.split_at_mut(n);
             model.torque(s.q, s.v, s.a, tau);
-            band(s.q, s.v, s.a, std);
+            band.at([s.q, s.v, s.a], std);
         };
         let mut emit = |row: &motion::FilteredRow| emit(row.t, row.raw);
         motion::run(&mut read, n, &settings, None, 2 * n, &compute, &mut emit).map_err(failed)?
@@ -112,7 +99,7 @@ pub fn torque(
                 for (x, hat) in values.iter_mut().zip(&hat) {
                     *x = hat[k];
                 }
-                band(&q, &v, &a, &mut values[n..]);
+                band.at([&q, &v, &a], &mut values[n..]);
                 emit(*t, &values);
             }
         }
@@ -140,6 +127,38 @@ pub fn torque(
         inputs,
         warnings,
     })
+}
+
+/// Standard deviations of a model's torque.
+struct Band<'a> {
+    model: &'a Model,
+    /// Of the model's parameters, row-major.
+    covariance: Vec<f64>,
+    /// What the fit left, per joint \[N or Nm\].
+    residual: Vec<f64>,
+}
+
+impl<'a> Band<'a> {
+    fn new(machine: &LoggedRobot, file: &ModelFile, model: &'a Model) -> Self {
+        let joints = machine.robot.joint_names().iter();
+        let residual = joints.map(|j| file.residual_std.get(j).copied().unwrap_or(0.0));
+        Band {
+            model,
+            covariance: file.model_covariance(model),
+            residual: residual.collect(),
+        }
+    }
+
+    /// Those of every joint at one position, velocity and acceleration.
+    fn at(&self, [q, v, a]: [&[f64]; 3], out: &mut [f64]) {
+        GRADIENT.with_borrow_mut(|g| {
+            g.resize(self.model.parameters(), 0.0);
+            for (j, (out, residual)) in out.iter_mut().zip(&self.residual).enumerate() {
+                self.model.gradient(j, q, v, a, g);
+                *out = (quadratic(&self.covariance, g) + residual * residual).sqrt();
+            }
+        });
+    }
 }
 
 thread_local! {
