@@ -138,16 +138,25 @@ impl Machine {
     /// [`RobotError`] where the machine cannot reach the position or is singular in it.
     #[inline]
     pub fn joints(&self, k: &Kinematics) -> Result<State, RobotError> {
-        let mut state = State {
-            k: *k,
-            ..State::EMPTY
-        };
+        let mut state = State::EMPTY;
+        self.follow(k, &mut state)?;
+        Ok(state)
+    }
+
+    /// [`Self::joints`] into a state whose torques and drives stay.
+    ///
+    /// # Errors
+    /// As there.
+    #[inline]
+    pub(super) fn follow(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
         let (n, transmission) = (self.coordinates(), self.model.robot.transmission());
-        let State { q, v, a, .. } = &mut state;
+        state.k.x[..n].copy_from_slice(&k.x[..n]);
+        state.k.xd[..n].copy_from_slice(&k.xd[..n]);
+        state.k.xdd[..n].copy_from_slice(&k.xdd[..n]);
+        let State { q, v, a, .. } = state;
         transmission.joints(&k.x[..n], &mut q[..n])?;
         transmission.joint_velocities(&q[..n], &k.xd[..n], &mut v[..n])?;
-        transmission.joint_accelerations(&q[..n], &v[..n], &k.xdd[..n], &mut a[..n])?;
-        Ok(state)
+        transmission.joint_accelerations(&q[..n], &v[..n], &k.xdd[..n], &mut a[..n])
     }
 
     /// Everything at one instant.
@@ -155,16 +164,20 @@ impl Machine {
     /// # Errors
     /// As [`Self::joints`].
     pub fn state(&self, k: &Kinematics) -> Result<State, RobotError> {
-        let mut state = self.joints(k)?;
-        let n = self.coordinates();
-        self.model.torque(
-            &state.q[..n],
-            &state.v[..n],
-            &state.a[..n],
-            &mut state.tau[..n],
-        );
-        self.drive(&mut state)?;
+        let mut state = State::EMPTY;
+        self.fill(k, &mut state)?;
         Ok(state)
+    }
+
+    /// [`Self::state`] into a state that is there.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn fill(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
+        self.follow(k, state)?;
+        let (n, State { q, v, a, tau, .. }) = (self.coordinates(), &mut *state);
+        self.model.torque(&q[..n], &v[..n], &a[..n], &mut tau[..n]);
+        self.drive(state)
     }
 
     /// What drives the coordinates where the joints need the torques `tau` at the pose `q`.

@@ -75,6 +75,8 @@ pub(super) struct Objective<'a> {
 pub(super) struct Work {
     pub series: Series,
     states: Vec<State>,
+    /// Beside them, where differences are taken.
+    beside: State,
     lines: Vec<Linearised>,
     /// Rows of the fit, sample after sample.
     rows: Vec<f64>,
@@ -141,6 +143,7 @@ impl<'a> Objective<'a> {
         Work {
             series: Series::still(self.variables.fundamental, n, self.variables.harmonics),
             states: vec![State::EMPTY; samples],
+            beside: State::EMPTY,
             lines: vec![rest; samples],
             rows: vec![0.0; samples * n * p],
             weights: vec![0.0; n * p],
@@ -161,10 +164,11 @@ impl<'a> Objective<'a> {
         let mut g = DMatrix::zeros(p, p);
         for m in 0..self.basis.samples {
             let k = self.kinematics(&self.basis, &work.series, m);
-            let mut state = self.machine.joints(&k)?;
-            let line = self.machine.linearised(&state);
+            let state = &mut work.states[m];
+            self.machine.follow(&k, state)?;
+            let line = self.machine.linearised(state);
             let y = &mut work.rows[m * n * p..(m + 1) * n * p];
-            self.machine.rows(&mut state, &line, false, y)?;
+            self.machine.rows(state, &line, false, y)?;
             for (row, weight) in y.chunks_exact(p).zip(&self.weights) {
                 for j in 0..p {
                     let scaled = weight * row[j];
@@ -173,7 +177,6 @@ impl<'a> Objective<'a> {
                     }
                 }
             }
-            work.states[m] = state;
             work.lines[m] = line;
         }
         for j in 0..p {
@@ -267,6 +270,7 @@ impl<'a> Objective<'a> {
                 weights: Some(&work.weights),
                 kappas: &[],
                 rows: &mut work.shifted,
+                state: &mut work.beside,
             };
             let by = local.derivatives(&state)?;
             self.basis
@@ -282,10 +286,10 @@ impl<'a> Objective<'a> {
         if self.curved.is_empty() {
             return Ok(total);
         }
+        let mut state = State::EMPTY;
         for m in 0..self.fine.samples {
-            let state = self
-                .machine
-                .state(&self.kinematics(&self.fine, &work.series, m))?;
+            let k = self.kinematics(&self.fine, &work.series, m);
+            self.machine.fill(&k, &mut state)?;
             let mut pressed = false;
             for (channel, sum) in self.curved.iter().zip(&mut work.kappas) {
                 *sum = 0.0;
@@ -306,6 +310,7 @@ impl<'a> Objective<'a> {
                     weights: None,
                     kappas: &work.kappas,
                     rows: &mut work.shifted,
+                    state: &mut work.beside,
                 };
                 let by = local.derivatives(&state)?;
                 self.fine
@@ -335,6 +340,7 @@ impl<'a> Objective<'a> {
         work: &mut Work,
     ) -> Result<(), NoValue> {
         self.variables.series(z, &mut work.series);
+        let mut state = State::EMPTY;
         let mut at = 0;
         let mut renew = |at: &mut usize, channel: &Channel, value: f64| {
             for (g, _) in channel.constraints(value) {
@@ -352,7 +358,7 @@ impl<'a> Objective<'a> {
         if !self.curved.is_empty() {
             for m in 0..self.fine.samples {
                 let k = self.kinematics(&self.fine, &work.series, m);
-                let state = self.machine.state(&k)?;
+                self.machine.fill(&k, &mut state)?;
                 for channel in &self.curved {
                     renew(&mut at, channel, self.machine.quantity(channel, &state));
                 }
@@ -402,13 +408,14 @@ struct Local<'a> {
     /// Pressure of each curved channel; empty where only rows count.
     kappas: &'a [f64],
     rows: &'a mut [f64],
+    state: &'a mut State,
 }
 
 impl Local<'_> {
     fn value(&mut self, k: &Kinematics) -> Result<f64, RobotError> {
-        let machine = self.objective.machine;
-        let mut state = machine.joints(k)?;
-        machine.rows(&mut state, self.line, !self.kappas.is_empty(), self.rows)?;
+        let (machine, state) = (self.objective.machine, &mut *self.state);
+        machine.follow(k, state)?;
+        machine.rows(state, self.line, !self.kappas.is_empty(), self.rows)?;
         let mut sum = 0.0;
         if let Some(weights) = self.weights {
             sum += self
@@ -420,7 +427,7 @@ impl Local<'_> {
         }
         for (channel, kappa) in self.objective.curved.iter().zip(self.kappas) {
             if *kappa != 0.0 {
-                sum += kappa * machine.quantity(channel, &state);
+                sum += kappa * machine.quantity(channel, state);
             }
         }
         Ok(sum)

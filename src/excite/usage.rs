@@ -250,35 +250,48 @@ fn of_polynomial(channel: &Channel, series: &Series) -> Use {
 
 fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance: f64) -> Vec<Use> {
     let [from, to] = path.span;
-    let state = |t: f64| {
-        let k = (path.at)(t);
-        let state = machine.state(&k).ok();
-        (k, state)
-    };
-    let grid: Vec<(Kinematics, Option<State>)> = (0..=path.parts)
-        .map(|m| state(from + (to - from) * m as f64 / path.parts as f64))
-        .collect();
-    let value = |channel: &Channel, (k, state): &(Kinematics, Option<State>)| {
-        let i = channel.index;
-        match channel.quantity {
-            Quantity::Position => k.x[i],
-            Quantity::Speed => k.xd[i],
-            Quantity::Acceleration => k.xdd[i],
-            _ => state
-                .as_ref()
-                .map_or(f64::NAN, |state| machine.quantity(channel, state)),
+    let mut state = State::EMPTY;
+    let mut grid = vec![Vec::with_capacity(path.parts + 1); channels.len()];
+    for m in 0..=path.parts {
+        let k = (path.at)(from + (to - from) * m as f64 / path.parts as f64);
+        let reached = machine.fill(&k, &mut state).is_ok();
+        for (channel, values) in channels.iter().zip(&mut grid) {
+            values.push(match (channel.quantity.is_linear(), reached) {
+                (true, _) => of_kinematics(channel, &k),
+                (false, true) => machine.quantity(channel, &state),
+                (false, false) => f64::NAN,
+            });
         }
+    }
+    let mut value = |channel: &Channel, t: f64| {
+        let k = (path.at)(t);
+        if channel.quantity.is_linear() {
+            return of_kinematics(channel, &k);
+        }
+        let reached = machine.fill(&k, &mut state);
+        reached.map_or(f64::NAN, |()| machine.quantity(channel, &state))
     };
     channels
         .iter()
-        .map(|channel| {
-            let peak = |sign: f64| {
-                let samples: Vec<f64> = grid.iter().map(|at| sign * value(channel, at)).collect();
-                let mut f = |t| sign * value(channel, &state(t));
+        .zip(grid)
+        .map(|(channel, values)| {
+            let mut peak = |sign: f64| {
+                let samples: Vec<f64> = values.iter().map(|value| sign * value).collect();
+                let mut f = |t| sign * value(channel, t);
                 let tolerance = tolerance * room(channel);
                 highest_from(&mut f, path.span, &samples, None, tolerance)
             };
             gathered(channel, peak(1.0), peak(-1.0))
         })
         .collect()
+}
+
+/// Position, speed or acceleration that a linear channel bounds.
+fn of_kinematics(channel: &Channel, k: &Kinematics) -> f64 {
+    let i = channel.index;
+    match channel.quantity {
+        Quantity::Position => k.x[i],
+        Quantity::Speed => k.xd[i],
+        _ => k.xdd[i],
+    }
 }

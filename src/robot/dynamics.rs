@@ -76,13 +76,13 @@ impl Dynamics {
         }
     }
 
-    /// x with M x = b, in the place of b; `false` where M, n x n row-major, is not positive definite. Does
-    /// not allocate.
+    /// x with M x = b, in the place of b; `false` where M, n x n row-major, is not positive definite. M may be
+    /// overwritten. Does not allocate.
     ///
     /// # Panics
     /// As [`Self::inertia_and_bias`].
     #[inline]
-    pub fn solve(&self, mass: &[f64], b: &mut [f64]) -> bool {
+    pub fn solve(&self, mass: &mut [f64], b: &mut [f64]) -> bool {
         if self.closed.is_none() {
             return cholesky(mass, b);
         }
@@ -98,37 +98,37 @@ impl Dynamics {
 
 /// x with L L^T x = b in the place of b; `false` where the n x n matrix is not positive definite.
 #[inline]
-fn cholesky(mass: &[f64], b: &mut [f64]) -> bool {
+fn cholesky(mass: &mut [f64], b: &mut [f64]) -> bool {
     let n = b.len();
     if n == 1 {
         // a root and its square would round
         b[0] /= mass[0];
         return mass[0] > 0.0;
     }
-    let mut l = [[0.0; MOST_JOINTS]; MOST_JOINTS];
+    // L takes the place of the lower triangle
     for i in 0..n {
         for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let sum: f64 = (0..j).map(|k| mass[i * n + k] * mass[j * n + k]).sum();
+            let own = mass[i * n + j];
             if i == j {
-                let own = mass[i * n + i];
                 let left = own - sum;
                 // rounding of a matrix that is singular
                 if left.partial_cmp(&(1e-12 * own.abs())) != Some(std::cmp::Ordering::Greater) {
                     return false;
                 }
-                l[i][i] = left.sqrt();
+                mass[i * n + i] = left.sqrt();
             } else {
-                l[i][j] = (mass[i * n + j] - sum) / l[j][j];
+                mass[i * n + j] = (own - sum) / mass[j * n + j];
             }
         }
     }
     for i in 0..n {
-        let sum: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
+        let sum: f64 = (0..i).map(|k| mass[i * n + k] * b[k]).sum();
+        b[i] = (b[i] - sum) / mass[i * n + i];
     }
     for i in (0..n).rev() {
-        let sum: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();
-        b[i] = (b[i] - sum) / l[i][i];
+        let sum: f64 = (i + 1..n).map(|k| mass[k * n + i] * b[k]).sum();
+        b[i] = (b[i] - sum) / mass[i * n + i];
     }
     true
 }

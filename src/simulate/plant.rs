@@ -213,7 +213,7 @@ impl<const J: usize> Plant<J> {
         gather(&mut mass, n);
         let solved = self
             .dynamics
-            .solve(&mass.as_flattened()[..n * n], &mut x[..n]);
+            .solve(&mut mass.as_flattened_mut()[..n * n], &mut x[..n]);
         solved.then_some(x)
     }
 }
