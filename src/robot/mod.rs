@@ -39,6 +39,7 @@ use tree::{Coordinate, Coupling, Grouping, Link, Parameters, Tree};
 
 pub use error::RobotError;
 pub use joint::{JointKind, ParameterInfo};
+use practice::{Nominal, Practice};
 pub use transmission::Transmission;
 
 /// A robot whose inverse dynamics are linear in its inertial parameters: links on joints, what a fit can
@@ -188,6 +189,23 @@ impl Robot {
     pub fn coordinate_kind(&self, i: usize) -> JointKind {
         let own = self.transmission().coordinate_kind(i);
         own.unwrap_or_else(|| self.joint_kind(i))
+    }
+
+    /// Numbers that stand for the robot where no model is given; none for a robot that only its file
+    /// describes.
+    pub fn nominal(&self) -> Option<Nominal> {
+        self.transmission().setup()?;
+        let mut theta = cft::practice::INERTIA.to_vec();
+        theta.resize(self.parameters().len(), 0.0);
+        Some(Nominal {
+            theta,
+            friction: friction::DoubleTanh::cft_joints(&cft::practice::FRICTION).to_vec(),
+        })
+    }
+
+    /// How the robot is run, where more is known of that than its file says.
+    pub fn practice(&self) -> Option<Practice> {
+        self.transmission().setup().map(cft::practice::of)
     }
 
     /// The inertial parameters, in the order of the regressor's columns.

@@ -1,7 +1,5 @@
 //! What is known of a robot beside its file: numbers that stand for it, and how it is run.
 
-use super::Robot;
-use super::cft::practice;
 use super::friction::DoubleTanh;
 
 /// Numbers that stand for a robot that no model is given for.
@@ -45,23 +43,4 @@ pub struct Excitation {
     pub b: Vec<Vec<f64>>,
     /// Fundamental \[Hz\].
     pub fundamental_hz: f64,
-}
-
-impl Robot {
-    /// Numbers that stand for the robot where no model is given; none for a robot that only its file
-    /// describes.
-    pub fn nominal(&self) -> Option<Nominal> {
-        self.transmission().setup()?;
-        let mut theta = practice::INERTIA.to_vec();
-        theta.resize(self.parameters().len(), 0.0);
-        Some(Nominal {
-            theta,
-            friction: DoubleTanh::cft_joints(&practice::FRICTION).to_vec(),
-        })
-    }
-
-    /// How the robot is run, where more is known of that than its file says.
-    pub fn practice(&self) -> Option<Practice> {
-        self.transmission().setup().map(practice::of)
-    }
 }
