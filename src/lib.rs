@@ -54,13 +54,13 @@
 //!
 //! | stage in [`identify`] | from | to | room | source |
 //! |---|---|---|---|---|
-//! | [`friction`](identify::friction) | one-joint logs | theta 13..32 with covariance | [`friction`] | eq. (30)-(38) |
-//! | [`lsq`](identify::lsq) | logs of all joints, friction | theta 1..12, or base parameters of a tree | [`inertia`] | eq. (39)-(42) |
-//! | [`diagnose`](identify::diagnose) | model, logs | effects that the model lacks, refined model | [`diagnose`] | |
-//! | [`validate`](identify::validate) | model, logs that were not used | torque errors | [`validate`] | Figures 7 and 8 |
-//! | [`compare`](identify::compare) | two models, logs | differences of parameters and errors | [`compare`] | Kuensch 1989 |
-//! | [`torque`](identify::torque) | model, positions | feed-forward torque with its band | [`motion`] | |
-//! | [`identify`](identify::identify) | logs by role | all of these | [`identify`] | |
+//! | [`friction`](identify::friction()) | one-joint logs | theta 13..32 with covariance | [`friction`] | eq. (30)-(38) |
+//! | [`lsq`](identify::lsq()) | logs of all joints, friction | theta 1..12, or base parameters of a tree | [`inertia`] | eq. (39)-(42) |
+//! | [`diagnose`](identify::diagnose()) | model, logs | effects that the model lacks, refined model | [`diagnose`] | |
+//! | [`validate`](identify::validate()) | model, logs that were not used | torque errors | [`validate`] | Figures 7 and 8 |
+//! | [`compare`](identify::compare()) | two models, logs | differences of parameters and errors | [`compare`] | Kuensch 1989 |
+//! | [`torque`](identify::torque()) | model, positions | feed-forward torque with its band | [`motion`] | |
+//! | [`identify`](identify::identify()) | logs by role | all of these | [`identify`] | |
 //!
 //! Below the stages: [`log`] reads text logs, MCAP and rosbag2 recordings and arrays in memory to
 //! blocks of t, q and tau; [`inspect`] looks for faults in them; [`motion`] turns them into filtered

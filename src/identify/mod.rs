@@ -6,13 +6,13 @@
 //!
 //! | stage | from | to |
 //! |---|---|---|
-//! | [`friction`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
-//! | [`lsq`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
-//! | [`diagnose`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
-//! | [`validate`] | logs that were not used, a model | [`Validated`]: torque errors |
-//! | [`compare`] | two models, logs | [`Compared`]: differences of parameters and of errors |
-//! | [`torque`] | positions, a model | [`FeedForward`]: torques with their band |
-//! | [`identify`] | logs by role | [`Campaigned`]: all of it, one after the other |
+//! | [`friction()`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
+//! | [`lsq()`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
+//! | [`diagnose()`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
+//! | [`validate()`] | logs that were not used, a model | [`Validated`]: torque errors |
+//! | [`compare()`] | two models, logs | [`Compared`]: differences of parameters and of errors |
+//! | [`torque()`] | positions, a model | [`FeedForward`]: torques with their band |
+//! | [`identify()`] | logs by role | [`Campaigned`]: all of it, one after the other |
 
 mod campaign;
 mod compare;
