@@ -334,7 +334,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
         return;
     };
     let levels = track.travel() / step;
-    // A joint that is held shows a few counts, which is no fault.
+    // A stationary joint shows a few counts, which is no fault.
     if levels < 30.0 && track.channel.role != ChannelRole::Torque {
         return;
     }

@@ -202,7 +202,7 @@ impl Transmission {
         self.pantograph.map(|_| four(q)[3].sin())
     }
 
-    /// Torques at pose `there` of the motor forces that give `tau` at pose `here`: held motor
+    /// Torques at pose `there` of the motor forces that give `tau` at pose `here`: constant motor
     /// forces turn into other joint torques as the arm moves (eq. (63)-(66)). Where motors act on
     /// the joints directly, and at a singular pose, `tau` itself.
     #[inline]

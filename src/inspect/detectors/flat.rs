@@ -1,6 +1,6 @@
 //! Values that do not change: flat tops of a clipped channel, and channels that stick.
 //!
-//! A channel may stand still for good reasons: the joint is held, the motor is off, the encoder is
+//! A channel may stand still for good reasons: the joint is stationary, the motor is off, the encoder is
 //! coarse. What a recorder or sensor does shows at the edges (the channel is moving, and stops from
 //! one row to the next), or in what happens meanwhile (the joint travels, its torque does not
 //! change in the last digit).

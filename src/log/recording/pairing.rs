@@ -1,7 +1,7 @@
 //! Positions of one topic and torques of another, each on its own clock, brought onto that of the positions.
 //!
 //! Positions are differentiated later and stay as they were measured; the torque at their times is
-//! interpolated between its neighbours, or held where the robot file says that it is. A row whose
+//! interpolated between its neighbours, or taken by a zero-order hold where the robot file says so. A row whose
 //! neighbours lie too far apart is left out: nothing is made up across a dropout.
 
 use std::collections::VecDeque;

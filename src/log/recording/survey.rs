@@ -45,7 +45,7 @@ struct TopicCandidate {
     velocities: bool,
     header: bool,
     time: bool,
-    /// Fields that no message held so far.
+    /// Fields that no message had so far.
     missing: Vec<bool>,
     names: Vec<String>,
 }

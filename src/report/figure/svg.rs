@@ -34,7 +34,7 @@ impl Stroke {
     }
 }
 
-/// Where a text is held.
+/// Where a text is anchored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -172,7 +172,7 @@ impl Svg {
         self.set(name, rest, style);
     }
 
-    /// Text that reads upwards, held at its middle.
+    /// Text that reads upwards, anchored at its middle.
     pub fn upright(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
         let _ = write!(
             self.body,
@@ -292,7 +292,7 @@ pub(super) fn fitted(text: &str, size: f64, width: f64) -> String {
     cut
 }
 
-/// A coordinate with at most two decimals. Values that no screen has are held at its edge, and a
+/// A coordinate with at most two decimals. Values that no screen has are clamped to its edge, and a
 /// number that is none at 0: the callers split their data before.
 fn px(value: f64) -> String {
     let value = if value.is_nan() { 0.0 } else { value };

@@ -3,7 +3,7 @@
 //! The base's point lies at the distance a from the axis in the direction `angle`, the link's at the distance
 //! b in the direction q, so that the spring is l = sqrt(a^2 + b^2 - 2 a b cos(q - angle)) long and the motor
 //! supplies d/dq of stiffness (l - free_length)^2/2. A moment that was found and not built is a cubic B-spline
-//! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, held beyond them.
+//! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, constant beyond them.
 
 use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
 use crate::effect::counterbalance::ENTRY;

@@ -41,7 +41,7 @@ fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateE
             inertia,
         });
     }
-    Built::plant(Held {
+    Built::plant(LinkLoad {
         chain: robot.tree().clone(),
         mass,
         centre: Vector3::new(mx, my, mz) / mass,
@@ -117,7 +117,7 @@ impl Effect for AtOneJoint {
 /// On the last link of a chain: m J'J + I J_w'J_w, and the same of what the speeds and gravity ask for. The
 /// spin of a ball has no torque of its own.
 #[derive(Debug)]
-struct Held {
+struct LinkLoad {
     chain: Tree,
     mass: f64,
     /// In the last link's frame \[m\].
@@ -126,7 +126,7 @@ struct Held {
     inertia: f64,
 }
 
-impl Effect for Held {
+impl Effect for LinkLoad {
     fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
         let n = self.chain.joints();
         let last = self.chain.links().len() - 1;
