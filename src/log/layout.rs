@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::section::LogSection;
+use super::section::{ColumnName, LogSection};
 
 /// One channel: SI value = `factor` x logged number + `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,33 @@ impl Channel {
             offset: 0.0,
             key: None,
         }
+    }
+}
+
+impl LogSection {
+    /// Which column is the time, and how it becomes seconds.
+    pub(crate) fn time_channel(&self) -> Channel {
+        let (unit, factor) = self.time_unit.in_seconds();
+        let time = || "[log] time".to_owned();
+        channel(&self.time, "t".to_owned(), unit, [factor, 0.0], time)
+    }
+}
+
+/// A channel by the column that the file names under `key`, else by the name of the contract; SI value =
+/// `gain[0]` x logged number + `gain[1]`.
+pub(crate) fn channel(
+    named: &Option<ColumnName>,
+    contract: String,
+    unit: &str,
+    [factor, offset]: [f64; 2],
+    key: impl Fn() -> String,
+) -> Channel {
+    Channel {
+        column: named.as_ref().map_or(contract, |name| name.0.clone()),
+        unit: unit.to_owned(),
+        factor,
+        offset,
+        key: named.as_ref().map(|_| key()),
     }
 }
 

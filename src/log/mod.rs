@@ -45,6 +45,6 @@ pub use spec::{LogSpec, Span};
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;
+pub(crate) use layout::channel;
 pub(crate) use names::{did_you_mean, list};
-pub(crate) use section::channel;
 pub(crate) use source::{remedy, shown};

@@ -8,8 +8,6 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserializer, Error, Visitor};
 use serde::{Deserialize, Serialize};
 
-use super::layout::Channel;
-
 /// Unit of a logged position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum PositionUnit {
@@ -115,7 +113,7 @@ pub enum TimeUnit {
 
 impl TimeUnit {
     /// As it is written in files, and seconds in one of it.
-    const fn in_seconds(self) -> (&'static str, f64) {
+    pub(super) const fn in_seconds(self) -> (&'static str, f64) {
         match self {
             Self::Second => ("s", 1.0),
             Self::Millisecond => ("ms", 1e-3),
@@ -285,33 +283,6 @@ pub struct LogSection {
     /// Raw columns by actuator coordinate.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub actuator: BTreeMap<String, ActuatorChannels>,
-}
-
-impl LogSection {
-    /// Which column is the time, and how it becomes seconds.
-    pub(crate) fn time_channel(&self) -> Channel {
-        let (unit, factor) = self.time_unit.in_seconds();
-        let time = || "[log] time".to_owned();
-        channel(&self.time, "t".to_owned(), unit, [factor, 0.0], time)
-    }
-}
-
-/// A channel by the column that the file names under `key`, else by the name of the contract; SI value =
-/// `gain[0]` x logged number + `gain[1]`.
-pub(crate) fn channel(
-    named: &Option<ColumnName>,
-    contract: String,
-    unit: &str,
-    [factor, offset]: [f64; 2],
-    key: impl Fn() -> String,
-) -> Channel {
-    Channel {
-        column: named.as_ref().map_or(contract, |name| name.0.clone()),
-        unit: unit.to_owned(),
-        factor,
-        offset,
-        key: named.as_ref().map(|_| key()),
-    }
 }
 
 /// A column by its name, or by its number from 1: `3` is kept as `#3`.
