@@ -116,8 +116,9 @@ impl<const J: usize> Plant<J> {
     pub fn check(&self) -> Result<(), SimulateError> {
         let n = self.joints();
         let m = &self.mechanism;
-        for j in 0..n {
-            self.check_joint(j)?;
+        if n == 1 {
+            // the inertia of a single joint is a parameter, told by its name
+            self.check_joint(0)?;
         }
         let finite = self.theta().iter().all(|x| x.is_finite());
         for x in m.poses() {
@@ -127,7 +128,8 @@ impl<const J: usize> Plant<J> {
                 return Err(SimulateError::NotPositiveDefinite { x });
             }
         }
-        Ok(())
+        // friction that is smoothed by the inertia is a number only where this is one
+        (0..n).try_for_each(|j| self.check_joint(j))
     }
 
     fn check_joint(&self, j: usize) -> Result<(), SimulateError> {
