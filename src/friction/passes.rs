@@ -50,7 +50,7 @@ const SETTLED: f64 = 1e-4;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl {
     rejected_from: 1e-4,
-    ..StepControl::damping(0.1, 10.0, [1e-9, 1e8])
+    ..StepControl::damping(10.0, 10.0, [1e-9, 1e8])
 };
 
 /// Levels that the user gives; what is not given comes from the log.

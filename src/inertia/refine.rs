@@ -23,7 +23,7 @@ const SETTLED: f64 = 1e-6;
 /// Most passes over the logs.
 const MOST: usize = 40;
 /// Damping of the steps.
-const DAMPING: StepControl = StepControl::damping(0.1, 10.0, [1e-9, 1e6]);
+const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e6]);
 /// A slope may change by this factor in one step.
 const FARTHEST: f64 = 4.0;
 /// No slope is steeper than this over the rms speed: tanh is a sign there.

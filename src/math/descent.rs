@@ -23,7 +23,7 @@ pub enum Ending {
 #[derive(Debug, Clone, Copy)]
 pub struct StepControl {
     pub start: f64,
-    /// Factors after a step that was accepted, and after one that was rejected.
+    /// Divisor after a step that was accepted, and factor after one that was rejected.
     pub accepted: f64,
     pub rejected: f64,
     /// An accepted step leaves it in here; a step that is rejected at the end of it was the last.
@@ -48,7 +48,7 @@ impl StepControl {
     pub const fn halving(lengths: u32) -> Self {
         StepControl {
             start: 1.0,
-            accepted: f64::INFINITY,
+            accepted: 0.0,
             rejected: 0.5,
             range: [1.0 / (1u64 << (lengths - 1)) as f64, 1.0],
             rejected_from: 0.0,
@@ -94,7 +94,7 @@ pub fn descend<S, E>(
         match step(&at, number)? {
             Trial::Accepted(next) => {
                 at = next;
-                number = (number * control.accepted).clamp(control.range[0], control.range[1]);
+                number = (number / control.accepted).clamp(control.range[0], control.range[1]);
             }
             Trial::Rejected => match control.after_rejection(number) {
                 Some(shorter) => number = shorter,
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    const DAMPING: StepControl = StepControl::damping(0.1, 10.0, [1e-9, 1e6]);
+    const DAMPING: StepControl = StepControl::damping(10.0, 10.0, [1e-9, 1e6]);
 
     /// The least of ln(1 + x^2), whose Newton step from far away goes the wrong way and whose
     /// Gauss-Newton step overshoots, damped.

@@ -32,7 +32,7 @@ const PLAIN_DRIVE: f64 = 0.1;
 /// A step that lowers the cost by less than this share is the last.
 const SETTLED: f64 = 1e-6;
 /// Damping of the steps.
-const DAMPING: StepControl = StepControl::damping(0.2, 4.0, [1e-12, 1e12]);
+const DAMPING: StepControl = StepControl::damping(5.0, 4.0, [1e-12, 1e12]);
 /// Most steps under each weight of the prior.
 const MOST: usize = 300;
 /// Weights of the prior on the way to [`PRIOR_WEIGHT`].
