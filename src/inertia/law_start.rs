@@ -119,13 +119,13 @@ impl<'a> SlopeLadder<'a> {
         let chosen = factors.with_own(&self.with_pairs(pairs));
         let found = fit_with(&chosen, inputs)?;
         let mut start = self.linear.clone();
-        for j in 0..self.linear.joints {
+        for (j, pair) in pairs.iter().enumerate() {
             let Some(k) = viscous(&self.linear.own[j]) else {
                 continue;
             };
             let at = |k: usize| found.theta[chosen.columns.first_own(j) + k];
             let last = chosen.columns.own[j].len();
-            let [steep, flat] = pairs[j].map(|k| self.slopes[j][k]);
+            let [steep, flat] = pair.map(|k| self.slopes[j][k]);
             let place = self.base(j).iter().position(|b| *b == k);
             start.own[j].retain(|o| !matches!(o, Own::Viscous | Own::Coulomb));
             start.known[j] = Some(KnownFriction {

@@ -200,7 +200,7 @@ impl<'t> Reading<'t> {
                         self.next();
                         path.push(self.next());
                     }
-                    self.named.paths.extend(self.from_root(&path));
+                    self.named.paths.extend(self.rooted(&path));
                 }
                 _ => {}
             }
@@ -240,7 +240,7 @@ impl<'t> Reading<'t> {
             self.next();
             name = self.next();
         }
-        if let Some(path) = self.from_root(&path) {
+        if let Some(path) = self.rooted(&path) {
             if self.inner.is_empty() {
                 self.named.given.insert(name.to_owned(), path.clone());
             }
@@ -249,7 +249,7 @@ impl<'t> Reading<'t> {
     }
 
     /// A path from the crate's root; `None` for one of another crate.
-    fn from_root(&self, path: &[&str]) -> Option<Module> {
+    fn rooted(&self, path: &[&str]) -> Option<Module> {
         let mut module = self.module.clone();
         let mut rest = path;
         match *path.first()? {
@@ -280,6 +280,9 @@ pub struct Imports<'s> {
     /// Indices of the one that imports and of the one that is imported.
     between: BTreeSet<(usize, usize)>,
 }
+
+/// What ties two children of a folder: the imports of the first from the second.
+type Ties<'a> = BTreeMap<(&'a str, &'a str), Vec<String>>;
 
 impl<'s> Imports<'s> {
     /// Reads what `part` leaves of each text: [`code`] or [`shipped`].
@@ -325,7 +328,7 @@ impl<'s> Imports<'s> {
     /// a `mod.rs` and the files below it import of each other is none.
     pub fn circles(&self) -> Vec<(String, Vec<String>)> {
         // of each folder, which of its files and folders imports which, by what
-        let mut folders: BTreeMap<&[String], BTreeMap<(&str, &str), Vec<String>>> = BTreeMap::new();
+        let mut folders: BTreeMap<&[String], Ties> = BTreeMap::new();
         for (from, to) in self.between_files() {
             let same = from
                 .module
