@@ -73,7 +73,7 @@ impl Context {
     }
 
     /// The flag behind [`Context::interrupted`], for a room that takes one.
-    pub fn stop_flag(&self) -> &AtomicBool {
+    pub(crate) fn stop_flag(&self) -> &AtomicBool {
         &self.interrupted
     }
 
@@ -92,7 +92,11 @@ impl Context {
     /// # Errors
     /// Usage, when two outputs are one file, or an output would overwrite one of `inputs`; output,
     /// when a folder is missing or cannot be written.
-    pub fn check_outputs(&self, inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
+    pub(crate) fn check_outputs(
+        &self,
+        inputs: &[&Path],
+        outputs: &[&Path],
+    ) -> Result<(), CliError> {
         let mut all = outputs.to_vec();
         all.extend(self.json.as_deref());
         outputs::check(inputs, &all)

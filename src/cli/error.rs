@@ -65,7 +65,7 @@ impl CliError {
     }
 
     /// The error of a room, with those that it stems from.
-    pub fn from_room(exit: Exit, error: &(dyn Error + 'static)) -> Self {
+    pub(crate) fn from_room(exit: Exit, error: &(dyn Error + 'static)) -> Self {
         Self::new(exit, with_sources(error))
     }
 

@@ -46,7 +46,7 @@ pub fn model(path: &Path) -> Result<Given<ModelFile>, CliError> {
 }
 
 /// A model file of the robot given.
-pub fn model_of(path: &Path, robot: &RobotFile) -> Result<Given<ModelFile>, CliError> {
+pub(crate) fn model_of(path: &Path, robot: &RobotFile) -> Result<Given<ModelFile>, CliError> {
     let model = model(path)?;
     model.value.belongs_to(&model.name, robot)?;
     Ok(model)

@@ -101,7 +101,7 @@ pub enum Trajectory {
 }
 
 /// Names of the actuator coordinates of the CFT robot.
-pub const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
+pub(crate) const CARTESIAN: [&str; 4] = ["x_c1", "x_c2", "x_c3", "x_c4"];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

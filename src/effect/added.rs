@@ -39,7 +39,7 @@ impl Added {
     ///
     /// # Errors
     /// [`EffectError`] for a joint or key that does not fit.
-    pub fn of_values(
+    pub(crate) fn of_values(
         law: &'static Law,
         robot: &Robot,
         joint: Option<&str>,

@@ -93,7 +93,7 @@ impl Cover {
     }
 
     /// A distance of joint j in revolutions or metres.
-    pub fn in_order_units(&self, j: usize, distance: f64) -> f64 {
+    pub(crate) fn in_order_units(&self, j: usize, distance: f64) -> f64 {
         match self.kinds[j] {
             JointKind::Revolute => distance / std::f64::consts::TAU,
             JointKind::Prismatic => distance,
@@ -109,7 +109,7 @@ impl JointCover {
 
     /// Whether the travel is wide enough to tell a smooth function of position, which would be carried
     /// on beyond it: half of the joint's range, where that is known.
-    pub fn is_wide(&self) -> Result<(), String> {
+    pub(crate) fn is_wide(&self) -> Result<(), String> {
         match self.full_range {
             Some(full) if self.range() < WIDE * full => Err(format!(
                 "the travel covers {:.0} % of the joint's range, and a function of position fitted \
@@ -126,7 +126,7 @@ impl JointCover {
     }
 
     /// Whether the joint moved both ways with speeds worth the name.
-    pub fn both_ways(&self) -> bool {
+    pub(crate) fn both_ways(&self) -> bool {
         self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
     }
 }

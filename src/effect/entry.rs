@@ -90,7 +90,7 @@ impl Ladder {
         travel: None,
     };
     /// Beside logs over the whole range: a gap keeps its width, a loop shrinks with the amplitude.
-    pub const NARROW: Ladder = Ladder {
+    pub(crate) const NARROW: Ladder = Ladder {
         travel: Some(0.1),
         ..Ladder::USUAL
     };
@@ -157,7 +157,7 @@ impl Key {
     }
 
     /// The key with numbers above zero alone.
-    pub const fn above_zero(self, rule: &'static str) -> Self {
+    pub(crate) const fn above_zero(self, rule: &'static str) -> Self {
         let range = Some(Range {
             least: 0.0,
             most: f64::INFINITY,

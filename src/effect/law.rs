@@ -118,7 +118,7 @@ impl Law {
     ///
     /// # Errors
     /// [`EffectError`] for a key that is absent or unusable.
-    pub fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
+    pub(crate) fn of_keys(&self, values: &Values) -> Result<[Vec<f64>; 2], EffectError> {
         if let Some(with) = &self.reparametrised {
             return (with.of_keys)(values);
         }

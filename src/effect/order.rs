@@ -48,12 +48,12 @@ pub fn is_whole(cover: &Cover, place: Place, order: f64) -> bool {
 const FULL_TURNS: f64 = 1.5;
 
 /// Orders between what the travel covers and what the position filter lets through.
-pub fn order_limits(cover: &Cover, place: Place) -> Vec<[f64; 2]> {
+pub(crate) fn order_limits(cover: &Cover, place: Place) -> Vec<[f64; 2]> {
     let travel = cover.travel(place).max(f64::MIN_POSITIVE);
     vec![[LEAST_WAVES / travel, MOST_ORDER]]
 }
 
 /// Waves that the travel must cover.
-pub const LEAST_WAVES: f64 = 1.5;
+pub(crate) const LEAST_WAVES: f64 = 1.5;
 /// No order above this is looked for.
 const MOST_ORDER: f64 = 1e6;

@@ -75,7 +75,7 @@ impl Unit {
     }
 
     /// The same in model files and results, which leave a 1 out and say slopes and powers in words.
-    pub fn in_files(self, kind: JointKind, from: JointKind, torque: &str) -> String {
+    pub(crate) fn in_files(self, kind: JointKind, from: JointKind, torque: &str) -> String {
         match self {
             Self::Slope => "1/speed".to_owned(),
             Self::Power => "torque per speed^p".to_owned(),

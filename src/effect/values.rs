@@ -60,7 +60,7 @@ impl Values<'_> {
     ///
     /// # Errors
     /// [`EffectError::Value`].
-    pub fn get_or(&self, key: &str, absent: f64) -> Result<f64, EffectError> {
+    pub(crate) fn get_or(&self, key: &str, absent: f64) -> Result<f64, EffectError> {
         match self.given.contains_key(key) {
             true => self.get(key),
             false => Ok(absent),

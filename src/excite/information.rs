@@ -39,7 +39,7 @@ impl Information {
     ///
     /// # Errors
     /// As [`Self::of_period`].
-    pub fn of_path(
+    pub(crate) fn of_path(
         machine: &Machine,
         samples: usize,
         at: &dyn Fn(usize) -> Kinematics,

@@ -269,7 +269,7 @@ impl Machine {
     }
 
     /// The rows of the fit as they are, n x p row-major.
-    pub fn exact_rows(&self, state: &State, y: &mut [f64]) {
+    pub(crate) fn exact_rows(&self, state: &State, y: &mut [f64]) {
         let (n, p, shared) = (self.coordinates(), self.unknowns(), self.columns.shared);
         let (q, v, a) = (&state.q[..n], &state.v[..n], &state.a[..n]);
         self.model.robot.regressor(q, v, a, &mut y[..n * shared]);

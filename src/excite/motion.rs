@@ -155,7 +155,7 @@ pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
 ///
 /// # Errors
 /// [`ExciteError::Robot`] where the machine cannot follow.
-pub fn torque_band(
+pub(crate) fn torque_band(
     machine: &Machine,
     series: &Series,
     share: f64,

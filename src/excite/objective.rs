@@ -120,7 +120,7 @@ impl<'a> Objective<'a> {
 
     /// The same with those of the curved limits tightened that the motion at z exceeds between the
     /// samples, by what it does; `None` where none is exceeded by more than the share given.
-    pub fn tightened(&self, z: &[f64], most: f64) -> Option<Self> {
+    pub(crate) fn tightened(&self, z: &[f64], most: f64) -> Option<Self> {
         let mut series = self.work().series;
         self.variables.series(z, &mut series);
         let uses = along_period(self.machine, &self.curved, &series);
@@ -154,7 +154,7 @@ impl<'a> Objective<'a> {
     }
 
     /// Number of constraints: two sides of every channel at every sample.
-    pub fn constraints(&self) -> usize {
+    pub(crate) fn constraints(&self) -> usize {
         2 * (self.linear.len() + self.curved.len()) * self.fine.samples
     }
 

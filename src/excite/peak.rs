@@ -34,7 +34,7 @@ pub fn highest(
 }
 
 /// [`highest`] of a function whose values at the ends of equal parts are there already.
-pub fn highest_from(
+pub(crate) fn highest_from(
     f: &mut dyn FnMut(f64) -> f64,
     [from, to]: [f64; 2],
     samples: &[f64],

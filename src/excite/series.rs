@@ -88,7 +88,7 @@ impl Series {
 
     /// Bound of the k-th time derivative's modulus of coordinate i, without the offset: the sum of
     /// its terms' amplitudes.
-    pub fn derivative_bound(&self, i: usize, k: i32) -> f64 {
+    pub(crate) fn derivative_bound(&self, i: usize, k: i32) -> f64 {
         let terms = self.a[i].iter().zip(&self.b[i]).enumerate();
         terms
             .map(|(l, (a, b))| ((l + 1) as f64 * self.fundamental).powi(k - 1) * a.hypot(*b))
@@ -156,7 +156,7 @@ impl Basis {
 
     /// [`Self::pull_back`] for every coordinate, whose derivatives stand one after the other in `out`.
     #[inline]
-    pub fn pull_back_all(
+    pub(crate) fn pull_back_all(
         &self,
         fundamental: f64,
         m: usize,
@@ -172,7 +172,7 @@ impl Basis {
     /// Adds to the derivatives by (offset, a, b) of coordinate i what the derivatives `g` by
     /// (x, xd, xdd) at sample m stand for.
     #[inline]
-    pub fn pull_back(&self, fundamental: f64, m: usize, g: [f64; 3], out: &mut [f64]) {
+    pub(crate) fn pull_back(&self, fundamental: f64, m: usize, g: [f64; 3], out: &mut [f64]) {
         let n = self.harmonics;
         let row = &self.table[m * n..(m + 1) * n];
         let (offset, rest) = out.split_at_mut(1);

@@ -102,7 +102,7 @@ impl Variables {
     }
 
     /// Derivatives by z from those by (offset, a, b), coordinate after coordinate.
-    pub fn pull_back(&self, by_coefficients: &[f64], out: &mut [f64]) {
+    pub(crate) fn pull_back(&self, by_coefficients: &[f64], out: &mut [f64]) {
         let mut at = 0;
         let rows = by_coefficients.chunks_exact(1 + 2 * self.harmonics);
         for (i, row) in rows.enumerate() {

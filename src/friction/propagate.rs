@@ -101,7 +101,7 @@ impl ScaledLaw {
 
     /// dF/dv.
     #[inline(always)]
-    pub fn slope_at(&self, v: f64) -> f64 {
+    pub(crate) fn slope_at(&self, v: f64) -> f64 {
         self.at(v).slope
     }
 
@@ -199,7 +199,7 @@ pub fn state(
 /// Integrates state and sensitivities over one interval; returns (q, v) at its end and fills
 /// `out`. `p` are the parameters that `law` was made from.
 #[inline]
-pub fn with_sensitivities(
+pub(crate) fn with_sensitivities(
     law: &ScaledLaw,
     p: &[f64],
     interval: &SampleInterval,

@@ -19,7 +19,7 @@ fn drop(maximum: &Maximum, value: f64) -> f64 {
 /// Whether the slope with index `i` (3 or 4) may be as steep as any that is tried, the other
 /// parameters fitted anew. A standard deviation cannot tell: it knows the curvature at the maximum
 /// alone, and a likelihood that rises to a plateau is curved at its edge.
-pub fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
+pub(crate) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> bool {
     let mut p = maximum.parameters.clone();
     p[i] = (problem.slope_range.1 * problem.velocity_scale).ln();
     let spread = spread(problem);
@@ -30,7 +30,7 @@ pub fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> boo
 /// One-sided 95 % lower bound of the slope with index `i` (3 or 4) by its profile likelihood: the
 /// slope steps down while everything else is fitted anew. The steeper slope, 3, takes the other
 /// with it, which would step into its place. `None` where the whole range is as likely.
-pub fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> Option<f64> {
+pub(crate) fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usize) -> Option<f64> {
     let spread = spread(problem);
     let lowest = (problem.slope_range.0 * problem.velocity_scale).ln();
     let mut p = maximum.parameters.clone();

@@ -129,7 +129,7 @@ impl WindowAverages {
 }
 
 /// The best `most` pairs of slopes with their linear fits, pairs apart from one another.
-pub fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
+pub(crate) fn from_log(prepared: &Prepared, most: usize) -> Vec<FilterStart> {
     let problem = &prepared.problem;
     let windows = WindowAverages::new(prepared);
     let (lo, hi) = problem.slope_range;
@@ -198,7 +198,7 @@ fn polish(prepared: &Prepared, windows: &WindowAverages, slopes: [f64; 2]) -> Op
 
 /// Nuisance that gives the constant inertia `inertia` as nearly as this motion's columns can, and
 /// no gravity: the start of a user who knows no more.
-pub fn constant_inertia(prepared: &Prepared, inertia: f64) -> Vec<f64> {
+pub(crate) fn constant_inertia(prepared: &Prepared, inertia: f64) -> Vec<f64> {
     let e = prepared.problem.nuisance;
     let mut normal = DMatrix::<f64>::zeros(e, e);
     let mut right = DVector::<f64>::zeros(e);

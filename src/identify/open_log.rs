@@ -67,7 +67,7 @@ impl OpenLog<'_> {
     }
 
     /// Whether torques come from a zero-order hold and so are means of two rows here.
-    pub fn is_centred(&self) -> bool {
+    pub(crate) fn is_centred(&self) -> bool {
         self.centre.is_some()
     }
 

@@ -81,12 +81,12 @@ impl RegressorColumns {
     }
 
     /// Number of unknowns in the rows of joint j.
-    pub fn unknowns_of(&self, j: usize) -> usize {
+    pub(crate) fn unknowns_of(&self, j: usize) -> usize {
         self.shared + self.own[j].len()
     }
 
     /// Width of one row of joint j: unknowns, gradient, target b = tau - F(v).
-    pub fn row_width(&self, j: usize) -> usize {
+    pub(crate) fn row_width(&self, j: usize) -> usize {
         self.unknowns_of(j) + self.gradient(j) + 1
     }
 

@@ -24,7 +24,7 @@ impl Instant {
     }
 
     /// An instant from whole seconds and nanoseconds.
-    pub fn from_s_ns(s: i64, ns: i64) -> Self {
+    pub(crate) fn from_s_ns(s: i64, ns: i64) -> Self {
         Self {
             fs: i128::from(s) * SECOND + i128::from(ns) * NANOSECOND,
         }

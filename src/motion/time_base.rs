@@ -161,7 +161,7 @@ impl TimeBase {
     }
 
     /// Takes a clock that is known already.
-    pub fn use_clock(&mut self, clock: SampleClock) {
+    pub(crate) fn use_clock(&mut self, clock: SampleClock) {
         self.clock = Some(clock);
     }
 
@@ -193,7 +193,7 @@ impl TimeBase {
     }
 
     /// Finds the clock of a log shorter than the rows it is usually found from.
-    pub fn settle_clock(&mut self) -> Result<SampleClock, MotionError> {
+    pub(crate) fn settle_clock(&mut self) -> Result<SampleClock, MotionError> {
         match self.clock {
             Some(clock) => Ok(clock),
             None => Ok(*self.clock.insert(SampleClock::of(&self.t)?)),

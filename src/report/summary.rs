@@ -70,7 +70,7 @@ pub fn parameters(caption: &str, rows: &[Parameter]) -> Table {
 }
 
 /// The errors as a table.
-pub fn torque_errors(caption: &str, rows: &[JointError]) -> Table {
+pub(crate) fn torque_errors(caption: &str, rows: &[JointError]) -> Table {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("relative error", Align::Decimal),

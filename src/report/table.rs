@@ -45,7 +45,7 @@ impl Table {
     }
 
     /// A table for a page, which tells numbers from words by itself.
-    pub fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
+    pub(crate) fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
         let columns: Vec<(&str, Align)> = head.iter().map(|name| (*name, Align::Left)).collect();
         let mut table = Table::new(&columns).caption(caption);
         rows.into_iter().for_each(|row| table.row(row));
@@ -211,11 +211,6 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
     }
 }
 
-/// `text` as lines that are indented by `indent` columns and fit [`WIDTH`], each with its line end.
-pub fn paragraph(text: &str, indent: usize) -> String {
-    hanging(&" ".repeat(indent), text, indent)
-}
-
 /// `head` and `text` as lines that fit [`WIDTH`], those after the first indented by `indent` columns,
 /// each with its line end.
 pub fn hanging(head: &str, text: &str, indent: usize) -> String {
@@ -250,7 +245,7 @@ pub fn folded(text: &str) -> String {
 const UNBROKEN: char = '\u{a0}';
 
 /// `text` as one word, which the end of a line does not part.
-pub fn unbroken(text: &str) -> String {
+pub(crate) fn unbroken(text: &str) -> String {
     text.replace(' ', UNBROKEN.encode_utf8(&mut [0; 2]))
 }
 

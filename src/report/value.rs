@@ -120,7 +120,7 @@ impl Writer<'_> {
         self.push(Part::Heading(text.to_owned()));
     }
 
-    pub fn paragraph(&mut self, text: &str) {
+    pub(crate) fn paragraph(&mut self, text: &str) {
         self.push(Part::Paragraph(text.to_owned()));
     }
 
@@ -169,7 +169,7 @@ impl Writer<'_> {
         self.push(Part::Code(text.to_owned()));
     }
 
-    pub fn details(&mut self, summary: &str, text: &str) {
+    pub(crate) fn details(&mut self, summary: &str, text: &str) {
         self.push(Part::Details {
             summary: summary.to_owned(),
             text: text.to_owned(),

@@ -6,8 +6,8 @@ use super::cft::linkage;
 use super::cft::links::{PseudoInertia, base_parameters};
 use super::joint::JointKind;
 use super::standard::{STANDARD, pseudo_inertia};
+use super::tree::base;
 use super::tree::newton_euler::walk;
-use super::tree::{base, parameters};
 use super::{Form, Robot};
 
 /// How a robot's inertial parameters follow from links and drives.
@@ -33,11 +33,6 @@ impl Robot {
     /// Number of standard parameters: ten a link, then the drive inertias.
     pub fn standard_parameters(&self) -> usize {
         base::standard_parameters(self.tree(), self.drive_inertia())
-    }
-
-    /// Name of a standard parameter, as groupings call it.
-    pub fn standard_name(&self, index: usize) -> String {
-        parameters::standard_name(self.tree().links().len(), index)
     }
 
     /// How the inertial parameters follow from the standard parameters of links and drives.

@@ -264,7 +264,14 @@ impl Robot {
     ///
     /// # Panics
     /// As [`Self::regressor`].
-    pub fn regressor_row(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
+    pub(crate) fn regressor_row(
+        &self,
+        joint: usize,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        out: &mut [f64],
+    ) {
         match &self.0.form {
             Form::Inertia => out[0] = a[0],
             Form::Report(_) => {

@@ -47,7 +47,7 @@ impl Robot {
     }
 
     /// Link that carries the tool: the last one.
-    pub fn tool_link(&self) -> usize {
+    pub(crate) fn tool_link(&self) -> usize {
         self.tree().links().len() - 1
     }
 

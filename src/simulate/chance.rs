@@ -36,7 +36,7 @@ pub fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
 }
 
 /// Generator of the given purpose for one of several things, such as joints.
-pub fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
+pub(crate) fn stream_of(seed: u64, purpose: Purpose, number: usize) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(purpose as u64 + APART * (number as u64 + 1));
     generator

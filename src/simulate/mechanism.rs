@@ -158,7 +158,11 @@ impl<const J: usize> Mechanism<J> {
     ///
     /// # Errors
     /// [`SimulateError::Robot`] where the pose is singular.
-    pub fn joint_speeds(&self, q: &[f64; J], xd: &[f64; J]) -> Result<[f64; J], SimulateError> {
+    pub(crate) fn joint_speeds(
+        &self,
+        q: &[f64; J],
+        xd: &[f64; J],
+    ) -> Result<[f64; J], SimulateError> {
         let (n, mut v) = (self.joints(), [0.0; J]);
         let transmission = self.robot.transmission();
         transmission.joint_velocities(&q[..n], &xd[..n], &mut v[..n])?;

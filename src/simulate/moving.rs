@@ -29,7 +29,7 @@ struct Balance<const J: usize> {
 impl<const J: usize> Moving<'_, J> {
     /// Positions and speeds where the motors and their encoders sit: those of the links, and beyond them
     /// the deflections of elastic joints.
-    pub fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
+    pub(crate) fn motor_side(&self, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([f64; J], [f64; J]) {
         let (mut q, mut v) = (*q, *v);
         for twist in self.effects.twists(z) {
             q[twist.joint] += twist.deflection;

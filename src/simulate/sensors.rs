@@ -117,7 +117,7 @@ impl<const J: usize> Sensors<J> {
     }
 
     /// Sampling instants 0..=count \[s\] at the given rate; the first is 0.
-    pub fn instants(&self, count: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
+    pub(crate) fn instants(&self, count: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
         let mut chance = stream(seed, Purpose::Jitter);
         (0..=count)
             .map(|k| {

@@ -15,14 +15,14 @@ pub struct Baseline<'a> {
 
 impl Baseline<'_> {
     /// Weighted square of the declared model's residual on the joints of a place.
-    pub fn declared_square(&self, at: &FittedModel, place: Place) -> f64 {
+    pub(crate) fn declared_square(&self, at: &FittedModel, place: Place) -> f64 {
         let joints = (0..self.declared.len()).filter(|j| place.touches(*j));
         let squares = joints.map(|j| at.weights[j].powi(2) * self.declared[j]);
         squares.sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
     /// Weighted square of the noise on the joints of a place, over the fitted rows.
-    pub fn noise_square(&self, at: &FittedModel, split: &DataSplit, place: Place) -> f64 {
+    pub(crate) fn noise_square(&self, at: &FittedModel, split: &DataSplit, place: Place) -> f64 {
         let joints = (0..self.noise.len()).filter(|j| place.touches(*j));
         let of_joint = |j: usize| {
             let rows = split.fitted_rows_of(j) as f64;

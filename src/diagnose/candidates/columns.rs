@@ -45,7 +45,7 @@ pub fn columns(
 }
 
 /// Part of the columns' power that the parallel filter keeps, over the fitted stretches.
-pub fn kept_by_filter(
+pub(crate) fn kept_by_filter(
     model: &AugmentedModel,
     problem: &FitProblem,
     torques: &[Torques],

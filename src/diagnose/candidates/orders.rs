@@ -9,7 +9,7 @@ use crate::robot::JointKind;
 /// Bins over the travel.
 const BINS: usize = 4096;
 /// Independent waves in a spectrum: sine and cosine of each whole number up to an eighth of the bins.
-pub const SCANNED: usize = BINS / 4;
+pub(crate) const SCANNED: usize = BINS / 4;
 /// Spacing of the orders that are looked at, over 1/travel.
 const SPACING: f64 = 0.25;
 /// Peaks kept of each spectrum.

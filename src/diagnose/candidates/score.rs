@@ -345,7 +345,7 @@ impl<'a> CandidateTest<'a> {
 }
 
 /// Pieces over which scores count as correlated; a piece is some correlation times long.
-pub const LAG: usize = 2;
+pub(crate) const LAG: usize = 2;
 /// Least share of a column that must be its own.
 const SHARE: f64 = 0.001;
 

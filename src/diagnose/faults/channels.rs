@@ -25,7 +25,7 @@ const KNOWN: f64 = 0.25;
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn suspicion(
+pub(crate) fn suspicion(
     model: &AugmentedModel,
     stretches: &[Stretch],
     parallel: &Parallel,

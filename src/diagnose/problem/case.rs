@@ -71,13 +71,16 @@ impl Default for SelectionLimits {
 
 impl Case {
     /// The stretches of logs with a role.
-    pub fn stretches_of(&self, role: LogRole) -> Vec<Stretch> {
+    pub(crate) fn stretches_of(&self, role: LogRole) -> Vec<Stretch> {
         let of_role = |s: &&Stretch| self.roles[s.log] == role;
         self.stretches.iter().filter(of_role).cloned().collect()
     }
 
     /// Those of the stretches' torques that belong to logs that are fitted.
-    pub fn fitted_torques<'a>(&self, all: &'a [Torques]) -> impl Iterator<Item = &'a Torques> {
+    pub(crate) fn fitted_torques<'a>(
+        &self,
+        all: &'a [Torques],
+    ) -> impl Iterator<Item = &'a Torques> {
         let pairs = self.stretches.iter().zip(all);
         let fitted = pairs.filter(|(s, _)| self.roles[s.log] == LogRole::Train);
         fitted.map(|(_, torques)| torques)

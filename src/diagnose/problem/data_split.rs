@@ -199,17 +199,17 @@ impl DataSplit {
     }
 
     /// Rows that are fitted.
-    pub fn fitted_rows(&self) -> usize {
+    pub(crate) fn fitted_rows(&self) -> usize {
         self.rows_where(RowRole::fitted)
     }
 
     /// Whether the rows of joint `j` along a stretch count for nothing.
-    pub fn ignores(&self, stretch: usize, j: usize) -> bool {
+    pub(crate) fn ignores(&self, stretch: usize, j: usize) -> bool {
         self.ignored.get(stretch).is_some_and(|joints| joints[j])
     }
 
     /// Whether joint `j` is stationary along a stretch, whatever the stretch is for.
-    pub fn is_stationary(&self, stretch: usize, j: usize) -> bool {
+    pub(crate) fn is_stationary(&self, stretch: usize, j: usize) -> bool {
         self.stationary.get(stretch).is_some_and(|joints| joints[j])
     }
 
@@ -221,14 +221,14 @@ impl DataSplit {
     }
 
     /// Rows that are fitted to joint `j`.
-    pub fn fitted_rows_of(&self, j: usize) -> usize {
+    pub(crate) fn fitted_rows_of(&self, j: usize) -> usize {
         let pieces = self.pieces.iter().filter(|p| p.role.fitted());
         let moving = pieces.filter(|p| !self.ignores(p.stretch, j));
         moving.map(|p| p.rows.len()).sum()
     }
 
     /// Rows of the pieces whose role is asked for.
-    pub fn rows_where(&self, wanted: impl Fn(RowRole) -> bool) -> usize {
+    pub(crate) fn rows_where(&self, wanted: impl Fn(RowRole) -> bool) -> usize {
         let pieces = self.pieces.iter().filter(|p| wanted(p.role));
         pieces.map(|p| p.rows.len()).sum()
     }

@@ -49,7 +49,7 @@ pub fn fit(start: &AugmentedModel, problem: &FitProblem) -> Result<FittedModel, 
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn refit(at: &FittedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
+pub(crate) fn refit(at: &FittedModel, problem: &FitProblem) -> Result<FittedModel, MotionError> {
     let begun = at.with(at.model.clone(), problem)?;
     let known = RankRevealingInverse::of(&at.normal);
     gauss_newton(begun, problem, Some(&known))
@@ -165,19 +165,19 @@ impl FittedModel {
     }
 
     /// The least that the objective comes to from here by a linear step, with one unknown fixed.
-    pub fn least_with_fixed(&self, problem: &FitProblem, fixed: Option<usize>) -> f64 {
+    pub(crate) fn least_with_fixed(&self, problem: &FitProblem, fixed: Option<usize>) -> f64 {
         self.objective(problem) - self.newton(&|i| Some(i) == fixed).1
     }
 
     /// Squared residual of the fitted rows in given weights.
-    pub fn square_with(&self, weights: &[f64], split: &DataSplit) -> f64 {
+    pub(crate) fn square_with(&self, weights: &[f64], split: &DataSplit) -> f64 {
         self.squares_of(weights, split, &RowRole::fitted)
             .iter()
             .sum()
     }
 
     /// Squared residual of each veto piece in given weights.
-    pub fn veto_squares(&self, weights: &[f64], split: &DataSplit) -> Vec<f64> {
+    pub(crate) fn veto_squares(&self, weights: &[f64], split: &DataSplit) -> Vec<f64> {
         self.squares_of(weights, split, &|role| role == RowRole::Veto)
     }
 

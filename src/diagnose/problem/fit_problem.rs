@@ -26,7 +26,7 @@ pub struct FitProblem<'a> {
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn inertial_of(
+pub(crate) fn inertial_of(
     robot: &Robot,
     stretches: &[Stretch],
     parallel: &Parallel,

@@ -94,7 +94,7 @@ impl Base {
     }
 
     /// Squared residual of each joint over the fitted rows.
-    pub fn residual_squares(&self, split: &DataSplit) -> Vec<f64> {
+    pub(crate) fn residual_squares(&self, split: &DataSplit) -> Vec<f64> {
         let joints = self.unknowns.columns.len();
         let of_joint = |j: usize| {
             let pieces = split.pieces.iter().zip(&self.sums);
@@ -105,7 +105,7 @@ impl Base {
     }
 
     /// Root mean square of each joint's residual over the fitted rows.
-    pub fn residual_rms(&self, split: &DataSplit) -> Vec<f64> {
+    pub(crate) fn residual_rms(&self, split: &DataSplit) -> Vec<f64> {
         let squares = self.residual_squares(split);
         let rows = |j| split.fitted_rows_of(j).max(1) as f64;
         let joints = squares.iter().enumerate();
@@ -142,7 +142,7 @@ impl Base {
     }
 
     /// The same of one piece.
-    pub fn sum_of(&self, sums: &[PieceSums], weights: &[f64]) -> NormalEquations {
+    pub(crate) fn sum_of(&self, sums: &[PieceSums], weights: &[f64]) -> NormalEquations {
         let mut total = NormalEquations::none(self.unknowns.len());
         self.add(sums, weights, &mut total);
         total

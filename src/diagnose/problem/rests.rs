@@ -8,7 +8,7 @@ const STANDING: f64 = 0.01;
 
 /// Rows in which a joint with a jump in its friction law stands still for as long as the filter
 /// remembers: static friction takes any torque up to its limit there, and no law of v says which.
-pub fn standing(
+pub(crate) fn standing(
     model: &AugmentedModel,
     stretch: &Stretch,
     parallel: &Parallel,
@@ -47,7 +47,7 @@ const REACH: f64 = 1.0;
 
 /// Which rows are within the filter's reach of a sample at which a joint with a jump in its friction law stands or
 /// turns: the law says more of friction there than friction does.
-pub fn near_rests(
+pub(crate) fn near_rests(
     model: &AugmentedModel,
     stretch: &Stretch,
     parallel: &Parallel,

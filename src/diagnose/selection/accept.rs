@@ -13,7 +13,7 @@ const VETO_CHANCE: f64 = 1.0;
 impl SelectionLimits {
     /// Whether the squared errors on the pieces that may veto grow by more than the limit, and by more than
     /// chance makes of them.
-    pub fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
+    pub(crate) fn vetoes(&self, before: &[f64], after: &[f64]) -> bool {
         let sum = |x: &[f64]| x.iter().sum::<f64>();
         let chance = match before.len() {
             0 | 1 => 0.0,
@@ -31,7 +31,7 @@ struct Worth {
 }
 
 /// Decides on all candidates of a round, in which so many shapes were tried.
-pub fn accept(
+pub(crate) fn accept(
     found: &mut [Candidate],
     shapes: usize,
     limits: &SelectionLimits,

@@ -11,7 +11,7 @@ use crate::motion::MotionError;
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn superfluous(
+pub(crate) fn superfluous(
     at: &FittedModel,
     problem: &FitProblem,
     limits: &SelectionLimits,

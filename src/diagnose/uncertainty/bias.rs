@@ -16,7 +16,10 @@ use crate::motion::{MotionError, Stretch};
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn from_smoothing(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+pub(crate) fn from_smoothing(
+    at: &FittedModel,
+    problem: &FitProblem,
+) -> Result<DVector<f64>, MotionError> {
     let none = DVector::zeros(at.base.unknowns.len());
     let mut again = Vec::with_capacity(problem.stretches.len());
     for (i, stretch) in problem.stretches.iter().enumerate() {
@@ -38,7 +41,10 @@ pub fn from_smoothing(at: &FittedModel, problem: &FitProblem) -> Result<DVector<
 ///
 /// # Errors
 /// [`MotionError`] of the filters.
-pub fn from_noise(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>, MotionError> {
+pub(crate) fn from_noise(
+    at: &FittedModel,
+    problem: &FitProblem,
+) -> Result<DVector<f64>, MotionError> {
     let mut sum = DVector::zeros(at.base.unknowns.len());
     for sign in [1.0, -1.0] {
         let noisier = |(i, stretch): (usize, &Stretch)| match problem.split.idle(i) {
@@ -56,7 +62,7 @@ pub fn from_noise(at: &FittedModel, problem: &FitProblem) -> Result<DVector<f64>
 /// friction at rest takes any torque up to its limit, and where the speed is nearly none the law says too much.
 /// As the unknowns rest where all rows together pull them nowhere, it is what those rows pull against the others;
 /// where there are next to no others, nothing tells.
-pub fn from_rests(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64) -> DVector<f64> {
+pub(crate) fn from_rests(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64) -> DVector<f64> {
     let unknowns = &at.base.unknowns;
     let mut pull = DVector::zeros(unknowns.len());
     for (i, (stretch, rows)) in problem.stretches.iter().zip(&at.base.stretches).enumerate() {

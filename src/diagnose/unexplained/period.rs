@@ -52,7 +52,7 @@ pub fn period(q: &[Vec<f64>]) -> Option<usize> {
 
 /// Variance of what a signal does not repeat from period to period, over whole periods of `rows`; none
 /// with fewer than two of them.
-pub fn unrepeated(signal: &[f64], rows: Range<usize>, period: usize) -> Option<f64> {
+pub(crate) fn unrepeated(signal: &[f64], rows: Range<usize>, period: usize) -> Option<f64> {
     let signal = signal.get(rows)?;
     let count = signal.len().checked_div(period)?;
     if count < 2 {

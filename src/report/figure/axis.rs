@@ -20,7 +20,7 @@ impl Scale {
         }
     }
 
-    pub fn px(&self, value: f64) -> f64 {
+    pub(crate) fn px(&self, value: f64) -> f64 {
         self.px_from + (value - self.from) / (self.to - self.from) * (self.px_to - self.px_from)
     }
 }

@@ -26,16 +26,16 @@ pub use torque::{JointTorque, TorqueFigure};
 
 /// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).
 mod colour {
-    pub const INK: &str = "#222222";
-    pub const MUTED: &str = "#666666";
-    pub const FRAME: &str = "#9a9a9a";
-    pub const GRID: &str = "#e7e7e7";
+    pub(crate) const INK: &str = "#222222";
+    pub(crate) const MUTED: &str = "#666666";
+    pub(crate) const FRAME: &str = "#9a9a9a";
+    pub(crate) const GRID: &str = "#e7e7e7";
     pub const ZERO: &str = "#bdbdbd";
-    pub const PAPER: &str = "#ffffff";
-    pub const BLUE: &str = "#0072b2";
-    pub const SKY: &str = "#56b4e9";
-    pub const VERMILLION: &str = "#d55e00";
-    pub const COVERED: &str = "#f0f4e8";
+    pub(crate) const PAPER: &str = "#ffffff";
+    pub(crate) const BLUE: &str = "#0072b2";
+    pub(crate) const SKY: &str = "#56b4e9";
+    pub(crate) const VERMILLION: &str = "#d55e00";
+    pub(crate) const COVERED: &str = "#f0f4e8";
 }
 
 /// All of them, for a page that shows figures in the dark.

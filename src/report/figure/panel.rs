@@ -69,7 +69,7 @@ impl Panel {
     }
 
     /// The frame itself and the numbers at the left side.
-    pub fn outline(&self, svg: &mut Svg) {
+    pub(crate) fn outline(&self, svg: &mut Svg) {
         let [left, ..] = self.frame;
         svg.rect(self.frame, "none", Some(Stroke::solid(colour::FRAME, 0.9)));
         for (&value, text) in self.y_ticks.values.iter().zip(&self.y_ticks.texts) {
@@ -85,7 +85,7 @@ impl Panel {
     }
 
     /// The numbers below.
-    pub fn x_numbers(&self, svg: &mut Svg) {
+    pub(crate) fn x_numbers(&self, svg: &mut Svg) {
         let [_, top, _, height] = self.frame;
         for (&value, text) in self.x_ticks.values.iter().zip(&self.x_ticks.texts) {
             let at = self.x.px(value);
@@ -97,7 +97,7 @@ impl Panel {
     }
 
     /// The title of the lower axis, `name [unit]`.
-    pub fn x_title(&self, svg: &mut Svg, name: &str, unit: &str) {
+    pub(crate) fn x_title(&self, svg: &mut Svg, name: &str, unit: &str) {
         let [left, top, width, height] = self.frame;
         let title = format!("{name} [{}]", self.x_ticks.unit(unit));
         svg.text(
@@ -108,7 +108,7 @@ impl Panel {
     }
 
     /// The title of the left axis, `name [unit]`, `offset` px left of the frame.
-    pub fn y_title(&self, svg: &mut Svg, offset: f64, name: &str, unit: &str) {
+    pub(crate) fn y_title(&self, svg: &mut Svg, offset: f64, name: &str, unit: &str) {
         let [left, top, _, height] = self.frame;
         let title = format!("{name} [{}]", self.y_ticks.unit(unit));
         svg.upright(

@@ -17,7 +17,7 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
-    pub const fn solid(colour: &'static str, width: f64) -> Self {
+    pub(crate) const fn solid(colour: &'static str, width: f64) -> Self {
         Stroke {
             colour,
             width,
@@ -25,7 +25,7 @@ impl Stroke {
         }
     }
 
-    pub const fn dashed(colour: &'static str, width: f64, dash: &'static str) -> Self {
+    pub(crate) const fn dashed(colour: &'static str, width: f64, dash: &'static str) -> Self {
         Stroke {
             colour,
             width,
@@ -61,12 +61,12 @@ impl Type {
         }
     }
 
-    pub const fn bold(mut self) -> Self {
+    pub(crate) const fn bold(mut self) -> Self {
         self.bold = true;
         self
     }
 
-    pub const fn muted(mut self) -> Self {
+    pub(crate) const fn muted(mut self) -> Self {
         self.colour = colour::MUTED;
         self
     }
@@ -94,7 +94,12 @@ impl Svg {
         }
     }
 
-    pub fn rect(&mut self, [x, y, width, height]: [f64; 4], fill: &str, stroke: Option<Stroke>) {
+    pub(crate) fn rect(
+        &mut self,
+        [x, y, width, height]: [f64; 4],
+        fill: &str,
+        stroke: Option<Stroke>,
+    ) {
         let _ = write!(
             self.body,
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{fill}\"",
@@ -138,7 +143,7 @@ impl Svg {
     }
 
     /// A filled shape, `opacity` 0..1.
-    pub fn area(&mut self, outline: &[[f64; 2]], fill: &str, opacity: f64) {
+    pub(crate) fn area(&mut self, outline: &[[f64; 2]], fill: &str, opacity: f64) {
         if outline.len() < 3 {
             return;
         }
@@ -185,7 +190,7 @@ impl Svg {
 
     /// Begins a group that is cut at a rectangle; end it with [`Svg::end_clip`]. A nested picture
     /// does it without an id, so that several figures may stand in one page.
-    pub fn clip(&mut self, [x, y, width, height]: [f64; 4]) {
+    pub(crate) fn clip(&mut self, [x, y, width, height]: [f64; 4]) {
         let (x, y, width, height) = (px(x), px(y), px(width), px(height));
         let _ = writeln!(
             self.body,
@@ -194,7 +199,7 @@ impl Svg {
         );
     }
 
-    pub fn end_clip(&mut self) {
+    pub(crate) fn end_clip(&mut self) {
         self.body.push_str("</svg>\n");
     }
 

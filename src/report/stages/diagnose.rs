@@ -82,13 +82,13 @@ pub fn data_fault(fault: &DataFault, given: &Provenance) -> Report {
 }
 
 /// A fault of the data for a terminal.
-pub fn fault_told(terminal: &mut Writer, fault: &DataFault) {
+pub(crate) fn fault_told(terminal: &mut Writer, fault: &DataFault) {
     terminal.line(&at_fault(fault));
     terminal.line(&format!("  {}", fault.remedy));
 }
 
 /// The same in a sentence.
-pub fn at_fault(fault: &DataFault) -> String {
+pub(crate) fn at_fault(fault: &DataFault) -> String {
     format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
 }
 

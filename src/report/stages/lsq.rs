@@ -130,7 +130,7 @@ fn groupings(terminal: &mut Writer, found: &IdentifiedDynamics) {
 }
 
 /// Condition, rank, effective sample size and residual of the fit, and what is essential.
-pub fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
+pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
     terminal.paragraph(&format!(

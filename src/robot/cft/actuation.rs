@@ -135,7 +135,7 @@ pub fn torques_to_forces(q: &[f64; 4], tau: &[f64; 4]) -> Result<[f64; 4], Robot
 }
 
 /// The matrix of eq. (66), d tau(q1, q2, q4, q5) / d F(x_c1..x_c4).
-pub fn torque_per_force(q: &[f64; 4]) -> [[f64; 4]; 4] {
+pub(crate) fn torque_per_force(q: &[f64; 4]) -> [[f64; 4]; 4] {
     let mut matrix = [[0.0; 4]; 4];
     for j in 0..4 {
         let mut unit = [0.0; 4];

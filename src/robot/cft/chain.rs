@@ -30,7 +30,7 @@ pub struct Row {
 
 impl Frame {
     /// The reference frame itself.
-    pub const IDENTITY: Self = Self {
+    pub(crate) const IDENTITY: Self = Self {
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         origin: [0.0; 3],
     };
@@ -67,7 +67,7 @@ impl Frame {
 }
 
 /// The dependent joints (q3 in m, q6 and q7 in rad) of q = (q1, q2, q4, q5) (eq. (54), (56)).
-pub fn dependent_joints(q: &[f64; 4]) -> [f64; 3] {
+pub(crate) fn dependent_joints(q: &[f64; 4]) -> [f64; 3] {
     let q3 = L4 * ((q[2] + q[3]).sin() + q[2].sin()) + D;
     [q3, -q[3], PI - q[2]]
 }

@@ -298,7 +298,7 @@ pub fn forward_dynamics(
 /// x with M x = b for a symmetric positive definite M, by L D L^T written out (no square roots,
 /// four divisions); `None` when M is not.
 #[inline]
-pub fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]> {
+pub(crate) fn solve_positive(m: &[[f64; 4]; 4], b: &[f64; 4]) -> Option<[f64; 4]> {
     let d0 = m[0][0];
     let i0 = 1.0 / d0;
     let (l1, l2, l3) = (m[0][1] * i0, m[0][2] * i0, m[0][3] * i0);

@@ -8,7 +8,7 @@ use crate::robot::tree::{Coordinate, Dependence, Link, Sine, Tree, TreeError};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Moving links 1..8; link 8 is at rest on link 7 and a frame of its own in Table 2.
-pub const LINKS: usize = 8;
+pub(crate) const LINKS: usize = 8;
 
 /// The chain of Table 2, its joints q1, q2, q4, q5.
 ///
@@ -74,7 +74,7 @@ pub fn chain() -> Result<Tree, TreeError> {
 /// Links with the 22 base parameters given (order of [`super::EXTENDED`]): of the many the one with
 /// delta = 0 and no masses but m1, m6 and m7. They move the joints as the robot does and are no
 /// picture of its links.
-pub fn links_of(theta: &[f64; 22]) -> [PseudoInertia; LINKS] {
+pub(crate) fn links_of(theta: &[f64; 22]) -> [PseudoInertia; LINKS] {
     let [
         t1,
         t2,

@@ -9,11 +9,11 @@ use crate::robot::error::RobotError;
 use std::f64::consts::FRAC_PI_2;
 
 /// dx_c2/dx_r = L6/L4 (eq. (48)).
-pub const OUTWARD_RATIO: f64 = L6 / L4;
+pub(crate) const OUTWARD_RATIO: f64 = L6 / L4;
 /// -dx_c1/dy_r = (L4 + L6)/L4 (eq. (49)).
-pub const DOWNWARD_RATIO: f64 = (L4 + L6) / L4;
+pub(crate) const DOWNWARD_RATIO: f64 = (L4 + L6) / L4;
 /// x_c3 - q2: the encoder's alignment and a quarter turn; the report rounds it to 2.4 (eq. (57)).
-pub const TURN_OFFSET: f64 = BASE_ANGLE + FRAC_PI_2;
+pub(crate) const TURN_OFFSET: f64 = BASE_ANGLE + FRAC_PI_2;
 
 /// |sin q5| below which a pose counts as singular; inside Table 5 it is above 0.6.
 const SINGULAR: f64 = 1e-9;
@@ -199,7 +199,7 @@ fn solve_references(q: &[f64; 4], x: f64, y: f64) -> Result<(f64, f64), RobotErr
 /// # Errors
 /// [`RobotError::Singular`] where |sin q5| is below 1e-9.
 #[inline]
-pub fn inverse_reference_jacobian(q: &[f64; 4]) -> Result<[[f64; 2]; 2], RobotError> {
+pub(crate) fn inverse_reference_jacobian(q: &[f64; 4]) -> Result<[[f64; 2]; 2], RobotError> {
     let (s4, c4) = q[2].sin_cos();
     let (s, c) = (q[2] + q[3]).sin_cos();
     let s5 = s * c4 - c * s4;

@@ -42,7 +42,7 @@ const CONVERSION: [f64; 4] = [
 
 /// The report's excitation trajectory in (x_c1, x_c2, x_c3, x_c4): Table 3, N = 4, with the printed offsets,
 /// then a_l and b_l. It lies inside Table 5 on TUeDACS; on dSPACE x_c4 needs another offset.
-pub const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
+pub(crate) const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
     [-0.1343, 0.2766, 2.4, 0.0869],
     [
         [-0.1102, 0.1629, 1.9698, 0.0002],
@@ -58,7 +58,7 @@ pub const TABLE_3: ([f64; 4], [[f64; 4]; 4], [[f64; 4]; 4]) = (
     ],
 );
 /// Its fundamental \[Hz\].
-pub const TABLE_3_HZ: f64 = 0.4;
+pub(crate) const TABLE_3_HZ: f64 = 0.4;
 
 /// Top speeds of the motor coordinates (x_c1, x_c2, x_c3, x_c4) at 4000 revolutions per minute:
 /// 0.167 m/s on y_r and x_r (seven and six times that on x_c1 and x_c2), 2.26 rad/s, 0.667 m/s.

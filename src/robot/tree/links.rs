@@ -217,7 +217,7 @@ impl Tree {
     }
 
     /// The same links where free fall is another \[m/s^2\].
-    pub fn in_gravity(&self, gravity: Vector) -> Self {
+    pub(crate) fn in_gravity(&self, gravity: Vector) -> Self {
         Self {
             gravity,
             ..self.clone()

@@ -163,7 +163,7 @@ impl Parameters {
 }
 
 /// Ixx3, mx3, m3 of link 3 (counted from 1); Ia3 of joint 3's drive.
-pub fn standard_name(links: usize, index: usize) -> String {
+pub(crate) fn standard_name(links: usize, index: usize) -> String {
     match index.checked_sub(links * STANDARD) {
         Some(joint) => format!("Ia{}", joint + 1),
         None => format!(

@@ -44,7 +44,7 @@ pub fn turn(r: &Rotation, a: &Vector) -> Vector {
 
 /// R' a.
 #[inline(always)]
-pub fn turn_back(r: &Rotation, a: &Vector) -> Vector {
+pub(crate) fn turn_back(r: &Rotation, a: &Vector) -> Vector {
     [
         r[0][0] * a[0] + r[1][0] * a[1] + r[2][0] * a[2],
         r[0][1] * a[0] + r[1][1] * a[1] + r[2][1] * a[2],

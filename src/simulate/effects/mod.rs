@@ -197,7 +197,7 @@ impl Effects {
     }
 
     /// Name of the first fault of the log.
-    pub fn first_fault(&self) -> Option<&'static str> {
+    pub(crate) fn first_fault(&self) -> Option<&'static str> {
         self.faults.first().map(|(name, _)| *name)
     }
 
@@ -230,7 +230,7 @@ impl Effects {
     }
 
     /// The springs between motors and links, for the states z of all effects.
-    pub fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
+    pub(crate) fn twists<'a>(&'a self, z: &'a [f64]) -> impl Iterator<Item = Twist> + 'a {
         let own = |(effect, states): &'a (Box<dyn Effect>, std::ops::Range<usize>)| {
             effect.twist(&z[states.clone()])
         };

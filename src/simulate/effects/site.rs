@@ -59,7 +59,7 @@ impl Site {
     }
 
     /// Half of the travel, m or rad.
-    pub fn half_travel(&self) -> f64 {
+    pub(crate) fn half_travel(&self) -> f64 {
         0.5 * (self.travel.1 - self.travel.0)
     }
 

@@ -111,7 +111,7 @@ impl LadderPlan {
     ///
     /// # Errors
     /// As there.
-    pub fn build_seeded(&self, seed: Option<u64>) -> Result<Ladder, SimulateError> {
+    pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<Ladder, SimulateError> {
         let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
         self.build(chance.as_mut())
     }
