@@ -11,7 +11,7 @@ use super::{ConfigError, check, urdf};
 use crate::log::{did_you_mean, list, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
-pub const EMBEDDED: [(&str, &str); 11] = [
+pub const EMBEDDED: [(&str, &str); 13] = [
     ("configs/cft.toml", include_str!("../../configs/cft.toml")),
     (
         "configs/cft-validation.toml",
@@ -37,6 +37,14 @@ pub const EMBEDDED: [(&str, &str); 11] = [
     ),
     ("configs/tx40.toml", include_str!("../../configs/tx40.toml")),
     ("configs/ur10.toml", include_str!("../../configs/ur10.toml")),
+    (
+        "configs/kr300.toml",
+        include_str!("../../configs/kr300.toml"),
+    ),
+    (
+        "configs/pendulum.toml",
+        include_str!("../../configs/pendulum.toml"),
+    ),
     (
         "configs/table3.toml",
         include_str!("../../configs/table3.toml"),
