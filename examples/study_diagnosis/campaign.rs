@@ -12,7 +12,7 @@ use cft_ident::inertia::columns::{KnownFriction, RegressorColumns};
 use cft_ident::inertia::solve::{Weighting, fit};
 use cft_ident::log::Block;
 use cft_ident::motion::{
-    FilterSettings as Processing, Parallel, Stretch, ZeroOrderHold, stretches,
+    FilterSettings as Processing, Parallel, ParallelFilters, Stretch, ZeroOrderHold, stretches,
 };
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
@@ -582,7 +582,7 @@ impl Campaign {
             },
             stretches: self.stretches.clone(),
             roles: self.roles.clone(),
-            parallel: lab.parallel.clone(),
+            filters: ParallelFilters::design(&lab.processing, &self.stretches).expect("a filter"),
             cutoff_hz: lab.processing.cutoff_hz,
             units: (0..joints)
                 .map(|j| lab.robot.joint_unit(j).to_owned())

@@ -18,7 +18,7 @@ pub(super) fn in_memory(
 ) -> Result<Option<InMemory>, CliError> {
     match identify::read_whole(machine, logs, context.control()) {
         Ok(in_memory) => Ok(Some(in_memory)),
-        Err(IdentifyError::TooManySamples { .. } | IdentifyError::SampledUnlike { .. }) => Ok(None),
+        Err(IdentifyError::TooManySamples { .. }) => Ok(None),
         Err(error) => Err(error.into()),
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 
 /// How much larger the second model's error is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -59,13 +59,14 @@ type PieceSquares = [f64; 3];
 pub fn differences(
     models: [&AugmentedModel; 2],
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
 ) -> Result<ErrorDifferences, MotionError> {
     let n = models[0].model.robot.joints();
-    let total: usize = stretches.iter().map(|s| parallel.rows(s.len())).sum();
+    let total: usize = stretches.iter().map(|s| filters.of(s).rows(s.len())).sum();
     let length = total.div_ceil(PIECES).max(SHORTEST);
     let mut pieces: Vec<Vec<PieceSquares>> = Vec::new();
     for stretch in stretches {
+        let parallel = filters.of(stretch);
         let hats = models.map(|model| model.reconstruct(stretch));
         let channels: Vec<&[f64]> = stretch
             .tau

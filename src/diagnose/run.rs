@@ -107,9 +107,9 @@ impl<'a> Diagnosing<'a> {
         let unknowns = Unknowns::of(&case.given, &case.open, &cover).len();
         check(case, &split, unknowns)?;
         let problem = FitProblem {
-            inertial: inertial_of(robot, &case.stretches, &case.parallel, &split)?,
+            inertial: inertial_of(robot, &case.stretches, &case.filters, &split)?,
             stretches: &case.stretches,
-            parallel: &case.parallel,
+            filters: &case.filters,
             split,
             open: &case.open,
             prior: &case.prior,
@@ -150,7 +150,7 @@ impl<'a> Diagnosing<'a> {
             return Ok(false);
         }
         let split = &mut self.problem.split;
-        let cut = disturbance::cut(&found, split, &case.stretches, &case.parallel);
+        let cut = disturbance::cut(&found, split, &case.stretches, &case.filters);
         for e in &cut {
             let joint = &case.given.model.robot.joint_names()[e.joint];
             let said = format!("cut out {:.2}..{:.2} s on {joint}", e.from_s, e.to_s);
@@ -170,7 +170,7 @@ impl<'a> Diagnosing<'a> {
         let of_fitted = case.fitted_torques(&torques);
         let residuals = residuals(&self.at.model, &self.stretches, of_fitted);
         let cover = &mut self.problem.cover;
-        orders::find(cover, &residuals, &self.stretches, &case.parallel)?;
+        orders::find(cover, &residuals, &self.stretches, &case.filters)?;
         let noise = noise(&residuals, case, &self.stretches)?;
         if case.limits.steps == 0 {
             return Ok(Vec::new());
@@ -338,7 +338,7 @@ impl<'a> Diagnosing<'a> {
             model,
             &case.units,
             &case.stretches,
-            &case.parallel,
+            &case.filters,
             &self.problem.split,
             (wanted, counted),
         )
@@ -389,7 +389,7 @@ fn data_split(case: &Case, fitted: &[Stretch]) -> DataSplit {
     DataSplit {
         ignored: ignored.map(|i| i.unwrap_or_else(|| all.clone())).collect(),
         stationary: stationary_joints(robot, &case.stretches),
-        ..DataSplit::of(&case.stretches, &case.roles, &case.parallel, case.cutoff_hz)
+        ..DataSplit::of(&case.stretches, &case.roles, &case.filters, case.cutoff_hz)
     }
 }
 
@@ -407,7 +407,7 @@ fn check(case: &Case, split: &DataSplit, unknowns: usize) -> Result<(), Diagnose
             });
         }
     }
-    match suspicion(&case.given, &case.stretches, &case.parallel, split)? {
+    match suspicion(&case.given, &case.stretches, &case.filters, split)? {
         Some(found) => Err(DiagnoseError::Channels(found)),
         None => Ok(()),
     }

@@ -1,7 +1,7 @@
 //! What a set of logs covers: by this an effect is refused that the data cannot show.
 
 use super::place::Place;
-use crate::motion::Stretch;
+use crate::motion::{Stretch, alike};
 use crate::robot::{JointKind, Robot};
 
 /// What one joint did.
@@ -32,7 +32,7 @@ pub struct Cover {
     pub kinds: Vec<JointKind>,
     /// Longest log \[s\].
     pub duration_s: f64,
-    /// Sampling step \[s\].
+    /// Sampling step of the slowest log \[s\].
     pub dt: f64,
     /// Cut-off of the parallel filter \[Hz\].
     pub cutoff_hz: f64,
@@ -46,7 +46,7 @@ impl Cover {
             joints: vec![JointCover::default(); n],
             kinds: (0..n).map(|j| robot.joint_kind(j)).collect(),
             duration_s: 0.0,
-            dt: stretches.first().map_or(1.0, |s| s.dt),
+            dt: slowest(stretches),
             cutoff_hz,
         };
         let stationary = stationary_joints(robot, stretches);
@@ -129,6 +129,16 @@ impl JointCover {
     pub(crate) fn both_ways(&self) -> bool {
         self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
     }
+}
+
+/// Sampling step of the slowest log; the first log's where all have one rate \[s\].
+fn slowest(stretches: &[Stretch]) -> f64 {
+    let first = stretches.first().map_or(1.0, |s| s.dt);
+    let steps = stretches.iter().map(|s| s.dt);
+    steps.fold(first, |found, dt| match dt > found && !alike(dt, found) {
+        true => dt,
+        false => found,
+    })
 }
 
 /// Travel below which a joint counts as stationary, over its travel in all logs or its full range: what a

@@ -15,7 +15,7 @@ use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::friction::estimate::FrictionCurvePoint;
 use crate::log::{Provenance, escape};
-use crate::motion::Parallel;
+use crate::motion::ParallelFilters;
 use crate::motion::Summary;
 use crate::robot::model::JointFriction;
 use crate::validate::{JointError, Overall, Reconstruction, Validation};
@@ -284,10 +284,10 @@ fn on_logs(
     };
     let validations = [validation(&sides[0])?, validation(&sides[1])?];
     control.check()?;
-    let parallel = Parallel::design(&settings, in_memory.summary.dt).map_err(named)?;
+    let filters = ParallelFilters::design(&settings, &in_memory.stretches).map_err(named)?;
     let models = sides.each_ref().map(|side| &side.model);
     let differences =
-        compare::differences(models, &in_memory.stretches, &parallel).map_err(named)?;
+        compare::differences(models, &in_memory.stretches, &filters).map_err(named)?;
     Ok(Tried {
         in_memory,
         validations,

@@ -17,7 +17,7 @@ use crate::diagnose::{
     Unknown,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
-use crate::motion::Parallel;
+use crate::motion::ParallelFilters;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
@@ -59,7 +59,7 @@ pub struct Diagnosed {
     pub logs: Vec<String>,
     /// The model as it was given.
     pub given: AugmentedModel,
-    pub parallel: Parallel,
+    pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
 
@@ -134,7 +134,7 @@ pub fn diagnose(
         in_memory,
         logs,
         given: case.given,
-        parallel: case.parallel,
+        filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     })))
 }
@@ -167,10 +167,10 @@ fn case(
     (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
 ) -> Result<Case, IdentifyError> {
     let processing = machine.settings();
-    let parallel = Parallel::design(&processing, in_memory.summary.dt)
+    let filters = ParallelFilters::design(&processing, &in_memory.stretches)
         .map_err(|error| IdentifyError::motion(name, error))?;
     let open = open(machine, file, &given);
-    let rate = 1.0 / (in_memory.summary.dt * parallel.decimation as f64);
+    let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
     let prior = ParameterPrior {
         information: information(file, &given, &open, settings.keep, &alone),
@@ -183,7 +183,7 @@ fn case(
         open,
         stretches: std::mem::take(&mut in_memory.stretches),
         roles,
-        parallel,
+        filters,
         cutoff_hz: processing.cutoff_hz,
         units: (0..machine.robot.joints())
             .map(|j| machine.file.torque_unit(j).to_owned())

@@ -54,10 +54,6 @@ pub enum IdentifyError {
         most: usize,
     },
     #[error(
-        "{log}: sampled at {dt:.6} s, the log before it at {before:.6} s; logs of one run are sampled alike; work on them one by one"
-    )]
-    SampledUnlike { log: String, dt: f64, before: f64 },
-    #[error(
         "the robot has no joint `{joint}`; {}its joints are {known}", did_you_mean(.joint, .known)
     )]
     NoJoint { joint: String, known: String },
@@ -113,7 +109,6 @@ impl IdentifyError {
             | Self::Motion { .. }
             | Self::TooManyRows { .. }
             | Self::TooManySamples { .. }
-            | Self::SampledUnlike { .. }
             | Self::Effect { .. }
             | Self::OtherRobot { .. } => ErrorKind::Input,
         }

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::error::IdentifyError;
-use super::logged_robot::{LoggedRobot, narrowed};
-use super::passes::{Passes, Simulated};
+use super::logged_robot::LoggedRobot;
+use super::passes::{Passes, PositionFilter, Simulated};
 use crate::config::campaign::EstimatorKind;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::add_processing;
@@ -20,7 +20,6 @@ use crate::inertia::robust::{self, Robust, Weigher};
 use crate::inertia::solution::FitError;
 use crate::inertia::solve::{self, Fit, fit};
 use crate::math::descent::Ending;
-use crate::motion::FilterSettings;
 
 /// What an estimator says of its own work.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -151,18 +150,17 @@ pub fn estimate(
     estimator: EstimatorKind,
     law: bool,
 ) -> Result<Estimated, IdentifyError> {
-    let settings = passes.machine.settings();
     let mut account = Account::of(estimator);
     let told = &mut account;
     let (mut fit, sums, solver) = match estimator {
-        EstimatorKind::Oe => refined(passes, &settings, &columns, law, told)?,
-        EstimatorKind::Wls if law => refined(passes, &settings, &columns, law, told)?,
-        EstimatorKind::Irls => robust_regression(passes, &settings, &columns, told)?,
-        EstimatorKind::Iv => instrumental(passes, &settings, &columns, told)?,
-        EstimatorKind::Ols => linear(passes, &settings, &columns, solve::Weighting::Ols)?,
-        EstimatorKind::Wls => linear(passes, &settings, &columns, solve::Weighting::Wls)?,
+        EstimatorKind::Oe => refined(passes, &columns, law, told)?,
+        EstimatorKind::Wls if law => refined(passes, &columns, law, told)?,
+        EstimatorKind::Irls => robust_regression(passes, &columns, told)?,
+        EstimatorKind::Iv => instrumental(passes, &columns, told)?,
+        EstimatorKind::Ols => linear(passes, &columns, solve::Weighting::Ols)?,
+        EstimatorKind::Wls => linear(passes, &columns, solve::Weighting::Wls)?,
     };
-    widen(passes, &settings, &columns, &solver, &mut fit)?;
+    widen(passes, &columns, &solver, &mut fit)?;
     let (columns, shift) = match &solver {
         Solver::Refined(refined) => (refined.columns.with_free_friction(), refined.shift()),
         _ => (columns, DVector::zeros(fit.theta.len())),
@@ -178,11 +176,10 @@ pub fn estimate(
 /// Linear least squares, rows weighted or alike.
 fn linear(
     passes: &mut Passes,
-    settings: &FilterSettings,
     columns: &RegressorColumns,
     estimator: solve::Weighting,
 ) -> Result<Found, IdentifyError> {
-    let sums = passes.read(settings, columns, None)?;
+    let sums = passes.read(PositionFilter::Declared, columns, None)?;
     let found = fit(&sums, estimator)?;
     Ok((found, sums.in_one_block(), Solver::Linear(estimator)))
 }
@@ -190,13 +187,13 @@ fn linear(
 /// The slopes of the friction law with all else.
 fn refined(
     passes: &mut Passes,
-    settings: &FilterSettings,
     columns: &RegressorColumns,
     law: bool,
     account: &mut Account,
 ) -> Result<Found, IdentifyError> {
     passes.work.doing("friction law");
-    let mut pass = |columns: &RegressorColumns| passes.read(settings, columns, None);
+    let mut pass =
+        |columns: &RegressorColumns| passes.read(PositionFilter::Declared, columns, None);
     let start = match law {
         true => law_start::begin(columns, &mut pass)?,
         false => columns.clone(),
@@ -220,7 +217,6 @@ fn refined(
 /// Rows with large residuals count less.
 fn robust_regression(
     passes: &mut Passes,
-    settings: &FilterSettings,
     columns: &RegressorColumns,
     account: &mut Account,
 ) -> Result<Found, IdentifyError> {
@@ -233,7 +229,7 @@ fn robust_regression(
         iterations,
         scale,
         down_weighted,
-    } = robust::irls(&mut |weigher| passes.read(settings, columns, weigher))?;
+    } = robust::irls(&mut |weigher| passes.read(PositionFilter::Declared, columns, weigher))?;
     account.status = status;
     account.iterations = iterations;
     account.tell(passes.machine, |j| JointAccount {
@@ -247,12 +243,11 @@ fn robust_regression(
 /// The regressor along simulated positions as instruments.
 fn instrumental(
     passes: &mut Passes,
-    settings: &FilterSettings,
     columns: &RegressorColumns,
     account: &mut Account,
 ) -> Result<Found, IdentifyError> {
     passes.work.doing("instrumental variables");
-    let sums = passes.read(settings, columns, None)?;
+    let sums = passes.read(PositionFilter::Declared, columns, None)?;
     let plain = fit(&sums, solve::Weighting::Wls)?;
     let map = passes.machine.robot.standard_map();
     let whole = solve::factor(&sums, &solve::weights_of(&sums, &plain.residual_std))?;
@@ -264,7 +259,8 @@ fn instrumental(
         iterations,
     } = instruments::iterate(columns, &plain, &mut |theta| {
         simulate_by = nearest(&map, &whole, effective, theta)?;
-        let (sums, simulated) = passes.read_instruments(settings, columns, &simulate_by)?;
+        let (sums, simulated) =
+            passes.read_instruments(PositionFilter::Declared, columns, &simulate_by)?;
         account.simulated = Some(simulated);
         Ok::<_, IdentifyError>(sums)
     })?;
@@ -284,24 +280,21 @@ fn instrumental(
 /// Adds to the uncertainty of a fit what a narrower position filter and the encoders' grid move.
 fn widen(
     passes: &mut Passes,
-    settings: &FilterSettings,
     columns: &RegressorColumns,
     solver: &Solver,
     fit: &mut Fit,
 ) -> Result<(), IdentifyError> {
     passes.work.doing("uncertainty");
     let read = solver.columns(columns);
-    let dt = passes.summary.as_ref().map_or(1e-3, |s| s.dt);
-    let narrow = narrowed(settings, 1.0 / dt);
     let mut weigher = solver.weigher();
     let again = match solver {
         Solver::Instrumental(found) => {
             let (found, simulated) = &**found;
-            let (sums, _) = passes.read_instruments(&narrow, read, simulated)?;
+            let (sums, _) = passes.read_instruments(PositionFilter::Narrower, read, simulated)?;
             instruments::again(read, found, &sums)?
         }
         _ => {
-            let sums = passes.read(&narrow, read, weigher.as_mut())?;
+            let sums = passes.read(PositionFilter::Narrower, read, weigher.as_mut())?;
             solver.solve(sums, weigher.as_ref())?
         }
     };
@@ -316,7 +309,7 @@ fn widen(
         let mut shifted = Vec::new();
         for grid in 0..GRIDS {
             let mut weigher = solver.weigher();
-            if let Some(sums) = passes.read_shifted(settings, read, grid, weigher.as_mut())? {
+            if let Some(sums) = passes.read_shifted(read, grid, weigher.as_mut())? {
                 shifted.push(solver.solve(sums, weigher.as_ref())?);
             }
         }

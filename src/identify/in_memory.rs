@@ -26,7 +26,7 @@ pub struct InMemory {
 /// Reads logs whole, smoothed as the model declares.
 ///
 /// # Errors
-/// A log that cannot be read, logs sampled unlike, or more samples than memory is meant to hold.
+/// A log that cannot be read, or more samples than memory is meant to hold.
 pub fn read_whole(
     machine: &LoggedRobot,
     logs: &[Log],
@@ -53,15 +53,6 @@ pub fn read_whole(
                 log: name,
                 samples,
                 most: MOST_SAMPLES,
-            });
-        }
-        if let Some(before) = &last
-            && (before.dt / summary.dt - 1.0).abs() > 0.02
-        {
-            return Err(IdentifyError::SampledUnlike {
-                log: name,
-                dt: summary.dt,
-                before: before.dt,
             });
         }
         warnings.extend(open.warnings());

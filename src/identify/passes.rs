@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::control::{Control, Work};
 use super::error::IdentifyError;
 use super::log::Log;
-use super::logged_robot::LoggedRobot;
+use super::logged_robot::{LoggedRobot, narrowed};
 use super::open_log::summary_warnings;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
@@ -32,6 +32,15 @@ pub struct Simulated {
     pub gains: Gains,
 }
 
+/// Which filter positions come through before they are differentiated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PositionFilter {
+    /// As the robot file says.
+    Declared,
+    /// Narrower, to see what smoothing changes.
+    Narrower,
+}
+
 /// Readings of the same logs, one after the other.
 pub struct Passes<'a> {
     pub(super) machine: &'a LoggedRobot,
@@ -42,6 +51,8 @@ pub struct Passes<'a> {
     pub warnings: Vec<String>,
     /// Of the first log, by the first reading.
     pub summary: Option<Summary>,
+    /// Sampling step of each log, by the first reading [s].
+    steps: Vec<f64>,
 }
 
 impl<'a> Passes<'a> {
@@ -54,24 +65,40 @@ impl<'a> Passes<'a> {
             inputs: Vec::new(),
             warnings: Vec::new(),
             summary: None,
+            steps: Vec::new(),
         }
+    }
+
+    /// The processing of a log; a narrower filter is that of the log's own rate.
+    fn settings(&self, filter: PositionFilter, log: usize) -> FilterSettings {
+        let declared = self.machine.settings();
+        match filter {
+            PositionFilter::Declared => declared,
+            PositionFilter::Narrower => narrowed(&declared, 1.0 / self.step_of(log)),
+        }
+    }
+
+    /// Sampling step of a log that was read [s].
+    fn step_of(&self, log: usize) -> f64 {
+        self.steps.get(log).copied().unwrap_or(1e-3)
     }
 
     pub(super) fn read(
         &mut self,
-        settings: &FilterSettings,
+        filter: PositionFilter,
         columns: &RegressorColumns,
         mut weigher: Option<&mut Weigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         let first = self.summary.is_none();
         let mut total: Option<BlockFactors> = None;
-        for log in self.logs {
+        for (index, log) in self.logs.iter().enumerate() {
+            let settings = self.settings(filter, index);
             let mut open = self.machine.open(log, self.control)?;
             let (sums, summary) = accumulate_weighted(
                 &self.machine.robot,
                 columns,
                 weigher.as_deref_mut(),
-                settings,
+                &settings,
                 &mut |block| open.read(block),
             )
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
@@ -80,6 +107,7 @@ impl<'a> Passes<'a> {
                 self.warnings
                     .extend(summary_warnings(&log.name(), &summary));
                 self.inputs.push(open.provenance()?);
+                self.steps.push(summary.dt);
                 self.summary.get_or_insert(summary);
             }
             match &mut total {
@@ -94,13 +122,13 @@ impl<'a> Passes<'a> {
     /// Rows with instruments from the loop under `theta`.
     pub(super) fn read_instruments(
         &mut self,
-        settings: &FilterSettings,
+        filter: PositionFilter,
         columns: &RegressorColumns,
         theta: &DVector<f64>,
     ) -> Result<(BlockFactors, Simulated), IdentifyError> {
-        let step = self.summary.as_ref().map_or(1e-3, |s| s.dt);
         let mut total: Option<(BlockFactors, Simulated)> = None;
-        for log in self.logs {
+        for (index, log) in self.logs.iter().enumerate() {
+            let (settings, step) = (self.settings(filter, index), self.step_of(index));
             let mut open = self.machine.open(log, self.control)?;
             let mut logged = self.machine.open_reference(log)?;
             let reference = match logged {
@@ -120,7 +148,7 @@ impl<'a> Passes<'a> {
                 columns,
                 theta,
                 reference,
-                settings,
+                &settings,
                 step,
                 &mut source,
             )
@@ -149,19 +177,19 @@ impl<'a> Passes<'a> {
     /// Positions rounded anew on a shifted grid of the encoders.
     pub(super) fn read_shifted(
         &mut self,
-        settings: &FilterSettings,
         columns: &RegressorColumns,
         grid: u32,
         mut weigher: Option<&mut Weigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
         let mut total: Option<BlockFactors> = None;
+        let settings = self.machine.settings();
         for log in self.logs {
             let mut open = self.machine.open(log, self.control)?;
             let sums = accumulate_shifted(
                 &self.machine.robot,
                 columns,
                 weigher.as_deref_mut(),
-                settings,
+                &settings,
                 grid,
                 &mut |block| open.read(block),
             )

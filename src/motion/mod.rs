@@ -42,7 +42,8 @@ pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};
 pub use run::{RunError, Summary, run};
 pub use settings::{Differences, FilterSettings, ParallelFilter, TorqueTiming};
-pub use stretch::{Parallel, Stretch, stretches};
+pub(crate) use stretch::alike;
+pub use stretch::{Parallel, ParallelFilters, Stretch, stretches};
 pub use zero_order_hold::ZeroOrderHold;
 
 use thiserror::Error;

@@ -209,3 +209,62 @@ impl Parallel {
         Ok(out)
     }
 }
+
+/// Steps that differ by less than this share are one: clocks of the same rate.
+const ALIKE: f64 = 0.02;
+
+/// The declared parallel filter for stretches of logs that may be sampled at several rates.
+#[derive(Debug, Clone)]
+pub struct ParallelFilters {
+    /// Sampling step \[s\] and the filter for it.
+    designs: Vec<(f64, Parallel)>,
+}
+
+impl ParallelFilters {
+    /// The filters for the steps of these stretches.
+    ///
+    /// # Errors
+    /// [`MotionError`] for settings that one of the sampling rates does not carry.
+    pub fn design(settings: &FilterSettings, stretches: &[Stretch]) -> Result<Self, MotionError> {
+        let mut designs: Vec<(f64, Parallel)> = Vec::new();
+        for dt in stretches.iter().rev().map(|s| s.dt) {
+            if !designs.iter().any(|(known, _)| alike(*known, dt)) {
+                designs.push((dt, Parallel::design(settings, dt)?));
+            }
+        }
+        if designs.is_empty() {
+            return Err(MotionError::TooFewSamples { samples: 0 });
+        }
+        Ok(ParallelFilters { designs })
+    }
+
+    /// Which of the rates a stretch has.
+    pub(crate) fn rate_of(&self, stretch: &Stretch) -> usize {
+        let off = |dt: f64| (dt / stretch.dt).ln().abs();
+        let steps = self.designs.iter().enumerate();
+        steps
+            .min_by(|(_, a), (_, b)| off(a.0).total_cmp(&off(b.0)))
+            .map_or(0, |(i, _)| i)
+    }
+
+    /// The filter for a stretch.
+    pub fn of(&self, stretch: &Stretch) -> &Parallel {
+        &self.designs[self.rate_of(stretch)].1
+    }
+
+    /// Sampling step \[s\] and filter of each rate.
+    pub(crate) fn designs(&self) -> &[(f64, Parallel)] {
+        &self.designs
+    }
+
+    /// Rows per second where most are kept \[Hz\].
+    pub(crate) fn row_rate_hz(&self) -> f64 {
+        let rate = |(dt, filter): &(f64, Parallel)| 1.0 / (dt * filter.decimation as f64);
+        self.designs.iter().map(rate).fold(0.0, f64::max)
+    }
+}
+
+/// Whether two sampling steps are of one rate.
+pub(crate) fn alike(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= ALIKE
+}

@@ -34,8 +34,9 @@ pub fn columns(
                 shifted(column, model.shift(j) / stretch.dt);
             }
             let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
-            let mut rows = problem.parallel.run(&channels)?;
-            let still = standing(model, stretch, problem.parallel, j);
+            let filter = problem.filters.of(stretch);
+            let mut rows = filter.run(&channels)?;
+            let still = standing(model, stretch, filter, j);
             rows.iter_mut().for_each(|column| clear(column, &still));
             of_stretch.push(rows);
         }
@@ -59,7 +60,7 @@ pub(crate) fn kept_by_filter(
         let scene = scene(model, stretch, torques);
         for mut column in effect.columns(&scene, j) {
             before += column.iter().map(|x| x * x).sum::<f64>();
-            problem.parallel.smooth(&mut column)?;
+            problem.filters.of(stretch).smooth(&mut column)?;
             after += column.iter().map(|x| x * x).sum::<f64>();
         }
     }

@@ -3,7 +3,7 @@
 //! filtered one at full rate, where a strong order beyond the band does not hide a weaker one in it.
 
 use crate::effect::{Cover, JointCover};
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::JointKind;
 
 /// Bins over the travel.
@@ -25,7 +25,7 @@ pub fn find(
     cover: &mut Cover,
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
 ) -> Result<(), MotionError> {
     for j in 0..cover.joints.len() {
         let range = cover.joints[j].range();
@@ -34,8 +34,8 @@ pub fn find(
         }
         let raw: Vec<Vec<f64>> = residuals.iter().map(|r| r[j].clone()).collect();
         let mut filtered = raw.clone();
-        for channel in &mut filtered {
-            parallel.smooth(channel)?;
+        for (channel, stretch) in filtered.iter_mut().zip(stretches) {
+            filters.of(stretch).smooth(channel)?;
         }
         let per_range = match cover.kinds[j] {
             JointKind::Revolute => std::f64::consts::TAU / range,

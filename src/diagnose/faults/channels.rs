@@ -4,7 +4,7 @@
 use crate::diagnose::problem::data_split::{DataSplit, Piece, RowRole};
 use crate::diagnose::problem::normal_equations::dot;
 use crate::effect::AugmentedModel;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 
 /// What is wrong with the torque channel of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ const KNOWN: f64 = 0.25;
 pub(crate) fn suspicion(
     model: &AugmentedModel,
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
     split: &DataSplit,
 ) -> Result<Option<Suspicion>, MotionError> {
     let n = model.model.robot.joints();
@@ -40,7 +40,7 @@ pub(crate) fn suspicion(
         }
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
-        let rows = parallel.run(&channels)?;
+        let rows = filters.of(stretch).run(&channels)?;
         let own = |p: &&Piece| p.stretch == index && RowRole::fitted(p.role);
         for piece in split.pieces.iter().filter(own) {
             for (a, products) in products.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use crate::diagnose::problem::data_split::{DataSplit, RowRole};
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::rests::near_rests;
-use crate::motion::{Parallel, Stretch};
+use crate::motion::{ParallelFilters, Stretch};
 
 /// An episode that was cut out.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +39,10 @@ pub fn find(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64) -> Vec<(usiz
     let joints = base.unknowns.columns.len();
     let mut found: Vec<(usize, usize, f64)> = Vec::new();
     for j in 0..joints {
-        let near = |stretch| near_rests(&at.model, stretch, problem.parallel, cutoff_hz, j);
+        let near = |stretch| {
+            let filter = problem.filters.of(stretch);
+            near_rests(&at.model, stretch, filter, cutoff_hz, j)
+        };
         let near: Vec<Vec<bool>> = problem.stretches.iter().map(near).collect();
         // an episode among the rows that may veto would veto what is right
         let looked_at = |i: &usize| {
@@ -94,14 +97,15 @@ pub fn cut(
     found: &[(usize, usize, f64)],
     split: &mut DataSplit,
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
 ) -> Vec<CutDisturbance> {
     let mut episodes: Vec<CutDisturbance> = Vec::new();
     let mut last = None;
     for &(i, joint, over) in found {
         let piece = split.pieces[i].clone();
         let stretch = &stretches[piece.stretch];
-        let time = |row: usize| stretch.began + stretch.dt * parallel.sample_of(row) as f64;
+        let filter = filters.of(stretch);
+        let time = |row: usize| stretch.began + stretch.dt * filter.sample_of(row) as f64;
         let (from_s, to_s) = (time(piece.rows.start), time(piece.rows.end));
         match episodes.last_mut() {
             Some(e) if last == Some((i, joint)) => {

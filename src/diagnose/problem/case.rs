@@ -4,7 +4,7 @@ use super::data_split::LogRole;
 use super::prior::ParameterPrior;
 use super::unknowns::FreeParameters;
 use crate::effect::{AugmentedModel, Torques};
-use crate::motion::{Parallel, Stretch};
+use crate::motion::{ParallelFilters, Stretch};
 
 /// What a diagnosis works on.
 pub struct Case {
@@ -15,7 +15,7 @@ pub struct Case {
     pub stretches: Vec<Stretch>,
     /// Role of each log.
     pub roles: Vec<LogRole>,
-    pub parallel: Parallel,
+    pub filters: ParallelFilters,
     pub cutoff_hz: f64,
     /// Torque unit per joint.
     pub units: Vec<String>,

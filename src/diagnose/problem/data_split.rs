@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::motion::{Parallel, Stretch};
+use crate::motion::{ParallelFilters, Stretch};
 
 /// What a log is given for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,15 +86,12 @@ impl DataSplit {
     pub fn of(
         stretches: &[Stretch],
         roles: &[LogRole],
-        parallel: &Parallel,
+        filters: &ParallelFilters,
         cutoff_hz: f64,
     ) -> Self {
         let mut split = DataSplit::default();
-        let dt = stretches.first().map_or(1.0, |s| s.dt) * parallel.decimation as f64;
-        let piece = ((PIECE_PERIODS / cutoff_hz / dt).ceil() as usize).max(4);
-        let gap = ((GAP_PERIODS / cutoff_hz / dt).ceil() as usize).max(1);
         let given = |role| roles.contains(&role);
-        let rows_of = |s: &Stretch| parallel.rows(s.len());
+        let rows_of = |s: &Stretch| filters.of(s).rows(s.len());
         let total: usize = stretches
             .iter()
             .filter(|s| roles[s.log] == LogRole::Train)
@@ -102,6 +99,10 @@ impl DataSplit {
             .sum();
         for (index, stretch) in stretches.iter().enumerate() {
             let rows = rows_of(stretch);
+            let parallel = filters.of(stretch);
+            let dt = stretch.dt * parallel.decimation as f64;
+            let piece = ((PIECE_PERIODS / cutoff_hz / dt).ceil() as usize).max(4);
+            let gap = ((GAP_PERIODS / cutoff_hz / dt).ceil() as usize).max(1);
             let cut =
                 |split: &mut DataSplit, range: Range<usize>, role: &dyn Fn(usize) -> RowRole| {
                     let count = (range.len() / piece).max(1);
@@ -273,9 +274,9 @@ mod tests {
     }
 
     fn split(roles: &[LogRole]) -> DataSplit {
-        let parallel = Parallel::design(&FilterSettings::default(), 1e-3).unwrap();
         let stretches: Vec<Stretch> = (0..roles.len()).map(|l| stretch(l, 30.0)).collect();
-        DataSplit::of(&stretches, roles, &parallel, 10.0)
+        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
+        DataSplit::of(&stretches, roles, &filters, 10.0)
     }
 
     #[test]

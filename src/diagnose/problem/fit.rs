@@ -97,7 +97,7 @@ fn evaluate(
         &model,
         unknowns,
         (problem.stretches, &problem.inertial),
-        problem.parallel,
+        problem.filters,
         &problem.split,
     )?;
     let weights = match weights {

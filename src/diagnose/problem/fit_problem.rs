@@ -7,7 +7,7 @@ use super::prior::ParameterPrior;
 use super::rows::{Inertial, inertial};
 use super::unknowns::FreeParameters;
 use crate::effect::{AugmentedModel, Cover, Torques};
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::Robot;
 
 /// Data, which of their rows do what, and what is known and open beforehand.
@@ -15,7 +15,7 @@ pub struct FitProblem<'a> {
     pub stretches: &'a [Stretch],
     /// What the inertial parameters do along each of them.
     pub inertial: Vec<Inertial>,
-    pub parallel: &'a Parallel,
+    pub filters: &'a ParallelFilters,
     pub split: DataSplit,
     pub open: &'a FreeParameters,
     pub prior: &'a ParameterPrior,
@@ -29,12 +29,15 @@ pub struct FitProblem<'a> {
 pub(crate) fn inertial_of(
     robot: &Robot,
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
     split: &DataSplit,
 ) -> Result<Vec<Inertial>, MotionError> {
     let all = stretches.par_iter().enumerate();
-    all.map(|(i, stretch)| inertial(robot, stretch, parallel, &|j| split.ignores(i, j)))
-        .collect()
+    all.map(|(i, stretch)| {
+        let filter = filters.of(stretch);
+        inertial(robot, stretch, filter, &|j| split.ignores(i, j))
+    })
+    .collect()
 }
 
 impl<'a> FitProblem<'a> {
@@ -44,7 +47,7 @@ impl<'a> FitProblem<'a> {
     /// [`MotionError`] of the filter.
     pub fn along(&self, robot: &Robot, stretches: &'a [Stretch]) -> Result<Self, MotionError> {
         Ok(FitProblem {
-            inertial: inertial_of(robot, stretches, self.parallel, &self.split)?,
+            inertial: inertial_of(robot, stretches, self.filters, &self.split)?,
             stretches,
             split: self.split.clone(),
             cover: self.cover.clone(),

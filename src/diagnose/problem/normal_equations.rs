@@ -9,7 +9,7 @@ use super::data_split::{DataSplit, Piece, RowRole};
 use super::rows::{Filtered, Inertial, filtered};
 use super::unknowns::Unknowns;
 use crate::effect::AugmentedModel;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 
 /// Sums of one joint over one piece: columns and residual.
 #[derive(Debug, Clone)]
@@ -65,7 +65,7 @@ impl Base {
         model: &AugmentedModel,
         unknowns: Unknowns,
         (stretches, inertial): (&[Stretch], &[Inertial]),
-        parallel: &Parallel,
+        filters: &ParallelFilters,
         split: &DataSplit,
     ) -> Result<Self, MotionError> {
         let filtered = stretches
@@ -73,7 +73,8 @@ impl Base {
             .zip(inertial)
             .enumerate()
             .map(|(i, motion)| {
-                filtered(model, &unknowns, motion, parallel, &|j| split.ignores(i, j))
+                let filter = filters.of(motion.0);
+                filtered(model, &unknowns, motion, filter, &|j| split.ignores(i, j))
             })
             .collect::<Result<Vec<_>, _>>()?;
         let of_piece = |piece: &Piece| {

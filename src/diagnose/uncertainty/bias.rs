@@ -27,7 +27,7 @@ pub(crate) fn from_smoothing(
             again.push(stretch.clone());
             continue;
         }
-        match problem.parallel.smoothed_twice(stretch)? {
+        match problem.filters.of(stretch).smoothed_twice(stretch)? {
             Some(stretch) => again.push(stretch),
             None => return Ok(none),
         }
@@ -49,7 +49,10 @@ pub(crate) fn from_noise(
     for sign in [1.0, -1.0] {
         let noisier = |(i, stretch): (usize, &Stretch)| match problem.split.idle(i) {
             true => Ok(stretch.clone()),
-            false => problem.parallel.with_added_noise(stretch, i as u64, sign),
+            false => problem
+                .filters
+                .of(stretch)
+                .with_added_noise(stretch, i as u64, sign),
         };
         let stretches = problem.stretches.iter().enumerate().map(noisier);
         let stretches = stretches.collect::<Result<Vec<_>, MotionError>>()?;
@@ -67,7 +70,13 @@ pub(crate) fn from_rests(at: &FittedModel, problem: &FitProblem, cutoff_hz: f64)
     let mut pull = DVector::zeros(unknowns.len());
     for (i, (stretch, rows)) in problem.stretches.iter().zip(&at.base.stretches).enumerate() {
         for j in (0..stretch.joints()).filter(|j| !problem.split.ignores(i, *j)) {
-            let near = near_rests(&at.model, stretch, problem.parallel, cutoff_hz, j);
+            let near = near_rests(
+                &at.model,
+                stretch,
+                problem.filters.of(stretch),
+                cutoff_hz,
+                j,
+            );
             let weight = at.weights[j] * at.weights[j];
             let pieces = problem.split.pieces.iter();
             let fitted = pieces.filter(|p| p.stretch == i && p.role.fitted());
@@ -103,7 +112,7 @@ mod tests {
     use crate::diagnose::problem::prior::ParameterPrior;
     use crate::diagnose::problem::unknowns::FreeParameters;
     use crate::effect::{AugmentedModel, Cover};
-    use crate::motion::{FilterSettings, Parallel};
+    use crate::motion::{FilterSettings, ParallelFilters};
     use crate::robot::friction::ViscousCoulomb;
     use crate::robot::model::{JointFriction, Model};
     use crate::robot::{JointKind, Robot};
@@ -164,9 +173,9 @@ mod tests {
             friction: vec![JointFriction::ViscousCoulomb(law)],
             offset: vec![0.0],
         });
-        let parallel = Parallel::design(&settings(), DT).unwrap();
         let stretches = [stretch];
-        let mut split = DataSplit::of(&stretches, &[LogRole::Train], &parallel, 30.0);
+        let filters = ParallelFilters::design(&settings(), &stretches).unwrap();
+        let mut split = DataSplit::of(&stretches, &[LogRole::Train], &filters, 30.0);
         split.ignored = vec![vec![false]];
         split.stationary = vec![vec![false]];
         let open = FreeParameters {
@@ -179,10 +188,10 @@ mod tests {
             rows_per_independent: 1.0,
         };
         let problem = FitProblem {
-            inertial: inertial_of(&robot, &stretches, &parallel, &split).unwrap(),
+            inertial: inertial_of(&robot, &stretches, &filters, &split).unwrap(),
             cover: Cover::of(&robot, &stretches, 30.0),
             stretches: &stretches,
-            parallel: &parallel,
+            filters: &filters,
             split,
             open: &open,
             prior: &prior,

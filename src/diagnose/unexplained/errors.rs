@@ -8,7 +8,7 @@ use crate::diagnose::problem::data_split::{DataSplit, RowRole};
 use crate::diagnose::problem::rests::standing;
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 
 /// Errors of one joint.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -75,7 +75,7 @@ pub fn errors(
     model: &AugmentedModel,
     units: &[String],
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
     split: &DataSplit,
     (wanted, counted): (&dyn Fn(RowRole) -> bool, Counted),
 ) -> Result<Option<Errors>, MotionError> {
@@ -90,6 +90,7 @@ pub fn errors(
         if own.is_empty() {
             continue;
         }
+        let parallel = filters.of(stretch);
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;

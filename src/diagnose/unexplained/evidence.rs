@@ -2,7 +2,7 @@
 //! backward apart, and its spectra over order and frequency, for a model before and after.
 
 use crate::effect::AugmentedModel;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::JointKind;
 
 /// Points of a line.
@@ -51,13 +51,14 @@ struct ResidualRows {
 pub fn evidence(
     model: &AugmentedModel,
     stretches: &[&Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
     cutoff_hz: f64,
 ) -> Result<Vec<JointEvidence>, MotionError> {
     let robot = &model.model.robot;
     let n = robot.joints();
     let mut all: Vec<ResidualRows> = (0..n).map(|_| ResidualRows::default()).collect();
     for stretch in stretches {
+        let parallel = filters.of(stretch);
         let load = model.torques(stretch).load;
         let hat = model.reconstruct(stretch);
         for (j, rows) in all.iter_mut().enumerate() {

@@ -38,7 +38,7 @@ pub fn noise(
     floor(
         residuals,
         stretches,
-        &case.parallel,
+        &case.filters,
         case.cutoff_hz,
         case.averaged,
         &stationary_joints(&case.given.model.robot, stretches),

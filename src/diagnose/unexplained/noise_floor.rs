@@ -13,7 +13,7 @@
 use super::period::{period, unrepeated};
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
 
 /// Borders of the bands that are looked at, over the cut-off.
 const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
@@ -26,39 +26,59 @@ const BORDERS: [f64; 3] = [1.5, 2.25, 3.0];
 pub fn floor(
     residuals: &[Vec<Vec<f64>>],
     stretches: &[Stretch],
-    parallel: &Parallel,
+    filters: &ParallelFilters,
     cutoff_hz: f64,
     averaged: bool,
     stationary: &[Vec<bool>],
 ) -> Result<Vec<f64>, MotionError> {
-    let rate = 1.0 / stretches.first().map_or(1.0, |s| s.dt);
-    let bands = Bands::design(parallel, cutoff_hz, rate, averaged)?;
-    // what the bands, and the band that is kept, see of white noise and of white noise differentiated twice
-    let mut seen = [[0.0; 2]; 2];
-    let mut kept = [0.0; 2];
-    for (source, kernel) in [&[1.0][..], &[1.0, -2.0, 1.0][..]].into_iter().enumerate() {
-        let (beyond, within) = bands.powers(kernel)?;
-        [seen[0][source], seen[1][source]] = beyond;
-        kept[source] = within;
-    }
+    // logs of one rate together
+    let bands = filters.designs().iter();
+    let bands = bands.map(|(dt, filter)| Bands::design(filter, cutoff_hz, 1.0 / dt, averaged));
+    let bands = bands.collect::<Result<Vec<_>, _>>()?;
+    let rate_of: Vec<usize> = stretches.iter().map(|s| filters.rate_of(s)).collect();
     let periods: Vec<Option<usize>> = stretches.iter().map(|s| period(&s.q)).collect();
     let mut floor = Vec::new();
     for j in 0..stretches.first().map_or(0, Stretch::joints) {
         // friction at rest is no noise; a joint that never moves has nothing else
         let always = stationary.iter().all(|s| s[j]);
-        let logs = residuals.iter().zip(stationary).zip(&periods);
-        let mut of_joint = Vec::with_capacity(stretches.len());
-        for ((residual, _), period) in logs.filter(|((_, s), _)| always || !s[j]) {
-            of_joint.extend(bands.look(&residual[j], *period)?);
+        let mut of_joint: Vec<Vec<StretchNoise>> = bands.iter().map(|_| Vec::new()).collect();
+        for (i, residual) in residuals.iter().enumerate() {
+            if always || !stationary[i][j] {
+                let rate = rate_of[i];
+                of_joint[rate].extend(bands[rate].look(&residual[j], periods[i])?);
+            }
         }
-        floor.push(together(&of_joint, seen, kept));
+        floor.push(over_rates(&bands, &of_joint));
     }
     Ok(floor)
+}
+
+/// Variance of the noise of one joint over the logs of every rate, by the rows that each keeps.
+fn over_rates(bands: &[Bands], noise: &[Vec<StretchNoise>]) -> f64 {
+    let of_rate = |(bands, noise): (&Bands, &Vec<StretchNoise>)| {
+        let samples: f64 = noise.iter().map(|s| s.weight).sum();
+        let rows = samples / bands.parallel.decimation as f64;
+        (rows, together(noise, bands.seen, bands.kept))
+    };
+    let all: Vec<(f64, f64)> = bands.iter().zip(noise).map(of_rate).collect();
+    let known = || all.iter().filter(|(rows, _)| *rows > 0.0);
+    match (known().next(), known().count()) {
+        (None, _) => 0.0,
+        (Some((_, variance)), 1) => *variance,
+        _ => {
+            let rows: f64 = known().map(|(rows, _)| rows).sum();
+            known().map(|(r, variance)| r * variance).sum::<f64>() / rows
+        }
+    }
 }
 
 /// The two bands beyond the one that is kept, and the blocks that are looked at.
 struct Bands<'a> {
     parallel: &'a Parallel,
+    /// What each band sees of white noise and of white noise differentiated twice.
+    seen: [[f64; 2]; 2],
+    /// What the band that is kept sees of them.
+    kept: [f64; 2],
     /// Low-pass filters at the borders.
     passes: [ZeroPhase; 3],
     /// Samples of a block, some periods of the band.
@@ -83,8 +103,10 @@ impl<'a> Bands<'a> {
         };
         let block = ((4.0 / cutoff_hz * rate).ceil() as usize).max(64);
         let width = top * cutoff_hz * (BORDERS[1] - BORDERS[0]);
-        Ok(Bands {
+        let mut bands = Bands {
             parallel,
+            seen: [[0.0; 2]; 2],
+            kept: [0.0; 2],
             passes: [
                 low_pass(BORDERS[0])?,
                 low_pass(BORDERS[1])?,
@@ -94,7 +116,14 @@ impl<'a> Bands<'a> {
             freedom: 2.0 * width * block as f64 / rate,
             // 1 + 16 + 36 + 16 + 1 = 70; of the mean of two neighbours (1 + 9 + 4 + 4 + 9 + 1) / 4 = 7
             gain: if averaged { 7.0 } else { 70.0 },
-        })
+        };
+        let kernels = [&[1.0][..], &[1.0, -2.0, 1.0][..]];
+        for (source, kernel) in kernels.into_iter().enumerate() {
+            let (beyond, within) = bands.powers(kernel)?;
+            [bands.seen[0][source], bands.seen[1][source]] = beyond;
+            bands.kept[source] = within;
+        }
+        Ok(bands)
     }
 
     /// A signal in each of the two bands.
@@ -327,7 +356,8 @@ mod tests {
             };
             let stretches = vec![stretch; parts];
             let stationary = vec![vec![false]; parts];
-            floor(&pieces, &stretches, &parallel, 10.0, false, &stationary).unwrap()[0]
+            let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
+            floor(&pieces, &stretches, &filters, 10.0, false, &stationary).unwrap()[0]
         };
         let (whole, four) = (of(1), of(4));
         assert!((whole / wanted - 1.0).abs() < 0.3, "{whole} {wanted}");
@@ -355,11 +385,13 @@ mod tests {
             .enumerate()
             .map(|(k, x)| x + 2.0 * (0.02 * k as f64).sin())
             .collect();
+        let stretches = [stretch];
+        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
         for raw in [noise, smooth] {
             let found = floor(
                 &[vec![raw]],
-                std::slice::from_ref(&stretch),
-                &parallel,
+                &stretches,
+                &filters,
                 10.0,
                 false,
                 &[vec![false]],
@@ -367,5 +399,30 @@ mod tests {
             .unwrap()[0];
             assert!((found / seen - 1.0).abs() < 0.1, "{found} {seen}");
         }
+    }
+
+    /// The same torque noise per sample, logged at 1000 and at 400 Hz: the filter lets more of the slow log through.
+    #[test]
+    fn logs_of_two_rates_have_the_floor_of_each_by_its_rows() {
+        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let mut normal = || -> f64 { (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0 };
+        let logs = [(1e-3, 60_000), (2.5e-3, 24_000)];
+        let stretches = logs.map(|(dt, n)| Stretch {
+            dt,
+            q: vec![vec![0.0; n]],
+            t: vec![0.0; n],
+            ..Stretch::default()
+        });
+        let noise = logs.map(|(_, n)| vec![(0..n).map(|_| normal()).collect::<Vec<f64>>()]);
+        let filters = ParallelFilters::design(&FilterSettings::default(), &stretches).unwrap();
+        let stationary = vec![vec![false]; 2];
+        let found = floor(&noise, &stretches, &filters, 10.0, false, &stationary).unwrap()[0];
+        let (mut squares, mut rows) = (0.0, 0.0);
+        for (stretch, noise) in stretches.iter().zip(&noise) {
+            let kept = filters.of(stretch).run(&[&noise[0]]).unwrap();
+            squares += kept[0].iter().map(|x| x * x).sum::<f64>();
+            rows += kept[0].len() as f64;
+        }
+        assert!((found / (squares / rows) - 1.0).abs() < 0.1);
     }
 }

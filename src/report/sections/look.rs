@@ -4,7 +4,7 @@ use crate::diagnose::{JointEvidence, evidence};
 use crate::effect::AugmentedModel;
 use crate::identify::{InMemory, LoggedRobot};
 use crate::log::escape;
-use crate::motion::{MotionError, Parallel, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 
 /// Logs with the processing of a model.
 pub struct Look<'a> {
@@ -12,7 +12,7 @@ pub struct Look<'a> {
     pub stretches: &'a [Stretch],
     /// Names of the logs, by the index that their stretches carry.
     pub names: Vec<String>,
-    pub parallel: Parallel,
+    pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
 
@@ -27,12 +27,12 @@ impl<'a> Look<'a> {
         logs: impl Iterator<Item = String>,
     ) -> Result<Self, MotionError> {
         let settings = machine.settings();
-        let parallel = Parallel::design(&settings, in_memory.summary.dt)?;
+        let filters = ParallelFilters::design(&settings, &in_memory.stretches)?;
         Ok(Look {
             machine,
             stretches: &in_memory.stretches,
             names: logs.map(|name| escape(&name)).collect(),
-            parallel,
+            filters,
             cutoff_hz: settings.cutoff_hz,
         })
     }
@@ -52,7 +52,7 @@ impl<'a> Look<'a> {
         wanted: &dyn Fn(usize) -> bool,
     ) -> Result<Vec<JointEvidence>, MotionError> {
         let stretches: Vec<&Stretch> = self.stretches.iter().filter(|s| wanted(s.log)).collect();
-        evidence(model, &stretches, &self.parallel, self.cutoff_hz)
+        evidence(model, &stretches, &self.filters, self.cutoff_hz)
     }
 
     /// Lowest and highest velocity of a joint over all logs [m/s or rad/s].

@@ -53,7 +53,7 @@ pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, M
                 .map(Vec::as_slice)
                 .collect();
             plain.add(&stretch.t, &channels);
-            let rows = look.parallel.run(&channels)?;
+            let rows = look.filters.of(stretch).run(&channels)?;
             let times = sampled(look, stretch);
             let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
             smooth.add(&times, &rows);
@@ -70,8 +70,9 @@ pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, M
 }
 
 fn sampled(look: &Look, stretch: &Stretch) -> Vec<f64> {
-    let rows = look.parallel.rows(stretch.len());
-    let at = |i| stretch.t.get(look.parallel.sample_of(i)).copied();
+    let filter = look.filters.of(stretch);
+    let rows = filter.rows(stretch.len());
+    let at = |i| stretch.t.get(filter.sample_of(i)).copied();
     (0..rows).filter_map(at).collect()
 }
 
