@@ -12,7 +12,7 @@ use crate::log::{self, Channels, Layout, RawReader};
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn guessed(log: &RawReader) -> Result<(ColumnPlan, Option<LogFault>), CliError> {
+pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFault>), CliError> {
     let (time, seconds) = time_column(log)?;
     let names = log.names();
     let mut channels = Vec::new();
@@ -32,7 +32,7 @@ pub(super) fn guessed(log: &RawReader) -> Result<(ColumnPlan, Option<LogFault>),
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
+pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError> {
     let names = log.names();
     let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
         CliError::input(format!(
@@ -43,7 +43,11 @@ pub(super) fn time_column(log: &RawReader) -> Result<(usize, f64), CliError> {
     })?;
     // `time [ms]`, or `time_ms`
     let suffix = || names[time].rsplit_once('_').map(|(_, unit)| unit);
-    Ok((time, seconds(log.unit(time).or_else(suffix))))
+    let stated = seconds(log.unit(time).or_else(suffix));
+    match stated {
+        Some(seconds) => Ok((time, seconds)),
+        None => Ok((time, log.set_time_by_numbers(time)?)),
+    }
 }
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
@@ -52,6 +56,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
+    let seconds = log.recognised_s().unwrap_or(layout.time.factor);
     let time = time.or_else(|| names.iter().position(|name| is_time(name)));
     let mut known: Vec<Option<ChannelColumn>> = vec![None; names.len()];
     place(log, machine, layout, &mut known);
@@ -65,7 +70,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
         .map(|(column, planned)| planned.unwrap_or_else(|| other(log, column)))
         .collect();
     let plan = ColumnPlan {
-        time: time.map(|time| (time, layout.time.factor)),
+        time: time.map(|time| (time, seconds)),
         channels,
     };
     (plan, log.refused().map(|error| refusal(error.to_string())))
@@ -138,13 +143,14 @@ pub(super) fn unit_of_joint(name: &str) -> Option<&str> {
     known.contains(&unit).then_some(unit)
 }
 
-/// Seconds per unit of a time column.
-fn seconds(unit: Option<&str>) -> f64 {
-    match unit.map(str::to_lowercase).as_deref() {
-        Some("ms") => 1e-3,
-        Some("us" | "µs" | "μs") => 1e-6,
-        Some("ns") => 1e-9,
-        _ => 1.0,
+/// Seconds per unit of a time column, where the unit is one of time.
+fn seconds(unit: Option<&str>) -> Option<f64> {
+    match unit?.to_lowercase().as_str() {
+        "s" | "sec" => Some(1.0),
+        "ms" => Some(1e-3),
+        "us" | "µs" | "μs" => Some(1e-6),
+        "ns" => Some(1e-9),
+        _ => None,
     }
 }
 

@@ -138,7 +138,7 @@ fn as_it_stands(
     let name = escape(&spec.name());
     let (time, seconds) = match log.is_recording() {
         true => (0, 1.0),
-        false => columns::time_column(&log)?,
+        false => columns::time_column(&mut log)?,
     };
     log.set_time(time, seconds);
     let others: Vec<usize> = (0..log.names().len()).filter(|k| *k != time).collect();

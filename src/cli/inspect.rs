@@ -73,7 +73,7 @@ fn inspect(
     let mut log = RawReader::open(spec, layout.as_ref())?;
     let (plan, refused) = match machine {
         Some(machine) => columns::of_robot(&log, machine),
-        None => columns::guessed(&log)?,
+        None => columns::guessed(&mut log)?,
     };
     let found = look(&mut log, &plan, &|| context.interrupted())?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;

@@ -98,6 +98,7 @@ impl RobotFile {
                 [gain, given.position_offset.unwrap_or(0.0)],
                 || key("position"),
             );
+            layout.positions[index].wrap = given.wrap.map(|range| (range * gain).abs());
             layout.velocities[index] = channel(
                 &given.velocity,
                 format!("dq_{joint}"),
@@ -154,6 +155,7 @@ impl RobotFile {
                 ],
                 || key("position"),
             );
+            layout.positions[index].wrap = given.wrap.map(|range| range * size);
             layout.torques[index] = channel(
                 &given.volts,
                 format!("u_{}", index + 1),

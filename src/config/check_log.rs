@@ -190,6 +190,7 @@ fn joint_channels(
     scale(document, &at("position_scale"), channels.position_scale)?;
     scale(document, &at("torque_scale"), channels.torque_scale)?;
     document.finite(&at("position_offset"), channels.position_offset.as_slice())?;
+    range(document, &at("wrap"), channels.wrap)?;
     document.finite(&at("torque_offset"), channels.torque_offset.as_slice())?;
     match (torque_is, &channels.torque) {
         (None, Some(_)) => Err(document.missing(
@@ -228,7 +229,19 @@ fn actuator_channels(
     }
     sign(document, &at("position_sign"), channels.position_sign)?;
     sign(document, &at("volts_sign"), channels.volts_sign)?;
+    range(document, &at("wrap"), channels.wrap)?;
     document.finite(&at("home"), channels.home.as_slice())
+}
+
+fn range(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+    match value {
+        Some(value) if !(value > 0.0 && value.is_finite()) => Err(document.value(
+            at,
+            &format!("is {value}"),
+            "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096",
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn sign(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {

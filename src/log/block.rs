@@ -69,6 +69,15 @@ impl Block {
         self.dq.truncate(kept * widths[2]);
     }
 
+    /// Keeps the first rows alone.
+    pub(super) fn truncate(&mut self, rows: usize) {
+        let widths = self.widths();
+        self.t.truncate(rows);
+        self.q.truncate(rows * widths[0]);
+        self.tau.truncate(rows * widths[1]);
+        self.dq.truncate(rows * widths[2]);
+    }
+
     /// Width of each matrix: positions, torques, velocities.
     fn widths(&self) -> [usize; 3] {
         [&self.q, &self.tau, &self.dq].map(|x| x.len().checked_div(self.len()).unwrap_or(0))

@@ -16,6 +16,8 @@ pub struct Channel {
     pub factor: f64,
     /// Offset in SI.
     pub offset: f64,
+    /// Range after which the logged number begins anew [SI].
+    pub wrap: Option<f64>,
     /// The key of the robot file that names this column; absent for a name of the contract.
     pub key: Option<String>,
 }
@@ -28,6 +30,7 @@ impl Channel {
             unit: unit.to_owned(),
             factor: 1.0,
             offset: 0.0,
+            wrap: None,
             key: None,
         }
     }
@@ -36,7 +39,7 @@ impl Channel {
 impl LogSection {
     /// Which column is the time, and how it becomes seconds.
     pub(crate) fn time_channel(&self) -> Channel {
-        let (unit, factor) = self.time_unit.in_seconds();
+        let (unit, factor) = self.time_unit.unwrap_or_default().in_seconds();
         let time = || "[log] time".to_owned();
         channel(&self.time, "t".to_owned(), unit, [factor, 0.0], time)
     }
@@ -56,6 +59,7 @@ pub(crate) fn channel(
         unit: unit.to_owned(),
         factor,
         offset,
+        wrap: None,
         key: named.as_ref().map(|_| key()),
     }
 }

@@ -13,6 +13,7 @@ mod columns;
 mod content;
 mod error;
 mod layout;
+mod mend;
 mod names;
 mod pass;
 mod raw;
@@ -25,11 +26,13 @@ mod spec;
 mod stale;
 mod text;
 mod time;
+mod time_unit;
 
 pub use arrays::Arrays;
 pub use block::Block;
 pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Layout};
+pub use mend::{Bridge, Mending, Unwrap};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader};
 pub use reader::Reader;
@@ -38,7 +41,7 @@ pub use recording::{
 };
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
-    PositionUnit, Stamp, TimeUnit, TorqueIs, TorqueUnit,
+    PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
 };
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};

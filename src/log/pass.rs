@@ -2,15 +2,19 @@
 
 use std::path::PathBuf;
 
-use super::columns::choose;
+use super::columns::{choose, position_of, unit_of};
 use super::content::Content;
 use super::layout::Layout;
 use super::recording::{JointStates, MessageRows, format_of};
 use super::rows::{LogRows, Strictness};
+use super::section::TimeUnit;
 use super::source::{self, Provenance};
 use super::text::TextRows;
 use super::time::Instant;
 use super::{LogError, LogSpec, Span};
+
+/// Rows by whose times a unit is recognised.
+const LOOKED_AT: usize = 1024;
 
 /// A log that is being gone through.
 #[derive(Debug)]
@@ -25,6 +29,8 @@ pub(super) struct LogPass {
     pub(super) refused: Option<LogError>,
     /// Column of the time and seconds per unit of it, where it was said.
     time: Option<(usize, f64)>,
+    /// The unit that the times were recognised to have, and their column, where nothing states it.
+    recognised: Option<(TimeUnit, String)>,
     /// The instant from which times are counted; known from the first row.
     origin: Option<Instant>,
     /// Times of the span [s], half open; set at the first row that has a time.
@@ -44,12 +50,55 @@ impl LogPass {
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
         let (rows, layout, refused) = open(&files, layout, strictness)?;
-        Ok(Self {
+        let mut pass = Self {
             files,
             strictness,
             refused,
             ..Self::of_rows(spec.clone(), rows, layout)
-        })
+        };
+        // Who names the column later knows its unit then.
+        let stated = pass.layout.section.time_unit.is_some() || pass.layout.joints.is_empty();
+        if !stated && let Some(column) = position_of(pass.rows.names(), &pass.layout.time) {
+            pass.recognise(column)?;
+        }
+        Ok(pass)
+    }
+
+    /// Takes the unit of a column of times from its numbers, where its name states none.
+    pub(super) fn recognise(&mut self, column: usize) -> Result<(), LogError> {
+        let name = &self.rows.names()[column];
+        let stated = unit_of(name).is_some() || TimeUnit::of_suffix(name).is_some();
+        if stated || self.rows.is_recording() {
+            return Ok(());
+        }
+        let (mut rows, ..) = open(&self.files, &self.layout, Strictness::Record)?;
+        let mut times = Vec::with_capacity(LOOKED_AT);
+        while times.len() < LOOKED_AT && rows.next()?.is_some() {
+            // A date is no number, and has no unit.
+            match rows.logged(column) {
+                Some(time) => times.push(time),
+                None => return Ok(()),
+            }
+        }
+        let unit = TimeUnit::of_numbers(&times);
+        self.set_time(column, unit.in_seconds().1);
+        if unit != TimeUnit::Second {
+            let name = super::escape(&self.rows.names()[column]);
+            self.recognised = Some((unit, name));
+        }
+        Ok(())
+    }
+
+    /// What was chosen on the way, one sentence each.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut told = self.rows.warnings();
+        if let Some((unit, column)) = &self.recognised {
+            let unit = unit.in_seconds().0;
+            told.push(format!(
+                "times of `{column}` are taken as {unit}, by the size of the numbers and of their steps; `time_unit = \"{unit}\"` in [log] of the robot file says so, \"s\" that they are seconds"
+            ));
+        }
+        told
     }
 
     /// Goes through rows that are there already.
@@ -62,6 +111,7 @@ impl LogPass {
             layout,
             refused: None,
             time: None,
+            recognised: None,
             origin: None,
             span: None,
             used: None,
@@ -73,6 +123,18 @@ impl LogPass {
     pub(super) fn set_time(&mut self, column: usize, seconds: f64) {
         self.time = Some((column, seconds));
         self.rows.set_time(column, seconds);
+    }
+
+    /// Seconds per unit of the times.
+    pub(super) fn seconds(&self) -> Option<f64> {
+        self.time.map(|(_, seconds)| seconds)
+    }
+
+    /// The same where they were recognised by their numbers.
+    pub(super) fn recognised_s(&self) -> Option<f64> {
+        self.recognised
+            .as_ref()
+            .map(|(unit, _)| unit.in_seconds().1)
     }
 
     /// The instant from which times are counted, once a row is read: zero, unless they lie so far

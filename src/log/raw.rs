@@ -102,6 +102,21 @@ impl RawReader {
         self.pass.origin()
     }
 
+    /// Says which column is the time, whose name states no unit: it is recognised by its numbers.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    pub fn set_time_by_numbers(&mut self, column: usize) -> Result<f64, LogError> {
+        self.pass.set_time(column, 1.0);
+        self.pass.recognise(column)?;
+        Ok(self.pass.seconds().unwrap_or(1.0))
+    }
+
+    /// Seconds per unit of the times that the robot file names, where they were recognised.
+    pub fn recognised_s(&self) -> Option<f64> {
+        self.pass.recognised_s()
+    }
+
     /// Fills the block with the next rows; false, and no row, at the end.
     ///
     /// # Errors
@@ -139,7 +154,7 @@ impl RawReader {
 
     /// What was left out, one sentence each; call it after the last block.
     pub fn warnings(&self) -> Vec<String> {
-        self.pass.rows.warnings()
+        self.pass.warnings()
     }
 
     /// Where files break off; call it after the last block.

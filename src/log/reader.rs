@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::arrays::{ArrayRows, Arrays};
-use super::layout::Layout;
+use super::layout::{Channel, Layout};
+use super::mend::{Bridging, Held, Mending, Unwrap};
 use super::pass::LogPass;
 use super::rows::Strictness;
 use super::source::{self, Provenance};
@@ -20,6 +21,10 @@ pub struct Reader {
     finished: bool,
     activity: Vec<Activity>,
     stale: Stale,
+    /// Positions that are followed through their turns, by their places.
+    turning: Vec<(usize, Unwrap)>,
+    held: Held,
+    bridging: Bridging,
     /// Messages that repeat the one before them in everything.
     duplicates: u64,
     /// Rows at the end of the last block that may turn out to be stale.
@@ -55,15 +60,46 @@ impl Reader {
 
     fn new(pass: LogPass) -> Self {
         let (joints, torques) = (pass.layout.positions.len(), pass.layout.torques.len());
-        Self {
+        let mut reader = Self {
             pass,
             seen: None,
             finished: false,
             activity: vec![Activity::default(); torques.min(joints)],
             stale: Stale::new(joints),
+            turning: Vec::new(),
+            held: Held::default(),
+            bridging: Bridging::default(),
             duplicates: 0,
             pending: Block::default(),
-        }
+        };
+        reader.mend(&Mending::default());
+        reader
+    }
+
+    /// Says what to mend, before the first row is read; positions whose range the layout names are
+    /// followed through their turns in any case.
+    pub fn mend(&mut self, mending: &Mending) {
+        let positions = self.pass.layout.positions.iter().enumerate();
+        let range = |(place, channel): (usize, &Channel)| {
+            let range = channel.wrap.or(*mending.wraps.get(place)?);
+            range.map(|range| (place, Unwrap::new(range)))
+        };
+        let named = |(place, channel): (usize, &Channel)| {
+            channel.wrap.map(|range| (place, Unwrap::new(range)))
+        };
+        self.turning = match mending.wraps.is_empty() {
+            true => positions.filter_map(named).collect(),
+            false => positions.filter_map(range).collect(),
+        };
+        self.held = Held::new(mending.held);
+        self.bridging = Bridging::new(Arc::clone(&mending.bridges));
+        self.stale.keep(mending.keep_repeats);
+    }
+
+    /// Rows for which each sample was held, in a log that repeats most of its rows while the robot
+    /// moves; call it after the last block.
+    pub fn hold(&self) -> Option<usize> {
+        self.stale.hold()
     }
 
     /// The layout that the log turned out to have.
@@ -112,6 +148,7 @@ impl Reader {
             }
             let (from, to) = self.pass.span(t)?;
             if t < from {
+                self.pass_over(block)?;
                 continue;
             }
             if t >= to {
@@ -133,11 +170,19 @@ impl Reader {
     /// What was left out, dropped or chosen so far, one sentence each; call it after the last block.
     pub fn warnings(&self) -> Vec<String> {
         let name = super::escape(&self.pass.spec.name());
-        let mut found = self.pass.rows.warnings();
+        let mut found = self.pass.warnings();
         if self.duplicates > 0 {
             found.push(format!(
                 "{} messages are the message before once more, time included, and are left out",
                 self.duplicates
+            ));
+        }
+        if self.held.dropped > 0 {
+            let rows = self.pass.samples + self.held.dropped;
+            found.push(format!(
+                "sample-and-hold: {} of {rows} rows ({:.0} %) are the row before once more; only fresh rows are used",
+                self.held.dropped,
+                100.0 * self.held.dropped as f64 / rows as f64
             ));
         }
         if self.stale.dropped() > 0 {
@@ -203,6 +248,22 @@ impl Reader {
         })
     }
 
+    /// Follows positions through their turns in a row before the span.
+    fn pass_over(&mut self, block: &mut Block) -> Result<(), LogError> {
+        if self.turning.is_empty() {
+            return Ok(());
+        }
+        let rows = block.len();
+        block.t.push(0.0);
+        let at_q = block.q.len();
+        self.pass.rows.append(block)?;
+        for (place, unwrap) in &mut self.turning {
+            unwrap.take(block.q[at_q + *place]);
+        }
+        block.truncate(rows);
+        Ok(())
+    }
+
     /// Appends the current row to the block, and drops rows before it that turn out to be stale.
     fn take(&mut self, t: f64, block: &mut Block) -> Result<(), LogError> {
         if block.is_empty() {
@@ -211,7 +272,16 @@ impl Reader {
         block.t.push(t);
         let (at_q, at_tau, at_dq) = (block.q.len(), block.tau.len(), block.dq.len());
         self.pass.rows.append(block)?;
+        let logged = [&block.q[at_q..], &block.tau[at_tau..], &block.dq[at_dq..]];
+        if self.held.repeats(logged) {
+            block.truncate(block.len() - 1);
+            return Ok(());
+        }
         let (q, tau) = (&mut block.q[at_q..], &mut block.tau[at_tau..]);
+        for (place, unwrap) in &mut self.turning {
+            q[*place] = unwrap.take(q[*place]);
+        }
+        self.bridging.mend(t, q, tau);
         for ((activity, q), tau) in self.activity.iter_mut().zip(&*q).zip(&*tau) {
             activity.driven |= *tau != 0.0;
             activity.moved |= *activity.first_position.get_or_insert(*q) != *q;

@@ -112,8 +112,19 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
+    /// The unit that the name of a column ends with: `time_ms`.
+    pub(super) fn of_suffix(name: &str) -> Option<Self> {
+        match name.rsplit_once('_')?.1 {
+            "s" | "sec" => Some(Self::Second),
+            "ms" => Some(Self::Millisecond),
+            "us" => Some(Self::Microsecond),
+            "ns" => Some(Self::Nanosecond),
+            _ => None,
+        }
+    }
+
     /// As it is written in files, and seconds in one of it.
-    pub(super) const fn in_seconds(self) -> (&'static str, f64) {
+    pub(crate) const fn in_seconds(self) -> (&'static str, f64) {
         match self {
             Self::Second => ("s", 1.0),
             Self::Millisecond => ("ms", 1e-3),
@@ -121,6 +132,30 @@ impl TimeUnit {
             Self::Nanosecond => ("ns", 1e-9),
         }
     }
+}
+
+/// A kind of finding about rows of a log, for which a fit would leave them out or mend them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RowFault {
+    /// Single rows far off their neighbours: bridged.
+    Spike,
+    /// A channel that stands still while what it measures does not: left out.
+    StuckChannel,
+    /// Flat tops of a torque: left out.
+    Saturation,
+    /// Flat tops of a position: left out.
+    Clipping,
+    /// Rows that show the positions of the row before while the robot moves: left out.
+    RepeatedRows,
+    /// A log whose rows hold each sample for several rows: only the fresh ones are used.
+    SampleAndHold,
+    /// A leap of a position that no drive can make: the log is parted there.
+    PositionStep,
+    /// A position that begins anew after its range: followed through its turns.
+    WrappedEncoder,
+    /// All channels frozen for a while: left out.
+    Stall,
 }
 
 /// What parts the columns of a text log.
@@ -191,6 +226,10 @@ pub struct JointChannels {
     /// Offset added after scaling [m or rad].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_offset: Option<f64>,
+    /// Range after which the logged position begins anew, in the unit of its column: 360 for an encoder
+    /// of one turn in degrees, 4096 for one in counts. The position is followed through its turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrap: Option<f64>,
     /// Column of the velocity; `dq_NAME` where absent, and then optional.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<ColumnName>,
@@ -231,6 +270,9 @@ pub struct ActuatorChannels {
     /// Homing offset: the coordinate where the encoder reads 0 [m or rad].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home: Option<f64>,
+    /// Range after which the logged position begins anew, in the unit of its column.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrap: Option<f64>,
     /// Column of the volts; `u_1`.. where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volts: Option<ColumnName>,
@@ -246,9 +288,14 @@ pub struct LogSection {
     /// Column of the time, or field of a message; `t` where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnName>,
-    /// Unit of the time column.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub time_unit: TimeUnit,
+    /// Unit of the time column; where absent the header's, else by the size of the numbers and of
+    /// their steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<TimeUnit>,
+    /// Kinds of findings about rows that are told but not acted upon: the rows stay in a fit as they
+    /// were logged.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keep: Vec<RowFault>,
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
     pub delimiter: Delimiter,

@@ -13,6 +13,8 @@ const LONGEST: usize = 20;
 const STEPS: f64 = 4.0;
 /// Stale rows from which a log is known to have them.
 const KNOWN: u64 = 10;
+/// Steps of a motion from which it is known whether samples were held.
+const SAMPLES: u64 = 50;
 /// Speeds before and after are the same motion where neither is more than this many times the other.
 const ALIKE: f64 = 3.0;
 
@@ -33,6 +35,11 @@ pub(super) struct Stale {
     whole: bool,
     repeated: u64,
     dropped: u64,
+    /// Whether stale rows stay.
+    keep: bool,
+    /// Steps of a motion that goes on, and rows between them that repeat everything.
+    moving: u64,
+    held: u64,
 }
 
 impl Stale {
@@ -47,7 +54,23 @@ impl Stale {
             whole: true,
             repeated: 0,
             dropped: 0,
+            keep: false,
+            moving: 0,
+            held: 0,
         }
+    }
+
+    /// Says whether stale rows stay.
+    pub(super) fn keep(&mut self, keep: bool) {
+        self.keep = keep;
+    }
+
+    /// Rows for which each sample was held, where at least every other row of the motion is one that
+    /// was held.
+    pub(super) fn hold(&self) -> Option<usize> {
+        let held = self.moving >= SAMPLES && 2 * self.held >= self.moving;
+        let rows = 1.0 + self.held as f64 / self.moving.max(1) as f64;
+        held.then(|| rows.round() as usize)
     }
 
     /// Takes the next row into account; `same` tells whether all but its positions repeats too. How
@@ -73,9 +96,12 @@ impl Stale {
 
     #[inline]
     fn moved(&mut self, duration: f64, q: &[f64]) -> usize {
-        let stale = (1..=LONGEST).contains(&self.run)
-            && (self.whole || self.dropped >= KNOWN)
-            && self.goes_on(duration, q);
+        let goes_on = self.run <= LONGEST && self.goes_on(duration, q);
+        if goes_on {
+            self.moving += 1;
+            self.held += if self.whole { self.run as u64 } else { 0 };
+        }
+        let stale = goes_on && self.run > 0 && (self.whole || self.dropped >= KNOWN) && !self.keep;
         let joints = self.step.iter_mut().zip(&mut self.resolution);
         for ((step, resolution), (to, from)) in joints.zip(q.iter().zip(&self.q)) {
             *step = to - from;
@@ -92,7 +118,6 @@ impl Stale {
     }
 
     /// Whether the motion before the run goes on in the step after it.
-    #[cold]
     fn goes_on(&self, duration: f64, q: &[f64]) -> bool {
         (0..q.len()).any(|joint| {
             let after = q[joint] - self.q[joint];

@@ -34,7 +34,7 @@ pub(super) struct Seen {
 /// Looks at a log, to its end.
 pub(super) fn look(spec: &LogSpec, context: &Context) -> Result<Seen, CliError> {
     let mut table = RawReader::open(spec, None)?;
-    let (plan, _) = columns::guessed(&table)?;
+    let (plan, _) = columns::guessed(&mut table)?;
     let bar = context.progress("looking at the log", None);
     let findings = look_at(&mut table, &plan, context)?;
     drop(bar);

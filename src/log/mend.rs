@@ -1,0 +1,194 @@
+//! What a first look at a log found, and a second one mends as it reads: positions that begin anew
+//! after their range, samples that were held for several rows, single numbers far off the others.
+
+use std::sync::Arc;
+
+/// Follows one position that begins anew after its range, through its turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unwrap {
+    range: f64,
+    last: Option<f64>,
+    turns: f64,
+}
+
+impl Unwrap {
+    /// For a range in the unit of the position; finite and more than 0.
+    pub fn new(range: f64) -> Self {
+        Self {
+            range,
+            last: None,
+            turns: 0.0,
+        }
+    }
+
+    /// The next position with the turns that it went through. A step of more than half the range is
+    /// one through its end: nothing tells it from one that is as fast.
+    #[inline]
+    pub fn take(&mut self, position: f64) -> f64 {
+        if !position.is_finite() {
+            return position;
+        }
+        if let Some(last) = self.last {
+            self.turns -= ((position - last) / self.range).round();
+        }
+        self.last = Some(position);
+        position + self.turns * self.range
+    }
+}
+
+/// A number that is put in the place of a logged one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bridge {
+    /// Time of its row [s].
+    pub t: f64,
+    /// Channel: the positions in joint order, then the torques.
+    pub channel: usize,
+    /// What stands there instead, as logged, in SI units.
+    pub value: f64,
+}
+
+/// What is mended while a log is read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mending {
+    /// Range of each position that begins anew [m or rad], where the robot file names none.
+    pub wraps: Vec<Option<f64>>,
+    /// Rows for which each sample was held: only fresh ones are handed out.
+    pub held: Option<usize>,
+    /// Whether rows that repeat others in the middle of a motion stay.
+    pub keep_repeats: bool,
+    /// Numbers to replace, in the order of time.
+    pub bridges: Arc<[Bridge]>,
+}
+
+/// Knows rows that are the one before once more, in a log that holds its samples.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Held {
+    /// Rows for which a sample is held; 0 where none is.
+    rows: usize,
+    /// Positions, torques and velocities of the last fresh row.
+    last: Vec<f64>,
+    /// Rows since then.
+    since: usize,
+    /// Rows that were left out.
+    pub(super) dropped: u64,
+}
+
+impl Held {
+    pub(super) fn new(rows: Option<usize>) -> Self {
+        Self {
+            rows: rows.unwrap_or(0),
+            ..Self::default()
+        }
+    }
+
+    /// Whether a row holds a sample that is there already. A robot at rest may give equal samples:
+    /// one is kept every so many rows.
+    #[inline]
+    pub(super) fn repeats(&mut self, parts: [&[f64]; 3]) -> bool {
+        if self.rows < 2 {
+            return false;
+        }
+        let mut last = self.last.as_slice();
+        let mut same = self.last.len() == parts.iter().map(|part| part.len()).sum::<usize>();
+        for part in parts {
+            let (before, rest) = last.split_at(part.len().min(last.len()));
+            same &= before == part;
+            last = rest;
+        }
+        self.since += 1;
+        if same && self.since < self.rows {
+            self.dropped += 1;
+            return true;
+        }
+        self.since = 0;
+        self.last.clear();
+        parts.iter().for_each(|part| self.last.extend(*part));
+        false
+    }
+}
+
+/// Puts numbers in the place of others, row after row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Bridging {
+    all: Arc<[Bridge]>,
+    next: usize,
+}
+
+impl Bridging {
+    pub(super) fn new(all: Arc<[Bridge]>) -> Self {
+        Self { all, next: 0 }
+    }
+
+    /// Mends the row at time `t` [s].
+    #[inline]
+    pub(super) fn mend(&mut self, t: f64, positions: &mut [f64], torques: &mut [f64]) {
+        while let Some(bridge) = self.all.get(self.next)
+            && bridge.t <= t
+        {
+            self.next += 1;
+            if bridge.t < t {
+                continue;
+            }
+            let place = match bridge.channel.checked_sub(positions.len()) {
+                None => positions.get_mut(bridge.channel),
+                Some(torque) => torques.get_mut(torque),
+            };
+            if let Some(place) = place {
+                *place = bridge.value;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_position_is_followed_through_its_turns_in_both_directions() {
+        let range = 360.0;
+        let true_ones: Vec<f64> = (0..4000)
+            .map(|k| 900.0 * (f64::from(k) * 0.003).sin())
+            .collect();
+        let mut unwrap = Unwrap::new(range);
+        for q in &true_ones {
+            let logged = (q + 180.0).rem_euclid(range) - 180.0;
+            assert!((unwrap.take(logged) - q).abs() < 1e-9, "{q}");
+        }
+        assert!(unwrap.take(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn of_held_samples_the_fresh_one_is_kept_and_at_rest_one_in_so_many_rows() {
+        let rows = [
+            1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 4.0,
+        ];
+        let mut held = Held::new(Some(3));
+        let fresh: Vec<usize> = (0..rows.len())
+            .filter(|k| !held.repeats([&rows[*k..=*k], &[7.0], &[]]))
+            .collect();
+        assert_eq!((fresh, held.dropped), (vec![0, 3, 6, 9, 12], 8));
+        let mut none = Held::new(None);
+        assert!(rows.iter().all(|x| !none.repeats([&[*x], &[], &[]])));
+    }
+
+    #[test]
+    fn numbers_are_replaced_at_their_rows_and_nowhere_else() {
+        let bridge = |t, channel, value| Bridge { t, channel, value };
+        let all = [
+            bridge(0.0, 0, 5.0),
+            bridge(0.2, 1, 6.0),
+            bridge(0.2, 2, 7.0),
+        ];
+        let mut bridging = Bridging::new(all.into());
+        for (t, expected) in [
+            (0.1, [1.0, 2.0, 3.0]),
+            (0.2, [1.0, 6.0, 7.0]),
+            (0.3, [1.0, 2.0, 3.0]),
+        ] {
+            let (mut q, mut tau) = ([1.0, 2.0], [3.0]);
+            bridging.mend(t, &mut q, &mut tau);
+            assert_eq!([q[0], q[1], tau[0]], expected);
+        }
+    }
+}

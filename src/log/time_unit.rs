@@ -1,0 +1,92 @@
+//! The unit of times whose header and robot file state none: by the size of the numbers and of their
+//! steps.
+
+use super::section::TimeUnit;
+
+/// Steps of the clocks that logs of robots have [s]: 100 kHz to 1 Hz.
+const STEPS_S: [f64; 2] = [1e-5, 1.0];
+/// A step in the middle of those that are usual [s].
+const USUAL_S: f64 = 2e-3;
+/// A step up to this one is in seconds, as the contract has it.
+const SECONDS: f64 = 0.5;
+/// Seconds since 1970 of clocks that are set: 2001 to 2096.
+const EPOCH_S: [f64; 2] = [1e9, 4e9];
+/// Rows from which a unit is told.
+const LEAST: usize = 64;
+
+impl TimeUnit {
+    /// The unit of these times, which may be in any order; seconds where nothing speaks for another.
+    ///
+    /// Numbers of the size of seconds, milliseconds, .. since 1970 are of that unit where their step
+    /// makes a rate that a log may have; else the step decides, for no robot is logged once a second.
+    pub(super) fn of_numbers(times: &[f64]) -> Self {
+        let mut steps: Vec<f64> = times
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .collect();
+        steps.retain(|step| *step > 0.0 && step.is_finite());
+        if steps.len() < LEAST {
+            return Self::Second;
+        }
+        steps.sort_by(f64::total_cmp);
+        let step = steps[steps.len() / 2];
+        let all = [
+            Self::Second,
+            Self::Millisecond,
+            Self::Microsecond,
+            Self::Nanosecond,
+        ];
+        let within = |value: f64, [low, high]: [f64; 2]| value >= low && value <= high;
+        let possible = |unit: &Self| within(step * unit.in_seconds().1, STEPS_S);
+        let first = times.first().copied().unwrap_or(0.0).abs();
+        let of_epoch = |unit: &Self| within(first * unit.in_seconds().1, EPOCH_S);
+        if let Some(unit) = all.iter().find(|unit| possible(unit) && of_epoch(unit)) {
+            return *unit;
+        }
+        if step <= SECONDS {
+            return Self::Second;
+        }
+        let off = |unit: &Self| (step * unit.in_seconds().1 / USUAL_S).ln().abs();
+        let found = all.iter().filter(|unit| possible(unit));
+        let found = found.min_by(|a, b| off(a).total_cmp(&off(b)));
+        found.copied().unwrap_or(Self::Second)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_known_by_the_size_of_times_and_steps() {
+        let unit = |first: f64, step: f64| {
+            let times: Vec<f64> = (0..200).map(|k| first + f64::from(k) * step).collect();
+            TimeUnit::of_numbers(&times)
+        };
+        for rate in [10.0, 125.0, 500.0, 1000.0, 5000.0] {
+            for begin in [0.0, 17.25, 90_000.0, 1.7e9, 1.76e9] {
+                assert_eq!(unit(begin, 1.0 / rate), TimeUnit::Second, "{rate} {begin}");
+                for (other, size) in [
+                    (TimeUnit::Millisecond, 1e-3),
+                    (TimeUnit::Microsecond, 1e-6),
+                    (TimeUnit::Nanosecond, 1e-9),
+                ] {
+                    // a step below a millisecond in milliseconds may be seconds as well
+                    let (first, step) = (begin / size, 1.0 / rate / size);
+                    if step > SECONDS && (rate > 50.0 || begin >= 1e9) {
+                        assert_eq!(unit(first, step), other, "{rate} Hz from {begin} s");
+                    }
+                }
+            }
+        }
+        // a clock that runs since the machine was switched on, 50 minutes ago
+        assert_eq!(unit(3e12, 1e6), TimeUnit::Nanosecond);
+    }
+
+    #[test]
+    fn few_rows_and_rows_without_times_are_seconds() {
+        assert_eq!(TimeUnit::of_numbers(&[0.0, 1.0, 2.0]), TimeUnit::Second);
+        assert_eq!(TimeUnit::of_numbers(&[f64::NAN; 200]), TimeUnit::Second);
+        assert_eq!(TimeUnit::of_numbers(&[]), TimeUnit::Second);
+    }
+}
