@@ -228,7 +228,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         without_time: 0,
     };
     let bar = context.progress("converting", Some(args.logs.len() as u64));
-    let (mut warnings, mut provenance) = (Vec::new(), Vec::new());
+    let notes = machine.as_ref().map(|machine| machine.file.notes.clone());
+    let (mut warnings, mut provenance) = (notes.unwrap_or_default(), Vec::new());
     for spec in &args.logs {
         provenance.push(match &machine {
             None => as_it_stands(spec, &mut target, &mut warnings, context)?,

@@ -187,7 +187,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &[])?;
     let known = Known::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
-    let (mut logs, mut provenance, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut logs, mut provenance) = (Vec::new(), Vec::new());
+    let notes = known.as_ref().map(|known| known.machine.file.notes.clone());
+    let mut warnings = notes.unwrap_or_default();
     for spec in &args.logs {
         let (findings, input) = inspect(spec, known.as_ref(), context, &mut warnings)?;
         logs.push((spec.name(), findings));

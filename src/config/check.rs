@@ -31,6 +31,11 @@ fn robot(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
         ),
         ("urdf", robot.urdf.is_some(), ModelKind::Serial),
         ("tip", robot.tip.is_some(), ModelKind::Serial),
+        (
+            "angles_as_written",
+            robot.angles_as_written.is_some(),
+            ModelKind::Serial,
+        ),
         ("coupling", !robot.coupling.is_empty(), ModelKind::Serial),
         ("link", !robot.link.is_empty(), ModelKind::Serial),
         ("frame", !robot.frame.is_empty(), ModelKind::Serial),

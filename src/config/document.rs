@@ -89,34 +89,51 @@ impl<'a> Document<'a> {
     /// Line of the key at `path`, or of the innermost table on the way that exists.
     /// A number stands for an element of an array.
     pub(crate) fn line_of(&self, path: &[&str]) -> usize {
+        let mut best = None;
+        self.follow(path, |key, _| best = Some(key));
+        best.map_or(1, |span: Range<usize>| self.line(span.start))
+    }
+
+    /// The number at `path` as it is written; `None` where there is none.
+    pub(crate) fn written(&self, path: &[&str]) -> Option<&'a str> {
+        let mut found = None;
+        let mut steps = 0;
+        self.follow(path, |_, value| {
+            steps += 1;
+            found = Some(value);
+        });
+        let text = self.text.get(found.filter(|_| steps == path.len())?)?;
+        Some(text.trim())
+    }
+
+    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an
+    /// array) and value.
+    fn follow(&self, path: &[&str], mut seen: impl FnMut(Range<usize>, Range<usize>)) {
         let Ok(root) = DeTable::parse(self.text) else {
-            return 1;
+            return;
         };
-        let mut best: Option<Range<usize>> = None;
         let mut table = Some(root.get_ref());
         let mut array: Option<&[toml::Spanned<DeValue<'_>>]> = None;
         for name in path {
-            let value = if let Some(inside) = table {
+            let (key, value) = if let Some(inside) = table {
                 let Some((key, value)) = inside.get_key_value(*name) else {
-                    break;
+                    return;
                 };
-                best = Some(key.span());
-                value
+                (key.span(), value)
             } else if let Some(inside) = array {
                 let found = name
                     .parse::<usize>()
                     .ok()
                     .and_then(|index| inside.get(index));
-                let Some(value) = found else { break };
-                best = Some(value.span());
-                value
+                let Some(value) = found else { return };
+                (value.span(), value)
             } else {
-                break;
+                return;
             };
+            seen(key, value.span());
             table = value.get_ref().as_table();
             array = value.get_ref().as_array().map(|elements| &**elements);
         }
-        best.map_or(1, |span| self.line(span.start))
     }
 
     /// The error for a key that must be there; `remedy` reads on after "add".

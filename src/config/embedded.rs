@@ -7,8 +7,8 @@ use super::document::Document;
 use super::model_file::ModelFile;
 use super::robot_file::RobotFile;
 use super::trajectory::Trajectory;
-use super::{ConfigError, check, urdf};
-use crate::log::{did_you_mean, list, remedy, shown};
+use super::{ConfigError, check, serial_chain, urdf};
+use crate::log::{did_you_mean, list, named_beside, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
 pub const EMBEDDED: [(&str, &str); 13] = [
@@ -75,17 +75,51 @@ pub fn text(path: &Path) -> Result<String, ConfigError> {
         return Err(ConfigError::Read {
             file: shown(path),
             remedy: format!(
-                "{}; {}these come with the tool: {known}",
+                "{}{}; {}these come with the tool: {known}",
                 remedy(&error),
+                named_beside(path, &["toml"]),
                 did_you_mean(&shown(path), &known),
             ),
             source: error,
         });
     }
+    if let Some(kind) = other_kind(path, "") {
+        return Err(kind);
+    }
     Err(ConfigError::Read {
         file: shown(path),
         remedy: remedy(&error).to_owned(),
         source: error,
+    })
+}
+
+/// What a file is that is no TOML text: a URDF, or a log.
+fn other_kind(path: &Path, text: &str) -> Option<ConfigError> {
+    let file = shown(path);
+    let ends = path
+        .extension()
+        .map(|end| end.to_string_lossy().to_lowercase());
+    let ends = ends.as_deref().unwrap_or_default();
+    let (found, remedy) = match text.trim_start_matches('\u{feff}').trim_start() {
+        text if text.starts_with('<') && (text.contains("<robot") || ends == "urdf") => (
+            "a URDF",
+            format!("make a robot file of it: cft-ident new NAME --urdf {file} --log LOG"),
+        ),
+        text if text.starts_with('<') => (
+            "an XML file",
+            "give a robot file; `cft-ident new` writes one".to_owned(),
+        ),
+        _ if ["csv", "mcap", "db3", "zst", "gz", "bag"].contains(&ends) => (
+            "a log",
+            format!("make a robot file for it: cft-ident new NAME --log {file}"),
+        ),
+        _ => return None,
+    };
+    Some(ConfigError::Kind {
+        file,
+        found,
+        wanted: "a robot or model file",
+        remedy,
     })
 }
 
@@ -99,8 +133,13 @@ impl RobotFile {
     /// The same for the text of a file in `folder`, from where the URDF is read that it names: the
     /// robot file then holds its links and limits.
     pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
+        if let Some(kind) = other_kind(Path::new(file), text) {
+            return Err(kind);
+        }
         let document = Document::new(file, text);
         let mut robot: Self = document.read()?;
+        let taken = serial_chain::take_as_meant(&mut robot.robot, &document, file);
+        robot.notes.extend(taken);
         urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
         Ok(robot)

@@ -15,6 +15,18 @@ pub enum ConfigError {
         /// What to do.
         remedy: String,
     },
+    /// A file of another kind.
+    #[error("{file}: is {found}, not {wanted}; {remedy}")]
+    Kind {
+        /// File as the user named it.
+        file: String,
+        /// What it is.
+        found: &'static str,
+        /// What is wanted.
+        wanted: &'static str,
+        /// What to do.
+        remedy: String,
+    },
     /// The text is no TOML, or a value has the wrong type.
     #[error("{file}:{line}: {message}")]
     Syntax {

@@ -3,6 +3,7 @@
 //! Every file is read strictly: a key that is not known is an error that names the line and the
 //! nearest known key. Files that come with the tool are found under `configs/` anywhere.
 
+mod angles;
 pub mod campaign;
 mod channels;
 mod check;

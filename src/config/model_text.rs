@@ -74,6 +74,7 @@ impl ModelFile {
             limits: raw.limits,
             control: raw.control,
             sensors: raw.sensors,
+            notes: Vec::new(),
         };
         let beside = robot.robot.urdf.is_some();
         urdf::resolve(&mut robot, &document, folder)?;

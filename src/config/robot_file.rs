@@ -65,6 +65,10 @@ pub struct RobotSection {
     /// Link of the URDF where the chain ends; every branch is read where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip: Option<String>,
+    /// Angles and axes of a serial chain stay as they are written; where absent, one that is a rounded
+    /// multiple of 15 degrees (1.5708, 0.785) is taken as that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angles_as_written: Option<bool>,
     /// Coupled gear trains of a serial chain.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coupling: Vec<CouplingSection>,
@@ -302,6 +306,9 @@ pub struct RobotFile {
     /// Sensors of the simulator.
     #[serde(default, skip_serializing_if = "is_default")]
     pub sensors: SensorsSection,
+    /// What was taken otherwise than it is written, one sentence each; commands tell it as warnings.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 impl RobotFile {

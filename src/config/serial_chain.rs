@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ConfigError;
+use super::angles::Changes;
 use super::document::Document;
 use super::robot_file::RobotSection;
 use super::serial_section::{BASE, CouplingSection, FollowsSection, LinkSection, SineSection};
-use crate::log::{list, nearest};
+use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector};
 use crate::robot::tree::{Coordinate, Coupling, Dependence, Link, Sine, Tree, TreeError};
 use crate::robot::{JointKind, Robot};
@@ -281,6 +282,83 @@ impl Misfit {
     }
 }
 
+/// Takes angles and axes of the links' rows for what they stand for, unless the file says otherwise;
+/// what was changed, in a sentence.
+pub(super) fn take_as_meant(
+    section: &mut RobotSection,
+    document: &Document,
+    file: &str,
+) -> Option<String> {
+    if section.angles_as_written == Some(true) {
+        return None;
+    }
+    let mut changes = Changes::default();
+    for (i, link) in section.link.iter_mut().enumerate() {
+        let index = i.to_string();
+        let name = link.joint.as_ref().or(link.name.as_ref());
+        let of = name.map_or_else(|| format!("link {}", i + 1), |name| escape(name));
+        let at = |key| document.written(&["robot", "link", &index, key]);
+        for (key, angle) in [("alpha", &mut link.alpha), ("theta", &mut link.theta)] {
+            if let (Some(angle), Some(written)) = (angle, at(key)) {
+                *angle = changes.angle(*angle, written, &format!("{key} of {of}"));
+            }
+        }
+        let part = |key, k: &str| document.written(&["robot", "link", &index, key, k]);
+        let parts = |key| Some([part(key, "0")?, part(key, "1")?, part(key, "2")?]);
+        if let (Some(rpy), Some(written)) = (&mut link.rpy, parts("rpy")) {
+            for (angle, written) in rpy.iter_mut().zip(written) {
+                *angle = changes.angle(*angle, written, &format!("rpy of {of}"));
+            }
+        }
+        if let (Some(axis), Some(written)) = (&mut link.axis, parts("axis")) {
+            *axis = changes.axis(*axis, written, &format!("axis of {of}"));
+        }
+    }
+    changes.told(file)
+}
+
+/// Refuses rows that `new` wrote and nobody filled in.
+fn filled_in(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
+    for (i, link) in section.link.iter().enumerate() {
+        let index = i.to_string();
+        for (key, value) in [
+            ("a", link.a),
+            ("alpha", link.alpha),
+            ("d", link.d),
+            ("theta", link.theta),
+        ] {
+            if value.is_some_and(f64::is_nan) {
+                return Err(document.value(
+                    &["robot", "link", index.as_str(), key],
+                    "is not filled in yet",
+                    "write the row of the modified Denavit-Hartenberg table of each joint, 0.0 where it is zero, or give the arm's URDF: `urdf = \"FILE\"` in [robot] in place of the rows",
+                ));
+            }
+        }
+    }
+    let still = |l: &LinkSection| {
+        let row = [l.a, l.alpha, l.d, l.theta];
+        let zero = |x: f64| x == 0.0;
+        row.into_iter().flatten().all(zero)
+            && l.xyz.into_iter().flatten().all(zero)
+            && l.rpy.into_iter().flatten().all(zero)
+            && l.parent.is_none()
+            && l.kind.unwrap_or(JointKind::Revolute) == JointKind::Revolute
+            && l.axis == section.link[0].axis
+    };
+    if section.link.len() > 1 && section.link.iter().all(still) {
+        return Err(document.value(
+            &["robot", "link"],
+            &format!(
+                "has {} rows of zeros: all joints would turn about one line",
+                section.link.len()
+            ),
+            "fill in the modified Denavit-Hartenberg table, or give the arm's URDF: `urdf = \"FILE\"` in [robot] in place of the rows",
+        ));
+    }
+    Ok(())
+}
+
 /// Refuses a serial section that is no chain.
 pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), ConfigError> {
     if section.link.is_empty() {
@@ -289,6 +367,7 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
             "[[robot.link]] tables, or `urdf = \"FILE\"`",
         ));
     }
+    filled_in(section, document)?;
     for name in section.chain_joints() {
         document.plain_name(&["robot", "model"], &name)?;
     }

@@ -133,7 +133,8 @@ pub fn friction(
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
-    let (groups, inputs, mut warnings) = by_joint(machine, logs, settings, control)?;
+    let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
+    let mut warnings = [machine.file.notes.clone(), found].concat();
     let work = control.begin("friction filter", Some(groups.len() as u64));
     let parameters = machine.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();

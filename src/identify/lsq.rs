@@ -118,10 +118,8 @@ pub fn lsq(
         account,
         ..
     } = estimated;
-    let mut warnings: Vec<String> = consistent
-        .iter()
-        .flat_map(ConsistentLinks::warnings)
-        .collect();
+    let mut warnings = machine.file.notes.clone();
+    warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
     if friction.is_none() {
         warnings.push(with_friction(law).to_owned());
     }

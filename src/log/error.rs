@@ -18,7 +18,7 @@ pub enum LogError {
     Read {
         file: String,
         source: std::io::Error,
-        remedy: &'static str,
+        remedy: String,
     },
     /// The file is of a kind that is not read.
     #[error("{file}: is {kind}; {remedy}")]

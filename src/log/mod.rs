@@ -50,4 +50,4 @@ pub use time::Instant;
 pub(crate) use columns::unit_of;
 pub(crate) use layout::channel;
 pub(crate) use names::{did_you_mean, list};
-pub(crate) use source::{remedy, shown};
+pub(crate) use source::{named_beside, remedy, shown};

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::LogError;
-use super::names::escape_whole;
+use super::names::{escape, escape_whole, list, nearest};
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -102,11 +102,42 @@ pub(super) fn open(path: &Path) -> Result<File, LogError> {
     opened.map_err(|error| failed(path, error))
 }
 
+/// "; the nearest is `x`", or "; there are x, y" of the files of these kinds in the folder of one that is
+/// not there; empty where there are none.
+pub(crate) fn named_beside(path: &Path, ends: &[&str]) -> String {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return String::new();
+    };
+    let is = |name: &String| ends.iter().any(|end| name.ends_with(&format!(".{end}")));
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(is).collect();
+    names.sort();
+    let known = || names.iter().map(String::as_str);
+    match nearest(&file_name(path), known()) {
+        Some(near) => format!("; did you mean `{}`?", escape(near)),
+        None if names.is_empty() => String::new(),
+        None => format!("; in that folder are {}", list(known())),
+    }
+}
+
+/// Endings of files that hold logs.
+const LOGS: [&str; 9] = [
+    "csv", "txt", "dat", "tsv", "mcap", "db3", "csv.gz", "csv.zst", "mcap.zst",
+];
+
 /// The error for a read that the system refused.
 pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
+    let beside = match error.kind() {
+        io::ErrorKind::NotFound => named_beside(path, &LOGS),
+        _ => String::new(),
+    };
     LogError::Read {
         file: shown(path),
-        remedy: remedy(&error),
+        remedy: format!("{}{beside}", remedy(&error)),
         source: error,
     }
 }

@@ -23,7 +23,7 @@ use super::ConfigError;
 use super::document::Document;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
-use crate::log::{remedy, shown};
+use crate::log::{named_beside, remedy, shown};
 use crate::robot::tree::space::{Rotation, product};
 
 /// Largest file. A URDF names its meshes and does not hold them.
@@ -38,11 +38,23 @@ pub struct UrdfChain {
     pub limits: Vec<(String, CoordinateLimits)>,
     /// Links that fixed joints hang on moving ones, by their placement alone.
     pub frames: Vec<FrameSection>,
+    /// What was taken otherwise than it is written, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// How angles and axes are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Angles {
+    /// 1.5708 as pi/2.
+    Meant,
+    /// As they are written.
+    Written,
 }
 
 /// The URDF that errors speak of.
 pub(super) struct Place<'a> {
     file: &'a str,
+    angles: Angles,
 }
 
 impl Place<'_> {
@@ -65,18 +77,28 @@ fn turned(r: &Rotation, a: &Rotation) -> Rotation {
 
 impl UrdfChain {
     /// Reads a URDF from text, up to the link `tip` where one is named; `file` names it in errors.
+    /// Angles and axes that are rounded multiples of 15 degrees are taken as those.
     ///
     /// # Errors
     /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
     /// of the link or joint that cannot be used.
     pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
+        Self::parse_with(file, text, tip, Angles::Meant)
+    }
+
+    fn parse_with(
+        file: &str,
+        text: &str,
+        tip: Option<&str>,
+        angles: Angles,
+    ) -> Result<Self, ConfigError> {
         let text = xml::without_comments(text);
         let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
             file: file.to_owned(),
             line: wrong.line,
             message: wrong.message,
         })?;
-        let place = Place { file };
+        let place = Place { file, angles };
         tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
     }
 
@@ -85,17 +107,25 @@ impl UrdfChain {
     /// # Errors
     /// Those of [`Self::parse`]; [`ConfigError::Read`] where the file cannot be read.
     pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
+        Self::load_with(path, tip, Angles::Meant)
+    }
+
+    fn load_with(path: &Path, tip: Option<&str>, angles: Angles) -> Result<Self, ConfigError> {
         let file = shown(path);
         let text = text_of(path).map_err(|source| ConfigError::Read {
             file: file.clone(),
             remedy: match source.kind() {
-                std::io::ErrorKind::InvalidData => "give a URDF file in UTF-8, below 16 MB",
-                _ => remedy(&source),
-            }
-            .to_owned(),
+                std::io::ErrorKind::InvalidData => {
+                    "give a URDF file in UTF-8, below 16 MB".to_owned()
+                }
+                std::io::ErrorKind::NotFound => {
+                    format!("{}{}", remedy(&source), named_beside(path, &["urdf"]))
+                }
+                _ => remedy(&source).to_owned(),
+            },
             source,
         })?;
-        Self::parse(&file, &text, tip)
+        Self::parse_with(&file, &text, tip, angles)
     }
 }
 
@@ -147,7 +177,12 @@ pub(super) fn resolve(
             "read the robot file from the disk, the URDF beside it",
         ));
     };
-    let chain = UrdfChain::load(&folder.join(urdf), robot.tip.as_deref())?;
+    let angles = match robot.angles_as_written {
+        Some(true) => Angles::Written,
+        _ => Angles::Meant,
+    };
+    let chain = UrdfChain::load_with(&folder.join(urdf), robot.tip.as_deref(), angles)?;
+    file.notes.extend(chain.notes);
     robot.link = chain.links;
     robot.frame.splice(0..0, chain.frames);
     robot.urdf = None;

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::Place;
 use super::xml::{EXPAND, Element, MACRO};
+use super::{Angles, Place};
 use crate::config::ConfigError;
+use crate::config::angles::Changes;
 use crate::config::robot_file::CoordinateLimits;
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
@@ -73,6 +74,8 @@ pub(super) struct Joint {
 pub(super) struct Parts {
     pub links: Vec<Link>,
     pub joints: Vec<Joint>,
+    /// Angles and axes that were taken for what they stand for.
+    pub changes: Changes,
 }
 
 /// Reads what stands in a `<robot>`.
@@ -88,6 +91,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
     let mut parts = Parts {
         links: Vec::new(),
         joints: Vec::new(),
+        changes: Changes::default(),
     };
     let mut links: BTreeMap<&str, usize> = BTreeMap::new();
     let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
@@ -126,7 +130,8 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
         if child.name() == "link" {
             parts.links.push(link(child, name, place)?);
         } else {
-            parts.joints.push(joint(child, name, place)?);
+            let joint = joint(child, name, place, &mut parts.changes)?;
+            parts.joints.push(joint);
         }
     }
     if parts.links.is_empty() {
@@ -137,14 +142,32 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "give the URDF of a whole robot",
         ));
     }
+    if let Some(root) = undeclared_root(&parts, &links) {
+        parts.links.insert(0, root);
+    }
     for joint in &parts.joints {
         for (what, link) in [("parent", &joint.parent), ("child", &joint.child)] {
-            if !links.contains_key(link.as_str()) {
+            if !parts.links.iter().any(|known| known.name == *link) {
                 return Err(no_link(joint, what, link, &parts.links, place));
             }
         }
     }
     Ok(parts)
+}
+
+/// The link that the arm hangs on where no `<link>` declares it (`world`): the one undeclared parent,
+/// if every link that is declared hangs on something. Else it is a slip of the pen.
+fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Link> {
+    let mut undeclared = (parts.joints.iter()).filter(|j| !declared.contains_key(&*j.parent));
+    let first = undeclared.next()?;
+    let alone = undeclared.all(|other| other.parent == first.parent);
+    let hangs = |link: &Link| parts.joints.iter().any(|j| j.child == link.name);
+    let no_child = parts.joints.iter().all(|j| j.child != first.parent);
+    (alone && no_child && parts.links.iter().all(hangs)).then(|| Link {
+        name: first.parent.clone(),
+        line: first.line,
+        body: None,
+    })
 }
 
 /// The error for a joint whose parent or child is no link.
@@ -196,7 +219,12 @@ fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError
     })
 }
 
-fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigError> {
+fn joint(
+    element: Element,
+    name: &str,
+    place: &Place,
+    changes: &mut Changes,
+) -> Result<Joint, ConfigError> {
     let at = Reading {
         place,
         what: format!("joint {}", escape(name)),
@@ -215,12 +243,23 @@ fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigErr
         let link = part.attribute("link");
         Ok(link.ok_or_else(|| at.lacks(part, "link"))?.to_owned())
     };
-    let (xyz, rpy) = at.origin(element)?;
-    let axis = match element.child("axis") {
+    let (xyz, mut rpy) = at.origin(element)?;
+    let mut axis = match element.child("axis") {
         // the default of the format
         None => [1.0, 0.0, 0.0],
         Some(axis) => at.vector(axis, "xyz", [1.0, 0.0, 0.0])?,
     };
+    if place.angles == Angles::Meant {
+        let written = |child: &str, key| words(element.child(child)?.attribute(key)?);
+        if let Some(written) = written("origin", "rpy") {
+            for (angle, written) in rpy.iter_mut().zip(written) {
+                *angle = changes.angle(*angle, written, &format!("rpy of {}", at.what));
+            }
+        }
+        if let Some(written) = written("axis", "xyz") {
+            axis = changes.axis(axis, written, &format!("axis of {}", at.what));
+        }
+    }
     let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
     if moving && axis.iter().all(|x| x.abs() < 1e-6) {
         return Err(place.wrong(
@@ -243,6 +282,12 @@ fn joint(element: Element, name: &str, place: &Place) -> Result<Joint, ConfigErr
         mimic: at.mimic(element)?,
         limits,
     })
+}
+
+/// The three words of a text.
+fn words(text: &str) -> Option<[&str; 3]> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    words.try_into().ok()
 }
 
 /// The reading of one link or joint, which errors name.

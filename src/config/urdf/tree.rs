@@ -110,7 +110,10 @@ pub(super) fn chain(
     // link by link, so that the order of an exported file is that of its source
     fixed.sort_by_key(|(_, seat)| seat.on);
     let frames = frames(&fixed, &moving);
-    finish(moving, frames, place)
+    Ok(UrdfChain {
+        notes: parts.changes.told(place.file).into_iter().collect(),
+        ..finish(moving, frames, place)?
+    })
 }
 
 /// The joint before each link, and the joints behind it with the links that they carry.
@@ -356,6 +359,7 @@ fn finish(
         links: moving.into_iter().map(|m| m.section).collect(),
         limits,
         frames,
+        notes: Vec::new(),
     })
 }
 
