@@ -83,11 +83,37 @@ fn a_recording_whose_joints_have_the_names_of_the_urdf_needs_no_mapping() {
 
 #[test]
 fn without_a_urdf_the_panda_gets_rows_to_be_filled_in() {
-    let Some(text) = first_fit(None, "panda/panda_exciting.csv") else {
+    let Some(log) = shared("panda/panda_exciting.csv") else {
         return;
     };
+    let folder = tempfile::tempdir().unwrap();
+    command(folder.path())
+        .args(["new", "mine", "--log"])
+        .arg(&log)
+        .assert()
+        .success()
+        .stdout(contains(
+            "next: fill in the modified Denavit-Hartenberg rows",
+        ));
+    let text = std::fs::read_to_string(folder.path().join("mine.toml")).unwrap();
     assert_eq!(text.matches("[[robot.link]]").count(), 7);
     assert!(text.contains("TO BE FILLED IN"), "{text}");
+    // nobody fits zeros: neither the rows as they are written, nor all of them zero
+    for (value, told) in [("nan", "is not filled in yet"), ("0.0", "7 rows of zeros")] {
+        let name = format!("{value}.toml");
+        std::fs::write(
+            folder.path().join(&name),
+            text.replace("= nan ", &format!("= {value} ")),
+        )
+        .unwrap();
+        command(folder.path())
+            .arg("lsq")
+            .arg(&log)
+            .args(["-r", &name, "-o", "model.toml"])
+            .assert()
+            .code(3)
+            .stderr(contains(told));
+    }
 }
 
 #[test]

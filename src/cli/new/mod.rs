@@ -128,8 +128,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let text = draft.text();
     // what is written must be readable, and the log by it
     let folder = target.parent();
-    let file = RobotFile::parse_in(&target.display().to_string(), &text, folder)?;
-    let mut warnings = mapping.warnings.clone();
+    // rows that are to be filled in are read as if they were
+    let filled = text.replace("= nan ", "= 1.0 ");
+    let file = RobotFile::parse_in(&target.display().to_string(), &filled, folder)?;
+    let mut warnings = [file.notes.clone(), mapping.warnings.clone()].concat();
     if let Some(spec) = &args.log
         && let Err(error) = Reader::open(spec, &file.layout())
     {
@@ -163,6 +165,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ]);
     }
     let next = match &args.log {
+        _ if draft.shape == Shape::Rows => format!(
+            "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {}\n",
+            target.display()
+        ),
         Some(spec) => format!(
             "next: cft-ident lsq {spec} -r {} -o model.toml\n",
             target.display()

@@ -127,8 +127,8 @@ impl Draft<'_> {
                 out.push_str(serial);
                 out.push_str(
                     "\n# TO BE FILLED IN: a row of the modified Denavit-Hartenberg table (Craig) for each joint: alpha and\n\
-                     # a of the link before it, then d and the angle theta at q = 0. With zeros every axis is that\n\
-                     # of the base and upright: a fit runs, but it knows friction and inertias about one axis only.\n",
+                     # a of the link before it, then d and the angle theta at q = 0; 0.0 where it is zero. Until then no\n\
+                     # command reads this file. A URDF does it too: urdf = \"FILE\" above, and none of these rows.\n",
                 );
                 for joint in &self.mapping.joints {
                     let kind = match joint.kind {
@@ -137,7 +137,7 @@ impl Draft<'_> {
                     };
                     let _ = write!(
                         out,
-                        "\n[[robot.link]]\njoint = {}\n{kind}a = 0.0         # m\nalpha = 0.0     # rad\nd = 0.0         # m\ntheta = 0.0     # rad\n",
+                        "\n[[robot.link]]\njoint = {}\n{kind}a = nan         # m\nalpha = nan     # rad\nd = nan         # m\ntheta = nan     # rad\n",
                         quoted(&joint.name)
                     );
                 }
