@@ -87,6 +87,7 @@ pub mod inertia;
 pub mod diagnose;
 pub mod validate;
 
+pub mod setup;
 pub mod simulate;
 
 pub mod excite;

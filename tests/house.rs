@@ -24,6 +24,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("diagnose", &["math", "robot", "log", "motion", "effect"]),
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
     ("inspect", &["math", "log"]),
+    ("setup", &["math", "robot", "motion", "inertia"]),
     ("simulate", &["math", "robot", "log", "config", "effect"]),
     (
         "excite",
@@ -39,22 +40,22 @@ const ROOMS: &[(&str, &[&str])] = &[
         "identify",
         &[
             "math", "verdict", "number", "robot", "log", "config", "motion", "effect", "friction",
-            "inertia", "diagnose", "validate", "inspect", "compare",
+            "inertia", "diagnose", "validate", "inspect", "setup", "compare",
         ],
     ),
     (
         "report",
         &[
             "math", "verdict", "number", "robot", "log", "config", "motion", "effect", "friction",
-            "inertia", "diagnose", "validate", "inspect", "excite", "compare", "identify",
+            "inertia", "diagnose", "validate", "inspect", "setup", "excite", "compare", "identify",
         ],
     ),
     (
         "cli",
         &[
             "math", "verdict", "number", "robot", "log", "config", "output", "motion", "effect",
-            "friction", "inertia", "diagnose", "validate", "inspect", "simulate", "excite",
-            "compare", "identify", "report", "export",
+            "friction", "inertia", "diagnose", "validate", "inspect", "setup", "simulate",
+            "excite", "compare", "identify", "report", "export",
         ],
     ),
 ];

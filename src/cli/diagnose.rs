@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures};
-use crate::identify::{self, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, LoggedRobot};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup};
+use crate::identify::{
+    self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult, LoggedRobot,
+};
 use crate::log::LogSpec;
 use crate::report::json::Document;
 use crate::report::sections::{provenance, quality};
@@ -74,7 +76,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     let model = (name.as_str(), &file);
-    let found = match identify::diagnose(&machine, model, &logs, &settings, context.control())? {
+    let report = setup::report(&machine, &train, None, context)?;
+    let fault = report.refusals().next().map(DataFault::of_setup);
+    let end = match fault {
+        Some(fault) => DiagnoseEnd::DataFault(fault),
+        None => identify::diagnose(&machine, model, &logs, &settings, context.control())?,
+    };
+    let setup = report.findings;
+    let found = match end {
         DiagnoseEnd::Diagnosed(found) => *found,
         DiagnoseEnd::DataFault(fault) => {
             let mut report = stages::diagnose::data_fault(&fault, &given.provenance);
@@ -89,13 +98,25 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             }
             return Ok(Outcome {
                 text: report.text(),
-                document: Document::new("diagnose", &[], &[], &fault.result())?,
+                document: Document::new(
+                    "diagnose",
+                    &[],
+                    &[],
+                    &DiagnosisResult {
+                        setup,
+                        ..fault.result()
+                    },
+                )?,
                 missed: Vec::new(),
             });
         }
     };
     let (inputs, warnings) = (&found.in_memory.inputs, &found.in_memory.warnings);
-    let document = Document::new("diagnose", inputs, warnings, &found.result(&machine))?;
+    let result = DiagnosisResult {
+        setup,
+        ..found.result(&machine)
+    };
+    let document = Document::new("diagnose", inputs, warnings, &result)?;
     let of = stages::diagnose::Diagnose {
         machine: &machine,
         file: &file,

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
+use super::{
+    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
+};
 use crate::identify::{self, FrictionSettings, LoggedRobot, new_model};
 use crate::log::LogSpec;
 use crate::report::json::Document;
@@ -41,6 +43,8 @@ pub struct Args {
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub setup: setup::Args,
     /// Seed of the starting points
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -52,7 +56,8 @@ pub struct Args {
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
-    let outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
+    let mut outputs = outputs::listed(Some(&args.output), &args.plot, args.report.as_deref());
+    outputs.extend(args.setup.fix_setup.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
@@ -69,8 +74,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         joint: args.joint.clone(),
     };
     let logs = logs_of(&args.logs);
-    let found = identify::friction(&machine, &logs, &settings, context.control())?;
-    let mut model = new_model(&machine, "friction", &found.inputs);
+    let robot = Path::new(&args.robot);
+    let checked = setup::checked(machine, robot, &logs, None, &args.setup, context)?;
+    let machine = &checked.machine;
+    let mut found = identify::friction(machine, &logs, &settings, context.control())?;
+    found.setup.clone_from(&checked.report.findings);
+    found
+        .warnings
+        .splice(0..0, checked.warnings.iter().cloned());
+    let mut model = new_model(machine, "friction", &found.inputs);
     if let Some(old) = old {
         model.parameters = old.parameters;
         model.covariance = old.covariance;
@@ -80,14 +92,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     found.write_into(&mut model);
     let document = Document::new("friction", &found.inputs, &found.warnings, &found)?;
     let of = stages::friction::Friction {
-        machine: &machine,
+        machine,
         found: &found,
         file: &model,
         logs: &names_of(&args.logs),
     };
     let mut report = stages::friction::friction(&of);
     if let Some(path) = &args.report {
-        let quality = pictures::inspected(&args.logs, &machine, context)?;
+        let quality = pictures::inspected(&args.logs, machine, context)?;
         let mut page = report.page();
         stages::friction::pictures(&mut page, &of, &given, &quality, context.command());
         context.check()?;
@@ -95,9 +107,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     for path in &args.plot {
-        let figure = stages::friction::figure(&machine, &found);
+        let figure = stages::friction::figure(machine, &found);
         outputs::write_picture(path, &figure.svg())?;
     }
+    checked.write(context)?;
     outputs::write_text(&args.output, &model.to_toml()?)?;
     report
         .terminal()

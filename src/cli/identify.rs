@@ -6,7 +6,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, campaign, logs_of, names_of, pictures, validate};
+use super::{CliError, Context, Outcome, campaign, logs_of, names_of, pictures, setup, validate};
 use crate::config::model_file::Parameter;
 use crate::config::{self, Campaign, ModelFile};
 use crate::identify::{
@@ -17,6 +17,7 @@ use crate::log::LogSpec;
 use crate::output::write_whole;
 use crate::report::json::Document;
 use crate::report::stages;
+use crate::setup::Finding;
 use crate::simulate::TruthFile;
 use crate::simulate::effects::EffectValue;
 
@@ -41,6 +42,8 @@ pub struct Args {
     /// Seed of the simulation and of the starting points [default: the campaign's]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    #[command(flatten)]
+    pub setup: setup::Args,
 }
 
 /// Folder where none is named.
@@ -76,7 +79,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let campaign = Campaign::load(&file)?;
     let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let mut outcome = execute((&name, &campaign), &base, &folder, context, warnings)?;
+    let mut outcome = execute(
+        (&name, &campaign),
+        &base,
+        &folder,
+        (&args.setup, context),
+        warnings,
+    )?;
     outcome.text += &format!(
         "written to {0}/; open {0}/report.html in a browser\n",
         folder.display()
@@ -109,7 +118,7 @@ fn execute(
     (name, campaign): (&str, &Campaign),
     base: &Path,
     folder: &Path,
-    context: &Context,
+    (args, context): (&setup::Args, &Context),
     mut warnings: Vec<String>,
 ) -> Result<Outcome, CliError> {
     let robot = resolve(base, &campaign.robot);
@@ -126,6 +135,10 @@ fn execute(
         validation: logs_of(&unseen),
     };
     training.extend(one_joint.iter().cloned());
+    let checked = setup::checked(machine, &robot, &logs_of(&training), None, args, context)?;
+    checked.write(context)?;
+    warnings.extend(checked.warnings.iter().cloned());
+    let machine = checked.machine;
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
         consistent: campaign.settings.feasible,
@@ -187,6 +200,7 @@ fn execute(
     files.push("result.json".into());
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = Identified {
+        setup: &checked.report.findings,
         friction: found.friction.as_ref().map(|(laws, _)| laws),
         lsq: &found.dynamics,
         validate: found.validated.as_ref(),
@@ -212,6 +226,8 @@ fn execute(
 /// The results of all stages.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Identified<'a> {
+    /// What the check of the set-up found.
+    setup: &'a [Finding],
     /// Null where there is no one-joint log.
     friction: Option<&'a IdentifiedFriction>,
     lsq: &'a IdentifiedDynamics,

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{CliError, Context, Exit, Outcome, columns};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot};
 use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look};
@@ -11,6 +14,7 @@ use crate::motion;
 use crate::report::json::Document;
 use crate::report::stages;
 use crate::robot::model::Model;
+use crate::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
 Example:
@@ -34,6 +38,15 @@ pub struct Args {
     /// Model file, which carries its robot: finds joints that are swapped or have the other sign
     #[arg(short, long, value_name = "MODEL.toml", conflicts_with = "robot")]
     pub model: Option<PathBuf>,
+}
+
+/// What logs hold, and what they say of the robot file.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Inspected {
+    #[serde(flatten)]
+    inspection: Inspection,
+    /// What the torques say against the set-up that the robot file declares.
+    setup: Vec<Finding>,
 }
 
 /// A robot as it was identified.
@@ -198,9 +211,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     drop(bar);
     context.check()?;
-    let result = Inspection::of(&logs);
+    let mut report = SetupReport::default();
+    if let Some(Known {
+        machine,
+        model: None,
+    }) = &known
+    {
+        report = setup::report(machine, &logs_of(&args.logs), None, context)?;
+    }
+    let mut text = stages::inspect::inspect(&logs);
+    stages::setup::section(&mut text.everywhere(), &report);
+    let result = Inspected {
+        inspection: Inspection::of(&logs),
+        setup: report.findings,
+    };
     Ok(Outcome {
-        text: stages::inspect::inspect(&logs).text(),
+        text: text.text(),
         document: Document::new("inspect", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
+use super::{
+    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
+};
 use crate::config::campaign::EstimatorKind;
 use crate::identify::{self, LoggedRobot, LsqSettings, refined};
 use crate::log::LogSpec;
@@ -41,6 +43,8 @@ pub struct Args {
     /// Write a report with verdict, numbers and pictures, as one page
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub setup: setup::Args,
 }
 
 /// Runs the command.
@@ -51,6 +55,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
     let mut outputs = vec![args.output.as_path()];
     outputs.extend(args.report.as_deref());
+    outputs.extend(args.setup.fix_setup.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let robot = files::robot(Path::new(&args.robot))?;
     let machine = LoggedRobot::new(&args.robot, robot.value);
@@ -77,22 +82,29 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         friction: known,
     };
     let logs = logs_of(&args.logs);
-    let found = identify::lsq(&machine, &logs, &settings, context.control())?;
-    let model = found.model(&machine, known.map(|k| k.1));
+    let robot = Path::new(&args.robot);
+    let checked = setup::checked(machine, robot, &logs, known, &args.setup, context)?;
+    let machine = &checked.machine;
+    let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
+    found.setup.clone_from(&checked.report.findings);
+    found
+        .warnings
+        .splice(0..0, checked.warnings.iter().cloned());
+    let model = found.model(machine, known.map(|k| k.1));
     let document = Document::new("lsq", &found.inputs, &found.warnings, &found)?;
     let names = names_of(&args.logs);
     let of = stages::lsq::Lsq {
-        machine: &machine,
+        machine,
         found: &found,
         file: &model,
         logs: &names,
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let in_memory = pictures::in_memory(&machine, &logs, context)?;
-        let look = pictures::look(&machine, in_memory.as_ref(), &names)?;
+        let in_memory = pictures::in_memory(machine, &logs, context)?;
+        let look = pictures::look(machine, in_memory.as_ref(), &names)?;
         let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let quality = pictures::inspected(&args.logs, &machine, context)?;
+        let quality = pictures::inspected(&args.logs, machine, context)?;
         stages::lsq::pictures(
             &mut report.page(),
             &of,
@@ -107,6 +119,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         outputs::write_text(path, &report.html())?;
     }
     context.check()?;
+    checked.write(context)?;
     outputs::write_text(&args.output, &model.to_toml()?)?;
     report
         .terminal()

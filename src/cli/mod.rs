@@ -30,6 +30,7 @@ mod files;
 mod outcome;
 mod outputs;
 mod pictures;
+mod setup;
 mod typed;
 
 use std::ffi::OsString;

@@ -4,13 +4,12 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
-use crate::cli::{convert, export, identify, new, simulate};
+use crate::cli::{convert, export, identify, inspect, new, simulate};
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
 use crate::identify::{
     Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated,
 };
-use crate::inspect::Inspection;
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
 
@@ -88,7 +87,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
-        Kind::Inspect => json::schema::<Inspection>("inspect"),
+        Kind::Inspect => json::schema::<inspect::Inspected>("inspect"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),
         Kind::Export => json::schema::<export::Exported>("export"),

@@ -72,6 +72,14 @@ impl RobotFile {
         Some(layout)
     }
 
+    /// The matrix R of `[log] gears`, p = R q; `None` where the motors are at the joints.
+    pub fn gear_matrix(&self) -> Option<DMatrix<f64>> {
+        match self.log.gears.is_empty() {
+            true => None,
+            false => gear_matrix(&self.log.gears),
+        }
+    }
+
     fn joint_layout(&self) -> Layout {
         let robot = self.robot();
         let plain = JointChannels::default();

@@ -8,6 +8,7 @@ pub mod campaign;
 mod channels;
 mod check;
 mod check_log;
+pub mod correction;
 mod document;
 mod embedded;
 mod error;

@@ -356,6 +356,11 @@ impl RobotFile {
         names
     }
 
+    /// Whether the direction of gravity is the file's to declare.
+    pub fn declares_gravity(&self) -> bool {
+        self.robot.model == ModelKind::Serial
+    }
+
     /// Whether the torques need friction that only `friction` can find before the inertias are fitted: the
     /// report's law, which is not linear in its slopes, on the report's robot.
     pub fn needs_friction_first(&self) -> bool {

@@ -20,6 +20,7 @@ use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::motion::ParallelFilters;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
+use crate::setup::{Finding, FindingKind};
 use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
 
 /// Logs by what they are for.
@@ -328,4 +329,20 @@ fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
         p.verdict = Some(verdict_of(value, std));
     }
     Some(if found > 0.0 { std / found } else { 1.0 })
+}
+
+impl DataFault {
+    /// A set-up that the torques contradict, as a fault of the data.
+    pub fn of_setup(finding: &Finding) -> Self {
+        let kind = match finding.kind {
+            FindingKind::Sign | FindingKind::Order => effect::wrong_sign_or_order::ENTRY.name,
+            other => other.word(),
+        };
+        Self {
+            kind: kind.to_owned(),
+            channel: finding.joint.clone(),
+            effect: finding.meaning.clone(),
+            remedy: format!("write {}", finding.remedy),
+        }
+    }
 }

@@ -11,6 +11,7 @@ use super::separate::separating_command;
 use crate::diagnose::{AcceptedEffect, Candidate, Errors, LogRole, SplitErrors};
 use crate::effect::disturbance;
 use crate::motion::Summary;
+use crate::setup::Finding;
 
 /// A diagnosis, or the fault of the data that comes before any physics.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -34,6 +35,8 @@ pub struct DiagnosisResult {
     pub processing: Option<Summary>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<DataFault>,
+    /// What the check of the set-up found.
+    pub setup: Vec<Finding>,
 }
 
 /// What a diagnosis comes to.
@@ -181,6 +184,7 @@ impl DataFault {
             episodes: None,
             processing: None,
             faults: vec![self.clone()],
+            setup: Vec::new(),
         }
     }
 }
@@ -243,6 +247,7 @@ impl Diagnosed {
             episodes: Some(episodes.collect()),
             processing: Some(self.in_memory.summary.clone()),
             faults: Vec::new(),
+            setup: Vec::new(),
         }
     }
 

@@ -23,6 +23,7 @@ use crate::log::Provenance;
 use crate::math::descent::Ending;
 use crate::number;
 use crate::robot::friction::DoubleTanh;
+use crate::setup::Finding;
 use crate::verdict::Verdict;
 
 /// How friction is estimated.
@@ -37,6 +38,8 @@ pub struct FrictionSettings {
 pub struct IdentifiedFriction {
     /// In joint order.
     pub joints: Vec<FrictionOfJoint>,
+    /// What the check of the set-up found, where it was made.
+    pub setup: Vec<Finding>,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
@@ -153,6 +156,7 @@ pub fn friction(
     warnings.extend(joints.iter().flat_map(joint_warnings));
     Ok(IdentifiedFriction {
         joints,
+        setup: Vec::new(),
         inputs,
         warnings,
     })

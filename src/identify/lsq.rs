@@ -27,6 +27,7 @@ use crate::math::descent::Ending;
 use crate::motion::Summary;
 use crate::number;
 use crate::robot::friction::DoubleTanh;
+use crate::setup::Finding;
 use crate::verdict::Verdict;
 
 /// How the inertial parameters are fitted.
@@ -63,6 +64,8 @@ pub struct IdentifiedDynamics {
     pub account: Account,
     #[serde(rename = "processing")]
     pub summary: Summary,
+    /// What the check of the set-up found, where it was made.
+    pub setup: Vec<Finding>,
     #[serde(skip)]
     pub columns: RegressorColumns,
     #[serde(skip)]
@@ -160,6 +163,7 @@ pub fn lsq(
         summary,
         inputs,
         warnings,
+        setup: Vec::new(),
     })
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use crate::inspect::{Cutter, Gate};
-use crate::log::{Block, Instant, Provenance, Reader};
+use crate::log::{Block, Instant, Layout, Provenance, Reader};
 use crate::motion::{Summary, ZeroOrderHold};
 use crate::robot::Robot;
 
@@ -43,6 +43,11 @@ impl OpenLog<'_> {
                 return Ok(more);
             }
         }
+    }
+
+    /// Which columns are read.
+    pub(super) fn layout(&self) -> &Layout {
+        self.reader.layout()
     }
 
     /// The instant from which the times of the blocks are counted.

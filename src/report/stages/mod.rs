@@ -8,4 +8,5 @@ pub mod friction;
 pub mod identify;
 pub mod inspect;
 pub mod lsq;
+pub mod setup;
 pub mod validate;

@@ -1,0 +1,189 @@
+//! The check of the set-up before a fit, and what becomes of it: a refusal, a new robot file, or a word.
+
+use std::path::{Path, PathBuf};
+
+use super::{CliError, Context, outputs};
+use crate::config::correction::edited;
+use crate::config::{self, ModelFile, RobotFile};
+use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
+use crate::setup::{Finding, SetupReport};
+
+/// What to do with a set-up that the torques contradict.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Args {
+    /// Where the torques contradict the set-up, write a robot file that is right by them and go on with it
+    #[arg(long, value_name = "NEW-ROBOT.toml")]
+    pub fix_setup: Option<PathBuf>,
+    /// Go on with the set-up as it is declared, whatever the torques say
+    #[arg(long, conflicts_with = "fix_setup")]
+    pub as_declared: bool,
+}
+
+/// A set-up that was checked.
+pub struct Checked {
+    /// The robot to go on with.
+    pub machine: LoggedRobot,
+    /// What was found, for the document.
+    pub report: SetupReport,
+    pub warnings: Vec<String>,
+    /// The new robot file, where one is to be written.
+    pub new_file: Option<(PathBuf, String)>,
+}
+
+impl Checked {
+    /// Writes the new robot file, where there is one, and says so.
+    pub fn write(&self, context: &Context) -> Result<(), CliError> {
+        if let Some((path, text)) = &self.new_file {
+            outputs::write_text(path, text)?;
+            context.note(&format!("written: {}", path.display()));
+        }
+        Ok(())
+    }
+}
+
+/// Checks the set-up by these logs. `robot` is the path of the robot file.
+///
+/// # Errors
+/// A set-up that the torques plainly contradict, where the arguments do not say what to do with it.
+pub fn checked(
+    machine: LoggedRobot,
+    robot: &Path,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    args: &Args,
+    context: &Context,
+) -> Result<Checked, CliError> {
+    let CheckedSetup {
+        report,
+        corrected,
+        edits,
+    } = check(&machine, logs, friction, context)?;
+    let mut warnings: Vec<String> = report
+        .findings
+        .iter()
+        .filter(|f| !f.sure)
+        .map(likely)
+        .collect();
+    for power in &report.friction_power {
+        warnings.push(power.sentence());
+    }
+    let refusals: Vec<&Finding> = report.refusals().collect();
+    if refusals.is_empty() || args.as_declared {
+        warnings.extend(
+            refusals
+                .iter()
+                .map(|f| format!("kept as declared: {}", told(f))),
+        );
+        return Ok(Checked {
+            machine,
+            report,
+            warnings,
+            new_file: None,
+        });
+    }
+    let (Some(path), Some(corrected)) = (&args.fix_setup, corrected) else {
+        return Err(refused(robot, &refusals));
+    };
+    let text = new_text(robot, &edits, &corrected, path)?;
+    warnings.extend(
+        refusals
+            .iter()
+            .map(|f| format!("put right in {}: {}", path.display(), told(f))),
+    );
+    Ok(Checked {
+        machine: LoggedRobot::new(&path.to_string_lossy(), corrected),
+        report,
+        warnings,
+        new_file: Some((path.clone(), text)),
+    })
+}
+
+/// The check; logs that cannot be checked are told by the fit itself.
+fn check(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    context: &Context,
+) -> Result<CheckedSetup, CliError> {
+    match check_setup(machine, logs, friction, context.control()) {
+        Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
+        found => Ok(found.unwrap_or_default()),
+    }
+}
+
+/// What the check says of these logs, for a command that only tells it.
+///
+/// # Errors
+/// Interruption.
+pub fn report(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    context: &Context,
+) -> Result<SetupReport, CliError> {
+    Ok(check(machine, logs, friction, context)?.report)
+}
+
+/// Text of the new robot file: the user's with the lines that differ, else the whole anew.
+fn new_text(
+    robot: &Path,
+    edits: &[crate::config::correction::Edit],
+    corrected: &RobotFile,
+    path: &Path,
+) -> Result<String, CliError> {
+    let text = config::text(robot)?;
+    let name = path.to_string_lossy();
+    // a URDF is named beside the file
+    let folder = path.parent();
+    if let Some(text) = edited(&text, edits)
+        && let Ok(read) = RobotFile::parse_in(&name, &text, folder)
+        && read == *corrected
+    {
+        return Ok(text);
+    }
+    toml::to_string(corrected)
+        .map_err(|error| CliError::output(format!("{}: {error}", path.display())))
+}
+
+fn told(finding: &Finding) -> String {
+    let mut out = finding.meaning.clone();
+    if !finding.remedy.is_empty() {
+        out += &format!("; write {}", finding.remedy);
+    }
+    let ties = finding
+        .tied_with
+        .iter()
+        .filter(|tie| !tie.remedy.is_empty());
+    for tie in ties.take(2) {
+        out += &format!("; these data say as well: {}", tie.remedy);
+    }
+    out
+}
+
+fn likely(finding: &Finding) -> String {
+    format!("the set-up may be wrong: {}", told(finding))
+}
+
+/// The error with which a fit refuses the logs.
+fn refused(robot: &Path, refusals: &[&Finding]) -> CliError {
+    let first = refusals
+        .first()
+        .map(|f| f.meaning.as_str())
+        .unwrap_or_default();
+    let mut error = CliError::input(format!(
+        "the torques contradict the robot file: {}",
+        first.replace("; ", ", ")
+    ))
+    .at(robot.display());
+    for finding in refusals {
+        error = error.hint(format!("write {}", finding.remedy));
+    }
+    for tie in refusals.iter().flat_map(|f| &f.tied_with).take(2) {
+        if !tie.remedy.is_empty() {
+            error = error.hint(format!("these data say as well: write {}", tie.remedy));
+        }
+    }
+    error
+        .hint("--fix-setup NEW-ROBOT.toml writes that for you and goes on")
+        .hint("--as-declared goes on with the set-up as it is")
+}

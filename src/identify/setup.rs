@@ -1,0 +1,142 @@
+//! The check of a set-up before a fit: does the robot file say of signs, order, scales, zeros and gravity
+//! what the torques of the logs say?
+
+use crate::config::ModelFile;
+use crate::log::{Channels as Logged, Layout};
+use crate::motion;
+use crate::robot::Robot;
+use crate::robot::friction::sign;
+use crate::setup::{Channels, Drive, Problem, Searched, SetupReport, Thinner, search};
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::setup_words;
+use super::unknowns::columns;
+use crate::config::RobotFile;
+use crate::config::correction::Edit;
+
+/// What the check found, and the robot file that is right by it.
+#[derive(Debug, Clone, Default)]
+pub struct CheckedSetup {
+    pub report: SetupReport,
+    /// The robot file with all that is sure put right; none where nothing is.
+    pub corrected: Option<RobotFile>,
+    /// What differs in it.
+    pub edits: Vec<Edit>,
+}
+
+/// Checks the set-up by logs of several joints or of one. `friction` is a model with the friction of every
+/// joint and its name, where there is one.
+///
+/// # Errors
+/// Logs that cannot be read or are refused, and interruption.
+pub fn check_setup(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    control: &Control,
+) -> Result<CheckedSetup, IdentifyError> {
+    let n = machine.robot.joints();
+    let settings = machine.settings();
+    let _work = control.begin("checking the set-up", None);
+    let mut thinner = Thinner::new(n, settings.cutoff_hz);
+    let mut channels = None;
+    for (index, log) in logs.iter().enumerate() {
+        let mut open = machine.open(log, control)?;
+        if channels.is_none() {
+            channels = Some(channels_of(machine, log, open.layout()));
+        }
+        let (mut last, mut step) = (None, 0.0);
+        motion::run(
+            &mut |block| open.read(block),
+            n,
+            &settings,
+            None,
+            5 * n,
+            &|s, out| {
+                for (out, x) in out.chunks_exact_mut(n).zip([s.q, s.v, s.a, s.v, s.tau]) {
+                    out.copy_from_slice(x);
+                }
+                for x in &mut out[3 * n..4 * n] {
+                    *x = sign(*x);
+                }
+            },
+            &mut |row| {
+                if let Some((segment, t)) = last
+                    && segment == row.segment
+                {
+                    step = row.t - t;
+                }
+                last = Some((row.segment, row.t));
+                thinner.add(index, step, row.filtered);
+            },
+        )
+        .map_err(|error| IdentifyError::of_run(&log.name(), error))?;
+    }
+    let columns = columns(machine, friction)?;
+    let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
+        let mut file = machine.file.clone();
+        file.robot.gravity = Some(gravity);
+        Some(file.robot())
+    };
+    let problem = Problem {
+        robot: &machine.robot,
+        in_gravity: machine.file.declares_gravity().then_some(&in_gravity),
+        channels: channels.ok_or(IdentifyError::NoLog)?,
+        columns: &columns,
+        sample: thinner.finish(),
+        ranges: machine.ranges(),
+    };
+    let searched = search(&problem, &|| control.stopped());
+    control.check()?;
+    Ok(told(machine, &problem, &searched))
+}
+
+fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
+    let report = setup_words::report(machine, problem, searched);
+    let motors = problem.channels.drive == Drive::Motors;
+    let edits = match report.refusals().next() {
+        Some(_) => setup_words::edits(&machine.file, &searched.correction, motors),
+        None => Vec::new(),
+    };
+    let corrected = (!edits.is_empty())
+        .then(|| setup_words::corrected(&machine.file, &searched.correction, motors));
+    CheckedSetup {
+        report,
+        corrected,
+        edits,
+    }
+}
+
+/// The channels of a log as the robot file declares them.
+fn channels_of(machine: &LoggedRobot, log: &Log, layout: &Layout) -> Channels {
+    let n = machine.robot.joints();
+    if matches!(log, Log::Arrays(_)) {
+        return Channels::of_joints(n);
+    }
+    let gears = machine.file.gear_matrix();
+    let drive = match (layout.channels, gears) {
+        (Logged::Actuator, _) => Drive::Motors,
+        (Logged::Joint, Some(r)) => Drive::Gears(r),
+        (Logged::Joint, None) => Drive::Joints,
+    };
+    let joint = |name: &String| machine.file.log.joint.get(name);
+    let offsets = match drive {
+        // behind gears they belong to the joints
+        Drive::Gears(_) => machine
+            .robot
+            .joint_names()
+            .iter()
+            .map(|name| joint(name).and_then(|c| c.position_offset).unwrap_or(0.0))
+            .collect(),
+        _ => layout.positions.iter().map(|c| c.offset).collect(),
+    };
+    Channels {
+        drive,
+        position_gain: layout.positions.iter().map(|c| c.factor).collect(),
+        position_offset: offsets,
+        torque_gain: layout.torques.iter().map(|c| c.factor).collect(),
+    }
+}

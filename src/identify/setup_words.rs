@@ -1,0 +1,432 @@
+//! What a search of the set-up found, as the user reads it and as the robot file has it.
+
+use super::logged_robot::LoggedRobot;
+use crate::config::RobotFile;
+use crate::config::correction::Edit;
+use crate::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit};
+use crate::number;
+use crate::robot::JointKind;
+use crate::robot::cft::COORDINATES;
+use crate::setup::{
+    Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind, Found,
+    FrictionPower, Problem, Searched, Setting, SetupReport,
+};
+
+/// The entries of the key `setup`, and the joints whose friction drives them.
+pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
+    let words = Words {
+        file: &machine.file,
+        names: match problem.channels.drive {
+            Drive::Motors => COORDINATES.map(str::to_owned).to_vec(),
+            _ => machine.robot.joint_names().to_vec(),
+        },
+        motors: problem.channels.drive == Drive::Motors,
+        gravity: machine.robot.tree().gravity(),
+    };
+    let findings = searched
+        .found
+        .iter()
+        .flat_map(|found| words.findings(found))
+        .collect();
+    let power = |negative: &crate::setup::Negative| FrictionPower {
+        joint: machine.robot.joint_names()[negative.joint].clone(),
+        power: negative.power,
+        std: negative.std,
+        cause: cause(problem, negative.joint).to_owned(),
+    };
+    SetupReport {
+        findings,
+        friction_power: searched.negative.iter().map(power).collect(),
+    }
+}
+
+/// Reversals of a joint below which its log tells little of friction.
+const FEW_REVERSALS: usize = 4;
+/// Speeds that vary by less than this share of their mean tell viscous friction from none.
+const FEW_SPEEDS: f64 = 0.5;
+
+/// Why a friction may come out negative.
+fn cause(problem: &Problem, joint: usize) -> &'static str {
+    let (sample, n) = (&problem.sample, problem.sample.joints);
+    let speeds = || sample.v.iter().skip(joint).step_by(n.max(1)).copied();
+    let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let moving: Vec<f64> = speeds().filter(|v| v.abs() > 0.05 * most).collect();
+    let turns = moving.windows(2).filter(|w| w[0] * w[1] < 0.0).count();
+    let mean = moving.iter().map(|v| v.abs()).sum::<f64>() / moving.len().max(1) as f64;
+    let square = moving.iter().map(|v| v * v).sum::<f64>() / moving.len().max(1) as f64;
+    let spread = (square - mean * mean).max(0.0).sqrt() / mean.max(f64::MIN_POSITIVE);
+    if turns < FEW_REVERSALS || spread < FEW_SPEEDS {
+        "the log has too few reversals or speeds to tell friction from a constant torque; log the joint at several speeds in both directions"
+    } else {
+        "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine"
+    }
+}
+
+struct Words<'a> {
+    file: &'a RobotFile,
+    names: Vec<String>,
+    motors: bool,
+    gravity: [f64; 3],
+}
+
+impl Words<'_> {
+    /// One entry for each joint whose sign or scale is wrong.
+    fn findings(&self, found: &Found) -> Vec<Finding> {
+        let split = |change: &Change| -> Vec<Change> {
+            match change {
+                Change::Sign(channel, joints) => joints
+                    .iter()
+                    .map(|j| Change::Sign(*channel, vec![*j]))
+                    .collect(),
+                Change::Scale(channel, joints, f) => joints
+                    .iter()
+                    .map(|j| Change::Scale(*channel, vec![*j], *f))
+                    .collect(),
+                other => vec![other.clone()],
+            }
+        };
+        let tied: Vec<Alternative> = found
+            .tied
+            .iter()
+            .map(|change| self.alternative(change))
+            .collect();
+        let finding = |change: Change| {
+            let (kind, channel, joint, with) = self.place(&change);
+            let (declared, value) = self.values(&change);
+            Finding {
+                kind,
+                channel,
+                joint,
+                with,
+                declared,
+                found: value,
+                found_std: found.std,
+                error_before: Some(found.error[0]),
+                error_after: Some(found.error[1]),
+                remedy: self.remedy(&change),
+                sure: found.sure,
+                evidence: Evidence {
+                    held_out_gain: found.gain,
+                    needed: found.needed,
+                    tried: found.tried,
+                    violated_before: found.violated[0].clone(),
+                    violated_after: found.violated[1].clone(),
+                },
+                tied_with: tied.clone(),
+                meaning: self.meaning(&change, found),
+            }
+        };
+        split(&found.change).into_iter().map(finding).collect()
+    }
+
+    fn alternative(&self, change: &Change) -> Alternative {
+        let (kind, channel, joint, with) = self.place(change);
+        Alternative {
+            kind,
+            channel,
+            joint,
+            with,
+            found: self.values(change).1,
+            remedy: self.remedy(change),
+        }
+    }
+
+    fn place(
+        &self,
+        change: &Change,
+    ) -> (
+        FindingKind,
+        Option<ChannelKind>,
+        Option<String>,
+        Option<String>,
+    ) {
+        let name = |j: &usize| Some(self.names[*j].clone());
+        let one = |joints: &[usize]| match joints {
+            [j] => name(j),
+            _ => None,
+        };
+        match change {
+            Change::Sign(channel, joints) => (FindingKind::Sign, Some(*channel), one(joints), None),
+            Change::Scale(channel, joints, _) => {
+                (FindingKind::Scale, Some(*channel), one(joints), None)
+            }
+            Change::Exchange(channel, a, b) => {
+                (FindingKind::Order, Some(*channel), name(a), name(b))
+            }
+            Change::Reverse => (FindingKind::Order, Some(ChannelKind::Both), None, None),
+            Change::Zero(j, _) => (
+                FindingKind::Zero,
+                Some(ChannelKind::Position),
+                name(j),
+                None,
+            ),
+            Change::Gravity(_) => (FindingKind::Gravity, None, None, None),
+        }
+    }
+
+    /// As declared, and as found.
+    fn values(&self, change: &Change) -> (Setting, Setting) {
+        use ChannelKind::Torque;
+        let of = |j: usize| Declared::of(self.file, &self.names[j], self.motors);
+        match change {
+            Change::Sign(channel, joints) => {
+                let sign = joints.first().map_or(1.0, |j| match channel {
+                    Torque => of(*j).torque_sign,
+                    _ => of(*j).position_sign,
+                });
+                (Setting::Number(sign), Setting::Number(-sign))
+            }
+            Change::Scale(channel, joints, f) => {
+                let scale = joints.first().map_or(1.0, |j| match channel {
+                    Torque => of(*j).torque_scale,
+                    _ => of(*j).position_scale,
+                });
+                (Setting::Number(scale), Setting::Number(scale * f))
+            }
+            Change::Exchange(_, a, b) => {
+                let (a, b) = (self.names[*a].clone(), self.names[*b].clone());
+                (
+                    Setting::Names(vec![a.clone(), b.clone()]),
+                    Setting::Names(vec![b, a]),
+                )
+            }
+            Change::Reverse => {
+                let reversed = self.names.iter().rev().cloned().collect();
+                (Setting::Names(self.names.clone()), Setting::Names(reversed))
+            }
+            Change::Zero(j, angle) => {
+                let offset = of(*j).offset;
+                (Setting::Number(offset), Setting::Number(offset + angle))
+            }
+            Change::Gravity(g) => (Setting::Vector(self.gravity), Setting::Vector(*g)),
+        }
+    }
+
+    /// The lines to write into the robot file.
+    fn remedy(&self, change: &Change) -> String {
+        let correction = Correction::none(self.names.len()).with(change);
+        let edits = edits(self.file, &correction, self.motors);
+        let lines: Vec<String> = edits
+            .iter()
+            .map(|edit| format!("`{}` in {}", edit.line(), edit.table()))
+            .collect();
+        lines.join(", ")
+    }
+
+    fn meaning(&self, change: &Change, found: &Found) -> String {
+        let joint = |j: &usize| self.names[*j].clone();
+        let joints = |of: &[usize]| of.iter().map(joint).collect::<Vec<_>>().join(", ");
+        let what = match change {
+            Change::Sign(channel, of) => {
+                format!(
+                    "the {} of {} has the other sign",
+                    word(*channel),
+                    joints(of)
+                )
+            }
+            Change::Scale(channel, of, f) => format!(
+                "the {} of {} is {} times what is declared",
+                word(*channel),
+                joints(of),
+                number::significant(*f, 4)
+            ),
+            Change::Exchange(ChannelKind::Both, a, b) => {
+                format!("{} and {} have changed places", joint(a), joint(b))
+            }
+            Change::Exchange(channel, a, b) => format!(
+                "the {}s of {} and {} have changed places",
+                word(*channel),
+                joint(a),
+                joint(b)
+            ),
+            Change::Reverse => "the joints are listed from the tip to the base".to_owned(),
+            Change::Zero(j, angle) => format!(
+                "the zero of {} is off by {} degrees",
+                joint(j),
+                number::significant(angle.to_degrees(), 3)
+            ),
+            Change::Gravity(g) => format!(
+                "free fall is along ({}) in the base frame",
+                g.map(|x| number::significant(x, 3)).join(", ")
+            ),
+        };
+        let [before, after] = found.error.map(number::percent);
+        let mut out = format!(
+            "{what}: as declared the model misses {before} of the torque, with that put right {after}"
+        );
+        if !found.violated[0].is_empty() && found.violated[1].is_empty() {
+            out += &format!(
+                "; as declared these are negative: {}",
+                found.violated[0].join(", ")
+            );
+        }
+        out
+    }
+}
+
+fn word(channel: ChannelKind) -> &'static str {
+    match channel {
+        ChannelKind::Torque => "torque",
+        ChannelKind::Position => "position",
+        ChannelKind::Both => "channel",
+    }
+}
+
+/// What the file says of a channel.
+struct Declared {
+    torque_sign: f64,
+    torque_scale: f64,
+    position_sign: f64,
+    position_scale: f64,
+    offset: f64,
+}
+
+impl Declared {
+    fn of(file: &RobotFile, name: &str, motors: bool) -> Self {
+        if motors {
+            let plain = ActuatorChannels::default();
+            let c = file.log.actuator.get(name).unwrap_or(&plain);
+            return Self {
+                torque_sign: c.volts_sign.unwrap_or(1.0),
+                torque_scale: 1.0,
+                position_sign: c.position_sign.unwrap_or(1.0),
+                position_scale: 1.0,
+                offset: c.home.unwrap_or(0.0),
+            };
+        }
+        let plain = JointChannels::default();
+        let c = file.log.joint.get(name).unwrap_or(&plain);
+        Self {
+            torque_sign: c.torque_sign.unwrap_or(1.0),
+            torque_scale: c.torque_scale.unwrap_or(1.0),
+            position_sign: c.position_sign.unwrap_or(1.0),
+            position_scale: c.position_scale.unwrap_or(1.0),
+            offset: c.position_offset.unwrap_or(0.0),
+        }
+    }
+}
+
+/// The robot file under a correction.
+pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> RobotFile {
+    let mut out = file.clone();
+    out.robot.gravity = by.gravity.or(out.robot.gravity);
+    let names = match motors {
+        true => COORDINATES.map(str::to_owned).to_vec(),
+        false => file.joint_names(),
+    };
+    for (j, name) in names.iter().enumerate() {
+        let (p, t) = (by.position_from[j], by.torque_from[j]);
+        let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
+        if p == j && t == j && pf == 1.0 && tf == 1.0 && by.zero[j] == 0.0 {
+            continue;
+        }
+        let declared = Declared::of(file, name, motors);
+        if motors {
+            let of = |k: usize| {
+                file.log
+                    .actuator
+                    .get(&names[k])
+                    .cloned()
+                    .unwrap_or_default()
+            };
+            let c = out.log.actuator.entry(name.clone()).or_default();
+            if p != j {
+                c.position = of(p).position.or(Some(ColumnName(names[p].clone())));
+            }
+            if t != j {
+                c.volts = of(t).volts.or(Some(ColumnName(format!("u_{}", t + 1))));
+            }
+            if pf < 0.0 {
+                c.position_sign = Some(-declared.position_sign);
+            }
+            if tf < 0.0 {
+                c.volts_sign = Some(-declared.torque_sign);
+            }
+            if by.zero[j] != 0.0 {
+                c.home = Some(declared.offset + by.zero[j]);
+            }
+            continue;
+        }
+        let of = |k: usize| file.log.joint.get(&names[k]).cloned().unwrap_or_default();
+        let column = |k: usize, prefix: &str| Some(ColumnName(format!("{prefix}_{}", names[k])));
+        let c = out.log.joint.entry(name.clone()).or_default();
+        if p != j {
+            c.position = of(p).position.or(column(p, "q"));
+            c.velocity = of(p).velocity.or(column(p, "dq"));
+            c.reference = of(p).reference;
+        }
+        if t != j {
+            c.torque = of(t).torque.or(column(t, "tau"));
+        }
+        if p != j && p == t {
+            c.name = of(p).name.or(Some(names[p].clone()));
+        }
+        if pf < 0.0 {
+            c.position_sign = Some(-declared.position_sign);
+        }
+        if pf.abs() != 1.0 {
+            match other_unit(c.position_unit, file.joint_kind(j), pf.abs()) {
+                Some(unit) => c.position_unit = Some(unit),
+                None => c.position_scale = Some(declared.position_scale * pf.abs()),
+            }
+        }
+        if by.zero[j] != 0.0 {
+            c.position_offset = Some(declared.offset + by.zero[j]);
+        }
+        if tf < 0.0 {
+            c.torque_sign = Some(-declared.torque_sign);
+        }
+        if tf.abs() != 1.0 {
+            c.torque_scale = Some(declared.torque_scale * tf.abs());
+        }
+    }
+    out
+}
+
+/// The unit that a position is in, where a factor is that of units.
+fn other_unit(now: Option<PositionUnit>, kind: JointKind, factor: f64) -> Option<PositionUnit> {
+    let near = |x: f64| (factor / x - 1.0).abs() < 1e-9;
+    let si = match kind {
+        JointKind::Revolute => PositionUnit::Radian,
+        JointKind::Prismatic => PositionUnit::Metre,
+    };
+    match now.unwrap_or(si) {
+        PositionUnit::Radian if near(1.0_f64.to_radians()) => Some(PositionUnit::Degree),
+        PositionUnit::Degree if near(1.0_f64.to_degrees()) => Some(PositionUnit::Radian),
+        PositionUnit::Metre if near(1e-3) => Some(PositionUnit::Millimetre),
+        PositionUnit::Millimetre if near(1e3) => Some(PositionUnit::Metre),
+        _ => None,
+    }
+}
+
+/// The keys by which the corrected file differs from the given one.
+pub(super) fn edits(file: &RobotFile, by: &Correction, motors: bool) -> Vec<Edit> {
+    let new = corrected(file, by, motors);
+    let mut out = Vec::new();
+    if let Some(g) = new.robot.gravity.filter(|g| Some(*g) != file.robot.gravity) {
+        out.push(Edit::new(&["robot", "gravity"], g.to_vec()));
+    }
+    differences("joint", &new.log.joint, &file.log.joint, &mut out);
+    differences("actuator", &new.log.actuator, &file.log.actuator, &mut out);
+    out
+}
+
+fn differences<T: serde::Serialize>(
+    table: &str,
+    new: &std::collections::BTreeMap<String, T>,
+    old: &std::collections::BTreeMap<String, T>,
+    out: &mut Vec<Edit>,
+) {
+    let keys = |of: Option<&T>| -> toml::Table {
+        of.and_then(|of| toml::Table::try_from(of).ok())
+            .unwrap_or_default()
+    };
+    for (name, channels) in new {
+        let before = keys(old.get(name));
+        for (key, value) in keys(Some(channels)) {
+            if before.get(&key) != Some(&value) {
+                out.push(Edit::new(&["log", table, name, &key], value));
+            }
+        }
+    }
+}

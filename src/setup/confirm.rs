@@ -1,0 +1,130 @@
+//! Gains on blocks of the logs that did not choose the hypothesis, by how many rows are independent.
+
+use super::channels::Carried;
+use super::correction::Correction;
+use super::fit::Fit;
+use super::normal::{Normal, Problem};
+use crate::inertia::columns::Own;
+use crate::robot::Robot;
+
+/// Correlation below which rows count as independent.
+const UNCORRELATED: f64 = 0.05;
+
+/// Log-likelihood that `after` gains over `before` on held-out blocks. `independent` is the share of the rows of
+/// each joint that are worth an independent one.
+pub(super) fn gain(
+    (before, of_before, power_before): (&Fit, &Normal, &[f64]),
+    (after, of_after, power_after): (&Fit, &Normal, &[f64]),
+    independent: &[f64],
+) -> Option<f64> {
+    let sums = |fit: &Fit, normal: &Normal| -> Option<Vec<f64>> {
+        let blocks = fit.held_out(normal)?;
+        let joints = 0..normal.joints;
+        Some(
+            joints
+                .map(|j| blocks.iter().map(|block| block[j]).sum())
+                .collect(),
+        )
+    };
+    let (b, a) = (sums(before, of_before)?, sums(after, of_after)?);
+    let rows = of_after.rows as f64;
+    let of = |j: usize| {
+        if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
+            return 0.0;
+        }
+        // beyond the torque itself a prediction is worth no more than none
+        let left = |x: f64, power: f64| (x / power).clamp(1e-8, 1.0);
+        let ratio = left(b[j], power_before[j]) / left(a[j], power_after[j]);
+        0.5 * rows * independent[j] * ratio.ln()
+    };
+    Some((0..b.len()).map(of).sum())
+}
+
+/// Of each joint, the share of the rows that are worth an independent one: one over the sum of the
+/// correlations of its residual.
+pub(super) fn independent(
+    problem: &Problem,
+    robot: &Robot,
+    by: &Correction,
+    fit: &Fit,
+) -> Vec<f64> {
+    let residual = residuals(problem, robot, by, fit);
+    residual.iter().map(|r| share(r)).collect()
+}
+
+/// Residual of each joint, row after row.
+fn residuals(problem: &Problem, robot: &Robot, by: &Correction, fit: &Fit) -> Vec<Vec<f64>> {
+    let n = robot.joints();
+    let p = robot.parameters().len();
+    let theta: Vec<f64> = fit.theta.iter().take(p).copied().collect();
+    let mut carried = Carried::new(n);
+    let mut tau = vec![0.0; n];
+    let mut out = vec![Vec::with_capacity(problem.sample.len()); n];
+    for k in 0..problem.sample.len() {
+        if !problem
+            .channels
+            .carry(robot, problem.sample.row(k), by, &mut carried)
+        {
+            continue;
+        }
+        robot.torque(&theta, &carried.q, &carried.v, &carried.a, &mut tau);
+        for (j, out) in out.iter_mut().enumerate() {
+            let target = &fit.targets[j];
+            let torques = &carried.tau[j * n..(j + 1) * n];
+            let mut r: f64 = torques.iter().zip(target.iter()).map(|(x, w)| x * w).sum();
+            if let Some(known) = &problem.columns.known[j] {
+                r += target[n] * known.law.torque(carried.v[j]);
+            }
+            let first = problem.first_own(robot, j);
+            for (i, own) in problem.columns.own[j].iter().enumerate() {
+                r -= fit.theta[first + i]
+                    * match own {
+                        Own::Coulomb => carried.sign[j],
+                        own => own.column(carried.v[j]),
+                    };
+            }
+            out.push(r - tau[j]);
+        }
+    }
+    out
+}
+
+fn share(r: &[f64]) -> f64 {
+    let rows = r.len();
+    let mean = r.iter().sum::<f64>() / rows.max(1) as f64;
+    let power: f64 = r.iter().map(|x| (x - mean).powi(2)).sum();
+    if rows < 8 || power <= 0.0 {
+        return 1.0;
+    }
+    let mut sum = 1.0;
+    for lag in 1..rows / 4 {
+        let products = r
+            .iter()
+            .zip(&r[lag..])
+            .map(|(a, b)| (a - mean) * (b - mean));
+        let correlation = products.sum::<f64>() / power;
+        if correlation < UNCORRELATED {
+            break;
+        }
+        sum += 2.0 * correlation;
+    }
+    1.0 / sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_that_repeat_are_worth_fewer() {
+        let mut x = 0x9e37_79b9_u64;
+        let mut chance = || {
+            x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (x >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let white: Vec<f64> = (0..2000).map(|_| chance()).collect();
+        let held: Vec<f64> = white.iter().flat_map(|x| [*x; 5]).collect();
+        let (one, five) = (share(&white), share(&held));
+        assert!(one > 0.8 && (one / five - 5.0).abs() < 1.2, "{one} {five}");
+    }
+}

@@ -1,0 +1,185 @@
+//! What is told of a set-up: the entries of the key `setup` in the documents of the commands.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// What is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FindingKind {
+    /// A channel has the other sign.
+    Sign,
+    /// Channels have changed places.
+    Order,
+    /// A channel has another unit or gear ratio.
+    Scale,
+    /// A joint's zero is elsewhere.
+    Zero,
+    /// Gravity has another direction.
+    Gravity,
+    /// Currents whose torque per ampere is not given.
+    Gains,
+    /// Torques lag behind positions.
+    Delay,
+    /// Geometry that was rounded or misread.
+    Geometry,
+}
+
+impl FindingKind {
+    /// As it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sign => "sign",
+            Self::Order => "order",
+            Self::Scale => "scale",
+            Self::Zero => "zero",
+            Self::Gravity => "gravity",
+            Self::Gains => "gains",
+            Self::Delay => "delay",
+            Self::Geometry => "geometry",
+        }
+    }
+}
+
+/// Which channel of a joint it is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChannelKind {
+    Torque,
+    Position,
+    Both,
+}
+
+/// A value of the robot file: as it is declared, or as it should be.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Setting {
+    /// A sign, a factor, an angle \[rad or m\].
+    Number(f64),
+    /// A direction \[m/s^2\].
+    Vector([f64; 3]),
+    /// Names of columns or joints.
+    Names(Vec<String>),
+}
+
+/// Another reading that the data do not tell from this one.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Alternative {
+    pub kind: FindingKind,
+    pub channel: Option<ChannelKind>,
+    /// Null for what concerns all joints.
+    pub joint: Option<String>,
+    /// The other joint of an exchange.
+    pub with: Option<String>,
+    pub found: Setting,
+    pub remedy: String,
+}
+
+/// What speaks for a finding.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct Evidence {
+    /// Gain of log-likelihood on blocks of the logs that did not choose it, by effective samples.
+    pub held_out_gain: f64,
+    /// Gain that chance alone would not reach with as many hypotheses as were tried.
+    pub needed: f64,
+    /// Hypotheses that were tried.
+    pub tried: usize,
+    /// Quantities that must be positive and are not, as the set-up is declared.
+    pub violated_before: Vec<String>,
+    /// Those that are not with the finding put right.
+    pub violated_after: Vec<String>,
+}
+
+/// One entry of the key `setup`: what the robot file declares and what the torques say.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Finding {
+    pub kind: FindingKind,
+    pub channel: Option<ChannelKind>,
+    /// Null for what concerns all joints.
+    pub joint: Option<String>,
+    /// The other joint of an exchange.
+    pub with: Option<String>,
+    pub declared: Setting,
+    pub found: Setting,
+    /// Standard deviation of `found`, where it is a number that was fitted.
+    pub found_std: Option<f64>,
+    /// Mean relative error over the joints as the set-up is declared: a fraction.
+    pub error_before: Option<f64>,
+    /// The same with this put right.
+    pub error_after: Option<f64>,
+    /// What to write into the robot file.
+    pub remedy: String,
+    /// Whether the evidence is overwhelming: a fit refuses the log then.
+    pub sure: bool,
+    pub evidence: Evidence,
+    /// Other readings that fit as well.
+    pub tied_with: Vec<Alternative>,
+    /// What is wrong, as a sentence.
+    pub meaning: String,
+}
+
+/// Power that the friction of a joint takes, where it is negative by more than two deviations.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct FrictionPower {
+    pub joint: String,
+    /// Mean power of all friction terms over the speeds of the logs \[W; A rad/s of a current\].
+    pub power: f64,
+    pub std: f64,
+    /// Its likeliest cause, as a sentence.
+    pub cause: String,
+}
+
+/// What the check of a set-up found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct SetupReport {
+    /// Nothing where the set-up is right.
+    pub findings: Vec<Finding>,
+    /// Joints whose friction drives them.
+    pub friction_power: Vec<FrictionPower>,
+}
+
+impl SetupReport {
+    /// What a fit refuses the logs for.
+    pub fn refusals(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.sure)
+    }
+}
+
+impl Finding {
+    /// A finding of another check than the search, with what the file declares and what it should say.
+    pub fn new(
+        kind: FindingKind,
+        joint: Option<String>,
+        [declared, found]: [Setting; 2],
+        meaning: String,
+        remedy: String,
+        sure: bool,
+    ) -> Self {
+        Self {
+            kind,
+            channel: None,
+            joint,
+            with: None,
+            declared,
+            found,
+            found_std: None,
+            error_before: None,
+            error_after: None,
+            remedy,
+            sure,
+            evidence: Evidence::default(),
+            tied_with: Vec::new(),
+            meaning,
+        }
+    }
+}
+
+impl FrictionPower {
+    /// As it is told.
+    pub fn sentence(&self) -> String {
+        format!(
+            "friction of {} drives it: all its terms together take {:.3e} +- {:.1e} W over the speeds of these logs, and friction takes power; {}",
+            self.joint, self.power, self.std, self.cause
+        )
+    }
+}

@@ -1,0 +1,40 @@
+//! Is the set-up right that a robot file declares? Signs, order, scales and zeros of its channels, and
+//! the direction of gravity, judged by the torques of a log before anything is fitted to them.
+//!
+//! A wrong set-up is a [`Correction`] away from the right one. Each that is thinkable is applied to a
+//! thinned sample of the log and the declared model is fitted to what it gives. Two measures decide: the
+//! likelihood of the residual, and physics: a body's inertia and the power that friction takes are
+//! positive. What gains more than chance and unmodelled effects can is told.
+//!
+//! | file | what |
+//! |---|---|
+//! | `finding` | what is told: the entries of the key `setup` |
+//! | `correction` | changes of a set-up, and their sum |
+//! | `sample` | a bounded number of smoothed rows, spread over the logs |
+//! | `channels` | from logged channels to joints, and back, under a correction |
+//! | `normal` | normal equations of the sample under a correction, by joint and block of time |
+//! | `fit` | their solution, with weights of its own, and its likelihood |
+//! | `physics` | inertia and friction power of a solution with their deviations |
+//! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
+//! | `hypotheses` | which corrections are tried |
+//! | `search` | which one is told |
+
+mod channels;
+mod confirm;
+mod correction;
+mod finding;
+mod fit;
+mod hypotheses;
+mod normal;
+mod physics;
+mod sample;
+mod search;
+
+pub use channels::{Channels, Drive};
+pub use correction::{Change, Correction};
+pub use finding::{
+    Alternative, ChannelKind, Evidence, Finding, FindingKind, FrictionPower, Setting, SetupReport,
+};
+pub use normal::Problem;
+pub use sample::{MOST_ROWS, Sample, Thinner};
+pub use search::{Found, Negative, Searched, search};

@@ -1,0 +1,175 @@
+//! Normal equations of a sample under a correction, by joint and by block of time.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::channels::{Carried, Channels};
+use super::correction::Correction;
+use super::sample::Sample;
+use crate::inertia::columns::{Own, RegressorColumns};
+use crate::robot::Robot;
+
+/// A joint whose speed is below this share of the fastest one's stands still: its torque tells nothing of
+/// signs and zeros.
+const STILL: f64 = 0.01;
+
+/// A robot file and a sample of its logs.
+pub struct Problem<'a> {
+    pub robot: &'a Robot,
+    /// The same robot in another gravity \[m/s^2\]; none where gravity is not declared by the file.
+    pub in_gravity: Option<&'a (dyn Fn([f64; 3]) -> Option<Robot> + Sync)>,
+    pub channels: Channels,
+    /// Friction terms of each joint, fitted or known.
+    pub columns: &'a RegressorColumns,
+    pub sample: Sample,
+    /// Travel of each joint, by which motions of metres and radians are compared.
+    pub ranges: Vec<f64>,
+}
+
+/// Sums of products by block and joint. Of joint j the columns are its shared parameters, its own terms, the
+/// torque of each channel, and its known friction.
+pub(super) struct Normal {
+    /// By block, then by joint.
+    pub blocks: Vec<Vec<DMatrix<f64>>>,
+    /// By joint.
+    pub total: Vec<DMatrix<f64>>,
+    /// Of each joint, the unknowns that its columns are of.
+    pub places: Vec<Vec<usize>>,
+    pub unknowns: usize,
+    pub joints: usize,
+    /// Rows per joint.
+    pub rows: usize,
+}
+
+impl Problem<'_> {
+    /// Joints that move, and whose torques are not all zero.
+    pub(super) fn moving(&self) -> Vec<bool> {
+        let speeds = self.sample.rms(&self.sample.v);
+        let speeds = speeds.iter().zip(&self.ranges);
+        let speeds: Vec<f64> = speeds.map(|(v, r)| v / r.max(f64::MIN_POSITIVE)).collect();
+        let most = speeds.iter().copied().fold(0.0, f64::max);
+        let torques = self.sample.rms(&self.sample.tau);
+        let moving = |(v, tau): (&f64, f64)| *v > STILL * most && tau > 0.0;
+        speeds.iter().zip(torques).map(moving).collect()
+    }
+
+    /// The robot in the gravity of a correction.
+    pub(super) fn robot_under(&self, by: &Correction) -> Option<Robot> {
+        match by.gravity {
+            None => Some(self.robot.clone()),
+            Some(gravity) => self.in_gravity.and_then(|robot| robot(gravity)),
+        }
+    }
+
+    /// Unknowns: shared parameters of this robot, then each joint's own.
+    pub(super) fn first_own(&self, robot: &Robot, j: usize) -> usize {
+        robot.parameters().len() + self.columns.own[..j].iter().map(Vec::len).sum::<usize>()
+    }
+
+    fn places(&self, robot: &Robot, moving: &[bool]) -> Vec<Vec<usize>> {
+        let (n, p) = (robot.joints(), robot.parameters().len());
+        let mut seen = vec![false; n * p];
+        let mut y = vec![0.0; n * p];
+        for s in 0..3 {
+            // no state in which entries cancel
+            let state = |k: usize| -> Vec<f64> {
+                (0..n)
+                    .map(|j| (1.7 + k as f64 + 3.1 * j as f64 + 5.3 * s as f64).sin())
+                    .collect()
+            };
+            robot.regressor(&state(1), &state(2), &state(3), &mut y);
+            for (seen, y) in seen.iter_mut().zip(&y) {
+                *seen |= *y != 0.0;
+            }
+        }
+        let of = |j: usize| -> Vec<usize> {
+            if !moving[j] {
+                return Vec::new();
+            }
+            let shared = (0..p).filter(|c| seen[j * p + c]);
+            let first = self.first_own(robot, j);
+            shared
+                .chain(first..first + self.columns.own[j].len())
+                .collect()
+        };
+        (0..n).map(of).collect()
+    }
+
+    /// Sums over the rows of these numbers, in `blocks` blocks; none where most of the rows are no pose of
+    /// the robot.
+    pub(super) fn normal(
+        &self,
+        robot: &Robot,
+        by: &Correction,
+        rows: &[usize],
+        blocks: usize,
+    ) -> Option<Normal> {
+        let (n, p) = (robot.joints(), robot.parameters().len());
+        let moving = self.moving();
+        let places = self.places(robot, &moving);
+        let widths: Vec<usize> = places.iter().map(|c| c.len() + n + 1).collect();
+        let mut carried = Carried::new(n);
+        let mut y = vec![0.0; n * p];
+        let mut out: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(blocks);
+        let mut data: Vec<Vec<f64>> = vec![Vec::new(); n];
+        let mut good = 0;
+        for block in 0..blocks {
+            let range = block * rows.len() / blocks..(block + 1) * rows.len() / blocks;
+            data.iter_mut().for_each(Vec::clear);
+            for &k in &rows[range] {
+                if !self
+                    .channels
+                    .carry(robot, self.sample.row(k), by, &mut carried)
+                {
+                    continue;
+                }
+                robot.regressor(&carried.q, &carried.v, &carried.a, &mut y);
+                if y.iter().any(|x| !x.is_finite()) {
+                    continue;
+                }
+                good += 1;
+                for (j, data) in data.iter_mut().enumerate().filter(|(j, _)| moving[*j]) {
+                    let shared = places[j].len() - self.columns.own[j].len();
+                    data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
+                    data.extend(self.columns.own[j].iter().map(|own| match own {
+                        Own::Coulomb => carried.sign[j],
+                        own => own.column(carried.v[j]),
+                    }));
+                    data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
+                    let known = self.columns.known[j].as_ref();
+                    data.push(known.map_or(0.0, |known| known.law.torque(carried.v[j])));
+                }
+            }
+            let gram = |(data, width): (&Vec<f64>, &usize)| {
+                if data.is_empty() {
+                    return DMatrix::zeros(*width, *width);
+                }
+                // columns of the transposed are rows
+                let x = DMatrix::from_column_slice(*width, data.len() / width, data);
+                &x * x.transpose()
+            };
+            out.push(data.iter().zip(&widths).map(gram).collect());
+        }
+        if 2 * good < rows.len() || good == 0 {
+            return None;
+        }
+        let sum = |j: usize| {
+            let zero = DMatrix::zeros(widths[j], widths[j]);
+            out.iter().fold(zero, |sum, block| sum + &block[j])
+        };
+        Some(Normal {
+            total: (0..n).map(sum).collect(),
+            blocks: out,
+            unknowns: self.first_own(robot, n),
+            places,
+            joints: n,
+            rows: good,
+        })
+    }
+}
+
+impl Normal {
+    /// Weights of the columns behind the unknowns of a joint: torques, then known friction.
+    pub(super) fn target(mix: &DVector<f64>, friction: f64) -> DVector<f64> {
+        mix.push(-friction)
+    }
+}

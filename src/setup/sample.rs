@@ -1,0 +1,167 @@
+//! A bounded number of smoothed rows, spread over the logs.
+
+/// Most rows that are kept.
+pub const MOST_ROWS: usize = 2000;
+
+/// Rows of smoothed motion and torque; each list holds n numbers a row.
+#[derive(Debug, Clone, Default)]
+pub struct Sample {
+    pub joints: usize,
+    /// Positions [m or rad], velocities and accelerations, joint side as declared.
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub a: Vec<f64>,
+    /// Signs of the velocities, filtered as all others.
+    pub sign: Vec<f64>,
+    /// Torques [N or N m], joint side as declared.
+    pub tau: Vec<f64>,
+    /// Of each row, its log.
+    pub log: Vec<usize>,
+    /// Time that a row stands for \[s\].
+    pub spacing_s: f64,
+    /// Cut-off of the filter that the rows came through \[Hz\].
+    pub cutoff_hz: f64,
+}
+
+/// One row.
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
+    pub q: &'a [f64],
+    pub v: &'a [f64],
+    pub a: &'a [f64],
+    pub sign: &'a [f64],
+    pub tau: &'a [f64],
+}
+
+impl Sample {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.log.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.log.is_empty()
+    }
+
+    /// Row k.
+    pub fn row(&self, k: usize) -> Row<'_> {
+        let at = k * self.joints..(k + 1) * self.joints;
+        Row {
+            q: &self.q[at.clone()],
+            v: &self.v[at.clone()],
+            a: &self.a[at.clone()],
+            sign: &self.sign[at.clone()],
+            tau: &self.tau[at],
+        }
+    }
+
+    /// Root mean square of each column of one list.
+    pub fn rms(&self, of: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.joints];
+        for row in of.chunks_exact(self.joints.max(1)) {
+            for (sum, x) in sums.iter_mut().zip(row) {
+                *sum += x * x;
+            }
+        }
+        let rows = self.len().max(1) as f64;
+        sums.iter().map(|sum| (sum / rows).sqrt()).collect()
+    }
+
+    /// About `most` rows of these, evenly spread.
+    pub fn spread(&self, most: usize) -> Vec<usize> {
+        let step = self.len().div_ceil(most.max(1)).max(1);
+        (0..self.len()).step_by(step).collect()
+    }
+}
+
+/// Takes rows as they come and keeps at most [`MOST_ROWS`], every so many: twice as rarely each time that
+/// there are too many.
+#[derive(Debug, Clone)]
+pub struct Thinner {
+    sample: Sample,
+    every: u64,
+    seen: u64,
+    /// Time that all rows stand for \[s\].
+    seconds: f64,
+}
+
+impl Thinner {
+    /// For a robot of `joints` joints whose rows are filtered at `cutoff_hz`.
+    pub fn new(joints: usize, cutoff_hz: f64) -> Self {
+        Self {
+            sample: Sample {
+                joints,
+                cutoff_hz,
+                ..Sample::default()
+            },
+            every: 1,
+            seen: 0,
+            seconds: 0.0,
+        }
+    }
+
+    /// Adds a row of `log` that stands for `seconds`: positions, velocities, accelerations, signs of the
+    /// velocities and torques, one after the other.
+    pub fn add(&mut self, log: usize, seconds: f64, channels: &[f64]) {
+        let n = self.sample.joints;
+        self.seconds += seconds;
+        let take = self.seen.is_multiple_of(self.every);
+        self.seen += 1;
+        if !take || channels.len() != 5 * n || channels.iter().any(|x| !x.is_finite()) {
+            return;
+        }
+        let s = &mut self.sample;
+        let lists = [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau];
+        for (list, x) in lists.into_iter().zip(channels.chunks_exact(n)) {
+            list.extend_from_slice(x);
+        }
+        s.log.push(log);
+        if s.len() > MOST_ROWS {
+            self.thin();
+        }
+    }
+
+    fn thin(&mut self) {
+        self.every *= 2;
+        let s = &mut self.sample;
+        let (n, rows) = (s.joints, s.log.len());
+        for list in [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau] {
+            for (to, from) in (0..rows).step_by(2).enumerate() {
+                list.copy_within(from * n..(from + 1) * n, to * n);
+            }
+            list.truncate(rows.div_ceil(2) * n);
+        }
+        for (to, from) in (0..rows).step_by(2).enumerate() {
+            s.log[to] = s.log[from];
+        }
+        s.log.truncate(rows.div_ceil(2));
+    }
+
+    /// The rows that were kept.
+    pub fn finish(mut self) -> Sample {
+        self.sample.spacing_s = self.seconds / self.sample.len().max(1) as f64;
+        self.sample
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_log_is_thinned_evenly() {
+        let mut thinner = Thinner::new(1, 10.0);
+        for k in 0..30_000 {
+            let x = f64::from(k);
+            thinner.add(k as usize / 10_000, 0.01, &[x, x, x, x, x]);
+        }
+        let sample = thinner.finish();
+        assert!((MOST_ROWS / 2..=MOST_ROWS).contains(&sample.len()));
+        let steps: Vec<f64> = sample.q.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(steps.iter().all(|s| *s == steps[0]), "{steps:?}");
+        assert_eq!(sample.log[sample.len() - 1], 2);
+        let all = sample.spacing_s * sample.len() as f64;
+        assert!((all - 300.0).abs() < 1e-6, "{all}");
+    }
+}

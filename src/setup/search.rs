@@ -1,0 +1,427 @@
+//! Which correction of a set-up is told, if any.
+//!
+//! Every hypothesis is fitted to few rows; those that do best, and those that put right what physics
+//! forbids, are fitted to all of them, and the best one is judged on blocks that did not choose it. What is
+//! found is applied and the search begins anew, for two things may be wrong.
+
+use std::sync::Arc;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::channels::Drive;
+use super::confirm;
+use super::correction::{Change, Correction};
+use super::fit::Fit;
+use super::hypotheses;
+use super::normal::{Normal, Problem};
+use super::physics::{Positive, Quantity, credit, positives};
+use crate::robot::Robot;
+
+/// Rows that hypotheses are chosen by.
+const SCREENED: usize = 160;
+/// Hypotheses that are fitted to all rows.
+const SHORT_LIST: usize = 10;
+/// Blocks of time that are held out in turn.
+const BLOCKS: usize = 24;
+/// Rounds: so many things at most are told.
+const ROUNDS: usize = 5;
+/// Log-likelihood that one right hypothesis must gain: odds of e^8, some 3000 to 1.
+const ODDS: f64 = 8.0;
+/// Readings that are as likely to within e^3, 20 to 1, are told as tied.
+const TIED: f64 = 3.0;
+/// The error must move by more than a tenth..
+const TENTH: f64 = 1.1;
+/// .. or a quantity that is negative by so many deviations become positive.
+const FORBIDDEN: f64 = -4.0;
+/// A quantity is told as negative beyond so many deviations.
+const NEGATIVE: f64 = -2.0;
+
+/// A correction that was found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    pub change: Change,
+    /// Deviation of the number in it, where it was fitted.
+    pub std: Option<f64>,
+    /// Mean relative error over the joints before and after it.
+    pub error: [f64; 2],
+    /// Log-likelihood gained on held-out blocks, physics included, and what is needed.
+    pub gain: f64,
+    pub needed: f64,
+    pub tried: usize,
+    /// Joints with an inertia or a friction power below zero, before and after it.
+    pub violated: [Vec<String>; 2],
+    /// Other changes that explain as much.
+    pub tied: Vec<Change>,
+    pub sure: bool,
+}
+
+/// Power of a joint's friction, where it is negative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Negative {
+    pub joint: usize,
+    pub power: f64,
+    pub std: f64,
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Searched {
+    /// In the order in which they were found.
+    pub found: Vec<Found>,
+    /// All that is sure, together.
+    pub correction: Correction,
+    /// Joints whose friction drives them, under the correction.
+    pub negative: Vec<Negative>,
+}
+
+/// A hypothesis as it was fitted.
+struct Trial {
+    by: Correction,
+    robot: Robot,
+    normal: Arc<Normal>,
+    fit: Fit,
+    power: Vec<f64>,
+}
+
+/// The same with what physics says of it.
+struct Judged {
+    change: Option<Change>,
+    std: Option<f64>,
+    trial: Trial,
+    positives: Vec<Positive>,
+    /// Log-posterior but for a constant.
+    worth: f64,
+}
+
+impl Trial {
+    fn new(
+        problem: &Problem,
+        by: Correction,
+        rows: &[usize],
+        blocks: usize,
+        shared: Option<&Trial>,
+    ) -> Option<Self> {
+        let same = shared.filter(|s| problem.channels.same_rows(&s.by, &by));
+        let (robot, normal) = match same {
+            Some(s) => (s.robot.clone(), Arc::clone(&s.normal)),
+            None => {
+                let robot = problem.robot_under(&by)?;
+                let normal = problem.normal(&robot, &by, rows, blocks)?;
+                (robot, Arc::new(normal))
+            }
+        };
+        let mix = problem.channels.mix(&by);
+        let power = power(problem, &by, &normal, &mix, rows);
+        // friction that is known may have been found with the sign as it is declared, or without
+        let known = |turned: bool| {
+            let of = |(j, mix): (usize, &DVector<f64>)| {
+                let sign = by.torque_factor[j].signum();
+                Normal::target(mix, if turned { sign } else { 1.0 })
+            };
+            mix.iter().enumerate().map(of).collect::<Vec<_>>()
+        };
+        let turned = by.torque_factor.iter().any(|f| *f < 0.0)
+            && problem.columns.known.iter().any(Option::is_some);
+        let fit = Fit::new(&normal, known(false), &power);
+        let other = turned
+            .then(|| Fit::new(&normal, known(true), &power))
+            .flatten();
+        let fit = match (fit, other) {
+            (Some(a), Some(b)) if b.score > a.score => Some(b),
+            (a, b) => a.or(b),
+        }?;
+        Some(Self {
+            by,
+            robot,
+            normal,
+            fit,
+            power,
+        })
+    }
+}
+
+/// Squares of each joint's torque, by which residuals are measured.
+fn power(
+    problem: &Problem,
+    by: &Correction,
+    normal: &Normal,
+    mix: &[DVector<f64>],
+    rows: &[usize],
+) -> Vec<f64> {
+    let n = normal.joints;
+    match problem.channels.drive {
+        Drive::Joints => (0..n)
+            .map(|j| {
+                let first = normal.places[j].len();
+                match normal.total[j].nrows() == first + n + 1 && first > 0 {
+                    true => {
+                        let k = normal.total[j].view((first, first), (n, n));
+                        mix[j].dot(&(k * &mix[j]))
+                    }
+                    false => 0.0,
+                }
+            })
+            .collect(),
+        // channels share joints: their sizes count together
+        _ => {
+            let scale = (2.0 * by.torque_size() / n as f64).exp();
+            let mut sums = vec![0.0; n];
+            for &k in rows {
+                for (sum, tau) in sums.iter_mut().zip(problem.sample.row(k).tau) {
+                    *sum += scale * tau * tau;
+                }
+            }
+            let moving = problem.moving();
+            sums.iter()
+                .zip(moving)
+                .map(|(s, m)| if m { *s } else { 0.0 })
+                .collect()
+        }
+    }
+}
+
+/// Looks for what is wrong with the set-up. `stopped` ends it early with what is found so far.
+pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searched {
+    let n = problem.robot.joints();
+    let mut out = Searched {
+        found: Vec::new(),
+        correction: Correction::none(n),
+        negative: Vec::new(),
+    };
+    let moving: Vec<usize> = problem
+        .moving()
+        .iter()
+        .enumerate()
+        .filter(|m| *m.1)
+        .map(|m| m.0)
+        .collect();
+    if moving.is_empty()
+        || problem.sample.len() < 4 * problem.robot.parameters().len() / n.max(1) + 40
+    {
+        return out;
+    }
+    for _ in 0..ROUNDS {
+        let Some((found, negative)) = round(problem, &out.correction, &moving, stopped) else {
+            break;
+        };
+        out.negative = negative;
+        let Some(found) = found else { break };
+        let sure = found.sure;
+        if sure {
+            out.correction = out.correction.with(&found.change);
+        }
+        out.found.push(found);
+        if !sure || stopped() {
+            break;
+        }
+    }
+    out
+}
+
+type Round = (Option<Found>, Vec<Negative>);
+
+fn round(
+    problem: &Problem,
+    base: &Correction,
+    moving: &[usize],
+    stopped: &(dyn Fn() -> bool + Sync),
+) -> Option<Round> {
+    let few = problem.sample.spread(SCREENED);
+    let all: Vec<usize> = (0..problem.sample.len()).collect();
+    let declared = Trial::new(problem, base.clone(), &few, 1, None)?;
+    let mut changes = hypotheses::of_torques(moving);
+    changes.extend(hypotheses::of_positions(problem, moving));
+    changes.extend(hypotheses::of_zeros(problem));
+    changes.extend(hypotheses::of_gravity(problem, base));
+    let tried = changes.len();
+    let score = |change: &Change| {
+        if stopped() {
+            return None;
+        }
+        let trial = Trial::new(problem, base.with(change), &few, 1, Some(&declared))?;
+        Some(trial.fit.score)
+    };
+    let scores: Vec<Option<f64>> = changes.par_iter().map(score).collect();
+    if stopped() {
+        return None;
+    }
+    let whole = Trial::new(problem, base.clone(), &all, BLOCKS, None)?;
+    let whole = judged(problem, None, None, whole);
+    let negative = negative(&whole.positives);
+    let mut order: Vec<usize> = (0..changes.len())
+        .filter(|i| scores[*i].is_some())
+        .collect();
+    // stable: the simplest of equals stays first
+    order.sort_by(|a, b| {
+        scores[*b]
+            .unwrap_or(0.0)
+            .total_cmp(&scores[*a].unwrap_or(0.0))
+    });
+    let forbidden = joints_below(&whole.positives, NEGATIVE);
+    let forced = |change: &Change| match change {
+        Change::Sign(_, joints) => {
+            !forbidden.is_empty()
+                && (*joints == forbidden
+                    || *joints == moving
+                    || matches!(&joints[..], [j] if forbidden.contains(j)))
+        }
+        _ => false,
+    };
+    let better = |i: &usize| scores[*i].is_some_and(|s| s > declared.fit.score);
+    let mut short: Vec<usize> = order
+        .iter()
+        .copied()
+        .filter(better)
+        .take(SHORT_LIST)
+        .collect();
+    let rest: Vec<usize> = order
+        .iter()
+        .copied()
+        .filter(|i| forced(&changes[*i]) && !short.contains(i))
+        .collect();
+    short.extend(rest);
+    short.sort_unstable();
+    let judge = |i: &usize| {
+        let trial = Trial::new(
+            problem,
+            base.with(&changes[*i]),
+            &all,
+            BLOCKS,
+            Some(&whole.trial),
+        )?;
+        Some(judged(problem, Some(changes[*i].clone()), None, trial))
+    };
+    let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
+    Some((decide(problem, &whole, list, tried), negative))
+}
+
+fn judged(problem: &Problem, change: Option<Change>, std: Option<f64>, trial: Trial) -> Judged {
+    let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
+    Judged {
+        change,
+        std,
+        worth: 0.0,
+        positives,
+        trial,
+    }
+}
+
+/// The best of the list, where it is better than the set-up as it is.
+fn decide(
+    problem: &Problem,
+    declared: &Judged,
+    mut list: Vec<Judged>,
+    tried: usize,
+) -> Option<Found> {
+    let likeliest = list
+        .iter()
+        .max_by(|a, b| a.trial.fit.score.total_cmp(&b.trial.fit.score))
+        .filter(|j| j.trial.fit.score > declared.trial.fit.score)
+        .unwrap_or(declared);
+    let t = &likeliest.trial;
+    let independent = confirm::independent(problem, &t.robot, &t.by, &t.fit);
+    let moving = problem.moving();
+    let of_moving = independent
+        .iter()
+        .zip(&moving)
+        .filter(|(_, m)| **m)
+        .map(|(x, _)| *x);
+    let share = of_moving.clone().sum::<f64>() / of_moving.count().max(1) as f64;
+    let worth = |judged: &Judged| {
+        let fit = &judged.trial.fit;
+        let rows = share * judged.trial.normal.rows as f64;
+        let unknowns = judged.trial.normal.unknowns + usize::from(judged.std.is_some());
+        share * fit.score + credit(&judged.positives) - 0.5 * unknowns as f64 * rows.max(1.0).ln()
+    };
+    for judged in &mut list {
+        judged.worth = worth(judged);
+    }
+    let most = list
+        .iter()
+        .map(|j| j.worth)
+        .fold(f64::NEG_INFINITY, f64::max);
+    // the simplest of those that are worth as much
+    let best = list.iter().position(|j| j.worth >= most - 0.5)?;
+    if list[best].worth <= worth(declared) {
+        return None;
+    }
+    let chosen = &list[best];
+    let parts = |j: &'_ Judged| -> (Fit, Vec<f64>) { (j.trial.fit.clone(), j.trial.power.clone()) };
+    let ((b, pb), (a, pa)) = (parts(declared), parts(chosen));
+    let held_out = confirm::gain(
+        (&b, &declared.trial.normal, &pb),
+        (&a, &chosen.trial.normal, &pa),
+        &independent,
+    )?;
+    let physics = credit(&chosen.positives) - credit(&declared.positives);
+    let needed = ODDS + (tried.max(1) as f64).ln();
+    let gain = held_out + physics;
+    if gain < needed {
+        return None;
+    }
+    let error = [b.error(), a.error()];
+    let largest = b
+        .left
+        .iter()
+        .zip(&a.left)
+        .filter(|(b, a)| **b > 0.0 && **a > 0.0)
+        .map(|(b, a)| (b / a).sqrt())
+        .fold(error[0] / error[1], f64::max);
+    let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
+        && joints_below(&chosen.positives, NEGATIVE).is_empty();
+    let sure = largest > TENTH || forbidden;
+    if !sure {
+        return None;
+    }
+    let name = |p: &Positive| {
+        let joint = &problem.robot.joint_names()[p.joint];
+        match p.quantity {
+            Quantity::Inertia => format!("inertia of {joint}"),
+            Quantity::FrictionPower => format!("friction power of {joint}"),
+        }
+    };
+    let violated = |of: &[Positive]| -> Vec<String> {
+        of.iter()
+            .filter(|p| p.deviations() < NEGATIVE)
+            .map(name)
+            .collect()
+    };
+    let tied = list
+        .iter()
+        .enumerate()
+        .filter(|(i, j)| *i != best && j.worth >= chosen.worth - TIED);
+    Some(Found {
+        tied: tied.filter_map(|(_, j)| j.change.clone()).take(3).collect(),
+        change: chosen.change.clone()?,
+        std: chosen.std,
+        error,
+        gain,
+        needed,
+        tried,
+        violated: [violated(&declared.positives), violated(&chosen.positives)],
+        sure,
+    })
+}
+
+/// Joints with a quantity below so many deviations.
+fn joints_below(of: &[Positive], deviations: f64) -> Vec<usize> {
+    let mut out: Vec<usize> = of
+        .iter()
+        .filter(|p| p.deviations() < deviations)
+        .map(|p| p.joint)
+        .collect();
+    out.dedup();
+    out
+}
+
+fn negative(of: &[Positive]) -> Vec<Negative> {
+    of.iter()
+        .filter(|p| p.quantity == Quantity::FrictionPower && p.value < NEGATIVE * p.std)
+        .map(|p| Negative {
+            joint: p.joint,
+            power: p.value,
+            std: p.std,
+        })
+        .collect()
+}
