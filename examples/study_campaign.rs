@@ -127,6 +127,7 @@ fn campaign(seed: u64) -> Value {
         shared: 12,
         own: vec![Vec::new(); 4],
         known: known.clone(),
+        rest_speed: Vec::new(),
     };
     let motion = excitation_at_random_phase(Setup::Tuedacs, seed);
     let recording = follow(&truth, &[], motion, &noisy(40.0, 10 * seed + 5)).expect("a run");
@@ -206,7 +207,7 @@ fn errors(
     models
         .iter()
         .map(|model| {
-            let mut all = Reconstruction::new(model);
+            let mut all = Reconstruction::new(model, &[]);
             let summary = all
                 .add(&processing(), &mut source(&log), &mut |_| {})
                 .expect("a log");

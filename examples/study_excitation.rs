@@ -64,6 +64,7 @@ fn campaigns(seed: u64) -> Value {
         shared: 12,
         own: vec![Vec::new(); 4],
         known: friction(&robot, &truth, seed),
+        rest_speed: Vec::new(),
     };
     let theta = |recording: &SimulatedRun<4>| -> Vec<f64> {
         let mut log = block(recording);

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::log::Block;
-use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary};
-use crate::robot::model::Model;
+use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary, rest};
+use crate::robot::model::{JointFriction, Model};
 
 /// Errors of one joint.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -20,6 +20,10 @@ pub struct JointError {
     pub rmse: f64,
     /// norm(tau - tau_hat) / norm(tau), filtered and decimated.
     pub relative_error: f64,
+    /// The same of the rows in which the joint moves; null where there are none.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which it rests.
+    pub relative_error_rest: Option<f64>,
     /// The same of every raw sample.
     pub relative_error_raw: f64,
     /// Largest filtered error.
@@ -28,6 +32,9 @@ pub struct JointError {
     pub r2: f64,
     /// Filtered, decimated rows.
     pub samples: u64,
+    /// Those in which it rests.
+    #[serde(skip)]
+    pub resting: u64,
 }
 
 /// Errors over all joints.
@@ -35,6 +42,10 @@ pub struct JointError {
 pub struct Overall {
     /// Stacked norms over all joints; none where their units differ.
     pub relative_error: Option<f64>,
+    /// The same of the rows in which each joint moves.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which each joint rests.
+    pub relative_error_rest: Option<f64>,
     /// Root mean square over joints of their relative errors.
     pub mean_relative_error: f64,
 }
@@ -74,11 +85,19 @@ struct ErrorSums {
     rows: u64,
     raw_error: f64,
     raw_torque: f64,
+    /// Squared error and torque of the rows in which the joint rests, and their number.
+    rest: [f64; 2],
+    resting: u64,
 }
 
 impl ErrorSums {
-    fn add(&mut self, measured: f64, reconstructed: f64) {
+    fn add(&mut self, measured: f64, reconstructed: f64, rests: bool) {
         let e = measured - reconstructed;
+        if rests {
+            self.rest[0] += e * e;
+            self.rest[1] += measured * measured;
+            self.resting += 1;
+        }
         self.error += e * e;
         self.torque += measured * measured;
         self.largest = self.largest.max(e.abs());
@@ -94,6 +113,15 @@ impl ErrorSums {
         self.raw_error += e * e;
         self.raw_torque += measured * measured;
     }
+}
+
+/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows.
+fn ratio(error: f64, torque: f64, rows: u64) -> Option<f64> {
+    let relative = match torque > 0.0 {
+        true => (error / torque).sqrt(),
+        false => f64::NAN,
+    };
+    (rows > 0).then_some(relative)
 }
 
 /// One row of raw torques, handed to the caller for a residual file.
@@ -143,15 +171,23 @@ impl<'a> Taken<'a> {
 /// Errors of several logs and joints, summed log after log.
 pub struct Reconstruction<'a> {
     model: &'a Model,
+    /// Speed up to which each joint rests [m/s or rad/s]; below 0 where its rows always count.
+    rest_speed: Vec<f64>,
     sums: Vec<ErrorSums>,
     traces: TorqueTraces,
 }
 
 impl<'a> Reconstruction<'a> {
-    /// Nothing yet.
-    pub fn new(model: &'a Model) -> Self {
+    /// Nothing yet. `rest_speed`: the speed up to which each joint rests [m/s or rad/s], none where rests are
+    /// not told; joints without friction never rest.
+    pub fn new(model: &'a Model, rest_speed: &[f64]) -> Self {
+        let speed = |(j, law): (usize, &JointFriction)| match (law, rest_speed.get(j)) {
+            (JointFriction::None, _) | (_, None) => -1.0,
+            (_, Some(speed)) => *speed,
+        };
         Reconstruction {
             model,
+            rest_speed: model.friction.iter().enumerate().map(speed).collect(),
             sums: vec![ErrorSums::default(); model.robot.joints()],
             traces: TorqueTraces::default(),
         }
@@ -169,7 +205,7 @@ impl<'a> Reconstruction<'a> {
         row: &mut dyn FnMut(&Reconstructed),
     ) -> Result<Summary, motion::RunError<E>> {
         let n = self.model.robot.joints();
-        let model = self.model;
+        let (model, rest_speed) = (self.model, self.rest_speed.clone());
         let mut full = settings.clone();
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
@@ -179,10 +215,13 @@ impl<'a> Reconstruction<'a> {
             n,
             &full,
             None,
-            2 * n,
+            3 * n,
             &|sample, out| {
                 out[..n].copy_from_slice(sample.tau);
-                model.torque(sample.q, sample.v, sample.a, &mut out[n..]);
+                model.torque(sample.q, sample.v, sample.a, &mut out[n..2 * n]);
+                for (j, speed) in rest_speed.iter().enumerate() {
+                    out[2 * n + j] = rest::movement(sample.v[j], *speed);
+                }
             },
             &mut |r| self.take(&mut taken, r.segment, r.t, r.raw, r.filtered, row),
         )?;
@@ -209,18 +248,23 @@ impl<'a> Reconstruction<'a> {
         let mut full = settings.clone();
         full.decimation = Some(1);
         let parallel = Parallel::design(&full, stretch.dt)?;
-        let channels: Vec<&[f64]> = stretch
-            .tau
+        let movement = |(v, speed): (&Vec<f64>, &f64)| -> Vec<f64> {
+            v.iter().map(|v| rest::movement(*v, *speed)).collect()
+        };
+        let moving: Vec<Vec<f64>> = stretch
+            .v
             .iter()
-            .chain(reconstructed)
-            .map(Vec::as_slice)
+            .zip(&self.rest_speed)
+            .map(movement)
             .collect();
+        let channels = stretch.tau.iter().chain(reconstructed).chain(&moving);
+        let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let mut taken = Taken::new(settings);
-        let (mut raw, mut filtered) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
+        let (mut raw, mut filtered) = (vec![0.0; 3 * n], vec![0.0; 3 * n]);
         let count = parallel.rows(stretch.len());
         for (i, k) in (0..count).map(|i| (i, parallel.sample_of(i))) {
-            for c in 0..2 * n {
+            for c in 0..3 * n {
                 raw[c] = channels[c][k];
                 filtered[c] = rows[c][i];
             }
@@ -250,13 +294,17 @@ impl<'a> Reconstruction<'a> {
         row(&Reconstructed {
             t,
             measured: &raw[..n],
-            reconstructed: &raw[n..],
+            reconstructed: &raw[n..2 * n],
         });
         if keep {
             for (j, s) in self.sums.iter_mut().enumerate() {
-                s.add(filtered[j], filtered[n + j]);
+                s.add(
+                    filtered[j],
+                    filtered[n + j],
+                    rest::rests(filtered[2 * n + j]),
+                );
             }
-            append(&mut self.traces, t, filtered, n);
+            append(&mut self.traces, t, &filtered[..2 * n], n);
         }
     }
 
@@ -267,13 +315,15 @@ impl<'a> Reconstruction<'a> {
         let joints: Vec<JointError> = (0..n)
             .map(|j| {
                 let s = &self.sums[j];
-                let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
+                let [error, torque] = [s.error - s.rest[0], s.torque - s.rest[1]];
                 JointError {
                     joint: robot.joint_names()[j].clone(),
                     unit: robot.joint_unit(j),
                     rmse: (s.error / s.rows.max(1) as f64).sqrt(),
-                    relative_error: ratio(s.error, s.torque),
-                    relative_error_raw: ratio(s.raw_error, s.raw_torque),
+                    relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
+                    relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
+                    relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
+                    relative_error_raw: ratio(s.raw_error, s.raw_torque, 1).unwrap_or(f64::NAN),
                     max_abs: s.largest,
                     r2: if s.scatter > 0.0 {
                         1.0 - s.error / s.scatter
@@ -281,14 +331,30 @@ impl<'a> Reconstruction<'a> {
                         f64::NAN
                     },
                     samples: s.rows,
+                    resting: s.resting,
                 }
             })
             .collect();
         let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
-        let (error, torque) = self
-            .sums
-            .iter()
-            .fold((0.0, 0.0), |(e, t), s| (e + s.error, t + s.torque));
+        // squared error and torque over all joints, then those of rest
+        let mut pooled = [0.0; 4];
+        let (mut moving, mut resting) = (0, 0);
+        for s in &self.sums {
+            for (sum, x) in pooled
+                .iter_mut()
+                .zip([s.error, s.torque, s.rest[0], s.rest[1]])
+            {
+                *sum += x;
+            }
+            moving += s.rows - s.resting;
+            resting += s.resting;
+        }
+        let [error, torque, at_rest, torque_at_rest] = pooled;
+        let part = |error: f64, torque: f64, rows: u64| {
+            one_unit
+                .then(|| ratio(error.max(0.0), torque, rows))
+                .flatten()
+        };
         let mean = joints
             .iter()
             .map(|e| e.relative_error * e.relative_error)
@@ -296,6 +362,8 @@ impl<'a> Reconstruction<'a> {
         Validation {
             overall: Overall {
                 relative_error: one_unit.then(|| (error / torque).sqrt()),
+                relative_error_moving: part(error - at_rest, torque - torque_at_rest, moving),
+                relative_error_rest: part(at_rest, torque_at_rest, resting),
                 mean_relative_error: (mean / n as f64).sqrt(),
             },
             joints,

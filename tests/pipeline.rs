@@ -43,6 +43,7 @@ fn fitted(robot: &Robot, truth: &CftTruth, recording: &SimulatedRun<4>) -> Fit {
         shared: 12,
         own: vec![Vec::new(); 4],
         known: known.to_vec(),
+        rest_speed: Vec::new(),
     };
     let processing = Processing {
         q_cutoff_hz: Some(100.0),
@@ -74,7 +75,7 @@ fn noise_free_data_give_theta_within_a_thousandth() {
         }
     }
     assert!(
-        fit.relative_error.iter().all(|e| *e < 3e-4),
+        fit.relative_error.iter().all(|e| e.all < 3e-4),
         "{:?}",
         fit.relative_error
     );
@@ -95,6 +96,7 @@ fn without_acceleration_of_q1_theta_1_is_lost_and_named() {
         shared: 12,
         own: vec![Vec::new(); 4],
         known: vec![None; 4],
+        rest_speed: Vec::new(),
     };
     let mut sums = cft_ident::inertia::accumulate::Accumulator::new(columns.clone(), 0.25);
     let mut channels = vec![0.0; columns.channels()];

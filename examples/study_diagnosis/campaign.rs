@@ -510,6 +510,7 @@ impl Campaign {
             shared: 12,
             own: vec![Vec::new(); 4],
             known: known.clone(),
+            rest_speed: Vec::new(),
         };
         let training = lab.run(truth, before, motion(seed), 10 * seed + 5);
         let sums = accumulate(robot, &columns, &processing(), &mut source(&training));
@@ -584,6 +585,7 @@ impl Campaign {
             roles: self.roles.clone(),
             filters: ParallelFilters::design(&lab.processing, &self.stretches).expect("a filter"),
             cutoff_hz: lab.processing.cutoff_hz,
+            rest_speed: vec![-1.0; joints],
             units: (0..joints)
                 .map(|j| lab.robot.joint_unit(j).to_owned())
                 .collect(),

@@ -120,6 +120,7 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
         shared: 1,
         own: vec![vec![Own::Viscous, Own::Coulomb]],
         known: vec![None],
+        rest_speed: Vec::new(),
     };
     let training = log(truth, specs, NOISE, 10 * seed);
     let sums = accumulate(

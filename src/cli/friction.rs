@@ -44,7 +44,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
     #[command(flatten)]
-    pub setup: setup::Args,
+    pub setup: setup::SetupArgs,
     /// Seed of the starting points
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

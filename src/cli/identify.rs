@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     #[command(flatten)]
-    pub setup: setup::Args,
+    pub setup: setup::SetupArgs,
 }
 
 /// Folder where none is named.
@@ -118,7 +118,7 @@ fn execute(
     (name, campaign): (&str, &Campaign),
     base: &Path,
     folder: &Path,
-    (args, context): (&setup::Args, &Context),
+    (args, context): (&setup::SetupArgs, &Context),
     mut warnings: Vec<String>,
 ) -> Result<Outcome, CliError> {
     let robot = resolve(base, &campaign.robot);

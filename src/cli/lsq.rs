@@ -44,7 +44,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
     pub report: Option<PathBuf>,
     #[command(flatten)]
-    pub setup: setup::Args,
+    pub setup: setup::SetupArgs,
 }
 
 /// Runs the command.

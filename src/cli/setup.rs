@@ -10,7 +10,7 @@ use crate::setup::{Finding, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
-pub struct Args {
+pub struct SetupArgs {
     /// Where the torques contradict the set-up, write a robot file that is right by them and go on with it
     #[arg(long, value_name = "NEW-ROBOT.toml")]
     pub fix_setup: Option<PathBuf>,
@@ -50,7 +50,7 @@ pub fn checked(
     robot: &Path,
     logs: &[Log],
     friction: Option<(&str, &ModelFile)>,
-    args: &Args,
+    args: &SetupArgs,
     context: &Context,
 ) -> Result<Checked, CliError> {
     let CheckedSetup {

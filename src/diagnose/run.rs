@@ -15,6 +15,7 @@ use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, RowRole};
 use super::problem::fit::{FittedModel, fit};
 use super::problem::fit_problem::{FitProblem, inertial_of};
+use super::problem::rests::rest_weight;
 use super::problem::unknowns::Unknowns;
 use super::selection::accept::accept;
 use super::selection::choose::{alternatives, choose};
@@ -106,7 +107,8 @@ impl<'a> Diagnosing<'a> {
         let cover = Cover::of(robot, &stretches, case.cutoff_hz);
         let unknowns = Unknowns::of(&case.given, &case.open, &cover).len();
         check(case, &split, unknowns)?;
-        let problem = FitProblem {
+        let joints = robot.joints();
+        let mut problem = FitProblem {
             inertial: inertial_of(robot, &case.stretches, &case.filters, &split)?,
             stretches: &case.stretches,
             filters: &case.filters,
@@ -114,8 +116,15 @@ impl<'a> Diagnosing<'a> {
             open: &case.open,
             prior: &case.prior,
             cover,
+            rest_weight: vec![0.0; joints],
         };
-        let at = fit(&case.given, &problem)?;
+        let mut at = fit(&case.given, &problem)?;
+        // friction and noise of the moving rows say what those at rest are worth
+        let noise = at.base.residual_rms(&problem.split);
+        problem.rest_weight = rest_weight(&at.model, &case.stretches, &case.filters, &noise);
+        if problem.rest_weight.iter().any(|weight| *weight > 0.0) {
+            at = fit(&case.given, &problem)?;
+        }
         Ok(Diagnosing {
             case,
             progress,
@@ -338,7 +347,7 @@ impl<'a> Diagnosing<'a> {
             model,
             &case.units,
             &case.stretches,
-            &case.filters,
+            (&case.filters, &case.rest_speed),
             &self.problem.split,
             (wanted, counted),
         )

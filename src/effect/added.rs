@@ -56,6 +56,11 @@ impl Added {
     }
 
     /// As results and files name it.
+    /// Whether its torque is the same while its joint rests.
+    pub(crate) fn at_rest(&self) -> bool {
+        self.law.entry.at_rest
+    }
+
     pub fn name(&self) -> &'static str {
         self.law.entry.name
     }

@@ -38,6 +38,7 @@ pub static ENTRY: Entry = Entry {
     formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \
                 axis; or a cubic B-spline on three pieces between from and to",
     source: "a spring or gas cylinder between two fixed points",
+    at_rest: true,
     ..Entry::USUAL
 };
 

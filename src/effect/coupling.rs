@@ -28,6 +28,7 @@ pub static ENTRY: Entry = Entry {
     formula: "viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j of joint j = from, counted \
                 from 1",
     source: "gears that two joints share, as in the wrist of many arms, or a linkage",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -14,6 +14,7 @@ pub static ENTRY: Entry = Entry {
     separate_by: "hold the joint still at one pose at the begin and at the end of the log",
     formula: "c t + a random walk of rms walk sqrt(t)",
     source: "a torque sensor or an amplifier that warms up",
+    at_rest: true,
     ..Entry::USUAL
 };
 

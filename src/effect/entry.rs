@@ -190,6 +190,8 @@ pub struct Entry {
     pub places: Places,
     pub role: Role,
     pub search: Search,
+    /// Whether its torque is the same while its joint rests. Friction takes any torque there.
+    pub at_rest: bool,
     /// Keys that are above zero where the effect is real: a fit with another sign has found something else.
     pub positive: &'static [&'static str],
     /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
@@ -211,6 +213,7 @@ impl Entry {
         places: Places::Joints,
         role: Role::Columns,
         search: Search::Linear,
+        at_rest: false,
         positive: &[],
         ladder: None,
         separate_by: "",

@@ -13,6 +13,7 @@ pub static ENTRY: Entry = Entry {
     separate_by: "a known payload, the model held by --keep",
     formula: "k times the acting torque: logged is (1 + k) times that",
     source: "a wrong torque constant or gear ratio",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -20,6 +20,7 @@ pub static ENTRY: Entry = Entry {
     formula: "slope of -sum m_i (gx p_x + gy p_y) over the chain; a sliding axis along x: \
                 -inertia gx",
     source: "a base that stands askew",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -27,6 +27,7 @@ pub static ENTRY: Entry = Entry {
                 inertia about that centre: about the vertical axis, on a serial robot the same \
                 about every axis",
     source: "a tool or a load that the model was not identified with",
+    at_rest: true,
     ..Entry::USUAL
 };
 

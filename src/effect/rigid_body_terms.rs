@@ -26,6 +26,7 @@ pub static ENTRY: Entry = Entry {
     separate_by: "declare `parameters = 22` and excite all joints together, fast",
     formula: "the ten columns that the twelve parameters leave out",
     source: "links that are no thin rods, by the full chain of the report",
+    at_rest: true,
     ..Entry::USUAL
 };
 

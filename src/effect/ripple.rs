@@ -29,6 +29,7 @@ pub static ENTRY: Entry = Entry {
                   frequency moves",
     formula: "sin sin(order q) + cos cos(order q), and harmonics 2 and 3",
     source: "cogging of a motor, teeth of a gear, an eccentric encoder",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -17,6 +17,7 @@ pub static ENTRY: Entry = Entry {
     separate_by: "fast reversals of one actuator at several poses of the arm",
     formula: "J a; at a screw J_a' J (J_a a + dJ_a/dt v)",
     source: "a rotor or screw that the links' inertias do not hold",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -18,6 +18,7 @@ pub static ENTRY: Entry = Entry {
                   does not",
     formula: "k (q - q0) + k3 (q - q0)^3",
     source: "a cable, a hose or a return spring",
+    at_rest: true,
     ..Entry::USUAL
 };
 

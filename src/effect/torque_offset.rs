@@ -13,6 +13,7 @@ pub static ENTRY: Entry = Entry {
                   both ways at three or more constant speeds",
     formula: "c",
     source: "bias of a torque sensor or of an amplifier",
+    at_rest: true,
     ..Entry::USUAL
 };
 

@@ -55,6 +55,7 @@ pub fn machine(
             shared: robot.parameters().len(),
             own,
             known: vec![None; n],
+            rest_speed: Vec::new(),
         },
         model,
         mechanism: Mechanism::of(file)?,

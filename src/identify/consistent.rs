@@ -92,7 +92,7 @@ pub(super) fn consistent(
     // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
     let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
     let bound = residual_of(&basis.sums, &found.theta)?;
-    let before = fit.relative_error.clone();
+    let before: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
     for j in 0..bound.len() {
         let growth = if free[j] > 0.0 {
             bound[j] / free[j]
@@ -100,8 +100,9 @@ pub(super) fn consistent(
             1.0
         };
         fit.residual_std[j] *= growth;
-        fit.relative_error[j] *= growth;
+        fit.relative_error[j].grow(growth);
     }
+    let after: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
     fit.theta = &found.theta + &basis.shift;
     let links = map.links.iter().zip(&found.links).zip(&found.given);
     let link = |((name, s), given): ((&String, &[f64; STANDARD]), &bool)| {
@@ -128,7 +129,7 @@ pub(super) fn consistent(
         links: links.map(link).collect(),
         drives: drives.map(drive).collect(),
         relative_error_before: RelativeError::each(machine, &before),
-        relative_error_after: RelativeError::each(machine, &fit.relative_error),
+        relative_error_after: RelativeError::each(machine, &after),
         prior_weight: PRIOR_WEIGHT,
         iterations: found.iterations,
         status: found.ending,

@@ -186,6 +186,7 @@ fn case(
         roles,
         filters,
         cutoff_hz: processing.cutoff_hz,
+        rest_speed: in_memory.rest_speed.clone(),
         units: (0..machine.robot.joints())
             .map(|j| machine.file.torque_unit(j).to_owned())
             .collect(),

@@ -203,7 +203,7 @@ fn refined(
     account.status = refined.ending;
     account.iterations = refined.iterations;
     account.tell(passes.machine, |j| JointAccount {
-        relative_error_before: Some(refined.before[j]),
+        relative_error_before: Some(refined.before[j].all),
         ..JointAccount::default()
     });
     let sums = refined.factors.in_one_block();

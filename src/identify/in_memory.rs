@@ -21,6 +21,8 @@ pub struct InMemory {
     pub origin: Instant,
     /// Torques are means of two rows: they come from a zero-order hold.
     pub averaged: bool,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub rest_speed: Vec<f64>,
 }
 
 /// Reads logs whole, smoothed as the model declares.
@@ -72,5 +74,6 @@ pub fn read_whole(
         summary,
         origin,
         averaged,
+        rest_speed: machine.rest_speeds(logs, control)?,
     })
 }

@@ -9,11 +9,12 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
+use super::speeds::SpeedMeter;
 use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
 use crate::inspect::{Gate, LogFault};
-use crate::log::{Layout, LogError, Reader, escape};
+use crate::log::{Block, Layout, LogError, Reader, escape};
 use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
 use crate::robot::{JointKind, Robot};
 use crate::validate::Validation;
@@ -35,7 +36,16 @@ pub struct LoggedRobot {
     pub file: RobotFile,
     pub robot: Robot,
     /// What the first look at each log found: a log is opened several times.
-    gates: Arc<Mutex<BTreeMap<String, Arc<Gate>>>>,
+    looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
+}
+
+/// What the first look at a log found.
+#[derive(Debug)]
+pub(super) struct FirstLook {
+    /// Faults, and rows to leave out.
+    pub(super) gate: Gate,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub(super) rest_speed: Vec<f64>,
 }
 
 impl LoggedRobot {
@@ -54,31 +64,50 @@ impl LoggedRobot {
             name: name.to_owned(),
             file,
             robot,
-            gates: Arc::default(),
+            looks: Arc::default(),
         }
     }
 
     /// Looks at a log before it is used, once.
-    fn gate(
+    fn first_look(
         &self,
         log: &Log,
         layout: &Layout,
         control: &Control,
-    ) -> Result<Arc<Gate>, IdentifyError> {
+    ) -> Result<Arc<FirstLook>, IdentifyError> {
         let key = format!("{} {}", layout.torques.len(), log.key());
-        let known = || self.gates.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(gate) = known().get(&key) {
-            return Ok(Arc::clone(gate));
+        let known = || self.looks.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(look) = known().get(&key) {
+            return Ok(Arc::clone(look));
         }
-        let gate = Arc::new(self.look(log, layout, control)?);
-        if let Some(fault) = gate.refusal() {
+        let look = Arc::new(self.look(log, layout, control)?);
+        if let Some(fault) = look.gate.refusal() {
             return Err(IdentifyError::Refused {
                 log: escape(&log.name()),
                 fault: Box::new(fault.clone()),
             });
         }
-        known().insert(key, Arc::clone(&gate));
-        Ok(gate)
+        known().insert(key, Arc::clone(&look));
+        Ok(look)
+    }
+
+    /// Speed up to which each joint rests, by the log in which it moves most [m/s or rad/s].
+    ///
+    /// # Errors
+    /// A log that cannot be read or is refused, and interruption.
+    pub(super) fn rest_speeds(
+        &self,
+        logs: &[Log],
+        control: &Control,
+    ) -> Result<Vec<f64>, IdentifyError> {
+        let mut speeds = vec![0.0; self.robot.joints()];
+        for log in logs {
+            let look = self.first_look(log, &self.file.layout(), control)?;
+            for (speed, of_log) in speeds.iter_mut().zip(&look.rest_speed) {
+                *speed = of_log.max(*speed);
+            }
+        }
+        Ok(speeds)
     }
 
     /// The fault for which a fit refuses a log, where it has one.
@@ -86,14 +115,29 @@ impl LoggedRobot {
     /// # Errors
     /// A log that cannot be read, and interruption.
     pub fn fault(&self, log: &Log, control: &Control) -> Result<Option<LogFault>, IdentifyError> {
-        let gate = self.look(log, &self.file.layout(), control)?;
-        Ok(gate.refusal().cloned())
+        let look = self.look(log, &self.file.layout(), control)?;
+        Ok(look.gate.refusal().cloned())
     }
 
-    fn look(&self, log: &Log, layout: &Layout, control: &Control) -> Result<Gate, IdentifyError> {
+    fn look(
+        &self,
+        log: &Log,
+        layout: &Layout,
+        control: &Control,
+    ) -> Result<FirstLook, IdentifyError> {
         let mut reader = self.reader(log, &layout.clone().as_logged())?;
-        let gate = Gate::look(&mut reader, &|| control.stopped())?;
-        gate.ok_or(IdentifyError::Interrupted)
+        let mut speeds = SpeedMeter::new();
+        let mut meter = |block: &Block, read: &Layout| {
+            let layouts = [Some(layout), layout.otherwise.as_deref()];
+            let declared = layouts.into_iter().flatten();
+            let mut declared = declared.filter(|l| l.channels == read.channels);
+            speeds.take(block, declared.next().and_then(|l| l.conversion.as_ref()));
+        };
+        let gate = Gate::look(&mut reader, &|| control.stopped(), &mut meter)?;
+        Ok(FirstLook {
+            gate: gate.ok_or(IdentifyError::Interrupted)?,
+            rest_speed: speeds.resting(),
+        })
     }
 
     fn reader(&self, log: &Log, layout: &Layout) -> Result<Reader, LogError> {
@@ -107,14 +151,14 @@ impl LoggedRobot {
         layout: &Layout,
         control: &'a Control,
     ) -> Result<OpenLog<'a>, IdentifyError> {
-        let gate = self.gate(log, layout, control)?;
+        let look = self.first_look(log, layout, control)?;
         Ok(OpenLog {
             reader: self.reader(log, layout)?,
             control,
             centre: None,
             name: escape(&log.name()),
-            cutter: gate.cutter(self.settings().gap_factor),
-            gate,
+            cutter: look.gate.cutter(self.settings().gap_factor),
+            look,
         })
     }
 

@@ -108,9 +108,11 @@ pub fn lsq(
         });
     }
     let mut passes = Passes::new(machine, logs, control);
-    let linear = columns(machine, friction)?;
+    let mut linear = columns(machine, friction)?;
+    linear.rest_at(machine.rest_speeds(logs, control)?);
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
     let (essential, essential_error) = essentials(&estimated)?;
+    let resting = estimated.basis.sums.resting_shares();
     let consistent = match settings.consistent {
         true => Some(consistent(machine, &mut estimated)?),
         false => None,
@@ -128,6 +130,7 @@ pub fn lsq(
     }
     warnings.extend(account.warnings());
     warnings.append(&mut passes.warnings);
+    warnings.extend(rests(machine, &resting));
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
     let inputs = std::mem::take(&mut passes.inputs);
     let unknowns = unknowns(machine, &columns, &fit, &essential);
@@ -142,8 +145,10 @@ pub fn lsq(
     let joints = names.map(|(j, joint)| JointResidual {
         joint: joint.clone(),
         unit: machine.file.torque_unit(j),
-        rmse: fit.residual_std[j],
-        relative_error: fit.relative_error[j],
+        rmse: fit.relative_error[j].rms,
+        relative_error: fit.relative_error[j].all,
+        relative_error_moving: fit.relative_error[j].moving,
+        relative_error_rest: fit.relative_error[j].rest,
     });
     Ok(IdentifiedDynamics {
         essential: EssentialFit {
@@ -207,6 +212,24 @@ impl Account {
     }
 }
 
+/// Share of a joint's rows at rest from which on they are told.
+const TOLD: f64 = 0.01;
+
+/// Rows at rest that are not fitted, as a warning.
+fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
+    let joints = machine.robot.joint_names().iter().zip(shares);
+    let told: Vec<String> = joints
+        .filter(|(_, share)| **share >= TOLD)
+        .map(|(joint, share)| format!("{joint} {}", number::percent(*share)))
+        .collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted",
+            told.join(", ")
+        )
+    })
+}
+
 /// What the data do not tell apart, as warnings.
 fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
     let sentence = |c: &Confounded| {
@@ -246,7 +269,7 @@ fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyEr
         .iter()
         .zip(&whole)
         .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
-    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e);
+    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e.all);
     Ok((found, error.collect()))
 }
 

@@ -38,6 +38,7 @@ mod residual;
 mod separate;
 mod setup;
 mod setup_words;
+mod speeds;
 mod torque;
 mod unknowns;
 mod validate;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
-use crate::inspect::{Cutter, Gate};
+use super::logged_robot::FirstLook;
+use crate::inspect::Cutter;
 use crate::log::{Block, Instant, Layout, Provenance, Reader};
 use crate::motion::{Summary, ZeroOrderHold};
 use crate::robot::Robot;
@@ -16,7 +17,7 @@ pub struct OpenLog<'a> {
     /// Brings motor forces by a zero-order hold to the rows' own time and pose.
     pub(super) centre: Option<(&'a Robot, ZeroOrderHold)>,
     pub(super) name: String,
-    pub(super) gate: Arc<Gate>,
+    pub(super) look: Arc<FirstLook>,
     pub(super) cutter: Cutter,
 }
 
@@ -52,13 +53,13 @@ impl OpenLog<'_> {
 
     /// The instant from which the times of the blocks are counted.
     pub fn origin(&self) -> Instant {
-        self.gate.origin()
+        self.look.gate.origin()
     }
 
     /// What was left out, dropped or chosen, once the last block is read.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = self.reader.warnings();
-        let found = self.gate.warnings().into_iter();
+        let found = self.look.gate.warnings().into_iter();
         out.extend(found.map(|text| format!("{}: {text}", self.name)));
         let removed = self.cutter.removed();
         if removed > 0 {

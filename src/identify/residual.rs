@@ -34,4 +34,8 @@ pub struct JointResidual {
     pub rmse: f64,
     /// The same over that of the torque, a fraction.
     pub relative_error: f64,
+    /// The same of the rows in which the joint moves.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which it rests; null where it never does.
+    pub relative_error_rest: Option<f64>,
 }

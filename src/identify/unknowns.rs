@@ -104,6 +104,7 @@ pub(super) fn columns(
         shared: robot.parameters().len(),
         own,
         known,
+        rest_speed: Vec::new(),
     })
 }
 

@@ -37,7 +37,7 @@ pub fn validate(
     row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, IdentifyError> {
     let work = control.begin("reconstruction", Some(logs.len() as u64));
-    let mut all = Reconstruction::new(&refined.model);
+    let mut all = Reconstruction::new(&refined.model, &machine.rest_speeds(logs, control)?);
     let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
     let settings = machine.settings();
     let mut segments = 0;

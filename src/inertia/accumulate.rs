@@ -17,7 +17,7 @@ const MOST_BLOCKS: usize = 512;
 pub struct BlockFactor {
     /// Uninterrupted stretch that the block belongs to; correlation ends at its borders.
     pub stretch: usize,
-    /// Rows per joint.
+    /// Instants.
     pub rows: u64,
     /// Upper triangle per joint, columns as in [`RegressorColumns::row_width`].
     pub r: Vec<DMatrix<f64>>,
@@ -33,9 +33,31 @@ pub struct Accumulator {
     began: f64,
     block_seconds: f64,
     blocks: Vec<BlockFactor>,
-    /// Squared norm of the filtered torque per joint.
-    torque_square: Vec<f64>,
+    /// Rows in which each joint moves, in a block or in the open one.
+    moving: Vec<JointRows>,
+    /// Those in which it rests.
+    resting: Vec<(JointRows, RFactor)>,
     rows: u64,
+}
+
+/// How many rows of a joint there are.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct JointRows {
+    pub count: u64,
+    /// Squared norm of the filtered torque.
+    pub torque_square: f64,
+}
+
+impl JointRows {
+    fn add(&mut self, torque: f64) {
+        self.count += 1;
+        self.torque_square += torque * torque;
+    }
+
+    fn merge(&mut self, other: JointRows) {
+        self.count += other.count;
+        self.torque_square += other.torque_square;
+    }
 }
 
 impl Accumulator {
@@ -44,8 +66,12 @@ impl Accumulator {
         let open = (0..columns.joints)
             .map(|j| RFactor::new(columns.row_width(j)))
             .collect();
-        let torque_square = vec![0.0; columns.joints];
+        let resting = (0..columns.joints)
+            .map(|j| (JointRows::default(), RFactor::new(columns.row_width(j))))
+            .collect();
         Accumulator {
+            moving: vec![JointRows::default(); columns.joints],
+            resting,
             columns,
             open,
             open_rows: 0,
@@ -53,7 +79,6 @@ impl Accumulator {
             began: 0.0,
             block_seconds,
             blocks: Vec::new(),
-            torque_square,
             rows: 0,
         }
     }
@@ -71,14 +96,24 @@ impl Accumulator {
         if self.open_rows == 0 {
             self.began = t;
         }
+        let torques = self.columns.offset(self.columns.joints);
         let mut at = 0;
         for (j, open) in self.open.iter_mut().enumerate() {
             let c = self.columns.row_width(j);
-            open.fold(&channels[at..at + c]);
+            let row = &channels[at..at + c];
+            let torque = channels[torques + j];
+            match self.columns.rests(channels, j) {
+                false => {
+                    open.fold(row);
+                    self.moving[j].add(torque);
+                }
+                true => {
+                    let (rows, factor) = &mut self.resting[j];
+                    factor.fold(row);
+                    rows.add(torque);
+                }
+            }
             at += c;
-        }
-        for (s, tau) in self.torque_square.iter_mut().zip(&channels[at..]) {
-            *s += tau * tau;
         }
         self.open_rows += 1;
         self.rows += 1;
@@ -121,10 +156,13 @@ impl Accumulator {
     /// Closes the last block and hands everything over.
     pub fn finish(mut self) -> BlockFactors {
         self.close();
+        let (resting, at_rest): (Vec<JointRows>, Vec<RFactor>) = self.resting.into_iter().unzip();
         BlockFactors {
             columns: self.columns,
             blocks: self.blocks,
-            torque_square: self.torque_square,
+            moving: self.moving,
+            resting,
+            at_rest: at_rest.iter().map(RFactor::r).collect(),
             rows: self.rows,
         }
     }
@@ -145,13 +183,43 @@ fn merged<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize)
     factor.r()
 }
 
+/// A joint's residual: its norm over that of the filtered torque, fractions.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RelativeResidual {
+    /// Over all rows.
+    pub all: f64,
+    /// Over those in which the joint moves; none where it never does.
+    pub moving: Option<f64>,
+    /// Over those in which it rests; none where it never does.
+    pub rest: Option<f64>,
+    /// Root mean square of the residual itself, over all rows [N or Nm].
+    pub rms: f64,
+}
+
+impl RelativeResidual {
+    /// The same of a residual that is `factor` times as large.
+    pub(crate) fn grow(&mut self, factor: f64) {
+        for x in [&mut self.all, &mut self.rms] {
+            *x *= factor;
+        }
+        for x in [&mut self.moving, &mut self.rest].into_iter().flatten() {
+            *x *= factor;
+        }
+    }
+}
+
 /// All rows of all logs, reduced.
 #[derive(Debug, Clone)]
 pub struct BlockFactors {
     pub columns: RegressorColumns,
     pub blocks: Vec<BlockFactor>,
-    pub torque_square: Vec<f64>,
-    /// Rows per joint.
+    /// Rows of each joint in the blocks: those in which it moves.
+    pub moving: Vec<JointRows>,
+    /// Those in which it rests; they are in no block.
+    pub resting: Vec<JointRows>,
+    /// Upper triangle of the rows in which each joint rests.
+    pub at_rest: Vec<DMatrix<f64>>,
+    /// Instants.
     pub rows: u64,
 }
 
@@ -163,8 +231,12 @@ impl BlockFactors {
             b.stretch += shift;
             b
         }));
-        for (a, b) in self.torque_square.iter_mut().zip(&other.torque_square) {
-            *a += b;
+        for (j, r) in other.at_rest.iter().enumerate() {
+            self.moving[j].merge(other.moving[j]);
+            if other.resting[j].count > 0 {
+                self.resting[j].merge(other.resting[j]);
+                self.at_rest[j] = merged([&self.at_rest[j], r], self.columns.row_width(j));
+            }
         }
         self.rows += other.rows;
     }
@@ -198,8 +270,15 @@ impl BlockFactors {
         });
         BlockFactors {
             blocks: blocks.collect(),
+            at_rest: self
+                .at_rest
+                .iter()
+                .enumerate()
+                .map(|(j, r)| chosen(r, j))
+                .collect(),
             columns,
-            torque_square: self.torque_square.clone(),
+            moving: self.moving.clone(),
+            resting: self.resting.clone(),
             rows: self.rows,
         }
     }
@@ -214,12 +293,52 @@ impl BlockFactors {
                 rows: self.rows,
                 r,
             }],
-            torque_square: self.torque_square.clone(),
+            moving: self.moving.clone(),
+            resting: self.resting.clone(),
+            at_rest: self.at_rest.clone(),
             rows: self.rows,
         }
     }
 
-    /// R factor of all rows of joint j.
+    /// |b - X theta|^2 of joint j over the rows in which it rests.
+    pub(super) fn square_at_rest(&self, theta: &DVector<f64>, j: usize) -> f64 {
+        let own = self.own_unknowns(theta, j);
+        self.parts(&self.at_rest[j], j).residual_square(&own)
+    }
+
+    /// The residual of joint j, whose squared norm is given for the rows in which it moves and for those in which it
+    /// rests, over the norm of its torque.
+    pub(super) fn relative_residual(&self, j: usize, squares: [f64; 2]) -> RelativeResidual {
+        let rows = [self.moving[j], self.resting[j]];
+        let ratio = |square: f64, torque: f64| match torque > 0.0 {
+            true => (square / torque).sqrt(),
+            false => f64::NAN,
+        };
+        let part = |k: usize| (rows[k].count > 0).then(|| ratio(squares[k], rows[k].torque_square));
+        let torque = rows[0].torque_square + rows[1].torque_square;
+        RelativeResidual {
+            all: ratio(squares[0] + squares[1], torque),
+            moving: part(0),
+            rest: part(1),
+            rms: ((squares[0] + squares[1]) / (rows[0].count + rows[1].count).max(1) as f64).sqrt(),
+        }
+    }
+
+    /// Share of each joint's rows in which it rests.
+    pub fn resting_shares(&self) -> Vec<f64> {
+        let rows = self.moving.iter().zip(&self.resting);
+        let share =
+            |(m, r): (&JointRows, &JointRows)| r.count as f64 / (m.count + r.count).max(1) as f64;
+        rows.map(share).collect()
+    }
+
+    /// Rows in which a joint moves, on average over the joints.
+    pub(crate) fn rows_per_joint(&self) -> f64 {
+        let counts = self.moving.iter().map(|rows| rows.count as f64);
+        counts.sum::<f64>() / self.moving.len().max(1) as f64
+    }
+
+    /// R factor of the rows of joint j in which it moves.
     pub fn joint(&self, j: usize) -> DMatrix<f64> {
         merged(
             self.blocks.iter().map(|b| &b.r[j]),

@@ -236,6 +236,7 @@ mod tests {
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]],
             known: vec![None],
+            rest_speed: Vec::new(),
         };
         let h = 1e-3;
         let theta = vec![95.0, 200.0, 20.0, -3.0];

@@ -1,6 +1,7 @@
 //! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
 //! gradient of its known friction, and the target.
 
+use crate::motion::rest;
 use crate::robot::Robot;
 use crate::robot::friction::{DoubleTanh, sign};
 
@@ -64,12 +65,27 @@ pub struct RegressorColumns {
     pub own: Vec<Vec<Own>>,
     /// Known friction per joint; its gradient takes five columns.
     pub known: Vec<Option<KnownFriction>>,
+    /// Speed up to which each joint rests [m/s or rad/s]: static friction takes any torque there, and its
+    /// rows inform no parameter. Below 0 of a joint whose rows always count; empty where all do.
+    pub rest_speed: Vec<f64>,
 }
 
 /// Columns that the gradient of a known friction law takes.
 pub const GRADIENT: usize = 5;
 
 impl RegressorColumns {
+    /// Rows in which a joint with friction rests, by the speed up to which it does [m/s or rad/s], inform no
+    /// parameter; joints without friction never rest.
+    pub fn rest_at(&mut self, speeds: Vec<f64>) {
+        let friction = |j: usize| {
+            let of_friction = |own: &Own| !matches!(own, Own::Offset);
+            self.known[j].is_some() || self.own[j].iter().any(of_friction)
+        };
+        let speeds = speeds.into_iter().enumerate();
+        let speeds = speeds.map(|(j, speed)| if friction(j) { speed } else { -1.0 });
+        self.rest_speed = speeds.collect();
+    }
+
     /// Number of unknowns: shared ones first, then each joint's own in turn.
     pub fn unknowns(&self) -> usize {
         self.shared + self.own.iter().map(Vec::len).sum::<usize>()
@@ -110,9 +126,17 @@ impl RegressorColumns {
         (0..j).map(|i| self.row_width(i)).sum()
     }
 
-    /// Channels per sample over all joints, measured torques included.
+    /// Channels per sample over all joints: their rows, measured torques, and for each joint 1 where it
+    /// moves and 0 where it rests, where rests are told.
     pub fn channels(&self) -> usize {
-        self.offset(self.joints) + self.joints
+        self.offset(self.joints) + self.joints + self.rest_speed.len()
+    }
+
+    /// Whether joint j rests in a row of filtered channels.
+    #[inline]
+    pub(crate) fn rests(&self, channels: &[f64], j: usize) -> bool {
+        let moving = self.offset(self.joints) + self.joints + j;
+        !self.rest_speed.is_empty() && rest::rests(channels[moving])
     }
 
     /// The same columns with the parameters of the known friction among the unknowns: their
@@ -129,6 +153,7 @@ impl RegressorColumns {
             shared: self.shared,
             own,
             known: vec![None; self.joints],
+            rest_speed: self.rest_speed.clone(),
         }
     }
 
@@ -146,6 +171,9 @@ impl RegressorColumns {
         robot.regressor(q, v, a, &mut out[..n * p]);
         let mut end = self.offset(n);
         out[end..end + n].copy_from_slice(tau);
+        for (j, speed) in self.rest_speed.iter().enumerate() {
+            out[end + n + j] = rest::movement(v[j], *speed);
+        }
         // from the last joint to the first: rows only move up
         for j in (0..n).rev() {
             let first = end - self.row_width(j);

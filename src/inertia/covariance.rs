@@ -30,7 +30,7 @@ pub(super) fn covariance(
     let columns = &factors.columns;
     let weights = inputs.weights;
     let u = columns.unknowns();
-    let rows = factors.rows as f64;
+    let rows = factors.rows_per_joint();
     let known = inputs.prior.map_or(DMatrix::zeros(u, u), |prior| {
         let rows = prior.rows.columns(0, u);
         rows.tr_mul(&rows) * prior.variance

@@ -56,6 +56,7 @@ fn doubled(columns: &RegressorColumns) -> RegressorColumns {
         shared: 2 * columns.shared,
         own: columns.own.iter().map(twice).collect(),
         known: columns.known.clone(),
+        rest_speed: columns.rest_speed.clone(),
     }
 }
 
@@ -218,9 +219,9 @@ fn fill(
             out[at..at + own].copy_from_slice(&z[from..from + own]);
             out[at + own..at + own + whole].copy_from_slice(&x[from..from + whole]);
         }
+        // torques, and which joints move
+        out[wide.offset(n)..].copy_from_slice(&x[columns.offset(n)..]);
     });
-    let last = out.len() - n;
-    out[last..].copy_from_slice(&s.tau[..n]);
 }
 
 thread_local! {
@@ -310,14 +311,13 @@ fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Res
         let c = columns.unknowns_of(j);
         r.column(r.ncols() - 1) - r.columns(c, c) * &own[j]
     };
-    let rows = factors.rows as f64;
+    let rows = factors.rows_per_joint();
     let mut fit = plain.clone();
     for (j, r) in joints.iter().enumerate() {
-        fit.residual_std[j] = residual(r, j).norm() / rows.sqrt();
-        fit.relative_error[j] = match fit.torque_rms[j] {
-            rms if rms > 0.0 => fit.residual_std[j] / rms,
-            _ => f64::NAN,
-        };
+        let square = residual(r, j).norm_squared();
+        fit.residual_std[j] = (square / factors.moving[j].count.max(1) as f64).sqrt();
+        let at_rest = residual(&factors.at_rest[j], j).norm_squared();
+        fit.relative_error[j] = factors.relative_residual(j, [square, at_rest]);
     }
     let score = |block: &BlockFactor| {
         let mut g = DVector::zeros(u);
@@ -447,6 +447,7 @@ mod tests {
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Offset]],
             known: vec![None],
+            rest_speed: Vec::new(),
         }
     }
 

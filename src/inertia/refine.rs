@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::accumulate::BlockFactors;
+use super::accumulate::{BlockFactors, RelativeResidual};
 use super::columns::{GRADIENT, Own, RegressorColumns};
 use super::solution::{FitError, FitInputs, PriorRows};
 use super::solve::{Fit, Weighting, fit, fit_with, least_square, weights_of};
@@ -40,7 +40,7 @@ pub struct RefinedFit {
     /// Passes over the logs.
     pub iterations: usize,
     /// Relative residual per joint before the refinement.
-    pub before: Vec<f64>,
+    pub before: Vec<RelativeResidual>,
     /// The rows of the last pass, the laws' changes among the unknowns.
     pub factors: BlockFactors,
     weights: Vec<f64>,
@@ -251,10 +251,10 @@ fn linear_fit(factors: &BlockFactors) -> Result<Fit, FitError> {
 /// Rms speed of each joint that has a law; 0 of the others.
 fn speeds(factors: &BlockFactors) -> Vec<f64> {
     let place = |own: &Vec<Own>| own.iter().position(|o| *o == Own::Law(0));
-    let speed = |(j, own)| match place(own) {
+    let speed = |(j, own): (usize, &Vec<Own>)| match place(own) {
         Some(k) => {
             let column = factors.columns.shared + k;
-            factors.joint(j).column(column).norm() / (factors.rows as f64).sqrt()
+            factors.joint(j).column(column).norm() / (factors.moving[j].count.max(1) as f64).sqrt()
         }
         None => 0.0,
     };
@@ -374,6 +374,7 @@ mod tests {
             shared: 1,
             own: vec![own],
             known: vec![known],
+            rest_speed: Vec::new(),
         }
     }
 

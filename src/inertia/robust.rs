@@ -181,6 +181,9 @@ impl Weigher {
         for j in 0..columns.joints {
             let (row, after) = std::mem::take(&mut rest).split_at_mut(columns.row_width(j));
             rest = after;
+            if columns.rests(channels, j) {
+                continue;
+            }
             let mut residual = row.last().copied().unwrap_or_default();
             for (c, x) in row[..columns.unknowns_of(j)].iter().enumerate() {
                 residual -= x * self.theta[columns.unknown(j, c)];
@@ -231,10 +234,8 @@ impl Weigher {
         // the residual of all rows as they are, outliers among them
         for (j, tally) in self.tally.iter().enumerate() {
             fit.residual_std[j] = (tally.square / tally.rows.max(1) as f64).sqrt();
-            fit.relative_error[j] = match fit.torque_rms[j] {
-                rms if rms > 0.0 => fit.residual_std[j] / rms,
-                _ => f64::NAN,
-            };
+            let at_rest = factors.square_at_rest(&fit.theta, j);
+            fit.relative_error[j] = factors.relative_residual(j, [tally.square, at_rest]);
         }
         Ok(fit)
     }
@@ -335,6 +336,7 @@ mod tests {
             shared: 1,
             own: vec![vec![Own::Viscous, Own::Coulomb]],
             known: vec![None],
+            rest_speed: Vec::new(),
         };
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;

@@ -81,11 +81,10 @@ pub(super) struct PriorRows {
 /// R factor of each joint, where there are rows enough.
 pub(super) fn joints(factors: &BlockFactors) -> Result<Vec<DMatrix<f64>>, FitError> {
     let u = factors.columns.unknowns();
-    if factors.rows < 2 * u as u64 {
-        return Err(FitError::TooFewRows {
-            rows: factors.rows,
-            unknowns: u,
-        });
+    let rows = factors.moving.iter().map(|rows| rows.count).max();
+    let rows = rows.unwrap_or(0);
+    if rows < 2 * u as u64 {
+        return Err(FitError::TooFewRows { rows, unknowns: u });
     }
     Ok((0..factors.columns.joints)
         .map(|j| factors.joint(j))
@@ -223,7 +222,8 @@ pub(super) fn residual_std(
         .enumerate()
         .map(|(j, r)| {
             let own = factors.own_unknowns(theta, j);
-            (factors.parts(r, j).residual_square(&own) / factors.rows as f64).sqrt()
+            let rows = factors.moving[j].count.max(1);
+            (factors.parts(r, j).residual_square(&own) / rows as f64).sqrt()
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::accumulate::BlockFactors;
+use super::accumulate::{BlockFactors, JointRows, RelativeResidual};
 use super::covariance::covariance;
 use super::solution::{
     ConditionNumbers, Confounded, FitError, FitInputs, conditions, joints, residual_std, solve,
@@ -40,12 +40,13 @@ pub struct Fit {
     pub rank: usize,
     /// Standard deviation of each joint's residual [N or Nm], filtered.
     pub residual_std: Vec<f64>,
-    /// Relative residual per joint: norm of residual over norm of filtered torque.
-    pub relative_error: Vec<f64>,
+    /// Relative residual per joint.
+    pub relative_error: Vec<RelativeResidual>,
     /// Root mean square of the filtered torque per joint.
     pub torque_rms: Vec<f64>,
     /// Root mean square of each unknown's column per joint, joints x unknowns.
     pub column_rms: DMatrix<f64>,
+    /// Rows of a joint that are fitted, on average over the joints.
     pub rows: u64,
     /// Rows that independent residuals of the same certainty would number.
     pub effective_rows: f64,
@@ -79,18 +80,14 @@ pub(super) fn fit_with(factors: &BlockFactors, inputs: FitInputs) -> Result<Fit,
 
 /// Weight of each joint's rows from the standard deviation of its residual [N or Nm].
 pub fn weights_of(factors: &BlockFactors, residual: &[f64]) -> Vec<f64> {
-    let of = |(s, t): (&f64, &f64)| {
-        let floor = 1e-9 * (t / factors.rows as f64).sqrt();
+    let of = |(s, t): (&f64, &JointRows)| {
+        let floor = 1e-9 * (t.torque_square / t.count.max(1) as f64).sqrt();
         match s.max(floor) {
             0.0 => 0.0,
             s => 1.0 / s,
         }
     };
-    residual
-        .iter()
-        .zip(&factors.torque_square)
-        .map(of)
-        .collect()
+    residual.iter().zip(&factors.moving).map(of).collect()
 }
 
 /// Lowest weighted sum of squares that any values of the unknowns reach, prior included.
@@ -135,21 +132,22 @@ fn finish(
     }
     let (covariance, textbook, sensitivity) =
         covariance(factors, joints, &solution, inputs, &residual);
-    let rows = factors.rows as f64;
+    let rows = factors.rows_per_joint();
     let torque_rms: Vec<f64> = factors
-        .torque_square
+        .moving
         .iter()
-        .map(|s| (s / rows).sqrt())
+        .map(|rows| (rows.torque_square / rows.count.max(1) as f64).sqrt())
         .collect();
-    let relative_error = residual
-        .iter()
-        .zip(&torque_rms)
-        .map(|(r, t)| if *t > 0.0 { r / t } else { f64::NAN })
-        .collect();
+    let error = |j: usize| {
+        let moving = residual[j].powi(2) * factors.moving[j].count as f64;
+        factors.relative_residual(j, [moving, factors.square_at_rest(&solution.theta, j)])
+    };
+    let relative_error = (0..n).map(error).collect();
     let mut column_rms = DMatrix::zeros(n, u);
     for (j, r) in joints.iter().enumerate() {
+        let of_joint = factors.moving[j].count.max(1) as f64;
         for c in 0..columns.unknowns_of(j) {
-            column_rms[(j, columns.unknown(j, c))] = r.column(c).norm() / rows.sqrt();
+            column_rms[(j, columns.unknown(j, c))] = r.column(c).norm() / of_joint.sqrt();
         }
     }
     let effective = (0..u)
@@ -174,7 +172,7 @@ fn finish(
         relative_error,
         torque_rms,
         column_rms,
-        rows: factors.rows,
+        rows: rows.round() as u64,
         effective_rows,
     })
 }
@@ -204,6 +202,7 @@ mod tests {
             shared: 1,
             own: vec![own],
             known: vec![known],
+            rest_speed: Vec::new(),
         }
     }
 
@@ -254,7 +253,7 @@ mod tests {
             assert!((found - truth).abs() < 1e-12, "{found} {truth}");
         }
         assert_eq!(fit.rank, 3);
-        assert!(fit.relative_error[0] < 1e-13);
+        assert!(fit.relative_error[0].all < 1e-13);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use super::channel::{ChannelRole, InspectedChannel};
 use super::fault::{LogFault, Severity};
 use super::judge::{Depth, LogJudge};
-use crate::log::{Block, Channels, Instant, LogError, Reader, escape};
+use crate::log::{Block, Channels, Instant, Layout, LogError, Reader, escape};
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
 /// clock closes none.
@@ -26,11 +26,16 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it.
+    /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it. `also` gets every
+    /// block, and the layout that it was read by.
     ///
     /// # Errors
     /// Whatever keeps the reader from the log.
-    pub fn look(reader: &mut Reader, stop: &dyn Fn() -> bool) -> Result<Option<Self>, LogError> {
+    pub fn look(
+        reader: &mut Reader,
+        stop: &dyn Fn() -> bool,
+        also: &mut dyn FnMut(&Block, &Layout),
+    ) -> Result<Option<Self>, LogError> {
         let mut judge = LogJudge::new(channels(reader), Depth::Gate);
         let mut block = Block::default();
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -38,6 +43,7 @@ impl Gate {
             if stop() {
                 return Ok(None);
             }
+            also(&block, reader.layout());
             let rows = block.len();
             let torques = block.tau.len().checked_div(rows).unwrap_or(0);
             columns.resize_with(block.joints() + torques, Vec::new);

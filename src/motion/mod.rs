@@ -23,6 +23,7 @@
 //! | `differences` | v and a from q |
 //! | `run` | the windows of a streamed log |
 //! | `zero_order_hold` | motor forces between two samples, where a linkage turns them |
+//! | `rest` | rows in which a joint rests |
 //! | `full_rate` | smooth q, v, a at every sample of one short record |
 //! | `stretch` | whole stretches in memory, for searches |
 //! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
@@ -31,6 +32,7 @@ mod added_noise;
 mod cutter;
 mod differences;
 mod full_rate;
+pub mod rest;
 mod run;
 mod settings;
 mod stretch;

@@ -151,11 +151,14 @@ q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
             joint: "q4".into(),
             unit: "Nm",
             relative_error: 0.0052,
+            relative_error_moving: Some(0.0052),
+            relative_error_rest: None,
             relative_error_raw: 0.0052,
             rmse: 0.0123,
             max_abs: 0.09,
             r2: 0.99993,
             samples: 2000,
+            resting: 0,
         };
         let text = torque_errors("Validation on unseen.csv", &[row]).to_string();
         let last = text.lines().last().unwrap();

@@ -1,7 +1,7 @@
 //! Filtered columns of a candidate over every stretch.
 
 use crate::diagnose::problem::fit_problem::FitProblem;
-use crate::diagnose::problem::rests::{clear, standing};
+use crate::diagnose::problem::rests::{standing, weigh};
 use crate::diagnose::problem::rows::scene;
 use crate::effect::{Added, AugmentedModel, Torques, shifted};
 use crate::motion::MotionError;
@@ -37,7 +37,12 @@ pub fn columns(
             let filter = problem.filters.of(stretch);
             let mut rows = filter.run(&channels)?;
             let still = standing(model, stretch, filter, j);
-            rows.iter_mut().for_each(|column| clear(column, &still));
+            let weight = match effect.at_rest() {
+                true => problem.rest_weight[j],
+                false => 0.0,
+            };
+            rows.iter_mut()
+                .for_each(|column| weigh(column, &still, weight));
             of_stretch.push(rows);
         }
         out.push(of_stretch);

@@ -17,6 +17,8 @@ pub struct Case {
     pub roles: Vec<LogRole>,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub rest_speed: Vec<f64>,
     /// Torque unit per joint.
     pub units: Vec<String>,
     /// Torques are means of two rows, as by a zero-order hold.

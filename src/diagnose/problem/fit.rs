@@ -97,7 +97,7 @@ fn evaluate(
         &model,
         unknowns,
         (problem.stretches, &problem.inertial),
-        problem.filters,
+        (problem.filters, &problem.rest_weight),
         &problem.split,
     )?;
     let weights = match weights {

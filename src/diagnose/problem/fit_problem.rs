@@ -20,6 +20,8 @@ pub struct FitProblem<'a> {
     pub open: &'a FreeParameters,
     pub prior: &'a ParameterPrior,
     pub cover: Cover,
+    /// Weight of each joint's rows at rest, where its friction law jumps.
+    pub rest_weight: Vec<f64>,
 }
 
 /// The filtered regressors of all stretches.
@@ -51,6 +53,7 @@ impl<'a> FitProblem<'a> {
             stretches,
             split: self.split.clone(),
             cover: self.cover.clone(),
+            rest_weight: self.rest_weight.clone(),
             ..*self
         })
     }

@@ -65,7 +65,7 @@ impl Base {
         model: &AugmentedModel,
         unknowns: Unknowns,
         (stretches, inertial): (&[Stretch], &[Inertial]),
-        filters: &ParallelFilters,
+        (filters, rest_weight): (&ParallelFilters, &[f64]),
         split: &DataSplit,
     ) -> Result<Self, MotionError> {
         let filtered = stretches
@@ -74,7 +74,9 @@ impl Base {
             .enumerate()
             .map(|(i, motion)| {
                 let filter = filters.of(motion.0);
-                filtered(model, &unknowns, motion, filter, &|j| split.ignores(i, j))
+                filtered(model, &unknowns, motion, (filter, rest_weight), &|j| {
+                    split.ignores(i, j)
+                })
             })
             .collect::<Result<Vec<_>, _>>()?;
         let of_piece = |piece: &Piece| {

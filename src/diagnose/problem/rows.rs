@@ -1,6 +1,6 @@
 //! Filtered, decimated rows of every joint.
 
-use super::rests::{clear, standing};
+use super::rests::{standing, weigh};
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{AugmentedModel, Scene, Torques, shifted};
 use crate::motion::{MotionError, Parallel, Stretch};
@@ -60,7 +60,8 @@ fn regressor(robot: &Robot, stretch: &Stretch) -> Vec<Vec<Vec<f64>>> {
     out
 }
 
-/// Columns of all unknowns and the residual along one stretch; zeros for joints whose rows are ignored.
+/// Columns of all unknowns and the residual along one stretch; zeros for joints whose rows are ignored. Rows in which
+/// a joint stands have its `rest_weight`, and say nothing of its friction.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -68,7 +69,7 @@ pub fn filtered(
     model: &AugmentedModel,
     unknowns: &Unknowns,
     (stretch, inertial): (&Stretch, &Inertial),
-    parallel: &Parallel,
+    (parallel, rest_weight): (&Parallel, &[f64]),
     ignored: &dyn Fn(usize) -> bool,
 ) -> Result<Filtered, MotionError> {
     let n = model.model.robot.joints();
@@ -112,11 +113,30 @@ pub fn filtered(
             .collect();
         columns.extend(rows);
         let still = standing(model, stretch, parallel, j);
-        columns.iter_mut().for_each(|column| clear(column, &still));
+        let at_rest = own_at_rest(model, unknowns, j);
+        for (column, at_rest) in columns.iter_mut().zip(at_rest.chain([true])) {
+            let weight = if at_rest { rest_weight[j] } else { 0.0 };
+            weigh(column, &still, weight);
+        }
         out.residual[j] = columns.pop().unwrap_or_default();
         out.columns[j] = columns;
     }
     Ok(out)
+}
+
+/// Whether each unknown of a joint has a part in its torque at rest.
+fn own_at_rest<'a>(
+    model: &'a AugmentedModel,
+    unknowns: &'a Unknowns,
+    j: usize,
+) -> impl Iterator<Item = bool> + 'a {
+    unknowns.columns[j].iter().map(|i| match unknowns.list[*i] {
+        Unknown::Theta(_) | Unknown::Offset(_) => true,
+        Unknown::Friction { .. } => false,
+        Unknown::Linear { effect, .. } | Unknown::Shape { effect, .. } => {
+            model.effects[effect].at_rest()
+        }
+    })
 }
 
 /// Columns of a joint's unknowns before the filter, `late` samples late; without those of the inertial parameters
@@ -260,7 +280,14 @@ mod tests {
         };
         let rows = |model: &AugmentedModel| {
             let unknowns = Unknowns::of(model, &open, &cover);
-            filtered(model, &unknowns, (&stretch, &kept), &parallel, &ignored).unwrap()
+            filtered(
+                model,
+                &unknowns,
+                (&stretch, &kept),
+                (&parallel, &[0.0; 4]),
+                &ignored,
+            )
+            .unwrap()
         };
         // q4 is reckoned anew where it is late; q1 and q5 are kept in both, q2 is ignored
         let (now, late) = (rows(&late_by(0.0)), rows(&late_by(1e-15)));

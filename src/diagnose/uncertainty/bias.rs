@@ -192,6 +192,7 @@ mod tests {
             cover: Cover::of(&robot, &stretches, 30.0),
             stretches: &stretches,
             filters: &filters,
+            rest_weight: vec![0.0],
             split,
             open: &open,
             prior: &prior,

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::diagnose::problem::data_split::{DataSplit, RowRole};
-use crate::diagnose::problem::rests::standing;
+use crate::diagnose::problem::rests::{resting, standing};
 use crate::effect::AugmentedModel;
 use crate::math::bootstrap::intervals_95;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
@@ -17,6 +17,10 @@ pub struct JointErrors {
     pub unit: String,
     pub rmse: f64,
     pub relative_error: f64,
+    /// The same of the rows in which the joint moves; null where there are none.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which it rests.
+    pub relative_error_rest: Option<f64>,
     /// Bootstrap interval of the relative error.
     pub interval_95: [f64; 2],
     pub relative_error_raw: f64,
@@ -30,6 +34,10 @@ pub struct JointErrors {
 pub struct OverallErrors {
     /// Stacked norms; none where the joints' units differ.
     pub relative_error: Option<f64>,
+    /// The same of the rows in which each joint moves.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which each joint rests.
+    pub relative_error_rest: Option<f64>,
     /// Root mean square over joints of their relative errors.
     pub mean_relative_error: f64,
     /// Bootstrap interval of the mean relative error.
@@ -53,6 +61,8 @@ struct PieceErrors {
     largest: f64,
     raw_error: f64,
     raw_torque: f64,
+    /// Squared error and torque, and number, of the rows in which the joint rests.
+    rest: [f64; 3],
 }
 
 /// Seed of the bootstrap.
@@ -75,7 +85,7 @@ pub fn errors(
     model: &AugmentedModel,
     units: &[String],
     stretches: &[Stretch],
-    filters: &ParallelFilters,
+    (filters, rest_speed): (&ParallelFilters, &[f64]),
     split: &DataSplit,
     (wanted, counted): (&dyn Fn(RowRole) -> bool, Counted),
 ) -> Result<Option<Errors>, MotionError> {
@@ -94,6 +104,7 @@ pub fn errors(
         let hat = model.reconstruct(stretch);
         let channels: Vec<&[f64]> = stretch.tau.iter().chain(&hat).map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
+        let resting = resting(model, stretch, parallel, rest_speed)?;
         let mut still = vec![vec![false; parallel.rows(stretch.len())]; n];
         if counted == Counted::Moving {
             for (j, still) in still.iter_mut().enumerate() {
@@ -115,6 +126,10 @@ pub fn errors(
                     s.mean += measured;
                     s.rows += 1.0;
                     s.largest = s.largest.max(e.abs());
+                    if resting[j][i] {
+                        let rest = [e * e, measured * measured, 1.0];
+                        s.rest.iter_mut().zip(rest).for_each(|(sum, x)| *sum += x);
+                    }
                 }
                 let first = parallel.sample_of(piece.rows.start);
                 let last = parallel.sample_of(piece.rows.end).min(stretch.len());
@@ -160,6 +175,14 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
         errors.push(mean(&errors));
         errors
     });
+    // squared error and torque, and number of rows, of joint j: moving, resting
+    let parts = |j: usize| -> [[f64; 3]; 2] {
+        let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
+        let all = [sum(|s| s.error), sum(|s| s.torque), sum(|s| s.rows)];
+        let rest = [sum(|s| s.rest[0]), sum(|s| s.rest[1]), sum(|s| s.rest[2])];
+        [std::array::from_fn(|k| (all[k] - rest[k]).max(0.0)), rest]
+    };
+    let part = |[error, torque, rows]: [f64; 3]| (rows > 0.0).then(|| ratio(error, torque));
     let joints: Vec<JointErrors> = (0..n)
         .map(|j| {
             let sum = |of: fn(&PieceErrors) -> f64| pieces.iter().map(|p| of(&p[j])).sum::<f64>();
@@ -170,6 +193,8 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
                 unit: units[j].clone(),
                 rmse: (sum(|s| s.error) / rows.max(1.0)).sqrt(),
                 relative_error: found[j],
+                relative_error_moving: part(parts(j)[0]),
+                relative_error_rest: part(parts(j)[1]),
                 interval_95: intervals[j],
                 relative_error_raw: ratio(sum(|s| s.raw_error), sum(|s| s.raw_torque)),
                 max_abs: pieces.iter().map(|p| p[j].largest).fold(0.0, f64::max),
@@ -183,10 +208,17 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
         })
         .collect();
     let one_unit = units.iter().all(|u| *u == units[0]);
+    let pooled = |k: usize| {
+        let add = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
+        let all = (0..n).map(|j| parts(j)[k]).fold([0.0; 3], add);
+        one_unit.then(|| part(all)).flatten()
+    };
     let total = |of: fn(&PieceErrors) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
     Errors {
         overall: OverallErrors {
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
+            relative_error_moving: pooled(0),
+            relative_error_rest: pooled(1),
             mean_relative_error: mean(&found),
             interval_95: intervals[n],
         },

@@ -12,7 +12,7 @@ use crate::report::sections::torque::Drawn;
 use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary};
-use crate::validate::Validation;
+use crate::validate::{JointError, Validation};
 
 /// What the report is made from.
 pub struct Validate<'a> {
@@ -104,11 +104,43 @@ pub fn told(terminal: &mut Writer, validation: &Validation, caption: &str) {
         let error = number::percent(e.relative_error_raw);
         unbroken(&format!("{} {error}", e.joint))
     });
+    let pooled = validation.overall.relative_error;
+    let pooled = pooled
+        .filter(|_| joints.len() > 1)
+        .map(|error| format!(", {} pooled (stacked norms)", number::percent(error)));
     terminal.paragraph(&format!(
-        "over joints {}; before the parallel filter: {}",
+        "over joints {}{}; before the parallel filter: {}",
         number::percent(validation.overall.mean_relative_error),
+        pooled.unwrap_or_default(),
         raw.collect::<Vec<_>>().join(", ")
     ));
+    if let Some(text) = at_rest(validation) {
+        terminal.paragraph(&text);
+    }
+}
+
+/// The errors of moving and of resting joints apart, where one rests in a hundredth of its rows.
+fn at_rest(validation: &Validation) -> Option<String> {
+    let rests = |e: &&JointError| 100 * e.resting >= e.samples && e.resting > 0;
+    let joints = validation.joints.iter().filter(rests);
+    let each: Vec<String> = joints
+        .map(|e| {
+            let error = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), number::percent);
+            unbroken(&format!(
+                "{} {} moving, {} at rest ({} of its rows)",
+                e.joint,
+                error(e.relative_error_moving),
+                error(e.relative_error_rest),
+                number::percent(e.resting as f64 / e.samples as f64)
+            ))
+        })
+        .collect();
+    (!each.is_empty()).then(|| {
+        format!(
+            "At rest friction takes any torque up to its Coulomb level, which no model predicts: {}",
+            each.join(", ")
+        )
+    })
 }
 
 /// The verdict in words, and whether nothing calls for attention.
@@ -161,6 +193,7 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
         .iter()
         .map(|e| {
             let torque = |v: f64| format!("{} {}", number::significant(v, 3), e.unit);
+            let rest = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), number::percent);
             vec![
                 e.joint.clone(),
                 number::percent(e.relative_error),
@@ -170,6 +203,8 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
                     true => format!("{:.5}", e.r2),
                     false => number::ABSENT.to_owned(),
                 },
+                rest(e.relative_error_moving),
+                rest(e.relative_error_rest),
                 number::percent(e.relative_error_raw),
                 e.samples.to_string(),
             ]
@@ -183,6 +218,8 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
             "rms error",
             "largest",
             "R\u{b2}",
+            "moving",
+            "at rest",
             "relative error before the filter",
             "rows",
         ],
