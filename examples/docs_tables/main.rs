@@ -6,6 +6,7 @@
 
 mod arms;
 mod blocks;
+mod setup;
 mod tables;
 
 use std::path::Path;

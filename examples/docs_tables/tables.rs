@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::arms;
+use super::{arms, setup};
 use cft_ident::number::{percent, significant, value_and_std};
 use serde_json::Value;
 
@@ -24,6 +24,7 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-errors", names @ ..] => arms::errors(names),
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
+        ["setup-faults", study] => setup::faults(study),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))

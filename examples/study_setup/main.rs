@@ -1,0 +1,81 @@
+//! Faults of the set-up, made one at a time on measured and simulated machines, and what the tool says
+//! of each: `cargo build && cargo run --example study_setup -- [MACHINE...]`.
+//!
+//! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
+//! goes on where it was. `--again` begins anew. The summary goes to docs/results/study_setup.json, from
+//! which docs/setup.md has its tables.
+
+mod bench;
+mod summary;
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::sync::Mutex;
+
+use bench::cases::cases;
+use bench::judge::{Clean, judge};
+use bench::machines::{NAMES, machine};
+use rayon::prelude::*;
+use serde_json::Value;
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let named: Vec<&String> = words.iter().filter(|w| !w.starts_with("--")).collect();
+    let wanted = |name: &str| named.is_empty() || named.iter().any(|w| *w == name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/study_setup");
+    std::fs::create_dir_all(&folder).expect("the folder can be made");
+    let path = folder.join("rows.jsonl");
+    if words.iter().any(|w| w == "--again") {
+        let _ = std::fs::remove_file(&path);
+    }
+    let known = finished(&path);
+    let file = OpenOptions::new().create(true).append(true).open(&path);
+    let file = Mutex::new(file.expect("the file of rows opens"));
+    for name in NAMES.into_iter().filter(|name| wanted(name)) {
+        let Some(machine) = machine(name, &folder) else {
+            continue;
+        };
+        let clean = Clean::new(machine, &folder);
+        let done = |case: &str| {
+            known
+                .iter()
+                .any(|r| r["machine"] == name && r["case"] == case)
+        };
+        let fresh = cases(&clean.machine);
+        fresh.par_iter().for_each(|case| {
+            let case_name = case.name(&clean.machine);
+            if done(&case_name) {
+                return;
+            }
+            let Some(mut row) = judge(&clean, case) else {
+                return;
+            };
+            row["machine"] = name.into();
+            row["kind"] = case.kind().into();
+            row["case"] = case_name.into();
+            let mut file = file.lock().expect("no thread panics");
+            writeln!(file, "{row}").expect("the row is written");
+        });
+        eprintln!(
+            "{name}: error {:.4}, {} cases",
+            clean.fit.error(),
+            fresh.len()
+        );
+    }
+    let rows = finished(&path);
+    let summary = summary::summary(&rows);
+    let out = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results/study_setup.json");
+    std::fs::write(out, format!("{summary:#}\n")).expect("the summary is written");
+    summary::print(&summary);
+}
+
+fn finished(path: &Path) -> Vec<Value> {
+    let Ok(file) = File::open(path) else {
+        return Vec::new();
+    };
+    let lines = BufReader::new(file).lines().map_while(Result::ok);
+    lines
+        .filter_map(|line| serde_json::from_str(&line).ok())
+        .collect()
+}
