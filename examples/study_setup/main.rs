@@ -1,5 +1,5 @@
 //! Faults of the set-up, made one at a time on measured and simulated machines, and what the tool says
-//! of each: `cargo build && cargo run --example study_setup -- [MACHINE...]`.
+//! of each: `cargo build && cargo run --example study_setup -- [MACHINE...] [--kind=KIND]`.
 //!
 //! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
 //! goes on where it was. `--again` begins anew. The summary goes to docs/results/study_setup.json, from
@@ -22,6 +22,10 @@ use serde_json::Value;
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let named: Vec<&String> = words.iter().filter(|w| !w.starts_with("--")).collect();
+    let kinds: Vec<&str> = words
+        .iter()
+        .filter_map(|w| w.strip_prefix("--kind="))
+        .collect();
     let wanted = |name: &str| named.is_empty() || named.iter().any(|w| *w == name);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/study_setup");
     std::fs::create_dir_all(&folder).expect("the folder can be made");
@@ -45,7 +49,8 @@ fn main() {
         let fresh = cases(&clean.machine);
         fresh.par_iter().for_each(|case| {
             let case_name = case.name(&clean.machine);
-            if done(&case_name) {
+            let other = !kinds.is_empty() && !kinds.contains(&case.kind());
+            if other || done(&case_name) {
                 return;
             }
             let Some(mut row) = judge(&clean, case) else {

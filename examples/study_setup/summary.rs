@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::bench::judge::{is, met};
 use crate::bench::machines::NAMES;
 
 /// Kinds in the order of the table.
@@ -32,16 +33,7 @@ struct Count {
     tied: usize,
     right_joint: usize,
     fixed: usize,
-    found: usize,
-}
-
-fn is(row: &Value, key: &str) -> bool {
-    row[key].as_bool() == Some(true)
-}
-
-/// Whether all that was asked of the tool was met.
-fn met(row: &Value) -> bool {
-    is(row, "named") && (is(row, "first") || is(row, "tied")) && is(row, "right_joint")
+    met: usize,
 }
 
 impl Count {
@@ -58,7 +50,7 @@ impl Count {
             out.tied += usize::from(!is(row, "first") && is(row, "tied"));
             out.right_joint += usize::from(is(row, "right_joint"));
             out.fixed += usize::from(is(row, "fixed"));
-            out.found += usize::from(met(row));
+            out.met += usize::from(met(row));
         }
         out
     }
@@ -72,7 +64,7 @@ impl Count {
             "tied": self.tied,
             "right_joint": self.right_joint,
             "fixed": self.fixed,
-            "found": self.found,
+            "met": self.met,
         })
     }
 }
@@ -103,7 +95,7 @@ pub fn summary(rows: &[Value]) -> Value {
     };
     let mut misses: Vec<Value> = faults
         .iter()
-        .filter(|r| is(r, "matters") && !(met(r) && is(r, "fixed")))
+        .filter(|r| is(r, "matters") && !met(r))
         .map(|r| {
             json!({
                 "case": label(r),

@@ -85,6 +85,18 @@ fn fitted(
     (done, fit)
 }
 
+/// What a row says of a case.
+pub fn is(row: &Value, key: &str) -> bool {
+    row[key].as_bool() == Some(true)
+}
+
+/// Whether all that is asked of the tool was met: the truth told first, and the mended file right; or
+/// the truth told as one of two that these data do not tell apart, of which the mended file has one.
+pub fn met(row: &Value) -> bool {
+    let alone = is(row, "first") && is(row, "fixed");
+    is(row, "named") && is(row, "right_joint") && (alone || is(row, "tied"))
+}
+
 /// Judges a case: its row in the results; nothing where this machine cannot have the fault.
 pub fn judge(clean: &Clean, case: &Case) -> Option<Value> {
     let folder = tempfile::tempdir().expect("a folder");
