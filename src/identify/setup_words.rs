@@ -40,25 +40,15 @@ pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
     }
 }
 
-/// Reversals of a joint below which its log tells little of friction.
-const FEW_REVERSALS: usize = 4;
-/// Speeds that vary by less than this share of their mean tell viscous friction from none.
-const FEW_SPEEDS: f64 = 0.5;
-
 /// Why a friction may come out negative.
 fn cause(problem: &Problem, joint: usize) -> &'static str {
-    let (sample, n) = (&problem.sample, problem.sample.joints);
-    let speeds = || sample.v.iter().skip(joint).step_by(n.max(1)).copied();
-    let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
-    let moving: Vec<f64> = speeds().filter(|v| v.abs() > 0.05 * most).collect();
-    let turns = moving.windows(2).filter(|w| w[0] * w[1] < 0.0).count();
-    let mean = moving.iter().map(|v| v.abs()).sum::<f64>() / moving.len().max(1) as f64;
-    let square = moving.iter().map(|v| v * v).sum::<f64>() / moving.len().max(1) as f64;
-    let spread = (square - mean * mean).max(0.0).sqrt() / mean.max(f64::MIN_POSITIVE);
-    if turns < FEW_REVERSALS || spread < FEW_SPEEDS {
-        "the log has too few reversals or speeds to tell friction from a constant torque; log the joint at several speeds in both directions"
-    } else {
-        "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine"
+    match tells_friction(&problem.sample, joint) {
+        false => {
+            "the log has too few reversals or speeds to tell friction from a constant torque; log the joint at several speeds in both directions"
+        }
+        true => {
+            "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine"
+        }
     }
 }
 

@@ -17,6 +17,7 @@
 //! | `physics` | inertia and friction power of a solution with their deviations |
 //! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
 //! | `hypotheses` | which corrections are tried |
+//! | `fitted` | corrections whose number is fitted: zeros, scales, gravity of any direction |
 //! | `search` | which one is told |
 
 mod channels;
@@ -24,6 +25,7 @@ mod confirm;
 mod correction;
 mod finding;
 mod fit;
+mod fitted;
 mod hypotheses;
 mod normal;
 mod physics;
@@ -36,5 +38,6 @@ pub use finding::{
     Alternative, ChannelKind, Evidence, Finding, FindingKind, FrictionPower, Setting, SetupReport,
 };
 pub use normal::Problem;
+pub use physics::tells_friction;
 pub use sample::{MOST_ROWS, Sample, Thinner};
 pub use search::{Found, Negative, Searched, search};

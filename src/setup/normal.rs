@@ -45,7 +45,9 @@ impl Problem<'_> {
     pub(super) fn moving(&self) -> Vec<bool> {
         let speeds = self.sample.rms(&self.sample.v);
         let speeds = speeds.iter().zip(&self.ranges);
-        let speeds: Vec<f64> = speeds.map(|(v, r)| v / r.max(f64::MIN_POSITIVE)).collect();
+        // of one joint there is nothing to compare with
+        let range = |r: &f64| if self.ranges.len() == 1 { 1.0 } else { *r };
+        let speeds: Vec<f64> = speeds.map(|(v, r)| v / range(r)).collect();
         let most = speeds.iter().copied().fold(0.0, f64::max);
         let torques = self.sample.rms(&self.sample.tau);
         let moving = |(v, tau): (&f64, f64)| *v > STILL * most && tau > 0.0;

@@ -7,12 +7,17 @@ use super::channels::Carried;
 use super::correction::Correction;
 use super::fit::Fit;
 use super::normal::{Normal, Problem};
+use super::sample::Sample;
 use crate::inertia::columns::Own;
 use crate::robot::Robot;
 
-/// A quantity that makes less than this share of a joint's torque may have any sign: effects that the model
-/// lacks are larger.
-const NEGLIGIBLE: f64 = 0.02;
+/// What the model lacks may look like a quantity to this correlation: a share of the residual that has any sign.
+const ALIKE: f64 = 0.25;
+/// A joint that goes the other way in a smaller share of its rows does not tell friction from a constant
+/// torque.
+const OTHER_WAY: f64 = 0.1;
+/// A speed below this share of the largest one is rest.
+const REST: f64 = 0.05;
 /// Rows whose poses stand for all of them.
 const POSES: usize = 60;
 
@@ -32,8 +37,10 @@ pub(super) struct Positive {
     pub quantity: Quantity,
     pub value: f64,
     pub std: f64,
-    /// What is worth mentioning beside the joint's torque.
+    /// What may come from effects that the model lacks.
     pub notable: f64,
+    /// Whether the motion is one that tells it.
+    pub told: bool,
 }
 
 impl Positive {
@@ -46,8 +53,8 @@ impl Positive {
 /// Log-probability that all are positive, each beyond `-LEAST` deviations counting no more: one contradiction
 /// must not hide what the residual says.
 pub(super) fn credit(of: &[Positive]) -> f64 {
-    of.iter()
-        .map(|p| log_normal_cdf(p.deviations().max(-LEAST)))
+    let told = of.iter().filter(|p| p.told);
+    told.map(|p| log_normal_cdf(p.deviations().max(-LEAST)))
         .sum()
 }
 
@@ -79,8 +86,7 @@ pub(super) fn positives(
     // squares of speed, acceleration
     let (mut speed, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
     let (mut unit, still) = (vec![0.0; n], vec![0.0; n]);
-    let (mut y, mut at_rest) = (vec![0.0; p], vec![0.0; p]);
-    let poses = rows.len();
+    let (mut y, mut at_rest) = (vec![0.0; n * p], vec![0.0; n * p]);
     for &k in &rows {
         if !problem
             .channels
@@ -89,13 +95,13 @@ pub(super) fn positives(
             continue;
         }
         count += 1.0;
+        robot.regressor(&carried.q, &still, &still, &mut at_rest);
         for j in (0..n).filter(|j| !normal.places[*j].is_empty()) {
             unit[j] = 1.0;
-            robot.regressor_row(j, &carried.q, &still, &unit, &mut y);
-            robot.regressor_row(j, &carried.q, &still, &still, &mut at_rest);
+            robot.regressor(&carried.q, &still, &unit, &mut y);
             unit[j] = 0.0;
-            for (c, (y, rest)) in y.iter().zip(&at_rest).enumerate() {
-                inertia[j][c] += y - rest;
+            for c in 0..p {
+                inertia[j][c] += y[j * p + c] - at_rest[j * p + c];
             }
         }
     }
@@ -126,9 +132,9 @@ pub(super) fn positives(
             }
         }
     }
-    let _ = poses;
     let all = f64::max(all, 1.0);
     let torque = torque_rms(problem, &fit.targets);
+    let missed = |j: usize| ALIKE * fit.left[j].sqrt() * torque[j];
     let mut out = Vec::new();
     for j in (0..n).filter(|j| !normal.places[*j].is_empty()) {
         let (v, a) = ((speed[j] / all).sqrt(), (acceleration[j] / all).sqrt());
@@ -137,22 +143,35 @@ pub(super) fn positives(
             quantity: Quantity::Inertia,
             value: inertia[j].dot(&fit.theta),
             std: fit.deviation(normal, &inertia[j]),
-            notable: NEGLIGIBLE * torque[j] / a.max(f64::MIN_POSITIVE),
+            told: true,
+            notable: missed(j) / a.max(f64::MIN_POSITIVE),
         });
         if problem.columns.known[j].is_some() || !problem.columns.own[j].is_empty() {
             let f = &power[j] / all;
             let friction = fit.targets[j][n];
+            let told = tells_friction(&problem.sample, j);
             out.push(Positive {
                 joint: j,
                 quantity: Quantity::FrictionPower,
                 // the target holds known friction with the sign that takes it off
                 value: f.dot(&fit.theta) - friction * known[j] / all,
                 std: fit.deviation(normal, &f),
-                notable: NEGLIGIBLE * torque[j] * v,
+                told,
+                notable: missed(j) * v,
             });
         }
     }
     out
+}
+
+/// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
+pub fn tells_friction(sample: &Sample, joint: usize) -> bool {
+    let of_joint = sample.v.iter().skip(joint);
+    let speeds = || of_joint.clone().step_by(sample.joints.max(1)).copied();
+    let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let forward = speeds().filter(|v| *v > REST * most).count() as f64;
+    let backward = speeds().filter(|v| *v < -REST * most).count() as f64;
+    forward.min(backward) > OTHER_WAY * (forward + backward)
 }
 
 /// Root mean square of each joint's torque.

@@ -12,7 +12,9 @@ use rayon::prelude::*;
 use super::channels::Drive;
 use super::confirm;
 use super::correction::{Change, Correction};
+use super::finding::ChannelKind;
 use super::fit::Fit;
+use super::fitted::Fitted;
 use super::hypotheses;
 use super::normal::{Normal, Problem};
 use super::physics::{Positive, Quantity, credit, positives};
@@ -34,6 +36,8 @@ const TIED: f64 = 3.0;
 const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
+/// Logarithm of a factor by which scales differ that cannot both be right.
+const FLAT: f64 = 0.7;
 /// A quantity is told as negative beyond so many deviations.
 const NEGATIVE: f64 = -2.0;
 
@@ -76,12 +80,12 @@ pub struct Searched {
 }
 
 /// A hypothesis as it was fitted.
-struct Trial {
-    by: Correction,
-    robot: Robot,
-    normal: Arc<Normal>,
-    fit: Fit,
-    power: Vec<f64>,
+pub(super) struct Trial {
+    pub by: Correction,
+    pub robot: Robot,
+    pub normal: Arc<Normal>,
+    pub fit: Fit,
+    pub power: Vec<f64>,
 }
 
 /// The same with what physics says of it.
@@ -95,7 +99,7 @@ struct Judged {
 }
 
 impl Trial {
-    fn new(
+    pub fn new(
         problem: &Problem,
         by: Correction,
         rows: &[usize],
@@ -242,10 +246,21 @@ fn round(
         let trial = Trial::new(problem, base.with(change), &few, 1, Some(&declared))?;
         Some(trial.fit.score)
     };
-    let scores: Vec<Option<f64>> = changes.par_iter().map(score).collect();
+    let mut scores: Vec<Option<f64>> = changes.par_iter().map(score).collect();
     if stopped() {
         return None;
     }
+    let few_rows = Fitted {
+        problem,
+        base,
+        rows: &few,
+        blocks: 1,
+        declared: &declared,
+    };
+    let fitted = few_rows.proposals(&changes, &scores, moving);
+    let fixed = changes.len();
+    scores.extend(fitted.iter().map(|(_, score)| Some(*score)));
+    changes.extend(fitted.into_iter().map(|(change, _)| change));
     let whole = Trial::new(problem, base.clone(), &all, BLOCKS, None)?;
     let whole = judged(problem, None, None, whole);
     let negative = negative(&whole.positives);
@@ -283,14 +298,21 @@ fn round(
     short.extend(rest);
     short.sort_unstable();
     let judge = |i: &usize| {
-        let trial = Trial::new(
-            problem,
-            base.with(&changes[*i]),
-            &all,
-            BLOCKS,
-            Some(&whole.trial),
-        )?;
-        Some(judged(problem, Some(changes[*i].clone()), None, trial))
+        let (mut change, mut std) = (changes[*i].clone(), None);
+        if *i >= fixed {
+            let all_rows = Fitted {
+                problem,
+                base,
+                rows: &all,
+                blocks: BLOCKS,
+                declared: &whole.trial,
+            };
+            let (better, curvature) = all_rows.polished(&change);
+            (change, std) = (better, Some(curvature));
+        }
+        let by = base.with(&change);
+        let trial = Trial::new(problem, by, &all, BLOCKS, Some(&whole.trial))?;
+        Some(judged(problem, Some(change), std, trial))
     };
     let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
     Some((decide(problem, &whole, list, tried), negative))
@@ -336,7 +358,11 @@ fn decide(
     };
     for judged in &mut list {
         judged.worth = worth(judged);
+        judged.std = judged
+            .std
+            .map(|curvature| (share * curvature).max(1e-12).sqrt().recip());
     }
+    drop_flat(&mut list);
     let most = list
         .iter()
         .map(|j| j.worth)
@@ -369,7 +395,7 @@ fn decide(
         .map(|(b, a)| (b / a).sqrt())
         .fold(error[0] / error[1], f64::max);
     let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
-        && joints_below(&chosen.positives, NEGATIVE).is_empty();
+        && joints_below(&chosen.positives, FORBIDDEN).is_empty();
     let sure = largest > TENTH || forbidden;
     if !sure {
         return None;
@@ -383,7 +409,7 @@ fn decide(
     };
     let violated = |of: &[Positive]| -> Vec<String> {
         of.iter()
-            .filter(|p| p.deviations() < NEGATIVE)
+            .filter(|p| p.told && p.deviations() < NEGATIVE)
             .map(name)
             .collect()
     };
@@ -404,11 +430,35 @@ fn decide(
     })
 }
 
+/// Leaves out a scale of a joint where another one, far from it, is worth as much: such a scale only takes the
+/// joint's torque out of the fit of the others, which leaves no trace of its size.
+fn drop_flat(list: &mut Vec<Judged>) {
+    let scale = |j: &Judged| match &j.change {
+        Some(Change::Scale(channel, joints, f)) => {
+            Some((*channel, joints.clone(), f.ln(), j.worth))
+        }
+        _ => None,
+    };
+    let scales: Vec<_> = list.iter().filter_map(scale).collect();
+    let flat = |of: &(ChannelKind, Vec<usize>, f64, f64)| {
+        let best = scales.iter().filter(|s| s.0 == of.0 && s.1 == of.1);
+        let most = best.clone().map(|s| s.3).fold(f64::NEG_INFINITY, f64::max);
+        let near: Vec<f64> = best.filter(|s| s.3 >= most - TIED).map(|s| s.2).collect();
+        let (low, high) = near
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                (l.min(*x), h.max(*x))
+            });
+        high - low > FLAT
+    };
+    list.retain(|j| scale(j).is_none_or(|of| !flat(&of)));
+}
+
 /// Joints with a quantity below so many deviations.
 fn joints_below(of: &[Positive], deviations: f64) -> Vec<usize> {
     let mut out: Vec<usize> = of
         .iter()
-        .filter(|p| p.deviations() < deviations)
+        .filter(|p| p.told && p.deviations() < deviations)
         .map(|p| p.joint)
         .collect();
     out.dedup();
