@@ -7,6 +7,7 @@ use crate::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit};
 use crate::number;
 use crate::robot::JointKind;
 use crate::robot::cft::COORDINATES;
+use crate::setup::tells_friction;
 use crate::setup::{
     Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind, Found,
     FrictionPower, Problem, Searched, Setting, SetupReport,

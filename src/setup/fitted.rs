@@ -17,6 +17,12 @@ const CALIBRATION: f64 = 2.5 * std::f64::consts::PI / 180.0;
 const TILT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Logarithm of a factor below which a torque constant is badly known, and no unit mistaken.
 const LEAST_SCALE: f64 = 0.4;
+/// No joint turns farther than this in a log, by its cables \[rad\].
+const MANY_TURNS: f64 = 14.0;
+/// Nor is a motion that excites it smaller \[rad\].
+const HARDLY: f64 = 0.05;
+/// Logarithm of the ratio of factors that are tried one after the other.
+const RATIO: f64 = 0.025;
 /// Halvings of a step behind the top of a climb.
 const HALVES: usize = 4;
 /// Steps of a search for the direction of gravity \[rad\].
@@ -90,6 +96,7 @@ impl Fitted<'_> {
         if moving.len() > 1 {
             for &j in moving {
                 out.extend(self.scaled(ChannelKind::Torque, j, declared));
+                out.extend(self.geared(j, declared));
             }
         }
         out
@@ -156,6 +163,36 @@ impl Fitted<'_> {
             }
         }
         (g, score)
+    }
+
+    /// A factor of any size on a joint's position, where it goes round many times or hardly at all: what is
+    /// logged is before a gear then, or in an unknown unit.
+    fn geared(&self, j: usize, declared: f64) -> Option<(Change, f64)> {
+        let n = self.problem.sample.joints;
+        let q = self.problem.sample.q.iter().skip(j).step_by(n);
+        let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+            (l.min(*q), h.max(*q))
+        });
+        let turns = self.problem.robot.joint_kind(j) == JointKind::Revolute;
+        let sign = match high - low {
+            range if turns && range > MANY_TURNS => -1.0,
+            range if turns && range < HARDLY => 1.0,
+            _ => return None,
+        };
+        let of = |k: usize| {
+            Change::Scale(
+                ChannelKind::Position,
+                vec![j],
+                (sign * RATIO * k as f64).exp(),
+            )
+        };
+        let tried = (1..(8.0 / RATIO) as usize).filter_map(|k| {
+            let change = of(k);
+            self.score(&change).map(|score| (change, score))
+        });
+        tried
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, score)| *score > declared)
     }
 
     /// A factor of any size on a joint's torque, where three times or a third of it does better.

@@ -9,8 +9,8 @@ use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::Robot;
 
 /// A joint whose speed is below this share of the fastest one's stands still: its torque tells nothing of
-/// signs and zeros.
-const STILL: f64 = 0.01;
+/// signs and zeros. One whose unit is mistaken for a thousandth moves.
+const STILL: f64 = 1e-5;
 
 /// A robot file and a sample of its logs.
 pub struct Problem<'a> {

@@ -36,6 +36,8 @@ const TIED: f64 = 3.0;
 const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
+/// Log-likelihood by which what is right may predict worse by chance.
+const WORSE: f64 = 1.0;
 /// Logarithm of a factor by which scales differ that cannot both be right.
 const FLAT: f64 = 0.7;
 /// A quantity is told as negative beyond so many deviations.
@@ -368,7 +370,13 @@ fn decide(
         .map(|j| j.worth)
         .fold(f64::NEG_INFINITY, f64::max);
     // the simplest of those that are worth as much
-    let best = list.iter().position(|j| j.worth >= most - 0.5)?;
+    let simplest = list.iter().position(|j| j.worth >= most - 0.5)?;
+    // a round number before a fitted one that is hardly better
+    let round = list.iter().position(|j| {
+        let alike = same_place(&j.change, &list[simplest].change);
+        alike && j.std.is_none() && j.worth >= most - TIED
+    });
+    let best = round.unwrap_or(simplest);
     if list[best].worth <= worth(declared) {
         return None;
     }
@@ -383,7 +391,11 @@ fn decide(
     let physics = credit(&chosen.positives) - credit(&declared.positives);
     let needed = ODDS + (tried.max(1) as f64).ln();
     let gain = held_out + physics;
-    if gain < needed {
+    // what is right predicts no worse, and wins in both halves of the logs
+    if gain < needed
+        || held_out < -WORSE
+        || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
+    {
         return None;
     }
     let error = [b.error(), a.error()];
@@ -413,12 +425,21 @@ fn decide(
             .map(name)
             .collect()
     };
-    let tied = list
+    let mut tied: Vec<Change> = Vec::new();
+    let mut order: Vec<&Judged> = list
         .iter()
-        .enumerate()
-        .filter(|(i, j)| *i != best && j.worth >= chosen.worth - TIED);
+        .filter(|j| j.worth >= chosen.worth - TIED)
+        .collect();
+    order.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    for change in order.into_iter().filter_map(|j| j.change.clone()) {
+        let there = |other: &Change| same_place(&Some(change.clone()), &Some(other.clone()));
+        if !tied.iter().any(there) && !chosen.change.as_ref().is_some_and(there) {
+            tied.push(change);
+        }
+    }
+    tied.truncate(3);
     Some(Found {
-        tied: tied.filter_map(|(_, j)| j.change.clone()).take(3).collect(),
+        tied,
         change: chosen.change.clone()?,
         std: chosen.std,
         error,
@@ -428,6 +449,44 @@ fn decide(
         violated: [violated(&declared.positives), violated(&chosen.positives)],
         sure,
     })
+}
+
+/// Whether two changes are of the same kind and channels, with other numbers.
+fn same_place(a: &Option<Change>, b: &Option<Change>) -> bool {
+    match (a, b) {
+        (Some(Change::Zero(i, _)), Some(Change::Zero(j, _))) => i == j,
+        (Some(Change::Gravity(_)), Some(Change::Gravity(_))) => true,
+        (Some(Change::Scale(c, i, _)), Some(Change::Scale(d, j, _))) => c == d && i == j,
+        _ => a == b,
+    }
+}
+
+/// Whether a hypothesis gains in the first half of the rows and in the second, each fitted by itself.
+fn wins_in_halves(
+    problem: &Problem,
+    declared: &Judged,
+    chosen: &Judged,
+    share: f64,
+    needed: f64,
+) -> bool {
+    let rows = problem.sample.len();
+    [(0, rows / 2), (rows / 2, rows)]
+        .into_iter()
+        .all(|(from, to)| {
+            let half: Vec<usize> = (from..to).collect();
+            let Some(before) = Trial::new(problem, declared.trial.by.clone(), &half, BLOCKS, None)
+            else {
+                return false;
+            };
+            let by = chosen.trial.by.clone();
+            let Some(after) = Trial::new(problem, by, &half, BLOCKS, Some(&before)) else {
+                return false;
+            };
+            let gain = share * (after.fit.score - before.fit.score);
+            let before = judged(problem, None, None, before);
+            let after = judged(problem, None, None, after);
+            gain + credit(&after.positives) - credit(&before.positives) > needed
+        })
 }
 
 /// Leaves out a scale of a joint where another one, far from it, is worth as much: such a scale only takes the
