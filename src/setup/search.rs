@@ -36,6 +36,8 @@ const TIED: f64 = 3.0;
 const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
+/// A relative error that is more than what real machines leave of a right set-up.
+const THIRD: f64 = 0.33;
 /// Log-likelihood by which what is right may predict worse by chance.
 const WORSE: f64 = 1.0;
 /// Logarithm of a factor by which scales differ that cannot both be right.
@@ -392,8 +394,10 @@ fn decide(
     let needed = ODDS + (tried.max(1) as f64).ln();
     let gain = held_out + physics;
     // what is right predicts no worse, and wins in both halves of the logs
+    let fitted = share * (a.score - b.score);
     if gain < needed
         || held_out < -WORSE
+        || fitted < -0.5 * WORSE
         || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
     {
         return None;
@@ -406,9 +410,11 @@ fn decide(
         .filter(|(b, a)| **b > 0.0 && **a > 0.0)
         .map(|(b, a)| (b / a).sqrt())
         .fold(error[0] / error[1], f64::max);
+    // what leaves a third of the torque unexplained must explain much more than that
+    let poor = error[1] > THIRD && error[0] < 1.5 * error[1];
     let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
         && joints_below(&chosen.positives, FORBIDDEN).is_empty();
-    let sure = largest > TENTH || forbidden;
+    let sure = !poor && (largest > TENTH || forbidden);
     if !sure {
         return None;
     }
