@@ -104,6 +104,18 @@ impl Fit {
         found.map(|fit| Self { targets, ..fit })
     }
 
+    /// Columns solved for.
+    pub fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        let columns: Vec<DVector<f64>> = right
+            .column_iter()
+            .map(|column| self.solver.solve(&column.into_owned()))
+            .collect();
+        match columns.is_empty() {
+            true => DMatrix::zeros(right.nrows(), 0),
+            false => DMatrix::from_columns(&columns),
+        }
+    }
+
     /// Relative error, the root of the mean square over the joints that move.
     pub fn error(&self) -> f64 {
         let active = self.left.iter().filter(|x| **x > 0.0);
@@ -155,6 +167,11 @@ impl Fit {
         };
         normal.blocks.iter().map(of).collect()
     }
+}
+
+/// H x = g, where H is a normal matrix.
+pub(super) fn solved(h: DMatrix<f64>, g: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(Solver::new(h)?.solve(g))
 }
 
 /// (-theta, target): what a joint's columns are multiplied with to give its residual.

@@ -16,6 +16,7 @@
 //! | `fit` | their solution, with weights of its own, and its likelihood |
 //! | `physics` | inertia and friction power of a solution with their deviations |
 //! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
+//! | `doubt` | whether there is any reason to try them all |
 //! | `hypotheses` | which corrections are tried |
 //! | `fitted` | corrections whose number is fitted: zeros, scales, gravity of any direction |
 //! | `search` | which one is told |
@@ -23,6 +24,7 @@
 mod channels;
 mod confirm;
 mod correction;
+mod doubt;
 mod finding;
 mod fit;
 mod fitted;

@@ -132,10 +132,8 @@ impl Problem<'_> {
                 for (j, data) in data.iter_mut().enumerate().filter(|(j, _)| moving[*j]) {
                     let shared = places[j].len() - self.columns.own[j].len();
                     data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
-                    data.extend(self.columns.own[j].iter().map(|own| match own {
-                        Own::Coulomb => carried.sign[j],
-                        own => own.column(carried.v[j]),
-                    }));
+                    let own = self.columns.own[j].iter();
+                    data.extend(own.map(|own| own_column(*own, &carried, j)));
                     data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
                     let known = self.columns.known[j].as_ref();
                     data.push(known.map_or(0.0, |known| known.law.torque(carried.v[j])));
@@ -173,5 +171,13 @@ impl Normal {
     /// Weights of the columns behind the unknowns of a joint: torques, then known friction.
     pub(super) fn target(mix: &DVector<f64>, friction: f64) -> DVector<f64> {
         mix.push(-friction)
+    }
+}
+
+/// The column of a joint's own term in a row.
+pub(super) fn own_column(own: Own, carried: &Carried, j: usize) -> f64 {
+    match own {
+        Own::Coulomb => carried.sign[j],
+        own => own.column(carried.v[j]),
     }
 }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::channels::Drive;
 use super::confirm;
 use super::correction::{Change, Correction};
+use super::doubt::doubtful;
 use super::finding::ChannelKind;
 use super::fit::Fit;
 use super::fitted::Fitted;
@@ -237,7 +238,12 @@ fn round(
 ) -> Option<Round> {
     let few = problem.sample.spread(SCREENED);
     let all: Vec<usize> = (0..problem.sample.len()).collect();
-    let declared = Trial::new(problem, base.clone(), &few, 1, None)?;
+    let declared = Trial::new(problem, base.clone(), &few, BLOCKS, None)?;
+    let few_judged = judged(problem, None, None, declared);
+    let declared = &few_judged.trial;
+    if !doubtful(problem, declared, &few_judged.positives, &few, moving) {
+        return Some((None, negative(&few_judged.positives)));
+    }
     let mut changes = hypotheses::of_torques(moving);
     changes.extend(hypotheses::of_positions(problem, moving));
     changes.extend(hypotheses::of_zeros(problem));
@@ -247,7 +253,7 @@ fn round(
         if stopped() {
             return None;
         }
-        let trial = Trial::new(problem, base.with(change), &few, 1, Some(&declared))?;
+        let trial = Trial::new(problem, base.with(change), &few, 1, Some(declared))?;
         Some(trial.fit.score)
     };
     let mut scores: Vec<Option<f64>> = changes.par_iter().map(score).collect();
@@ -259,7 +265,7 @@ fn round(
         base,
         rows: &few,
         blocks: 1,
-        declared: &declared,
+        declared,
     };
     let fitted = few_rows.proposals(&changes, &scores, moving);
     let fixed = changes.len();

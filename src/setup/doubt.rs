@@ -1,0 +1,285 @@
+//! Is there anything to look for? A right set-up is to cost little: few rows, and no trial of every hypothesis.
+//!
+//! Signs, order and scales of torques are quadratic forms of one set of normal equations; zeros are looked
+//! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::channels::{Carried, Drive};
+use super::correction::{Change, Correction};
+use super::finding::ChannelKind::{Both, Position};
+use super::fit::Fit;
+use super::hypotheses;
+use super::normal::Problem;
+use super::physics::Positive;
+use super::search::Trial;
+use crate::robot::JointKind;
+
+/// Gain of log-likelihood, by few rows that are nearly independent, beyond which all is looked for.
+const GAIN: f64 = 3.0;
+/// Deviations below zero at which a quantity that must be positive is looked into.
+const BELOW: f64 = -3.0;
+/// A joint whose relative error is larger ..
+const LARGE: f64 = 0.25;
+/// .. though its own rows alone leave less than this share of it, contradicts the others.
+const ALONE: f64 = 0.6;
+/// Zeros that would be moved by less are no fault \[rad\].
+const MOVED: f64 = 0.02;
+/// Rows that positions are tried on.
+const FEWER: usize = 80;
+/// Step of differences \[rad\].
+const STEP: f64 = 1e-4;
+/// A motion in turns or in thousandths is looked into \[rad\].
+const PLAUSIBLE: [f64; 2] = [0.05, 14.0];
+
+/// Whether the declared set-up, fitted to few rows, gives any reason to try all hypotheses.
+pub(super) fn doubtful(
+    problem: &Problem,
+    declared: &Trial,
+    positives: &[Positive],
+    rows: &[usize],
+    moving: &[usize],
+) -> bool {
+    positives.iter().any(|p| p.told && p.deviations() < BELOW)
+        || implausible(problem, moving)
+        || contradicts(declared)
+        || torques(problem, declared, moving)
+        || zeros(problem, declared, rows)
+        || positions(problem, &declared.by, moving)
+}
+
+/// Whether a joint moves farther, or less, than a log that excites it can.
+fn implausible(problem: &Problem, moving: &[usize]) -> bool {
+    moving.len() > 1
+        && moving.iter().any(|&j| {
+            let sample = &problem.sample;
+            let q = sample.q.iter().skip(j).step_by(sample.joints);
+            let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
+            let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+            let turns = problem.robot.joint_kind(j) == JointKind::Revolute;
+            turns && !(PLAUSIBLE[0]..PLAUSIBLE[1]).contains(&(high - low))
+        })
+}
+
+/// Whether a joint's error is large though its own rows alone would leave little.
+fn contradicts(declared: &Trial) -> bool {
+    let (normal, fit) = (&declared.normal, &declared.fit);
+    (0..normal.joints).any(|j| {
+        let c = normal.places[j].len();
+        if c == 0 || fit.left[j] < LARGE * LARGE || normal.rows <= c + 8 {
+            return false;
+        }
+        let gram = &normal.total[j];
+        let target = &fit.targets[j];
+        let h = gram.view((0, 0), (c, c)).into_owned();
+        let g = gram.view((0, c), (c, target.len())) * target;
+        let Some(theta) = super::fit::solved(h, &g) else {
+            return false;
+        };
+        let k = gram.view((c, c), (target.len(), target.len())) * target;
+        let alone = (target.dot(&k) - g.dot(&theta)).max(0.0) / declared.power[j];
+        // as many unknowns as there are take their share of the rows
+        let rows = normal.rows as f64;
+        let fair = alone * rows / (rows - c as f64);
+        fair < ALONE * ALONE * fit.left[j]
+    })
+}
+
+/// Whether other signs, orders or scales of the torques gain.
+fn torques(problem: &Problem, declared: &Trial, moving: &[usize]) -> bool {
+    let gains = |change: &Change| {
+        let by = declared.by.with(change);
+        let trial = Trial::new(problem, by, &[], 1, Some(declared));
+        trial.is_some_and(|trial| trial.fit.score > declared.fit.score + GAIN)
+    };
+    let changes = hypotheses::of_torques(moving);
+    let known = problem.columns.known.iter().any(Option::is_some);
+    if problem.channels.drive != Drive::Joints || known {
+        let simple = |change: &&Change| change.joints().len() < 2;
+        return changes.iter().filter(simple).any(gains);
+    }
+    let Some(forms) = Forms::new(declared) else {
+        return true;
+    };
+    let before = forms.score(problem, &declared.by);
+    changes
+        .iter()
+        .any(|change| forms.score(problem, &declared.by.with(change)) > before && gains(change))
+}
+
+/// The solution for every torque in every joint's place, with the weights of the set-up as it is.
+struct Forms<'a> {
+    declared: &'a Trial,
+    /// Unknowns of torque k in place of joint j's, in column j n + k.
+    solved: DMatrix<f64>,
+}
+
+impl<'a> Forms<'a> {
+    fn new(declared: &'a Trial) -> Option<Self> {
+        let (normal, fit) = (&declared.normal, &declared.fit);
+        let (n, u) = (normal.joints, normal.unknowns);
+        let mut right = DMatrix::zeros(u, n * n);
+        for (j, gram) in normal.total.iter().enumerate() {
+            let c = normal.places[j].len();
+            for k in 0..if c == 0 { 0 } else { n } {
+                for (i, at) in normal.places[j].iter().enumerate() {
+                    right[(*at, j * n + k)] = fit.weights[j] * gram[(i, c + k)];
+                }
+            }
+        }
+        let solved = fit.solve(&right);
+        Some(Self { declared, solved })
+    }
+
+    /// Log-likelihood under a correction of the torques alone.
+    fn score(&self, problem: &Problem, by: &Correction) -> f64 {
+        let normal = &self.declared.normal;
+        let n = normal.joints;
+        let mix = problem.channels.mix(by);
+        let mut theta = DVector::zeros(normal.unknowns);
+        for (j, mix) in mix.iter().enumerate() {
+            for (k, a) in mix.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                theta.axpy(*a, &self.solved.column(j * n + k), 1.0);
+            }
+        }
+        let mut sum = 0.0;
+        for (j, gram) in normal.total.iter().enumerate() {
+            let places = &normal.places[j];
+            let c = places.len();
+            if c == 0 {
+                continue;
+            }
+            let k = gram.view((c, c), (n, n)) * &mix[j];
+            let power = mix[j].dot(&k);
+            let whole = DVector::from_fn(c + n, |i, _| match i < c {
+                true => -theta[places[i]],
+                false => mix[j][i - c],
+            });
+            let rss = whole.dot(&(gram.view((0, 0), (c + n, c + n)) * &whole));
+            if power > 0.0 {
+                sum += (rss / power).max(1e-8).ln();
+            }
+        }
+        -0.5 * normal.rows as f64 * sum
+    }
+}
+
+/// Whether a joint's zero elsewhere gains, by the derivative of the torques with it.
+fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
+    let Trial {
+        robot,
+        by,
+        normal,
+        fit,
+        ..
+    } = declared;
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    if !robot.knows_links() || n < 2 {
+        return false;
+    }
+    let theta: Vec<f64> = fit.theta.iter().take(p).copied().collect();
+    let mut carried = Carried::new(n);
+    let mut y = vec![0.0; n * p];
+    let (mut tau, mut side) = (vec![0.0; n], vec![0.0; n]);
+    // of each zero: products with the unknowns' columns, with the residual, with itself
+    let mut with_unknowns = DMatrix::zeros(normal.unknowns, n);
+    let (mut with_residual, mut with_itself) = (vec![0.0; n], vec![0.0; n]);
+    let mut row = vec![0.0; p + 4];
+    for &k in rows {
+        if !problem
+            .channels
+            .carry(robot, problem.sample.row(k), by, &mut carried)
+        {
+            continue;
+        }
+        robot.regressor(&carried.q, &carried.v, &carried.a, &mut y);
+        robot.torque(&theta, &carried.q, &carried.v, &carried.a, &mut tau);
+        let residual: Vec<f64> = (0..n)
+            .map(|j| fit.residual(problem, normal, &carried, j, tau[j]))
+            .collect();
+        for z in (0..n).filter(|z| robot.joint_kind(*z) == JointKind::Revolute) {
+            carried.q[z] += STEP;
+            robot.torque(&theta, &carried.q, &carried.v, &carried.a, &mut side);
+            carried.q[z] -= STEP;
+            for j in (0..n).filter(|j| fit.weights[*j] > 0.0) {
+                let slope = (side[j] - tau[j]) / STEP;
+                let weighted = fit.weights[j] * slope;
+                with_itself[z] += weighted * slope;
+                with_residual[z] += weighted * residual[j];
+                let shared = normal.places[j].iter().take_while(|c| **c < p);
+                for c in shared {
+                    with_unknowns[(*c, z)] += weighted * y[j * p + c];
+                }
+                for (i, own) in problem.columns.own[j].iter().enumerate() {
+                    row[i] = super::normal::own_column(*own, &carried, j);
+                    with_unknowns[(problem.first_own(robot, j) + i, z)] += weighted * row[i];
+                }
+            }
+        }
+    }
+    let solved = fit.solve(&with_unknowns);
+    (0..n).any(|z| {
+        let own = with_itself[z] - with_unknowns.column(z).dot(&solved.column(z));
+        // nothing of it is left where the parameters take it
+        if own <= 1e-6 * with_itself[z] || own <= 0.0 {
+            return false;
+        }
+        let moved = with_residual[z] / own;
+        0.5 * with_residual[z] * moved > GAIN && moved.abs() > MOVED
+    })
+}
+
+/// Whether turned positions, or joints in each other's place, gain.
+fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
+    if moving.len() < 2 {
+        return false;
+    }
+    let rows = problem.sample.spread(FEWER);
+    let Some(declared) = Trial::new(problem, by.clone(), &rows, 1, None) else {
+        return true;
+    };
+    let mut changes: Vec<Change> = moving
+        .iter()
+        .map(|j| Change::Sign(Position, vec![*j]))
+        .collect();
+    for pair in moving.windows(2) {
+        changes.push(Change::Exchange(Both, pair[0], pair[1]));
+        changes.push(Change::Exchange(Position, pair[0], pair[1]));
+    }
+    changes.iter().any(|change| {
+        let trial = Trial::new(problem, by.with(change), &rows, 1, Some(&declared));
+        trial.is_some_and(|trial| trial.fit.score > declared.fit.score + GAIN)
+    })
+}
+
+impl Fit {
+    /// What the fit leaves of a joint's torque in a row, where its inertial part is `rigid`.
+    fn residual(
+        &self,
+        problem: &Problem,
+        normal: &super::normal::Normal,
+        carried: &Carried,
+        j: usize,
+        rigid: f64,
+    ) -> f64 {
+        let n = normal.joints;
+        if self.weights[j] == 0.0 {
+            return 0.0;
+        }
+        let torques = carried.tau[j * n..(j + 1) * n].iter();
+        let mut r: f64 = torques
+            .zip(self.targets[j].iter())
+            .map(|(x, w)| x * w)
+            .sum();
+        if let Some(known) = &problem.columns.known[j] {
+            r += self.targets[j][n] * known.law.torque(carried.v[j]);
+        }
+        let places = &normal.places[j];
+        let own = &problem.columns.own[j];
+        let first = places.len() - own.len();
+        for (own, at) in own.iter().zip(&places[first..]) {
+            r -= self.theta[*at] * super::normal::own_column(*own, carried, j);
+        }
+        r - rigid
+    }
+}
