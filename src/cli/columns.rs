@@ -13,19 +13,14 @@ use crate::log::{self, Channels, Layout, RawReader};
 /// # Errors
 /// Where no column is a time.
 pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFault>), CliError> {
-    let (time, seconds) = time_column(log)?;
-    let names = log.names();
-    let mut channels = Vec::new();
-    for column in 0..names.len() {
-        if column != time {
-            channels.push(other(log, column));
-        }
-    }
-    let plan = ColumnPlan {
-        time: Some((time, seconds)),
-        channels,
+    let time = match log.is_timed() && !log.is_recording() {
+        true => None,
+        false => Some(time_column(log)?),
     };
-    Ok((plan, None))
+    let columns = 0..log.names().len();
+    let channels = columns.filter(|column| time.is_none_or(|(time, _)| time != *column));
+    let channels = channels.map(|column| other(log, column)).collect();
+    Ok((ColumnPlan { time, channels }, None))
 }
 
 /// Place of the time, and seconds per unit of it.
@@ -39,7 +34,8 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
             "no column is a time; the header has {}",
             log::list(names.iter().map(String::as_str))
         ))
-        .hint("name the time column in the [log] section of a robot file and give it with -r")
+        .hint("name the time column, `time = ..`, or say the rate, `rate_hz = ..`, in [log] of a robot file and give it with -r")
+        .hint("`cft-ident new NAME --log LOG --rate HZ` writes such a file")
     })?;
     // `time [ms]`, or `time_ms`
     let suffix = || names[time].rsplit_once('_').map(|(_, unit)| unit);
@@ -58,6 +54,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
     let time = log.find(&layout.time);
     let seconds = log.recognised_s().unwrap_or(layout.time.factor);
     let time = time.or_else(|| names.iter().position(|name| is_time(name)));
+    let time = time.filter(|_| layout.section.rate_hz.is_none());
     let mut known: Vec<Option<ChannelColumn>> = vec![None; names.len()];
     place(log, machine, layout, &mut known);
     if let Some(other) = &layout.otherwise {

@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, columns};
 use crate::identify::LoggedRobot;
-use crate::log::{Block, Instant, LogSpec, Provenance, RawBlock, RawReader, Reader, escape};
+use crate::log::{
+    Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
+};
 use crate::number;
 use crate::output::{LogForm, LogWriter};
 use crate::report::json::Document;
@@ -36,6 +38,12 @@ pub struct Args {
     /// Robot file, or a built-in one such as configs/cft.toml: write its joint channels
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: Option<String>,
+    /// Topic to write, where a recording holds the joint states of several machines
+    #[arg(long, value_name = "NAME", conflicts_with = "robot")]
+    pub topic: Option<String>,
+    /// Leave out rows without a time, or with more or fewer fields than the header names, and go on
+    #[arg(long)]
+    pub drop_rows: bool,
 }
 
 /// A log that was converted.
@@ -130,11 +138,16 @@ impl Target<'_> {
 /// Converts one log as it stands.
 fn as_it_stands(
     spec: &LogSpec,
+    args: &Args,
     target: &mut Target<'_>,
     warnings: &mut Vec<String>,
     context: &Context,
 ) -> Result<Provenance, CliError> {
-    let mut log = RawReader::open(spec, None)?;
+    let section = LogSection {
+        topic: args.topic.clone(),
+        ..LogSection::default()
+    };
+    let mut log = RawReader::open_plain(spec, &section)?;
     let name = escape(&spec.name());
     let (time, seconds) = match log.is_recording() {
         true => (0, 1.0),
@@ -155,12 +168,17 @@ fn as_it_stands(
             first = false;
         }
     }
-    if log.malformed() > 0 {
+    let lost = log.malformed();
+    if lost > 0 && args.drop_rows {
+        warnings.push(format!(
+            "{name}: {lost} rows with more or fewer fields than the header names are left out"
+        ));
+    } else if lost > 0 {
         return Err(CliError::input(format!(
-            "{name}: {} rows have more or fewer fields than the header names",
-            log.malformed()
+            "{name}: {lost} rows have more or fewer fields than the header names"
         ))
-        .hint("complete or delete these rows; write decimal points, not commas"));
+        .hint("complete or delete these rows; write decimal points, not commas")
+        .hint("or leave them out: --drop-rows"));
     }
     warnings.extend(log.warnings().iter().map(|text| format!("{name}: {text}")));
     for column in others {
@@ -232,7 +250,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let (mut warnings, mut provenance) = (notes.unwrap_or_default(), Vec::new());
     for spec in &args.logs {
         provenance.push(match &machine {
-            None => as_it_stands(spec, &mut target, &mut warnings, context)?,
+            None => as_it_stands(spec, args, &mut target, &mut warnings, context)?,
             Some(machine) => of_robot(spec, machine, &mut target, &mut warnings, context)?,
         });
         bar.advance(1);
@@ -241,6 +259,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if target.rows == 0 {
         return Err(CliError::input("the logs hold no row with a time")
             .hint("check the time column, and the span"));
+    }
+    if target.without_time > 0 && !args.drop_rows {
+        return Err(CliError::input(format!(
+            "{} of {} rows have no time and would be lost",
+            target.without_time,
+            target.without_time + target.rows
+        ))
+        .hint("give them a time, or delete them")
+        .hint("or leave them out: --drop-rows"));
     }
     if target.without_time > 0 {
         warnings.push(format!(

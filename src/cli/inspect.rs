@@ -9,7 +9,7 @@ use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot};
 use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look};
-use crate::log::{LogSpec, Provenance, RawReader, escape};
+use crate::log::{LogSection, LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::report::json::Document;
 use crate::report::stages;
@@ -77,13 +77,21 @@ impl Known {
 /// Looks at one log.
 fn inspect(
     spec: &LogSpec,
+    topic: Option<String>,
     known: Option<&Known>,
     context: &Context,
     warnings: &mut Vec<String>,
 ) -> Result<(Findings, Provenance), CliError> {
     let machine = known.map(|known| &known.machine);
     let layout = machine.map(|machine| machine.file.layout());
-    let mut log = RawReader::open(spec, layout.as_ref())?;
+    let section = LogSection {
+        topic,
+        ..LogSection::default()
+    };
+    let mut log = match &layout {
+        Some(layout) => RawReader::open(spec, Some(layout))?,
+        None => RawReader::open_plain(spec, &section)?,
+    };
     let (plan, refused) = match machine {
         Some(machine) => columns::of_robot(&log, machine),
         None => columns::guessed(&mut log)?,
@@ -204,9 +212,24 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let notes = known.as_ref().map(|known| known.machine.file.notes.clone());
     let mut warnings = notes.unwrap_or_default();
     for spec in &args.logs {
-        let (findings, input) = inspect(spec, known.as_ref(), context, &mut warnings)?;
-        logs.push((spec.name(), findings));
-        provenance.push(input);
+        // What several machines recorded is no one log: each is looked at on its own.
+        let machines = match &known {
+            Some(_) => Vec::new(),
+            None => crate::log::topics(spec)?,
+        };
+        let topics: Vec<Option<String>> = match machines.len() {
+            0 | 1 => vec![None],
+            _ => machines.into_iter().map(|of| Some(of.topic)).collect(),
+        };
+        for topic in topics {
+            let name = match &topic {
+                None => spec.name(),
+                Some(topic) => format!("{} {topic}", spec.name()),
+            };
+            let (findings, input) = inspect(spec, topic, known.as_ref(), context, &mut warnings)?;
+            logs.push((name, findings));
+            provenance.push(input);
+        }
         bar.advance(1);
     }
     drop(bar);

@@ -15,6 +15,16 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
     let log = &file.log;
     document.known_names(&["log", "joint"], &log.joint, &file.joint_names())?;
     document.finite(&["log", "torque_delay_s"], log.torque_delay_s.as_slice())?;
+    if let Some(rate) = log.rate_hz {
+        document.positive(&["log", "rate_hz"], rate)?;
+        if log.time.is_some() || log.time_unit.is_some() {
+            return Err(document.value(
+                &["log", "rate_hz"],
+                "stands beside a column of times",
+                "keep one of the two: `rate_hz` is for logs that have no times",
+            ));
+        }
+    }
     gears(file, document)?;
     foreign_effort(file, document)?;
     // Which key reads which column: no column may be read twice.

@@ -38,7 +38,10 @@ impl Header<'_> {
                 .map(|(channel, joint)| self.find(channel, &format!("{what} of {joint}")))
                 .collect()
         };
-        let time = self.find(&layout.time, "time")?;
+        let time = match layout.section.rate_hz {
+            Some(_) => None,
+            None => Some(self.find(&layout.time, "time")?),
+        };
         let positions = each(&layout.positions, "position")?;
         let torques = each(&layout.torques, "torque")?;
         // A velocity is optional unless the robot file names its column.
@@ -49,7 +52,7 @@ impl Header<'_> {
             Vec::new()
         };
         Ok(ScaledColumns {
-            time: Some(time),
+            time,
             positions,
             torques,
             velocities,

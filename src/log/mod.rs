@@ -34,10 +34,10 @@ pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Layout};
 pub use mend::{Bridge, Mending, Unwrap};
 pub use names::{escape, escape_whole, nearest};
-pub use raw::{RawBlock, RawReader};
+pub use raw::{RawBlock, RawReader, topics};
 pub use reader::Reader;
 pub use recording::{
-    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, Value,
+    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup, Value,
 };
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,

@@ -57,7 +57,10 @@ impl LogPass {
             ..Self::of_rows(spec.clone(), rows, layout)
         };
         // Who names the column later knows its unit then.
-        let stated = pass.layout.section.time_unit.is_some() || pass.layout.joints.is_empty();
+        let section = &pass.layout.section;
+        let stated = section.time_unit.is_some()
+            || section.rate_hz.is_some()
+            || pass.layout.joints.is_empty();
         if !stated && let Some(column) = position_of(pass.rows.names(), &pass.layout.time) {
             pass.recognise(column)?;
         }
@@ -230,7 +233,7 @@ fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Op
             (Err(error), Strictness::Record) => refused = Some(error),
         }
     }
-    match JointStates::open(files) {
+    match JointStates::open(files, layout.section.topic.as_deref()) {
         Ok(states) => {
             let layout = choose(states.names(), layout);
             Ok((Box::new(states), layout, refused))

@@ -2,12 +2,29 @@
 //! passes over, can be looked at here.
 
 use super::columns::{position_of, unit_of};
+use super::content::Content;
 use super::layout::{Channel, Layout};
 use super::pass::LogPass;
+use super::recording::{StateGroup, format_of, state_groups};
 use super::rows::Strictness;
 use super::source::Provenance;
 use super::time::Instant;
-use super::{LogError, LogSpec};
+use super::{LogError, LogSection, LogSpec};
+
+/// The machines whose joint states a recording holds, by their topics; none of a text log.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
+    let files = spec.files()?;
+    let [first, ..] = files.as_slice() else {
+        return Ok(Vec::new());
+    };
+    match format_of(Content::open(first)?.head()) {
+        Some(_) => state_groups(&files),
+        None => Ok(Vec::new()),
+    }
+}
 
 /// Consecutive rows of all columns.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -48,15 +65,30 @@ impl RawReader {
     /// Opens a log; `layout` tells the columns of a robot, where there is one.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no log.
+    /// A file that cannot be read, or is no log; without a robot, a recording of several machines.
     pub fn open(spec: &LogSpec, layout: Option<&Layout>) -> Result<Self, LogError> {
+        match layout {
+            Some(layout) => Self::of_layout(spec, layout),
+            None => Self::open_plain(spec, &LogSection::default()),
+        }
+    }
+
+    /// Opens a log of no robot that is known, by what `section` says of topic, delimiter and rate.
+    ///
+    /// # Errors
+    /// Those of [`Self::open`].
+    pub fn open_plain(spec: &LogSpec, section: &LogSection) -> Result<Self, LogError> {
         // A log without a header has columns #1, #2, ...
-        let without_robot = || Layout {
+        let layout = Layout {
             time: Channel::si("#1", "s"),
+            section: section.clone(),
             ..Layout::joint_columns(&[] as &[&str])
         };
-        let layout = layout.cloned().unwrap_or_else(without_robot);
-        let pass = LogPass::open(spec, &layout, Strictness::Record)?;
+        Self::of_layout(spec, &layout)
+    }
+
+    fn of_layout(spec: &LogSpec, layout: &Layout) -> Result<Self, LogError> {
+        let pass = LogPass::open(spec, layout, Strictness::Record)?;
         let words = vec![0; pass.rows.names().len()];
         Ok(Self { pass, words })
     }
@@ -89,6 +121,11 @@ impl RawReader {
     /// Whether rows carry their own times, as those of recordings do.
     pub fn is_recording(&self) -> bool {
         self.pass.rows.is_recording()
+    }
+
+    /// Whether rows have times of their own: those of a recording, or of a log whose rate is given.
+    pub fn is_timed(&self) -> bool {
+        self.is_recording() || self.layout().section.rate_hz.is_some()
     }
 
     /// Says which column is the time, and how many seconds its unit has.
@@ -140,7 +177,11 @@ impl RawReader {
             block.t.push(t);
             for (index, column) in block.columns.iter_mut().enumerate() {
                 let number = self.pass.rows.logged(index);
-                self.words[index] += u64::from(number.is_none());
+                if number.is_none() {
+                    // else most of the numbers, or all rows, would be lost in silence
+                    self.pass.rows.refuse_comma(index)?;
+                    self.words[index] += 1;
+                }
                 column.push(number.unwrap_or(f64::NAN));
             }
         }

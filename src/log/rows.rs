@@ -26,6 +26,11 @@ pub(super) trait LogRows: Debug + Send {
     /// words.
     fn logged(&self, column: usize) -> Option<f64>;
 
+    /// Refuses a field that is no number because it has a decimal comma.
+    fn refuse_comma(&self, _column: usize) -> Result<(), LogError> {
+        Ok(())
+    }
+
     /// Appends the channels of the current row to the block, in SI units.
     fn append(&self, _: &mut Block) -> Result<(), LogError> {
         Ok(())

@@ -10,29 +10,12 @@ use super::encoding::reader_of;
 use super::message::{MessageHead, MessageReader, Schema, Wanted};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
+use super::state_topics::{ARRAYS, COLUMNS, FoundTopic, Survey, TIMES, Times, groups, survey};
 use super::value::Value;
-use crate::log::names::{escape, list};
+use crate::log::names::{escape, list, nearest};
 use crate::log::rows::LogRows;
 use crate::log::time::{Instant, Stamped};
 use crate::log::{LogError, source};
-
-/// Messages that are looked at for topics and their names.
-const LOOKED_AT: u64 = 20_000;
-/// Messages of one topic that are looked at for its names.
-const OF_TOPIC: u32 = 200;
-/// Names of one topic that become columns, the first ones.
-const NAMES: usize = 1024;
-/// Topics of joint states that are read, the first ones.
-const TOPICS: usize = 32;
-/// Topic of joints, by the convention of ROS.
-const JOINTS: &str = "joint_states";
-/// Topic whose names are those of columns, not of joints.
-const COLUMNS: &str = "columns";
-/// Topic of times that are no whole nanoseconds.
-const TIMES: &str = "/t";
-
-/// The arrays of a message, in the order of the columns.
-const ARRAYS: [(&str, &str); 3] = [("position", "q"), ("effort", "tau"), ("velocity", "dq")];
 
 /// One topic and the columns that it fills.
 struct StateTopic {
@@ -43,17 +26,6 @@ struct StateTopic {
     /// Place of its first column.
     first: usize,
     stamped: bool,
-}
-
-/// What a topic was found to hold.
-struct FoundTopic {
-    topic: String,
-    schema: Schema,
-    probe: Box<dyn MessageReader>,
-    names: Vec<String>,
-    arrays: [bool; 3],
-    stamped: bool,
-    looked_at: u32,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -70,7 +42,7 @@ struct StateRow {
 pub(in crate::log) struct JointStates {
     recording: MessageFiles,
     sources: Vec<StateTopic>,
-    times: Option<(Schema, Box<dyn MessageReader>)>,
+    times: Times,
     columns: Vec<String>,
     row: StateRow,
     /// The row that begins with the message after this row.
@@ -91,12 +63,17 @@ impl fmt::Debug for JointStates {
 }
 
 impl JointStates {
-    /// Finds the topics.
+    /// Finds the topics, those of `topic` and of what was recorded at its instants where one is named.
     ///
     /// # Errors
-    /// A file that cannot be read; a recording without a `JointState`.
-    pub(in crate::log) fn open(paths: &[PathBuf]) -> Result<Self, LogError> {
-        let (mut found, other_topics, times) = survey(paths)?;
+    /// A file that cannot be read; a recording without a `JointState`, or of several machines where no
+    /// topic is named.
+    pub(in crate::log) fn open(paths: &[PathBuf], topic: Option<&str>) -> Result<Self, LogError> {
+        let Survey {
+            mut found,
+            others: mut other_topics,
+            times,
+        } = survey(paths)?;
         if found.is_empty() {
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
@@ -107,8 +84,50 @@ impl JointStates {
                 ),
             });
         }
-        let main = main_topic(&found);
-        found.sort_by_key(|one| (one.topic != main, one.topic.trim_matches('/') == COLUMNS));
+        let groups = groups(&found);
+        let names = || groups.iter().map(|group| found[group[0]].topic.as_str());
+        let chosen = match (topic, &groups[..]) {
+            (None, [only]) => only,
+            (None, several) => {
+                return Err(LogError::Topic {
+                    file: source::shown_all(paths),
+                    problem: format!(
+                        "holds {} topics of joint states with instants of their own",
+                        several.len()
+                    ),
+                    remedy: format!("name one with --topic: {}", list(names())),
+                });
+            }
+            (Some(name), groups) => {
+                let has = |group: &&Vec<usize>| group.iter().any(|k| found[*k].topic == name);
+                groups.iter().find(has).ok_or_else(|| {
+                    let near = nearest(name, names());
+                    let near = near.map(|near| format!("did you mean `{}`? ", escape(near)));
+                    LogError::Topic {
+                        file: source::shown_all(paths),
+                        problem: format!("no joint states on topic `{}`", escape(name)),
+                        remedy: format!(
+                            "{}the topics are {}",
+                            near.unwrap_or_default(),
+                            list(names())
+                        ),
+                    }
+                })?
+            }
+        };
+        let main = match topic {
+            Some(name) => name.to_owned(),
+            None => found[chosen[0]].topic.clone(),
+        };
+        let mut place = 0..;
+        found.retain(|one| {
+            let kept = place.next().is_some_and(|k| chosen.contains(&k));
+            if !kept {
+                other_topics.push(one.topic.clone());
+            }
+            kept
+        });
+        found.sort_by_key(|one| (one.topic != main, one.is_columns()));
         let mut columns = vec!["t".to_owned()];
         let mut sources = Vec::new();
         for one in found {
@@ -243,7 +262,7 @@ impl LogRows for JointStates {
         let mut out: Vec<String> = self.breaks();
         if !self.other_topics.is_empty() {
             let topics = list(self.other_topics.iter().map(String::as_str));
-            out.push(format!("{topics} hold no JointState and are left out"));
+            out.push(format!("topics that are left out: {topics}"));
         }
         if self.unreadable > 0 {
             out.push(format!(
@@ -303,18 +322,9 @@ impl StateRow {
     }
 }
 
-/// The topic whose columns have no name of a topic before them.
-fn main_topic(found: &[FoundTopic]) -> String {
-    let last = |one: &&FoundTopic| one.topic.rsplit('/').next() == Some(JOINTS);
-    let both = |one: &&FoundTopic| one.arrays[0] && one.arrays[1];
-    let named = found.iter().find(last);
-    let best = named.or_else(|| found.iter().find(both)).or(found.first());
-    best.map(|one| one.topic.clone()).unwrap_or_default()
-}
-
 /// Name of the column with one array's element.
 fn column(of: &FoundTopic, letter: &str, name: &str, main: &str) -> String {
-    if of.topic == main && of.topic.trim_matches('/') != COLUMNS {
+    if of.topic == main && !of.is_columns() {
         return format!("{letter}_{name}");
     }
     let topic = of.topic.trim_matches('/');
@@ -323,103 +333,5 @@ fn column(of: &FoundTopic, letter: &str, name: &str, main: &str) -> String {
         (COLUMNS, true) => name.to_owned(),
         (topic, true) => format!("{}_{name}", topic.replace('/', ".")),
         (topic, false) => format!("{}.{letter}_{name}", topic.replace('/', ".")),
-    }
-}
-
-type Survey = (
-    Vec<FoundTopic>,
-    Vec<String>,
-    Option<(Schema, Box<dyn MessageReader>)>,
-);
-
-/// Looks at the beginning of a recording.
-fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
-    let mut recording = MessageFiles::open(paths, Wanted::default())?;
-    let mut found: Vec<FoundTopic> = Vec::new();
-    let mut times = None;
-    let mut messages = 0;
-    while messages < LOOKED_AT
-        && let Some(message) = recording.next()?
-    {
-        messages += 1;
-        let (topic, schema) = (&message.topic.name, &*message.topic.schema);
-        let known = found
-            .iter()
-            .position(|f| f.topic == *topic && f.schema == *schema);
-        let at = match known {
-            Some(at) => at,
-            None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
-                let Ok(probe) = reader_of(schema, &probes()) else {
-                    continue;
-                };
-                found.push(FoundTopic {
-                    topic: topic.clone(),
-                    schema: schema.clone(),
-                    probe,
-                    names: Vec::new(),
-                    arrays: [false; 3],
-                    stamped: false,
-                    looked_at: 0,
-                });
-                found.len() - 1
-            }
-            None => {
-                if topic == TIMES && schema.name.ends_with("Float64") && times.is_none() {
-                    let reader = reader_of(schema, &[vec![FieldPath::parse("data")]]);
-                    times = reader.ok().map(|reader| (schema.clone(), reader));
-                }
-                continue;
-            }
-        };
-        found[at].look(message.data);
-    }
-    found.retain(|one| !one.names.is_empty() && one.arrays.contains(&true));
-    let others = recording.seen.iter().map(|topic| topic.name.clone());
-    let used = |name: &String| {
-        found.iter().any(|one| one.topic == *name) || (times.is_some() && name == TIMES)
-    };
-    let others = others.filter(|name| !used(name)).collect();
-    Ok((found, others, times))
-}
-
-/// What is asked of a message to see what it holds; the last makes the decoder look at the names.
-fn probes() -> Vec<Vec<FieldPath>> {
-    let mut fields: Vec<Vec<FieldPath>> = ARRAYS
-        .iter()
-        .map(|(array, _)| vec![FieldPath::parse(&format!("{array}[0]"))])
-        .collect();
-    fields.push(vec![
-        FieldPath::parse("header.stamp.sec"),
-        FieldPath::parse("header.stamp.secs"),
-    ]);
-    fields.push(vec![
-        FieldPath::parse("header.stamp.nanosec"),
-        FieldPath::parse("header.stamp.nsecs"),
-    ]);
-    fields.push(vec![FieldPath::named("position", "name", "")]);
-    fields
-}
-
-impl FoundTopic {
-    fn look(&mut self, data: &[u8]) {
-        if self.looked_at >= OF_TOPIC {
-            return;
-        }
-        self.looked_at += 1;
-        let mut values = [Value::Absent; 6];
-        if self.probe.read(data, &mut values).is_err() {
-            return;
-        }
-        for (filled, value) in self.arrays.iter_mut().zip(&values) {
-            *filled |= *value != Value::Absent;
-        }
-        self.stamped |= values[3..5]
-            .iter()
-            .any(|v| v.integer().is_some_and(|x| x != 0));
-        for name in self.probe.names(data) {
-            if self.names.len() < NAMES && !self.names.contains(&name) {
-                self.names.push(name);
-            }
-        }
     }
 }

@@ -13,13 +13,16 @@ mod pairing;
 mod parts;
 mod path;
 mod rows;
+mod state_topics;
 mod survey;
 mod value;
 
 pub(super) use format::{FORMATS, format_of};
 pub(super) use joint_states::JointStates;
 pub(super) use rows::MessageRows;
+pub(super) use state_topics::state_groups;
 
 pub use delay::{DelayEstimate, DelayEstimator};
 pub use encoding::{CdrReader, DefinitionError, MalformedMessage};
+pub use state_topics::StateGroup;
 pub use value::Value;

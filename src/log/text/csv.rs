@@ -244,6 +244,14 @@ impl TextFile {
         self.field(column).and_then(number::parse)
     }
 
+    /// Whether a field of the current row is no number because of its decimal comma.
+    #[cold]
+    pub(super) fn has_decimal_comma(&self, column: usize) -> bool {
+        let text =
+            String::from_utf8_lossy(self.field(column).unwrap_or_default()).replace(',', ".");
+        self.decimal_comma && number::parse(text.as_bytes()).is_some()
+    }
+
     /// Why a column of the current row holds no number that can be used.
     #[cold]
     pub(super) fn no_number(&self, column: usize) -> LogError {
@@ -251,7 +259,7 @@ impl TextFile {
         let text = String::from_utf8_lossy(field);
         let text = text.trim();
         let name = self.header.get(column).map(|name| escape(name));
-        let at = self.place();
+        let (at, column_index) = (self.place(), column);
         let column = name.unwrap_or_default();
         if number::parse(field).is_some() {
             return LogError::NotFinite {
@@ -261,10 +269,9 @@ impl TextFile {
                 remedy: "delete the rows without a measurement: a gap in time is handled, a made-up number is not",
             };
         }
-        let with_point = text.replace(',', ".");
         let remedy = if text.is_empty() {
             "delete the rows without a measurement: a gap in time is handled"
-        } else if self.decimal_comma && number::parse(with_point.as_bytes()).is_some() {
+        } else if self.has_decimal_comma(column_index) {
             "write decimal points instead of decimal commas, e.g. `sed 's/,/./g'`"
         } else if text.contains(':') {
             "write the time as seconds from the start, or with its date: 2024-05-01T12:34:56.789Z"

@@ -31,6 +31,8 @@ pub(super) struct TextRows {
     file: TextFile,
     columns: ScaledColumns,
     time: Option<TimeColumn>,
+    /// Rate of a log without times [Hz], and rows so far.
+    even: Option<(f64, u64)>,
     strictness: Strictness,
 }
 
@@ -58,6 +60,7 @@ impl TextRows {
         let mut rows = Self {
             file,
             time: None,
+            even: layout.section.rate_hz.map(|rate| (rate, 0)),
             strictness,
             columns,
         };
@@ -70,6 +73,11 @@ impl TextRows {
     /// Time of the current row, where it has one.
     #[inline]
     fn stamp(&mut self) -> Option<Stamped> {
+        if let Some((rate, row)) = &mut self.even {
+            let t = *row as f64 / *rate;
+            *row += 1;
+            return Some(Stamped::Seconds(t));
+        }
         let (file, time) = (&self.file, self.time.as_mut()?);
         let seconds = || {
             let seconds = file.number(time.index)? * time.seconds;
@@ -143,6 +151,13 @@ impl LogRows for TextRows {
         self.file
             .number(column)
             .or_else(|| self.file.is_blank_field(column).then_some(f64::NAN))
+    }
+
+    fn refuse_comma(&self, column: usize) -> Result<(), LogError> {
+        match self.file.has_decimal_comma(column) {
+            true => Err(self.file.no_number(column)),
+            false => Ok(()),
+        }
     }
 
     fn has_velocities(&self) -> bool {

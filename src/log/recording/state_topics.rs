@@ -1,0 +1,231 @@
+//! Which topics of a recording hold joint states, and which of them are of one machine: those whose
+//! messages have the same instants.
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use super::encoding::reader_of;
+use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::parts::MessageFiles;
+use super::path::FieldPath;
+use super::value::Value;
+use crate::log::LogError;
+
+/// Messages that are looked at for topics and their names.
+const LOOKED_AT: u64 = 20_000;
+/// Messages of one topic that are looked at for its names.
+const OF_TOPIC: u32 = 200;
+/// Names of one topic that become columns, the first ones.
+const NAMES: usize = 1024;
+/// Topics of joint states that are read, the first ones.
+const TOPICS: usize = 32;
+/// Topic of joints, by the convention of ROS.
+const JOINTS: &str = "joint_states";
+/// Topic whose names are those of columns, not of joints.
+pub(super) const COLUMNS: &str = "columns";
+/// Topic of times that are no whole nanoseconds.
+pub(super) const TIMES: &str = "/t";
+/// Part of the instants of one topic that another one has too, where one machine wrote both.
+const SHARED: f64 = 0.8;
+
+/// The arrays of a message, in the order of the columns.
+pub(super) const ARRAYS: [(&str, &str); 3] =
+    [("position", "q"), ("effort", "tau"), ("velocity", "dq")];
+
+/// What a topic was found to hold.
+pub(super) struct FoundTopic {
+    pub topic: String,
+    pub schema: Schema,
+    probe: Box<dyn MessageReader>,
+    pub names: Vec<String>,
+    /// Which arrays are filled.
+    pub arrays: [bool; 3],
+    pub stamped: bool,
+    looked_at: u32,
+    /// Instants of its messages [ns], by the header's stamp where that is set.
+    instants: HashSet<i128>,
+}
+
+/// The reader of times that are no whole nanoseconds, with its schema.
+pub(super) type Times = Option<(Schema, Box<dyn MessageReader>)>;
+
+/// What a recording holds beside the topics of joint states: other topics, and a topic of times.
+pub(super) struct Survey {
+    pub found: Vec<FoundTopic>,
+    pub others: Vec<String>,
+    pub times: Times,
+}
+
+/// Looks at the beginning of a recording.
+pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
+    let mut recording = MessageFiles::open(paths, Wanted::default())?;
+    let mut found: Vec<FoundTopic> = Vec::new();
+    let mut times = None;
+    let mut messages = 0;
+    while messages < LOOKED_AT
+        && let Some(message) = recording.next()?
+    {
+        messages += 1;
+        let (topic, schema) = (&message.topic.name, &*message.topic.schema);
+        let known = found
+            .iter()
+            .position(|f| f.topic == *topic && f.schema == *schema);
+        let at = match known {
+            Some(at) => at,
+            None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
+                let Ok(probe) = reader_of(schema, &probes()) else {
+                    continue;
+                };
+                found.push(FoundTopic {
+                    topic: topic.clone(),
+                    schema: schema.clone(),
+                    probe,
+                    names: Vec::new(),
+                    arrays: [false; 3],
+                    stamped: false,
+                    looked_at: 0,
+                    instants: HashSet::new(),
+                });
+                found.len() - 1
+            }
+            None => {
+                if topic == TIMES && schema.name.ends_with("Float64") && times.is_none() {
+                    let reader = reader_of(schema, &[vec![FieldPath::parse("data")]]);
+                    times = reader.ok().map(|reader| (schema.clone(), reader));
+                }
+                continue;
+            }
+        };
+        found[at].look(&message.head, message.data);
+    }
+    found.retain(|one| !one.names.is_empty() && one.arrays.contains(&true));
+    let others = recording.seen.iter().map(|topic| topic.name.clone());
+    let used = |name: &String| {
+        found.iter().any(|one| one.topic == *name) || (times.is_some() && name == TIMES)
+    };
+    let others = others.filter(|name| !used(name)).collect();
+    Ok(Survey {
+        found,
+        others,
+        times,
+    })
+}
+
+/// What is asked of a message to see what it holds; the last makes the decoder look at the names.
+fn probes() -> Vec<Vec<FieldPath>> {
+    let mut fields: Vec<Vec<FieldPath>> = ARRAYS
+        .iter()
+        .map(|(array, _)| vec![FieldPath::parse(&format!("{array}[0]"))])
+        .collect();
+    fields.push(vec![
+        FieldPath::parse("header.stamp.sec"),
+        FieldPath::parse("header.stamp.secs"),
+    ]);
+    fields.push(vec![
+        FieldPath::parse("header.stamp.nanosec"),
+        FieldPath::parse("header.stamp.nsecs"),
+    ]);
+    fields.push(vec![FieldPath::named("position", "name", "")]);
+    fields
+}
+
+impl FoundTopic {
+    fn look(&mut self, head: &MessageHead, data: &[u8]) {
+        let mut values = [Value::Absent; 6];
+        if self.probe.read(data, &mut values).is_err() {
+            return;
+        }
+        let stamp = match (values[3].integer(), values[4].integer()) {
+            (Some(s), Some(ns)) if (s, ns) != (0, 0) => Some(s * 1_000_000_000 + ns),
+            _ => None,
+        };
+        self.instants
+            .insert(stamp.unwrap_or(i128::from(head.log_ns)));
+        if self.looked_at >= OF_TOPIC {
+            return;
+        }
+        self.looked_at += 1;
+        for (filled, value) in self.arrays.iter_mut().zip(&values) {
+            *filled |= *value != Value::Absent;
+        }
+        self.stamped |= stamp.is_some();
+        for name in self.probe.names(data) {
+            if self.names.len() < NAMES && !self.names.contains(&name) {
+                self.names.push(name);
+            }
+        }
+    }
+
+    /// Whether its names are those of columns.
+    pub(super) fn is_columns(&self) -> bool {
+        self.topic.trim_matches('/') == COLUMNS
+    }
+
+    /// Whether the messages of two topics have the same instants, where both were recorded.
+    fn goes_with(&self, other: &Self) -> bool {
+        let ends = |of: &Self| Some((*of.instants.iter().min()?, *of.instants.iter().max()?));
+        let (Some((a0, a1)), Some((b0, b1))) = (ends(self), ends(other)) else {
+            return false;
+        };
+        let both = a0.max(b0)..=a1.min(b1);
+        let within = |of: &Self| of.instants.iter().filter(|t| both.contains(*t)).count();
+        let shared = self.instants.intersection(&other.instants).count();
+        let fewer = within(self).min(within(other));
+        fewer > 0 && shared as f64 >= SHARED * fewer as f64
+    }
+}
+
+/// The topic whose columns have no name of a topic before them.
+fn main_topic(found: &[FoundTopic]) -> Option<usize> {
+    let last = |one: &FoundTopic| one.topic.rsplit('/').next() == Some(JOINTS);
+    let both = |one: &FoundTopic| one.arrays[0] && one.arrays[1];
+    let named = found.iter().position(last);
+    let named = named.or_else(|| found.iter().position(both));
+    named.or_else(|| (!found.is_empty()).then_some(0))
+}
+
+/// Indices of topics that are of one machine, the main one of each first, and the recording's main
+/// topic in the first group.
+pub(super) fn groups(found: &[FoundTopic]) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    let main = main_topic(found);
+    order.sort_by_key(|k| (Some(*k) != main, found[*k].is_columns()));
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for k in order {
+        let of = |group: &&mut Vec<usize>| {
+            found[k].is_columns() || group.iter().any(|g| found[*g].goes_with(&found[k]))
+        };
+        match groups.iter_mut().find(of) {
+            Some(group) => group.push(k),
+            None => groups.push(vec![k]),
+        }
+    }
+    groups
+}
+
+/// A topic of a recording with what belongs to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StateGroup {
+    /// Topic of the joints.
+    pub topic: String,
+    /// Further topics whose messages have the same instants.
+    pub with: Vec<String>,
+    /// Names of the joints of the first one.
+    pub joints: Vec<String>,
+    /// Whether any of them holds positions, torques, velocities.
+    pub holds: [bool; 3],
+}
+
+/// The machines whose joint states a recording holds, the main one first.
+pub(in crate::log) fn state_groups(paths: &[PathBuf]) -> Result<Vec<StateGroup>, LogError> {
+    let found = survey(paths)?.found;
+    let of = |group: &Vec<usize>| StateGroup {
+        topic: found[group[0]].topic.clone(),
+        with: (group[1..].iter())
+            .map(|k| found[*k].topic.clone())
+            .collect(),
+        joints: found[group[0]].names.clone(),
+        holds: std::array::from_fn(|i| group.iter().any(|k| found[*k].arrays[i])),
+    };
+    Ok(groups(&found).iter().map(of).collect())
+}
