@@ -63,7 +63,7 @@
 //! | [`identify`](identify::identify()) | logs by role | all of these | [`identify`] | |
 //!
 //! Below the stages: [`log`] reads text logs, MCAP and rosbag2 recordings and arrays in memory to
-//! blocks of t, q and tau; [`inspect`] looks for faults in them; [`motion`] turns them into filtered
+//! blocks of t, q and tau; [`inspect`] looks for faults in them, [`mapping`] for the joints in a log that nobody described; [`motion`] turns them into filtered
 //! rows of q, v, a and tau; [`robot`] holds the physics, [`effect`] what a plain model lacks, [`math`]
 //! what is small and general, [`config`] the files. Beside them: [`simulate`] is a plant to test
 //! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`report`] tells
@@ -80,6 +80,7 @@ pub mod motion;
 
 pub mod effect;
 pub mod inspect;
+pub mod mapping;
 
 pub mod friction;
 pub mod inertia;

@@ -25,6 +25,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
     ("inspect", &["math", "log"]),
     ("setup", &["math", "robot", "motion", "inertia"]),
+    ("mapping", &["robot", "log", "inspect"]),
     ("simulate", &["math", "robot", "log", "config", "effect"]),
     (
         "excite",
@@ -54,7 +55,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "number", "robot", "log", "config", "output", "motion", "effect",
-            "friction", "inertia", "diagnose", "validate", "inspect", "setup", "simulate",
+            "friction", "inertia", "diagnose", "validate", "inspect", "mapping", "setup", "simulate",
             "excite", "compare", "identify", "report", "export",
         ],
     ),

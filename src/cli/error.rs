@@ -12,6 +12,7 @@ use super::exit::Exit;
 use crate::config::ConfigError;
 use crate::identify::{ErrorKind, IdentifyError};
 use crate::log::LogError;
+use crate::mapping::MappingError;
 use crate::output::OutputError;
 use crate::report::json::JsonError;
 use crate::report::table::folded;
@@ -116,6 +117,15 @@ impl From<LogError> for CliError {
 impl From<ConfigError> for CliError {
     fn from(error: ConfigError) -> Self {
         Self::from_room(Exit::BadInput, &error)
+    }
+}
+
+impl From<MappingError> for CliError {
+    fn from(error: MappingError) -> Self {
+        match error {
+            MappingError::Interrupted => Self::interrupted(),
+            error => Self::from_room(Exit::BadInput, &error),
+        }
     }
 }
 

@@ -68,12 +68,16 @@ impl Changes {
     }
 }
 
-/// A multiple of pi/12 as people say it.
-fn in_words(angle: f64) -> String {
-    let k = (angle / PI * PARTS).round() as i64;
+/// k/12 in its smallest numbers.
+fn reduced(k: i64) -> (i64, i64) {
     let shared = (1..=12).rev().find(|d| k % d == 0 && 12 % d == 0);
     let divisor = shared.unwrap_or(1);
-    let (above, below) = (k / divisor, 12 / divisor);
+    (k / divisor, 12 / divisor)
+}
+
+/// A multiple of pi/12 as people say it.
+fn in_words(angle: f64) -> String {
+    let (above, below) = reduced((angle / PI * PARTS).round() as i64);
     let above = match above {
         1 => "pi".to_owned(),
         -1 => "-pi".to_owned(),
@@ -109,7 +113,9 @@ fn is_rounded(written: &str, value: f64, exact: f64) -> bool {
 /// The multiple of pi/12 that a text stands for [rad].
 fn angle(written: &str, value: f64) -> Option<f64> {
     let k = (value / PI * PARTS).round();
-    let exact = PI * (k / PARTS);
+    // in the smallest numbers, which divide as those of a library do
+    let (above, below) = reduced(k as i64);
+    let exact = PI * above as f64 / below as f64;
     (k != 0.0 && is_rounded(written, value, exact)).then_some(exact)
 }
 

@@ -1,25 +1,6 @@
 //! What the columns of a log are: told by the robot file, or guessed from their names.
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-/// What a channel holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ChannelRole {
-    /// Position of a joint or motor.
-    Position,
-    /// Velocity of a joint or motor.
-    Velocity,
-    /// Acceleration of a joint or motor.
-    Acceleration,
-    /// Torque, force, current or voltage.
-    Torque,
-    /// What was commanded or wanted.
-    Command,
-    /// Anything else.
-    Other,
-}
+use super::words::{self, ChannelRole};
 
 /// A channel: a column as the judge sees it.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,9 +51,22 @@ pub fn is_time(name: &str) -> bool {
         .iter()
         .find_map(|unit| base.strip_suffix(unit))
         .unwrap_or(base);
+    let base = base.trim_start_matches(['_', '%', '/', '.']);
     matches!(
         base,
-        "t" | "time" | "timestamp" | "stamp" | "times" | "secs" | "seconds"
+        "t" | "time"
+            | "timestamp"
+            | "time_stamp"
+            | "stamp"
+            | "times"
+            | "sec"
+            | "secs"
+            | "seconds"
+            | "elapsed"
+            | "elapsed_time"
+            | "rosbagtimestamp"
+            | "header.stamp"
+            | "field.header.stamp"
     )
 }
 
@@ -107,38 +101,24 @@ const WORDS: [(&str, ChannelRole); 27] = [
     ("v", ChannelRole::Velocity),
 ];
 
-/// Words that make a command of whatever they stand in.
-const COMMANDS: [&str; 12] = [
-    "ref",
-    "reference",
-    "cmd",
-    "command",
-    "commanded",
-    "des",
-    "desired",
-    "target",
-    "setpoint",
-    "goal",
-    "wanted",
-    "sp",
-];
-
 /// Role and joint by the name of a column: `q_elbow`, `dq1`, `position[elbow]`, `Reference Velocity`.
 fn guess(name: &str) -> (ChannelRole, Option<String>) {
-    let lower = name.trim().to_lowercase();
     // A unit in brackets is no part of the name; a joint in brackets is.
-    let base = match lower.rsplit_once([' ', '_']) {
+    let base = match name.trim().rsplit_once([' ', '_']) {
         Some((head, unit)) if unit.starts_with(['[', '(']) => head,
-        _ => lower.as_str(),
+        _ => name.trim(),
     };
-    let words = || base.split(|c: char| !c.is_alphanumeric());
-    let plain = |word: &str| {
-        word.trim_end_matches(|c: char| c.is_ascii_digit())
-            .to_owned()
-    };
-    if words().any(|word| COMMANDS.contains(&plain(word).as_str())) {
+    let spoken = words::words(base);
+    let base = base.to_lowercase();
+    if words::is_command(&spoken) {
         return (ChannelRole::Command, None);
     }
+    let told = words::role(&spoken);
+    let of_words = || {
+        let joint = told.filter(|role| *role != ChannelRole::Other);
+        let joint = joint.map(|_| words::joint(&spoken));
+        (told.unwrap_or(ChannelRole::Other), joint)
+    };
     for (word, role) in WORDS {
         let Some(rest) = base.strip_prefix(word) else {
             continue;
@@ -148,12 +128,18 @@ fn guess(name: &str) -> (ChannelRole, Option<String>) {
         let ends = rest.is_empty() || rest.starts_with(|c: char| !c.is_alphabetic());
         // One letter alone means too much to be believed.
         let numbered = !rest.is_empty() || word.len() > 1;
-        if ends && numbered {
+        // `position_error` and `q_dot` are what their other words say
+        let contract = ["q_", "dq_", "ddq_", "tau_"]
+            .iter()
+            .any(|p| base.starts_with(p));
+        let agrees =
+            told.is_none_or(|told| told == role || (told == ChannelRole::Other && contract));
+        if ends && numbered && agrees {
             let joint = (!joint.is_empty()).then(|| joint.to_owned());
             return (role, Some(joint.unwrap_or_default()));
         }
     }
-    (ChannelRole::Other, None)
+    of_words()
 }
 
 #[cfg(test)]
@@ -190,6 +176,12 @@ mod tests {
             ("quality", ChannelRole::Other, None),
             ("pulses", ChannelRole::Other, None),
             ("temperature", ChannelRole::Other, None),
+            ("positions_0", ChannelRole::Position, Some("0")),
+            ("actual_qd_3", ChannelRole::Velocity, Some("3")),
+            ("joint_1_position", ChannelRole::Position, Some("joint_1")),
+            ("act_torque_abs_nm_1", ChannelRole::Torque, Some("abs_1")),
+            ("position_error_1", ChannelRole::Other, None),
+            ("q_dot_1", ChannelRole::Velocity, Some("1")),
             ("v", ChannelRole::Other, None),
         ] {
             let found = InspectedChannel::guessed(name);

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::channel::ChannelRole;
 use super::detectors::excitation::JointMotion;
 use super::fault::{LogFault, Severity};
+use super::words::ChannelRole;
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

@@ -1,9 +1,10 @@
 //! What a fit must know of a log before it begins: whether it can be used, and which of its rows
 //! are to be left out.
 
-use super::channel::{ChannelRole, InspectedChannel};
+use super::channel::InspectedChannel;
 use super::fault::{LogFault, Severity};
 use super::judge::{Depth, LogJudge};
+use super::words::ChannelRole;
 use crate::log::{Block, Channels, Instant, Layout, LogError, Reader, escape};
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven

@@ -1,6 +1,6 @@
 //! Runs every detector over the rows of a log, and gathers what they know at the end.
 
-use super::channel::{ChannelRole, InspectedChannel};
+use super::channel::InspectedChannel;
 use super::detectors::clock::{LogClock, RowStep, typical_step};
 use super::detectors::copies::Copies;
 use super::detectors::excitation::Excitation;
@@ -9,6 +9,7 @@ use super::detectors::repeats::Repeats;
 use super::detectors::spike::Spikes;
 use super::detectors::windows::Windows;
 use super::fault::Episodes;
+use super::words::ChannelRole;
 
 /// A joint moves where it travels further than this share of what the farthest joint does.
 const TRAVELS: f64 = 0.02;

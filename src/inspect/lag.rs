@@ -1,12 +1,12 @@
 //! Delay between positions and torques, from the motion itself.
 
-use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::windows::Window;
 use super::draft::{FaultList, seconds};
 use super::fault::FaultKind;
 use super::fault::Severity::Warning;
 use super::judge::LogJudge;
+use super::words::ChannelRole;
 use crate::log::DelayEstimator;
 
 /// Stretches of the log that are looked at.

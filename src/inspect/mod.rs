@@ -23,8 +23,9 @@ mod order;
 mod shape;
 mod together;
 mod verdicts;
+pub mod words;
 
-pub use channel::{ChannelRole, InspectedChannel, is_time};
+pub use channel::{InspectedChannel, is_time};
 pub use detectors::excitation::JointMotion;
 pub use fault::{FaultKind, LogFault, Severity};
 pub use findings::{ChannelFacts, Findings, Gap, Inspection};
@@ -32,3 +33,4 @@ pub use gate::{Cutter, Gate};
 pub use judge::{Depth, LogJudge};
 pub use look::{ChannelColumn, ColumnPlan, look};
 pub use order::{Change, Comparison};
+pub use words::ChannelRole;

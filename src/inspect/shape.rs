@@ -1,7 +1,6 @@
 //! Faults in the shape of one channel: flat where it should change, off where it should be smooth,
 //! coarse.
 
-use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::flat::{FlatRun, Levels};
 use super::detectors::grain;
@@ -9,6 +8,7 @@ use super::draft::{FaultList, rows_text};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::judge::{Depth, LogJudge, Track};
+use super::words::ChannelRole;
 
 /// Rows of one value from which a channel may be stuck.
 const STUCK_ROWS: u64 = 10;

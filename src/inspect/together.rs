@@ -1,6 +1,5 @@
 //! Faults that show between channels: copies, rows that repeat, velocities that lag.
 
-use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::grain;
 use super::detectors::velocity;
@@ -9,6 +8,7 @@ use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{FaultKind, LogFault};
 use super::judge::{Depth, LogJudge, Track};
 use super::lag;
+use super::words::ChannelRole;
 
 /// A velocity that lags by more rows is filtered.
 const LAG_ROWS: f64 = 1.5;

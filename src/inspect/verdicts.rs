@@ -1,6 +1,5 @@
 //! From what the detectors gathered to faults: all thresholds stand here and in [`super::shape`].
 
-use super::channel::ChannelRole;
 use super::detectors::clock::ClockFacts;
 use super::detectors::excitation::JointMotion;
 use super::detectors::grain;
@@ -9,6 +8,7 @@ use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::findings::{ChannelFacts, Findings, Gap, joined};
 use super::judge::{Depth, LogJudge, Track};
+use super::words::ChannelRole;
 use super::{shape, together};
 
 /// Steps off the median by more than a tenth, as a share of all, from which a clock is irregular.

@@ -1,6 +1,5 @@
 //! `cft-ident new`: a robot file for a robot that the tool has never seen.
 
-mod columns;
 mod text;
 
 use std::path::{Component, Path, PathBuf};
@@ -9,13 +8,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::outputs::write_text;
-use super::{CliError, Context, Outcome};
+use super::{CliError, Context, Outcome, inspect};
 use crate::config::{RobotFile, UrdfChain};
+use crate::identify::LoggedRobot;
+use crate::inspect::{LogFault, Severity};
 use crate::log::{LogSpec, Provenance, Reader, escape};
+use crate::mapping::{Asked, JointColumns, Known, Mapping, look};
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::robot::JointKind;
-use columns::Mapping;
 use text::Draft;
 
 const EXAMPLE: &str = "\
@@ -25,9 +26,10 @@ Example:
 
 /// Write a commented robot file from what a URDF and a log show.
 ///
-/// NAME.toml names the joints, maps the columns of the log to them by their names, and suggests
-/// cut-offs from its rate; where there is no URDF it is a single joint, or a table of modified
-/// Denavit-Hartenberg rows to be filled in. What was guessed says so. An existing file stays.
+/// NAME.toml names the joints, maps the columns of the log to them by their names and numbers, takes
+/// units from names and sizes, and suggests cut-offs from its rate; where there is no URDF it is a
+/// single joint, or a table of modified Denavit-Hartenberg rows to be filled in. What was guessed
+/// says CHECK IT. The log is inspected with it. An existing file stays.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
@@ -43,6 +45,18 @@ pub struct Args {
     /// A log of the robot
     #[arg(long, value_name = "LOG")]
     pub log: Option<LogSpec>,
+    /// Rate of a log that has no column of times
+    #[arg(long, value_name = "HZ", requires = "log", value_parser = rate)]
+    pub rate: Option<f64>,
+    /// Topic of the robot in a recording of several machines
+    #[arg(long, value_name = "NAME", requires = "log")]
+    pub topic: Option<String>,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate: Option<f64> = text.parse().ok();
+    rate.filter(|rate| rate.is_finite() && *rate > 0.0)
+        .ok_or_else(|| "give a number above 0".to_owned())
 }
 
 /// What the robot is, as far as it can be seen.
@@ -64,11 +78,17 @@ pub struct Drafted {
     /// What the robot is.
     #[schemars(extend("enum" = ["single-joint", "serial"]))]
     model: &'static str,
-    joints: Vec<columns::Joint>,
+    joints: Vec<JointColumns>,
     /// Rate of the log \[Hz\].
     rate_hz: Option<f64>,
     /// Cut-off of the parallel filter that was suggested \[Hz\].
     cutoff_hz: Option<f64>,
+    /// Topic of the recording that was chosen.
+    topic: Option<String>,
+    /// What is a guess and marked CHECK IT in the file.
+    checks: Vec<String>,
+    /// What an inspection of the log with this file found; null without a log.
+    faults: Option<Vec<LogFault>>,
 }
 
 /// Runs the command.
@@ -102,12 +122,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         Some(path) => Some(UrdfChain::load(path, args.tip.as_deref())?),
         None => None,
     };
+    let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
+    let asked = Asked {
+        rate_hz: args.rate,
+        topic: args.topic.clone(),
+    };
+    let bar = context.progress("looking at the log", None);
+    let joints = known.as_ref().map(Vec::len);
     let seen = match &args.log {
-        Some(spec) => Some(columns::look(spec, context)?),
+        Some(spec) => Some(look(spec, &asked, joints, &|| context.interrupted())?),
         None => None,
     };
-    let named: Option<Vec<(String, JointKind)>> = chain.as_ref().map(joints_of);
-    let mapping = Mapping::of(named.as_deref(), seen.as_ref());
+    drop(bar);
+    let mapping = Mapping::of(known.as_deref(), seen.as_ref());
     let shape = match (&args.urdf, mapping.joints.len()) {
         (Some(path), _) => Shape::Urdf {
             path: beside(path, &target),
@@ -132,13 +159,29 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let filled = text.replace("= nan ", "= 1.0 ");
     let file = RobotFile::parse_in(&target.display().to_string(), &filled, folder)?;
     let mut warnings = [file.notes.clone(), mapping.warnings.clone()].concat();
-    if let Some(spec) = &args.log
-        && let Err(error) = Reader::open(spec, &file.layout())
+    if let Some(seen) = &seen
+        && args.topic.is_none()
+        && let Some(topic) = &seen.topic
     {
         warnings.push(format!(
-            "the log cannot be read with this file yet: {error}; correct [log] in {}",
-            target.display()
+            "topic {} is read, for it holds positions and torques and is no leader's and no command's; the others are {}",
+            escape(topic),
+            crate::log::list(seen.other_topics.iter().map(String::as_str))
         ));
+    }
+    let (mut unread, mut faults) = (false, None);
+    if let Some(spec) = &args.log {
+        if let Err(error) = Reader::open(spec, &file.layout()) {
+            unread = true;
+            warnings.push(format!(
+                "the log cannot be read with this file yet: {error}; correct [log] in {}",
+                target.display()
+            ));
+        } else {
+            let machine = LoggedRobot::new(&target.to_string_lossy(), file);
+            let found = inspect::findings(spec, &machine, context);
+            faults = Some(found?.faults);
+        }
     }
     write_text(&target, &text)?;
     let mut provenance = Vec::new();
@@ -158,23 +201,38 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let or_dash = |column: &Option<String>| column.clone().unwrap_or_else(|| "-".to_owned());
     for joint in &mapping.joints {
         table.row([
-            joint.name.as_str(),
+            joint.joint.as_str(),
             &or_dash(&joint.position),
             &or_dash(&joint.velocity),
             &or_dash(&joint.torque),
         ]);
     }
+    let place = target.display();
+    let wrong = faults
+        .iter()
+        .flatten()
+        .any(|f| f.severity == Severity::Error);
     let next = match &args.log {
         _ if draft.shape == Shape::Rows => format!(
-            "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {}\n",
-            target.display()
+            "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {place}\n"
         ),
-        Some(spec) => format!(
-            "next: cft-ident lsq {spec} -r {} -o model.toml\n",
-            target.display()
-        ),
-        None => format!("next: cft-ident inspect LOG -r {}\n", target.display()),
+        None => format!("next: cft-ident inspect LOG -r {place}\n"),
+        Some(_) if unread => format!("next: correct [log] in {place}\n"),
+        Some(spec) if wrong => {
+            format!("next: mend the errors that are found: cft-ident inspect {spec} -r {place}\n")
+        }
+        Some(spec) => {
+            let first = match mapping.is_sure(seen.as_ref()) {
+                true => "",
+                false => "look at the lines with CHECK IT in the file, then: ",
+            };
+            format!("next: {first}cft-ident lsq {spec} -r {place} -o model.toml\n")
+        }
     };
+    let checks: String = (mapping.checks.iter())
+        .map(|check| format!("CHECK IT: {check}\n"))
+        .collect();
+    let found = inspected(faults.as_deref());
     let result = Drafted {
         file: target
             .file_name()
@@ -185,19 +243,59 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         joints: mapping.joints.clone(),
         rate_hz: seen.as_ref().and_then(|s| s.rate_hz),
         cutoff_hz: draft.cutoff_hz(),
+        topic: seen.as_ref().and_then(|s| s.topic.clone()),
+        checks: mapping.checks.clone(),
+        faults,
     };
     Ok(Outcome {
-        text: format!("{table}{next}"),
+        text: format!("{table}{checks}{found}{next}"),
         document: Document::new("new", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })
 }
 
-/// The independent joints of a URDF and their kinds.
-fn joints_of(chain: &UrdfChain) -> Vec<(String, JointKind)> {
+/// What an inspection found that spoils a fit, in lines.
+fn inspected(faults: Option<&[LogFault]>) -> String {
+    let Some(faults) = faults else {
+        return String::new();
+    };
+    let told = faults.iter().filter(|f| f.severity != Severity::Info);
+    let lines: String = told
+        .clone()
+        .take(6)
+        .map(|fault| {
+            let kind = match fault.severity {
+                Severity::Error => "error",
+                _ => "warning",
+            };
+            let channel = fault
+                .channel
+                .as_deref()
+                .map(|name| format!("{}: ", escape(name)));
+            format!(
+                "inspect: {kind}: {}{}\n",
+                channel.unwrap_or_default(),
+                fault.effect
+            )
+        })
+        .collect();
+    match told.count() {
+        0 => "inspect: no faults found\n".to_owned(),
+        n if n > 6 => format!("{lines}inspect: and {} more\n", n - 6),
+        _ => lines,
+    }
+}
+
+/// The independent joints of a URDF, their kinds and their largest torques.
+fn joints_of(chain: &UrdfChain) -> Vec<Known> {
     let of = |link: &crate::config::serial_section::LinkSection| {
-        let kind = link.kind.unwrap_or(JointKind::Revolute);
-        link.joint.clone().map(|joint| (joint, kind))
+        let name = link.joint.clone()?;
+        let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
+        Some(Known {
+            kind: link.kind.unwrap_or(JointKind::Revolute),
+            torque: limits.and_then(|(_, limits)| limits.torque),
+            name,
+        })
     };
     chain.links.iter().filter_map(of).collect()
 }

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::Shape;
-use super::columns::{Joint, Mapping, Seen};
+use crate::log::escape;
+use crate::mapping::{Clock, JointColumns, Mapping, Seen};
 use crate::number;
 use crate::robot::JointKind;
 
@@ -81,7 +82,7 @@ impl Draft<'_> {
             let _ = write!(
                 out,
                 "# [limits.{}]\n# position = [-1.0, 1.0]\n# speed = 1.0\n# acceleration = 5.0\n# torque = 10.0\n",
-                key(&joint.name)
+                key(&joint.joint)
             );
         }
         out
@@ -111,7 +112,7 @@ impl Draft<'_> {
                     .mapping
                     .joints
                     .first()
-                    .map_or("q1", |j| j.name.as_str());
+                    .map_or("q1", |j| j.joint.as_str());
                 let (kind, why) = match kind {
                     JointKind::Prismatic => ("prismatic", "its position is in m"),
                     JointKind::Revolute => ("revolute", "guessed; prismatic where it slides"),
@@ -138,7 +139,7 @@ impl Draft<'_> {
                     let _ = write!(
                         out,
                         "\n[[robot.link]]\njoint = {}\n{kind}a = nan         # m\nalpha = nan     # rad\nd = nan         # m\ntheta = nan     # rad\n",
-                        quoted(&joint.name)
+                        quoted(&joint.joint)
                     );
                 }
             }
@@ -147,22 +148,15 @@ impl Draft<'_> {
 
     fn log(&self, out: &mut String) {
         out.push_str("\n[log]\n");
-        if let Some(seen) = self.seen
-            && let Some((time, seconds)) = &seen.time
-        {
-            if time != "t" {
-                let _ = writeln!(out, "time = {}", quoted(time));
-            }
-            let unit = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
-                .into_iter()
-                .find(|(_, size)| size == seconds);
-            if let Some((unit, _)) = unit {
-                let _ = writeln!(out, "time_unit = {}", quoted(unit));
-            }
+        if let Some(seen) = self.seen {
+            self.clock(seen, out);
         }
-        out.push_str(
-            "torque_is = \"joint\"     # or \"motor\", \"current\", \"commanded\"\n\
-             torque_held = false     # true where a torque was held from its own row to the next\n",
+        let what = self.mapping.torque_is;
+        let _ = writeln!(
+            out,
+            "torque_is = {:<12} # \"joint\", \"motor\", \"current\" or \"commanded\"\n\
+             torque_held = false     # true where a torque was held from its own row to the next",
+            quoted(what)
         );
         if self.seen.is_none() {
             out.push_str(
@@ -173,31 +167,80 @@ impl Draft<'_> {
                 let _ = writeln!(
                     out,
                     "# {} = {{ position = \"pos 1\", torque = \"I 1\", torque_unit = \"A\", torque_scale = 12.5 }}",
-                    key(&joint.name)
+                    key(&joint.joint)
                 );
             }
             return;
         }
-        let lines: Vec<String> = self.mapping.joints.iter().filter_map(columns).collect();
+        let recording = self.seen.is_some_and(Seen::is_recording);
+        let joints = self.mapping.joints.iter();
+        let lines: Vec<String> = joints.filter_map(|j| columns(j, recording)).collect();
+        for check in &self.mapping.checks {
+            let _ = writeln!(out, "# CHECK IT: {check}.");
+        }
+        if !self.mapping.others.is_empty() {
+            let _ = writeln!(
+                out,
+                "# Others of the kind: {}.",
+                self.mapping.others.join(", ")
+            );
+        }
         if lines.is_empty() {
             out.push_str(
                 "# The log has the tool's own names for its columns: nothing is to be mapped.\n",
             );
             return;
         }
-        let how = match self.mapping.by_order {
-            true => "in the order of the columns, for their names tell nothing: CHECK IT",
-            false => "by their names",
-        };
         let _ = write!(
             out,
-            "\n# Columns of each joint, {how}.\n\
+            "\n# Columns of each joint, {}.\n\
              # More keys: position_unit, position_sign, position_scale, position_offset,\n\
-             # torque_unit, torque_sign, torque_scale (gear ratio times torque constant).\n[log.joint]\n"
+             # torque_unit, torque_sign, torque_scale (gear ratio times torque constant).\n[log.joint]\n",
+            self.mapping.how
         );
         for line in lines {
             out.push_str(&line);
             out.push('\n');
+        }
+    }
+
+    /// Where the times come from, and which topic of a recording is read.
+    fn clock(&self, seen: &Seen, out: &mut String) {
+        match &seen.clock {
+            Clock::Messages => {}
+            Clock::Rate(rate) => {
+                let _ = writeln!(out, "rate_hz = {rate:?}   # the log has no times");
+            }
+            Clock::Column {
+                name,
+                seconds,
+                guessed,
+            } => {
+                let guessed = match guessed {
+                    true => "   # CHECK IT: it runs evenly, as times do",
+                    false => "",
+                };
+                if name != "t" || !guessed.is_empty() {
+                    let _ = writeln!(out, "time = {}{guessed}", column(name));
+                }
+                let unit = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
+                    .into_iter()
+                    .find(|(_, size)| size == seconds);
+                if let Some((unit, _)) = unit {
+                    let _ = writeln!(out, "time_unit = {}", quoted(unit));
+                }
+            }
+        }
+        if let Some(topic) = &seen.topic {
+            let _ = writeln!(out, "topic = {}", quoted(topic));
+            if !seen.other_topics.is_empty() {
+                let others: Vec<String> = seen.other_topics.iter().map(|t| escape(t)).collect();
+                let _ = writeln!(
+                    out,
+                    "# Other machines in the recording: {}.",
+                    others.join(", ")
+                );
+            }
         }
     }
 
@@ -224,32 +267,50 @@ impl Draft<'_> {
     }
 }
 
-/// The line of a joint in `[log.joint]`, where its columns have names of their own.
-fn columns(joint: &Joint) -> Option<String> {
+/// A column as TOML names it: in quotes, or by its number.
+fn column(name: &str) -> String {
+    match name.strip_prefix('#').and_then(|n| n.parse::<u32>().ok()) {
+        Some(number) => number.to_string(),
+        None => quoted(name),
+    }
+}
+
+/// The line of a joint in `[log.joint]`, where its columns have names or units of their own.
+fn columns(joint: &JointColumns, recording: bool) -> Option<String> {
     let mut keys = Vec::new();
-    for (what, column, plain) in [
+    // messages hold the arrays of all joints: what is named there is the joint
+    if let Some(name) = &joint.in_messages {
+        keys.push(format!("name = {}", quoted(name)));
+    }
+    for (what, found, plain) in [
         ("position", &joint.position, "q_"),
         ("velocity", &joint.velocity, "dq_"),
         ("torque", &joint.torque, "tau_"),
     ] {
-        if let Some(column) = column
-            && *column != format!("{plain}{}", joint.name)
+        if let Some(found) = found
+            && !recording
+            && *found != format!("{plain}{}", joint.joint)
         {
-            keys.push(format!("{what} = {}", quoted(column)));
+            keys.push(format!("{what} = {}", column(found)));
         }
     }
-    if let Some(unit @ ("deg" | "mm" | "counts")) = joint.position_unit.as_deref() {
+    if let Some(unit) = joint.position_unit {
         keys.push(format!("position_unit = {}", quoted(unit)));
     }
-    if let Some(unit @ ("A" | "V")) = joint.torque_unit.as_deref() {
+    if joint.position_unit == Some("counts") && joint.position_scale.is_none() {
+        keys.push("position_scale = 1.0".to_owned());
+    }
+    if let Some(scale) = joint.position_scale {
+        keys.push(format!("position_scale = {scale:?}"));
+    }
+    if let Some(wrap) = joint.wrap {
+        keys.push(format!("wrap = {wrap:?}"));
+    }
+    if let Some(unit) = joint.torque_unit {
         keys.push(format!("torque_unit = {}", quoted(unit)));
     }
-    // no joint turns that far in radians
-    let degrees =
-        joint.kind == JointKind::Revolute && joint.span > 40.0 && joint.position_unit.is_none();
-    let remark = match degrees {
-        true => "   # went through more than 40: in deg? then position_unit = \"deg\"",
-        false => "",
-    };
-    (!keys.is_empty()).then(|| format!("{} = {{ {} }}{remark}", key(&joint.name), keys.join(", ")))
+    if let Some(scale) = joint.torque_scale {
+        keys.push(format!("torque_scale = {scale:?}"));
+    }
+    (!keys.is_empty()).then(|| format!("{} = {{ {} }}", key(&joint.joint), keys.join(", ")))
 }

@@ -1,0 +1,202 @@
+//! Columns without names: what they hold says what they are.
+
+use crate::inspect::ChannelRole;
+
+/// Likeness of a column to the differences of another that makes it its velocity.
+const LIKE: f64 = 0.9;
+/// Part of the joints that must show such a velocity.
+const MOST: f64 = 0.6;
+
+/// Whether numbers run as those of a clock do: upward, by steps of one size. A counter of rows is none.
+pub(super) fn is_clock(numbers: &[f64]) -> bool {
+    let mut steps: Vec<f64> = numbers.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.len() < 2 || !steps.iter().all(|step| *step > 0.0) {
+        return false;
+    }
+    let counts = steps.iter().all(|step| *step == 1.0) && matches!(numbers[0], 0.0 | 1.0);
+    steps.sort_by(f64::total_cmp);
+    let middle = steps[steps.len() / 2];
+    let even = steps
+        .iter()
+        .filter(|s| (0.3..3.0).contains(&(**s / middle)));
+    !counts && 10 * even.count() >= 9 * steps.len()
+}
+
+/// Correlation of the central differences of one column with another.
+fn likeness(position: &[f64], velocity: &[f64]) -> f64 {
+    let (mut n, mut a, mut b, mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    // over ten rows, which takes most of an encoder's grain
+    for k in 5..position.len().saturating_sub(5) {
+        let (x, y) = (position[k + 5] - position[k - 5], velocity[k]);
+        if !(x.is_finite() && y.is_finite()) {
+            continue;
+        }
+        n += 1.0;
+        (a, b) = (a + x, b + y);
+        (aa, bb, ab) = (aa + x * x, bb + y * y, ab + x * y);
+    }
+    let spread = (n * aa - a * a) * (n * bb - b * b);
+    match spread > 0.0 {
+        true => (n * ab - a * b) / spread.sqrt(),
+        false => 0.0,
+    }
+}
+
+/// How rough a column is: its steps beside its spread. Positions are smoother than torques.
+fn roughness(numbers: &[f64]) -> f64 {
+    let finite: Vec<f64> = numbers.iter().copied().filter(|x| x.is_finite()).collect();
+    let n = finite.len().max(1) as f64;
+    let mean = finite.iter().sum::<f64>() / n;
+    let spread = finite.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    let steps = finite
+        .windows(2)
+        .map(|p| (p[1] - p[0]).powi(2))
+        .sum::<f64>();
+    match spread > 0.0 {
+        true => steps / spread,
+        false => f64::INFINITY,
+    }
+}
+
+/// Role and joint of each column of a log that names none, times left out: the blocks `q dq tau` or
+/// `q tau`, joint after joint in each, or the three of each joint together.
+pub(super) fn roles(columns: &[&[f64]], joints: Option<usize>) -> Vec<(ChannelRole, String)> {
+    let m = columns.len();
+    let mut out = vec![(ChannelRole::Other, String::new()); m];
+    let mut set = |at: usize, role: ChannelRole, joint: usize| {
+        if let Some(place) = out.get_mut(at) {
+            *place = (role, (joint + 1).to_string());
+        }
+    };
+    let (p, v, t) = (
+        ChannelRole::Position,
+        ChannelRole::Velocity,
+        ChannelRole::Torque,
+    );
+    if let Some((first, n, stride)) = with_velocities(columns, joints) {
+        for joint in 0..n {
+            let q = first + joint * stride;
+            let by = if stride == 1 { n } else { 1 };
+            set(q, p, joint);
+            set(q + by, v, joint);
+            set(q + 2 * by, t, joint);
+        }
+        return out;
+    }
+    let n = joints.filter(|n| m >= 2 * n).unwrap_or(m / 2);
+    if n == 0 {
+        return out;
+    }
+    let rough = |from: usize| (from..from + n).map(|k| roughness(columns[k])).sum::<f64>();
+    let torques_first = rough(0) > rough(n);
+    for joint in 0..n {
+        let (q, tau) = match torques_first {
+            true => (n + joint, joint),
+            false => (joint, n + joint),
+        };
+        set(q, p, joint);
+        set(tau, t, joint);
+    }
+    out
+}
+
+/// Place of the first position, number of joints and distance between positions, where velocities show
+/// them.
+fn with_velocities(columns: &[&[f64]], joints: Option<usize>) -> Option<(usize, usize, usize)> {
+    let m = columns.len();
+    let is_rate = |q: usize, dq: usize| likeness(columns[q], columns[dq]) > LIKE;
+    let share = |pairs: &[(usize, usize)]| {
+        let like = pairs.iter().filter(|(q, dq)| is_rate(*q, *dq)).count();
+        like as f64 / pairs.len() as f64
+    };
+    let mut best: Option<(f64, (usize, usize, usize))> = None;
+    let mut consider = |first: usize, n: usize, stride: usize| {
+        let by = if stride == 1 { n } else { 1 };
+        let last = first + (n - 1) * stride + by;
+        if n == 0 || last >= m || joints.is_some_and(|j| j != n) {
+            return;
+        }
+        let pairs: Vec<(usize, usize)> = (0..n)
+            .map(|j| (first + j * stride, first + j * stride + by))
+            .collect();
+        let like = share(&pairs);
+        // of equal ones the one with more joints
+        let score = like + 1e-3 * n as f64;
+        if like >= MOST && best.is_none_or(|(found, _)| score > found) {
+            best = Some((score, (first, n, stride)));
+        }
+    };
+    for first in 0..m.min(3) {
+        for n in 1..=(m - first) / 2 {
+            consider(first, n, 1);
+        }
+        for n in 2..=m / 3 {
+            consider(first, n, 3);
+        }
+    }
+    best.map(|(_, found)| found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(k: usize, joint: usize, turned: f64) -> f64 {
+        let w = 1.0 + 0.37 * joint as f64;
+        (w * 0.002 * k as f64 + turned).sin() * (1.0 + joint as f64)
+    }
+
+    fn noise(k: usize, joint: usize) -> f64 {
+        ((k * 7919 + joint * 104_729) % 1000) as f64 / 1000.0 - 0.5
+    }
+
+    fn column(kind: char, joint: usize) -> Vec<f64> {
+        let at = |k: usize| match kind {
+            'q' => wave(k, joint, 0.0),
+            'v' => wave(k, joint, std::f64::consts::FRAC_PI_2),
+            _ => 3.0 * wave(k, joint, 1.0) + noise(k, joint),
+        };
+        (0..4000).map(at).collect()
+    }
+
+    fn roles_of(order: &[(char, usize)], joints: Option<usize>) -> String {
+        let columns: Vec<Vec<f64>> = order.iter().map(|(kind, j)| column(*kind, *j)).collect();
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let letter = |(role, joint): (ChannelRole, String)| match role {
+            ChannelRole::Position => format!("q{joint}"),
+            ChannelRole::Velocity => format!("v{joint}"),
+            ChannelRole::Torque => format!("t{joint}"),
+            _ => "-".to_owned(),
+        };
+        let found: Vec<String> = roles(&columns, joints).into_iter().map(letter).collect();
+        found.join(" ")
+    }
+
+    #[test]
+    fn blocks_and_joints_in_turn_are_told_by_their_velocities() {
+        let (q, v, t) = ('q', 'v', 't');
+        let blocks = [(q, 0), (q, 1), (v, 0), (v, 1), (t, 0), (t, 1)];
+        assert_eq!(roles_of(&blocks, None), "q1 q2 v1 v2 t1 t2");
+        let in_turn = [(q, 0), (v, 0), (t, 0), (q, 1), (v, 1), (t, 1)];
+        assert_eq!(roles_of(&in_turn, None), "q1 v1 t1 q2 v2 t2");
+        assert_eq!(roles_of(&[(q, 0), (v, 0), (t, 0)], None), "q1 v1 t1");
+    }
+
+    #[test]
+    fn without_velocities_positions_are_the_smoother_half() {
+        let (q, t) = ('q', 't');
+        let plain = [(q, 0), (q, 1), (t, 0), (t, 1)];
+        assert_eq!(roles_of(&plain, Some(2)), "q1 q2 t1 t2");
+        let turned = [(t, 0), (t, 1), (q, 0), (q, 1)];
+        assert_eq!(roles_of(&turned, None), "t1 t2 q1 q2");
+    }
+
+    #[test]
+    fn a_clock_runs_evenly_and_a_counter_of_rows_is_none() {
+        let clock: Vec<f64> = (0..500).map(|k| 3.0 + 0.002 * f64::from(k)).collect();
+        let count: Vec<f64> = (0..500).map(f64::from).collect();
+        assert!(is_clock(&clock));
+        assert!(!is_clock(&count));
+        assert!(!is_clock(&column('q', 0)));
+    }
+}

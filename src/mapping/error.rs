@@ -1,0 +1,36 @@
+//! What keeps a log from being described.
+
+use thiserror::Error;
+
+use crate::log::LogError;
+
+/// Why a log says too little to be described.
+#[derive(Debug, Error)]
+pub enum MappingError {
+    /// A log that cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// No column is a time.
+    #[error(
+        "{log}: no column is a time: {columns}; give the rate at which it was recorded: --rate HZ; or add a column of times"
+    )]
+    NoTime {
+        /// Name of the log.
+        log: String,
+        /// The columns that it has.
+        columns: String,
+    },
+    /// Several machines in one recording.
+    #[error(
+        "{log}: holds several machines: {topics}; name the topic of the one that was measured: --topic NAME"
+    )]
+    Topics {
+        /// Name of the log.
+        log: String,
+        /// Their topics, those that are likeliest first.
+        topics: String,
+    },
+    /// The user stopped it.
+    #[error("interrupted")]
+    Interrupted,
+}

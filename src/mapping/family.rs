@@ -1,0 +1,318 @@
+//! Columns whose names differ in a number or in the name of a joint alone, and how they fit the joints.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::look::Column;
+use crate::inspect::ChannelRole;
+use crate::inspect::words::{Word, words};
+use crate::log::nearest;
+
+/// What tells a member of a family from the others.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Key {
+    Number(u32),
+    Name(String),
+}
+
+/// Columns of one kind, one for each joint.
+#[derive(Debug, Clone)]
+pub(super) struct Family<'a> {
+    /// The name that they share, `#` for what differs.
+    pub pattern: String,
+    pub members: Vec<(Key, &'a Column)>,
+    /// How far its words are from a measured quantity of the joint; below 0 where they say `measured`.
+    pub penalty: i32,
+}
+
+/// How the columns of a family were given to the joints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum How {
+    /// Each has the joint's name, or the numbers of all are those of the joints, from 0 or from 1.
+    Fits,
+    /// As many as joints, in their order: the joints have no numbers.
+    InOrder,
+    /// Some of them, or more than there are joints.
+    InPart,
+}
+
+/// Words that say that a quantity is not what a joint's sensor measured, and how much they count.
+const PENALTIES: [(&[&str], i32); 4] = [
+    (
+        &[
+            "ext",
+            "external",
+            "contact",
+            "est",
+            "estimated",
+            "estimate",
+            "model",
+            "predicted",
+            "sim",
+            "simulated",
+            "gravity",
+            "friction",
+            "feedforward",
+            "ff",
+            "comp",
+            "computed",
+            "bias",
+            "offset",
+            "error",
+            "err",
+            "limit",
+            "max",
+            "min",
+            "temp",
+            "temperature",
+        ],
+        3,
+    ),
+    (
+        &[
+            "se",
+            "secondary",
+            "rel",
+            "relative",
+            "delta",
+            "diff",
+            "voltage",
+            "volts",
+        ],
+        2,
+    ),
+    (
+        &[
+            "raw", "filt", "filtered", "mot", "motor", "smooth", "current", "currents", "curr",
+            "cur", "amps", "amp", "iq", "u",
+        ],
+        1,
+    ),
+    (
+        &[
+            "act", "actual", "meas", "measured", "feedback", "fbk", "follower", "sensor",
+        ],
+        -1,
+    ),
+];
+
+fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
+    let of = |known: &[&str]| {
+        pattern
+            .iter()
+            .any(|word| known.contains(&word.text.as_str()))
+    };
+    let told = PENALTIES.iter().filter(|(known, _)| of(known));
+    let sum: i32 = told.map(|(_, count)| *count).sum();
+    // `current` beside a position is an adjective
+    let adjective = role != ChannelRole::Torque && of(&["current"]);
+    sum - i32::from(adjective)
+}
+
+/// The families among columns of one role. A column may be in several.
+pub(super) fn families<'a>(columns: &[&'a Column], joints: &[&str]) -> Vec<Family<'a>> {
+    let mut found: BTreeMap<String, Vec<(Key, &Column)>> = BTreeMap::new();
+    let mut order: Vec<String> = Vec::new();
+    let mut add = |pattern: String, key: Key, column: &'a Column| {
+        let members = found.entry(pattern.clone()).or_insert_with(|| {
+            order.push(pattern);
+            Vec::new()
+        });
+        members.push((key, column));
+    };
+    for column in columns {
+        let name = &column.name;
+        if name.starts_with('#') {
+            // a column without a name: its content gave it a number
+            let key = match column.joint.parse() {
+                Ok(number) => Key::Number(number),
+                Err(_) => Key::Name(column.joint.clone()),
+            };
+            add("#".to_owned(), key, column);
+            continue;
+        }
+        let without =
+            |at: std::ops::Range<usize>| format!("{}#{}", &name[..at.start], &name[at.end..]);
+        let spoken = words(name);
+        for word in spoken.iter().filter(|word| word.number().is_some()) {
+            add(
+                without(word.at.clone()),
+                Key::Number(word.number().unwrap_or(0)),
+                column,
+            );
+        }
+        // the names of the robot's joints, the longest that is in it
+        let part = |joint: &str| {
+            let joint = words(joint);
+            let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
+            let found = spoken.windows(joint.len().max(1)).find(same)?;
+            Some(found.first()?.at.start..found.last()?.at.end)
+        };
+        let named = joints
+            .iter()
+            .filter_map(|joint| Some((*joint, part(joint)?)));
+        let longest = named.max_by_key(|(joint, _)| joint.len());
+        if let Some((joint, at)) = longest {
+            add(without(at), Key::Name(joint.to_owned()), column);
+        } else if column.joint.is_empty() {
+            add(name.clone(), Key::Name(String::new()), column);
+        } else if column.joint.parse::<u32>().is_err()
+            && let Some(at) = part(&column.joint)
+        {
+            add(without(at), Key::Name(column.joint.clone()), column);
+        }
+    }
+    let family = |pattern: String| {
+        let members = found.remove(&pattern)?;
+        let keys: BTreeSet<&Key> = members.iter().map(|(key, _)| key).collect();
+        let role = members.first()?.1.role;
+        (keys.len() == members.len()).then(|| Family {
+            penalty: penalty(&words(&pattern), role),
+            pattern,
+            members,
+        })
+    };
+    order.into_iter().filter_map(family).collect()
+}
+
+/// The numbers of names, one each and no two alike: the last in each, else the first.
+fn numbers(names: &[&str]) -> Option<Vec<u32>> {
+    let of = |last: bool| -> Option<Vec<u32>> {
+        let one = |name: &&str| {
+            let spoken = words(name);
+            let mut numbers = spoken.iter().filter_map(Word::number);
+            if last {
+                numbers.next_back()
+            } else {
+                numbers.next()
+            }
+        };
+        let found = names.iter().map(one).collect::<Option<Vec<u32>>>()?;
+        let apart = found.iter().collect::<BTreeSet<_>>().len() == found.len();
+        apart.then_some(found)
+    };
+    of(true).or_else(|| of(false))
+}
+
+/// A name without the word `joint`.
+fn bare(name: &str) -> String {
+    let spoken = words(name);
+    let left = spoken.iter().filter(|word| word.text != "joint");
+    let left: Vec<&str> = left.map(|word| word.text.as_str()).collect();
+    match left.is_empty() {
+        true => name.to_lowercase(),
+        false => left.join("_"),
+    }
+}
+
+/// The columns of joints from a family, and how they were found.
+pub(super) fn fit<'a>(
+    family: &Family<'a>,
+    joints: &[&str],
+) -> Option<(How, Vec<Option<&'a Column>>)> {
+    let by_key = |key: &Key| {
+        let found = family.members.iter().find(|(own, _)| own == key);
+        found.map(|(_, column)| *column)
+    };
+    let named: Vec<Option<&Column>> = joints
+        .iter()
+        .map(|joint| {
+            let is = |key: &Key| matches!(key, Key::Name(name) if bare(name) == bare(joint));
+            let found = family.members.iter().find(|(key, _)| is(key));
+            found.map(|(_, column)| *column)
+        })
+        .collect();
+    if named.iter().all(Option::is_some) {
+        return Some((How::Fits, named));
+    }
+    let mut own: Vec<u32> = Vec::new();
+    for (key, _) in &family.members {
+        if let Key::Number(number) = key {
+            own.push(*number);
+        }
+    }
+    own.sort_unstable();
+    if own.len() == family.members.len() && !own.is_empty() {
+        let base = own[0];
+        let in_a_row = own.iter().zip(base..).all(|(a, b)| *a == b) && base <= 1;
+        let of_joints = numbers(joints);
+        let from_one = |of: &[u32]| {
+            let first = of.iter().min().copied().unwrap_or(0);
+            let mut sorted = of.to_vec();
+            sorted.sort_unstable();
+            sorted
+                .iter()
+                .zip(first..)
+                .all(|(a, b)| *a == b)
+                .then_some(first)
+        };
+        let whole = in_a_row && own.len() == joints.len();
+        return Some(
+            match (&of_joints, of_joints.as_deref().and_then(from_one)) {
+                // the joints have numbers in a row: the first column is the first joint's
+                (Some(of), Some(first)) if whole => {
+                    let place = |n: &u32| by_key(&Key::Number(n - first + base));
+                    (How::Fits, of.iter().map(place).collect())
+                }
+                (None, _) if whole => {
+                    let place = |k: usize| by_key(&Key::Number(base + k as u32));
+                    let how = if joints.len() == 1 {
+                        How::Fits
+                    } else {
+                        How::InOrder
+                    };
+                    (how, (0..joints.len()).map(place).collect())
+                }
+                // other numbers, or not all: by the same number where the joints have one
+                (Some(of), _)
+                    if of.iter().all(|n| own.contains(n)) && own.len() == joints.len() =>
+                {
+                    let place = |n: &u32| by_key(&Key::Number(*n));
+                    (How::Fits, of.iter().map(place).collect())
+                }
+                (Some(of), first) => {
+                    let shift = first.map_or(0, |first| i64::from(base) - i64::from(first));
+                    let shift = if base <= 1 { shift } else { 0 };
+                    let place = |n: &u32| {
+                        let number = u32::try_from(i64::from(*n) + shift).ok()?;
+                        by_key(&Key::Number(number))
+                    };
+                    (How::InPart, of.iter().map(place).collect())
+                }
+                (None, _) if own.len() >= joints.len() => {
+                    let place = |k: usize| by_key(&Key::Number(own[k]));
+                    (How::InPart, (0..joints.len()).map(place).collect())
+                }
+                (None, _) => return None,
+            },
+        );
+    }
+    // one joint, one column
+    if let ([_], [(_, only)]) = (joints, &family.members[..]) {
+        return Some((How::Fits, vec![Some(only)]));
+    }
+    let names: Vec<&str> = (family.members.iter())
+        .filter_map(|(key, _)| match key {
+            Key::Name(name) => Some(name.as_str()),
+            Key::Number(_) => None,
+        })
+        .collect();
+    let near: Vec<Option<&Column>> = joints
+        .iter()
+        .map(|joint| {
+            let near = nearest(joint, names.iter().copied())?;
+            by_key(&Key::Name(near.to_owned()))
+        })
+        .collect();
+    let mut seen = BTreeSet::new();
+    let twice = near
+        .iter()
+        .flatten()
+        .any(|column| !seen.insert(&column.name));
+    if near.iter().any(Option::is_some) && !twice {
+        return Some((How::InPart, near));
+    }
+    (family.members.len() == joints.len() && joints.len() > 1).then(|| {
+        let all = family.members.iter().map(|(_, column)| Some(*column));
+        (How::InOrder, all.collect())
+    })
+}

@@ -1,0 +1,288 @@
+//! A log as its columns: names, roles, units, ranges, and its clock.
+
+use super::content;
+use super::error::MappingError;
+use super::units::wrap_of;
+use crate::inspect::words::{is_command, joint, role, words};
+use crate::inspect::{self, ChannelColumn, ChannelRole, ColumnPlan, InspectedChannel};
+use crate::log::{
+    self, LogSection, LogSpec, Provenance, RawBlock, RawReader, StateGroup, escape, list,
+};
+
+/// Rows at the beginning whose numbers are looked at one by one.
+const SAMPLE: usize = 20_480;
+
+/// A column of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Its name; `#3` where it has none.
+    pub name: String,
+    /// What it holds, commanded or measured.
+    pub role: ChannelRole,
+    /// It was commanded, or is of a machine that leads.
+    pub commanded: bool,
+    /// The joint that its name speaks of; empty where it names none.
+    pub joint: String,
+    /// The unit that its name states.
+    pub unit: Option<String>,
+    /// Smallest and largest number, in its own unit.
+    pub range: [f64; 2],
+    /// Every number is a whole one, and not all are 0.
+    pub whole: bool,
+    /// Range after which it begins anew.
+    pub wrap: Option<f64>,
+}
+
+impl Column {
+    /// A column by its name.
+    pub fn named(name: &str) -> Self {
+        let guessed = InspectedChannel::guessed(name);
+        let spoken = words(name);
+        let (role, joint) = match guessed.role {
+            ChannelRole::Command => (role(&spoken).unwrap_or(ChannelRole::Other), joint(&spoken)),
+            role => (role, guessed.joint.unwrap_or_default()),
+        };
+        Self {
+            name: name.to_owned(),
+            role,
+            commanded: is_command(&spoken),
+            joint,
+            unit: None,
+            range: [0.0; 2],
+            whole: false,
+            wrap: None,
+        }
+    }
+
+    /// Width of what it went through, in its own unit.
+    pub fn span(&self) -> f64 {
+        self.range[1] - self.range[0]
+    }
+
+    /// Largest size of a number in it.
+    pub fn largest(&self) -> f64 {
+        self.range[0].abs().max(self.range[1].abs())
+    }
+}
+
+/// Where times come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Clock {
+    /// Messages have their own.
+    Messages,
+    /// A column, by its name; seconds per unit of it, and whether anything but its name told that it is
+    /// one.
+    Column {
+        name: String,
+        seconds: f64,
+        guessed: bool,
+    },
+    /// Rows lie evenly \[Hz\].
+    Rate(f64),
+}
+
+/// What the user says of the log.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Asked {
+    /// Rate of a log without times \[Hz\].
+    pub rate_hz: Option<f64>,
+    /// Topic of a recording.
+    pub topic: Option<String>,
+}
+
+/// What a log shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    pub columns: Vec<Column>,
+    pub clock: Clock,
+    /// Topic that was chosen among several.
+    pub topic: Option<String>,
+    /// Topics that were not.
+    pub other_topics: Vec<String>,
+    /// Columns have numbers and no names.
+    pub headerless: bool,
+    pub rate_hz: Option<f64>,
+    pub duration_s: f64,
+    pub name: String,
+    pub provenance: Provenance,
+}
+
+impl Seen {
+    /// Whether it is a recording of messages.
+    pub fn is_recording(&self) -> bool {
+        self.clock == Clock::Messages
+    }
+}
+
+/// Looks at a log, to its end; `joints` is the number of the robot's joints where that is known.
+///
+/// # Errors
+/// A log that cannot be read or has no times, a recording of several machines, and interruption.
+pub fn look(
+    spec: &LogSpec,
+    asked: &Asked,
+    joints: Option<usize>,
+    stop: &dyn Fn() -> bool,
+) -> Result<Seen, MappingError> {
+    let name = escape(&spec.name());
+    let groups = log::topics(spec)?;
+    let topic = match &asked.topic {
+        Some(topic) => Some(topic.clone()),
+        None => chosen(&groups, &name)?,
+    };
+    let section = LogSection {
+        topic: topic.clone(),
+        rate_hz: asked.rate_hz,
+        ..LogSection::default()
+    };
+    let mut log = RawReader::open_plain(spec, &section)?;
+    let sample = sample(&mut log)?;
+    let mut log = RawReader::open_plain(spec, &section)?;
+    let time = match (log.is_recording(), asked.rate_hz) {
+        (true, _) | (_, Some(_)) => None,
+        _ => Some(time_of(&mut log, &sample, &name)?),
+    };
+    let headerless = log.names().first().is_some_and(|name| name == "#1");
+    let at = time.as_ref().map(|(at, ..)| *at);
+    // the time of a recording is its first column
+    let at = at.or_else(|| log.is_recording().then_some(0));
+    let numbers: Vec<usize> = (0..log.names().len()).filter(|k| Some(*k) != at).collect();
+    let mut columns: Vec<Column> = numbers
+        .iter()
+        .map(|k| Column {
+            unit: log.unit(*k).map(str::to_owned),
+            whole: is_whole(&sample[*k]),
+            wrap: wrap_of(&sample[*k]),
+            ..Column::named(&log.names()[*k])
+        })
+        .collect();
+    if headerless {
+        let held: Vec<&[f64]> = numbers.iter().map(|k| sample[*k].as_slice()).collect();
+        for (column, (role, joint)) in columns.iter_mut().zip(content::roles(&held, joints)) {
+            (column.role, column.joint) = (role, joint);
+        }
+    }
+    let channels = numbers.iter().zip(&columns).map(|(k, column)| {
+        let joint = Some(column.joint.as_str());
+        ChannelColumn {
+            column: *k,
+            factor: 1.0,
+            offset: 0.0,
+            channel: InspectedChannel::new(&column.name, column.role, joint, None),
+        }
+    });
+    let plan = ColumnPlan {
+        time: time.as_ref().map(|(at, seconds, _)| (*at, *seconds)),
+        channels: channels.collect(),
+    };
+    let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
+    for column in &mut columns {
+        let fact = findings.channels.iter().find(|f| f.name == column.name);
+        if let Some((low, high)) = fact.and_then(|f| f.min.zip(f.max)) {
+            column.range = [low, high];
+        }
+    }
+    let clock = match (time, asked.rate_hz) {
+        (Some((at, seconds, guessed)), _) => Clock::Column {
+            name: log.names()[at].clone(),
+            seconds,
+            guessed,
+        },
+        (None, Some(rate)) if !log.is_recording() => Clock::Rate(rate),
+        _ => Clock::Messages,
+    };
+    let others = groups.into_iter().map(|group| group.topic);
+    Ok(Seen {
+        columns,
+        clock,
+        other_topics: match &topic {
+            Some(topic) => others.filter(|other| other != topic).collect(),
+            None => Vec::new(),
+        },
+        topic,
+        headerless,
+        rate_hz: findings.rate_hz,
+        duration_s: findings.duration_s,
+        name,
+        provenance: log.provenance()?,
+    })
+}
+
+/// The topic of the machine that was measured, where a recording holds several; leaders and commands are
+/// no measurements.
+fn chosen(groups: &[StateGroup], name: &str) -> Result<Option<String>, MappingError> {
+    if groups.len() < 2 {
+        return Ok(None);
+    }
+    let measured = |g: &&StateGroup| !is_command(&words(&g.topic));
+    let whole = |g: &&StateGroup| g.holds[0] && g.holds[1];
+    let best: Vec<&StateGroup> = groups.iter().filter(measured).filter(whole).collect();
+    if let [only] = best[..] {
+        return Ok(Some(only.topic.clone()));
+    }
+    let mut ranked: Vec<&StateGroup> = groups.iter().collect();
+    ranked.sort_by_key(|g| (!measured(g), !whole(g)));
+    Err(MappingError::Topics {
+        log: name.to_owned(),
+        topics: list(ranked.iter().map(|g| g.topic.as_str())),
+    })
+}
+
+/// The first numbers of every column.
+fn sample(log: &mut RawReader) -> Result<Vec<Vec<f64>>, MappingError> {
+    let width = log.names().len();
+    let mut out = vec![Vec::new(); width];
+    let mut block = RawBlock::default();
+    let most = SAMPLE.min((1 << 22) / width.max(1));
+    while out.first().is_some_and(|c| c.len() < most) && log.read(&mut block)? {
+        for (to, from) in out.iter_mut().zip(&block.columns) {
+            to.extend(from);
+        }
+    }
+    Ok(out)
+}
+
+/// Place of the time, seconds per unit of it, and whether it was guessed from its numbers.
+fn time_of(
+    log: &mut RawReader,
+    sample: &[Vec<f64>],
+    name: &str,
+) -> Result<(usize, f64, bool), MappingError> {
+    let named = log.names().iter().position(|name| inspect::is_time(name));
+    let found = match named {
+        Some(at) => Some((at, false)),
+        None => {
+            let runs = |k: &usize| content::is_clock(&sample[*k]);
+            (0..sample.len()).find(runs).map(|at| (at, true))
+        }
+    };
+    let Some((at, guessed)) = found else {
+        return Err(MappingError::NoTime {
+            log: name.to_owned(),
+            columns: list(log.names().iter().map(String::as_str)),
+        });
+    };
+    let of_name = log.unit(at).map(str::to_owned);
+    let suffix = log.names()[at]
+        .rsplit_once('_')
+        .map(|(_, unit)| unit.to_owned());
+    let stated = [of_name, suffix].into_iter().flatten().find_map(|unit| {
+        Some(match unit.to_lowercase().as_str() {
+            "s" | "sec" => 1.0,
+            "ms" => 1e-3,
+            "us" | "µs" | "μs" => 1e-6,
+            "ns" => 1e-9,
+            _ => return None,
+        })
+    });
+    let seconds = match stated {
+        Some(seconds) => seconds,
+        None => log.set_time_by_numbers(at)?,
+    };
+    Ok((at, seconds, guessed))
+}
+
+fn is_whole(numbers: &[f64]) -> bool {
+    let finite = || numbers.iter().filter(|x| x.is_finite());
+    finite().all(|x| x.fract() == 0.0) && finite().any(|x| *x != 0.0)
+}

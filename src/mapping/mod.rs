@@ -1,0 +1,22 @@
+//! Which columns of a log that nobody has described are which joint, in which unit.
+//!
+//! | file | what |
+//! |---|---|
+//! | `look` | a log as its columns: names, roles, ranges, times, and the topic of a recording |
+//! | `content` | roles of columns without names, by what they hold |
+//! | `family` | columns whose names differ in a number or a joint's name alone, and how well they fit |
+//! | `choose` | one family each for positions, velocities and torques |
+//! | `units` | units that names state, or that numbers suggest |
+//!
+//! A guess is a guess: each is told in words, and what is not certain says `CHECK IT`.
+
+mod choose;
+mod content;
+mod error;
+mod family;
+mod look;
+mod units;
+
+pub use choose::{JointColumns, Known, Mapping};
+pub use error::MappingError;
+pub use look::{Asked, Clock, Column, Seen, look};
