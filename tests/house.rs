@@ -55,8 +55,8 @@ const ROOMS: &[(&str, &[&str])] = &[
         "cli",
         &[
             "math", "verdict", "number", "robot", "log", "config", "output", "motion", "effect",
-            "friction", "inertia", "diagnose", "validate", "inspect", "mapping", "setup", "simulate",
-            "excite", "compare", "identify", "report", "export",
+            "friction", "inertia", "diagnose", "validate", "inspect", "mapping", "setup",
+            "simulate", "excite", "compare", "identify", "report", "export",
         ],
     ),
 ];

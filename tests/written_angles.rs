@@ -38,21 +38,21 @@ fn rows_with_rounded_angles_have_the_parameters_of_exact_ones() {
         let kept = RobotFile::parse("panda.toml", &kept).unwrap();
         let alpha = written.parse::<f64>().unwrap();
         assert_eq!(kept.robot.link[2].alpha, Some(alpha));
-        assert!(kept.notes.is_empty(), "{:?}", kept.notes);
+        assert!(kept.notes.0.is_empty(), "{:?}", kept.notes.0);
     }
     // the fault that this is about: one false parameter
     let kept = panda("1.5708").replace("[robot]", "[robot]\nangles_as_written = true");
     assert_eq!(base_parameters(&kept), exact + 1);
     // told in one sentence, and only where something moved
     let file = RobotFile::parse("panda.toml", &panda("1.5708")).unwrap();
-    assert_eq!(file.notes.len(), 1, "{:?}", file.notes);
+    assert_eq!(file.notes.0.len(), 1, "{:?}", file.notes.0);
     assert!(
-        file.notes[0].contains("alpha of q2 -1.5708 as -pi/2 and 5 more"),
+        file.notes.0[0].contains("alpha of q2 -1.5708 as -pi/2 and 5 more"),
         "{}",
-        file.notes[0]
+        file.notes.0[0]
     );
     let file = RobotFile::parse("panda.toml", &panda("1.57079632679")).unwrap();
-    assert!(file.notes.is_empty(), "{:?}", file.notes);
+    assert!(file.notes.0.is_empty(), "{:?}", file.notes.0);
 }
 
 /// The text with every number of each `rpy` at `decimals`.
@@ -163,8 +163,7 @@ fn the_panda_with_rounded_angles_fits_as_with_exact_ones() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let fitted = |half_turn: &str| {
-        std::fs::write(folder.path().join("panda.toml"), panda(half_turn)).unwrap();
+    let fit = || {
         let mut command = assert_cmd::Command::cargo_bin("cft-ident").unwrap();
         let done = command
             .current_dir(folder.path())
@@ -173,8 +172,11 @@ fn the_panda_with_rounded_angles_fits_as_with_exact_ones() {
             .args(["-r", "panda.toml", "-o", "model.toml", "--json", "-", "-q"])
             .assert()
             .success();
-        let found: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
-        found
+        serde_json::from_slice::<serde_json::Value>(&done.get_output().stdout).unwrap()
+    };
+    let fitted = |half_turn: &str| {
+        std::fs::write(folder.path().join("panda.toml"), panda(half_turn)).unwrap();
+        fit()
     };
     let count = |found: &serde_json::Value| found["parameters"].as_array().unwrap().len();
     let condition = |found: &serde_json::Value| found["condition"]["normalised"].as_f64().unwrap();
@@ -188,6 +190,20 @@ fn the_panda_with_rounded_angles_fits_as_with_exact_ones() {
     assert!((condition(&rounded) / condition(&exact) - 1.0).abs() < 1e-6);
     let warnings = rounded["warnings"].to_string();
     assert!(warnings.contains("as -pi/2"), "{warnings}");
+    assert_eq!(rounded["setup"], serde_json::Value::Array(Vec::new()));
+    // as it is written there is one parameter more, and the geometry that makes it is named
+    let kept = panda("1.5708").replace("[robot]", "[robot]\nangles_as_written = true");
+    std::fs::write(folder.path().join("panda.toml"), &kept).unwrap();
+    let kept = fit();
+    assert_eq!(count(&kept), 70);
+    assert!(condition(&kept) > 1e6, "{}", condition(&kept));
+    let setup = kept["setup"].as_array().unwrap();
+    assert!(setup.iter().any(|f| f["kind"] == "geometry"), "{setup:?}");
+    assert!(
+        setup.iter().all(|f| f["kind"] != "geometry"
+            || (f["found"].as_f64().unwrap().abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-9),
+        "{setup:?}"
+    );
 }
 
 #[test]

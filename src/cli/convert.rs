@@ -246,7 +246,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         without_time: 0,
     };
     let bar = context.progress("converting", Some(args.logs.len() as u64));
-    let notes = machine.as_ref().map(|machine| machine.file.notes.clone());
+    let notes = machine.as_ref().map(|machine| machine.file.notes.0.clone());
     let (mut warnings, mut provenance) = (notes.unwrap_or_default(), Vec::new());
     for spec in &args.logs {
         provenance.push(match &machine {

@@ -209,7 +209,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = Known::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance) = (Vec::new(), Vec::new());
-    let notes = known.as_ref().map(|known| known.machine.file.notes.clone());
+    let notes = known
+        .as_ref()
+        .map(|known| known.machine.file.notes.0.clone());
     let mut warnings = notes.unwrap_or_default();
     for spec in &args.logs {
         // What several machines recorded is no one log: each is looked at on its own.

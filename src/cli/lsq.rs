@@ -86,7 +86,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let checked = setup::checked(machine, robot, &logs, known, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
-    found.setup.clone_from(&checked.report.findings);
+    found
+        .setup
+        .splice(0..0, checked.report.findings.iter().cloned());
     found
         .warnings
         .splice(0..0, checked.warnings.iter().cloned());

@@ -146,7 +146,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let names = (file_name(&args.output), file_name(&truth_path));
     let duration = duration(&robot, &simulated);
     let result = Simulated::of(&simulated, args.seed, duration, &names);
-    let told = [robot.notes.clone(), warnings(&simulated)].concat();
+    let told = [robot.notes.0.clone(), warnings(&simulated)].concat();
     Ok(Outcome {
         text: render(&robot, &simulated, duration, &names.0),
         document: Document::new("simulate", &inputs, &told, &result)?,

@@ -139,7 +139,7 @@ impl RobotFile {
         let document = Document::new(file, text);
         let mut robot: Self = document.read()?;
         let taken = serial_chain::take_as_meant(&mut robot.robot, &document, file);
-        robot.notes.extend(taken);
+        robot.notes.0.extend(taken);
         urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
         Ok(robot)

@@ -9,11 +9,11 @@ use serde::Deserialize;
 
 use super::document::Document;
 use super::model_file::{Covariance, Effect, LinkBody, ModelFile, ModelProvenance, Parameter};
-use super::robot_file::ModelKind;
 use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
     RobotSection, SensorsSection,
 };
+use super::robot_file::{ModelKind, Notes};
 use super::{ConfigError, check, urdf};
 use crate::log::LogSection;
 
@@ -74,7 +74,7 @@ impl ModelFile {
             limits: raw.limits,
             control: raw.control,
             sensors: raw.sensors,
-            notes: Vec::new(),
+            notes: Notes::default(),
         };
         let beside = robot.robot.urdf.is_some();
         urdf::resolve(&mut robot, &document, folder)?;

@@ -137,7 +137,7 @@ pub fn friction(
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
     let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
-    let mut warnings = [machine.file.notes.clone(), found].concat();
+    let mut warnings = [machine.file.notes.0.clone(), found].concat();
     let work = control.begin("friction filter", Some(groups.len() as u64));
     let parameters = machine.robot.parameters().iter();
     let parameter_names: Vec<String> = parameters.map(|p| p.name.to_string()).collect();

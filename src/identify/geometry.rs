@@ -119,7 +119,10 @@ pub(super) fn geometry(
         .filter(open)
         .max_by(|a, b| a.fitted_std.total_cmp(&b.fitted_std));
     let largest = largest.map_or_else(String::new, |u| {
-        format!(" ({} = {:.3e} +- {:.1e} {})", u.key, u.fitted, u.fitted_std, u.unit)
+        format!(
+            " ({} = {:.3e} +- {:.1e} {})",
+            u.key, u.fitted, u.fitted_std, u.unit
+        )
     });
     let finding = |k: usize| {
         let Nearly {
@@ -131,7 +134,9 @@ pub(super) fn geometry(
         } = nearly[k];
         let section = &file.robot.link[link];
         let joint = section.joint.clone();
-        let name = joint.clone().unwrap_or_else(|| format!("link {}", link + 1));
+        let name = joint
+            .clone()
+            .unwrap_or_else(|| format!("link {}", link + 1));
         let place = match key {
             "xyz" | "rpy" => format!("{key}[{part}]"),
             _ => key.to_owned(),
@@ -145,7 +150,9 @@ pub(super) fn geometry(
                 (value - exact).abs(),
                 declared - plain
             ),
-            format!("{place} = {exact:?} in the row of {name} of the robot file or its URDF, unless it was measured so"),
+            format!(
+                "{place} = {exact:?} in the row of {name} of the robot file or its URDF, unless it was measured so"
+            ),
             false,
         )
     };

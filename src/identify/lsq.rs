@@ -7,6 +7,7 @@ use super::consistent::{ConsistentLinks, consistent};
 use super::control::Control;
 use super::error::IdentifyError;
 use super::estimate::{Account, Estimated, estimate};
+use super::geometry::geometry;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::new_model;
@@ -123,7 +124,7 @@ pub fn lsq(
         account,
         ..
     } = estimated;
-    let mut warnings = machine.file.notes.clone();
+    let mut warnings = machine.file.notes.0.clone();
     warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
     if friction.is_none() {
         warnings.push(with_friction(law).to_owned());
@@ -141,6 +142,11 @@ pub fn lsq(
     {
         return Err(IdentifyError::NothingDetermined);
     }
+    let found = geometry(machine, fit.condition.normalised, &unknowns);
+    let told = found.iter().map(|finding| &finding.meaning);
+    warnings.extend(
+        told.map(|told| format!("{told}; take the plain number unless it was measured so")),
+    );
     let names = machine.robot.joint_names().iter().enumerate();
     let joints = names.map(|(j, joint)| JointResidual {
         joint: joint.clone(),
@@ -168,7 +174,7 @@ pub fn lsq(
         summary,
         inputs,
         warnings,
-        setup: Vec::new(),
+        setup: found,
     })
 }
 

@@ -24,6 +24,7 @@ mod diagnosis;
 mod error;
 mod estimate;
 mod friction;
+mod geometry;
 mod in_memory;
 mod log;
 mod logged_robot;

@@ -158,7 +158,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     // rows that are to be filled in are read as if they were
     let filled = text.replace("= nan ", "= 1.0 ");
     let file = RobotFile::parse_in(&target.display().to_string(), &filled, folder)?;
-    let mut warnings = [file.notes.clone(), mapping.warnings.clone()].concat();
+    let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
     if let Some(seen) = &seen
         && args.topic.is_none()
         && let Some(topic) = &seen.topic

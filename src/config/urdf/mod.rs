@@ -182,7 +182,7 @@ pub(super) fn resolve(
         _ => Angles::Meant,
     };
     let chain = UrdfChain::load_with(&folder.join(urdf), robot.tip.as_deref(), angles)?;
-    file.notes.extend(chain.notes);
+    file.notes.0.extend(chain.notes);
     robot.link = chain.links;
     robot.frame.splice(0..0, chain.frames);
     robot.urdf = None;
