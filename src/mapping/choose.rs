@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::column::Column;
 use super::family::{Family, How, Key, families, fit};
-use super::look::{Clock, Column, Seen};
+use super::look::{Clock, Seen};
 use super::units::{Unit, of_positions, of_torques};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::words;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::look::Column;
+use super::column::Column;
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{Word, words};
 use crate::log::nearest;

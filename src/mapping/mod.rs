@@ -2,6 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `column` | what one column is by its name |
 //! | `look` | a log as its columns: names, roles, ranges, times, and the topic of a recording |
 //! | `content` | roles of columns without names, by what they hold |
 //! | `family` | columns whose names differ in a number or a joint's name alone, and how well they fit |
@@ -11,6 +12,7 @@
 //! A guess is a guess: each is told in words, and what is not certain says `CHECK IT`.
 
 mod choose;
+mod column;
 mod content;
 mod error;
 mod family;
@@ -18,5 +20,6 @@ mod look;
 mod units;
 
 pub use choose::{JointColumns, Known, Mapping};
+pub use column::Column;
 pub use error::MappingError;
-pub use look::{Asked, Clock, Column, Seen, look};
+pub use look::{Asked, Clock, Seen, look};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::look::Column;
+use super::column::Column;
 use crate::inspect::words::words;
 use crate::robot::JointKind;
 

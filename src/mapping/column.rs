@@ -1,0 +1,57 @@
+//! A column of a log, as its name and its numbers show it.
+
+use crate::inspect::words::{is_command, joint, role, words};
+use crate::inspect::{ChannelRole, InspectedChannel};
+
+/// A column of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Its name; `#3` where it has none.
+    pub name: String,
+    /// What it holds, commanded or measured.
+    pub role: ChannelRole,
+    /// It was commanded, or is of a machine that leads.
+    pub commanded: bool,
+    /// The joint that its name speaks of; empty where it names none.
+    pub joint: String,
+    /// The unit that its name states.
+    pub unit: Option<String>,
+    /// Smallest and largest number, in its own unit.
+    pub range: [f64; 2],
+    /// Every number is a whole one, and not all are 0.
+    pub whole: bool,
+    /// Range after which it begins anew.
+    pub wrap: Option<f64>,
+}
+
+impl Column {
+    /// A column by its name.
+    pub fn named(name: &str) -> Self {
+        let guessed = InspectedChannel::guessed(name);
+        let spoken = words(name);
+        let (role, joint) = match guessed.role {
+            ChannelRole::Command => (role(&spoken).unwrap_or(ChannelRole::Other), joint(&spoken)),
+            role => (role, guessed.joint.unwrap_or_default()),
+        };
+        Self {
+            name: name.to_owned(),
+            role,
+            commanded: is_command(&spoken),
+            joint,
+            unit: None,
+            range: [0.0; 2],
+            whole: false,
+            wrap: None,
+        }
+    }
+
+    /// Width of what it went through, in its own unit.
+    pub fn span(&self) -> f64 {
+        self.range[1] - self.range[0]
+    }
+
+    /// Largest size of a number in it.
+    pub fn largest(&self) -> f64 {
+        self.range[0].abs().max(self.range[1].abs())
+    }
+}
