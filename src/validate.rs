@@ -175,6 +175,8 @@ pub struct Reconstruction<'a> {
     rest_speed: Vec<f64>,
     sums: Vec<ErrorSums>,
     traces: TorqueTraces,
+    /// Time of the log's own clock where the times of its rows are 0 [s].
+    zero: f64,
 }
 
 impl<'a> Reconstruction<'a> {
@@ -190,7 +192,14 @@ impl<'a> Reconstruction<'a> {
             rest_speed: model.friction.iter().enumerate().map(speed).collect(),
             sums: vec![ErrorSums::default(); model.robot.joints()],
             traces: TorqueTraces::default(),
+            zero: 0.0,
         }
+    }
+
+    /// Says from where the times of the next log are counted, by its own clock [s]: traces have that
+    /// clock's times.
+    pub fn count_from(&mut self, zero: f64) {
+        self.zero = zero;
     }
 
     /// Runs one log through with the processing that the model declares. `row` gets every raw
@@ -304,7 +313,7 @@ impl<'a> Reconstruction<'a> {
                     rest::rests(filtered[2 * n + j]),
                 );
             }
-            append(&mut self.traces, t, &filtered[..2 * n], n);
+            append(&mut self.traces, self.zero + t, &filtered[..2 * n], n);
         }
     }
 

@@ -23,7 +23,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("inertia", &["math", "robot", "log", "motion", "verdict"]),
     ("diagnose", &["math", "robot", "log", "motion", "effect"]),
     ("validate", &["math", "robot", "log", "motion", "verdict"]),
-    ("inspect", &["math", "log"]),
+    ("inspect", &["math", "number", "log"]),
     ("setup", &["math", "robot", "motion", "inertia"]),
     ("mapping", &["robot", "log", "inspect"]),
     ("simulate", &["math", "robot", "log", "config", "effect"]),

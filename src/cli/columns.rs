@@ -20,7 +20,13 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFaul
     let columns = 0..log.names().len();
     let channels = columns.filter(|column| time.is_none_or(|(time, _)| time != *column));
     let channels = channels.map(|column| other(log, column)).collect();
-    Ok((ColumnPlan { time, channels }, None))
+    let plan = ColumnPlan {
+        time,
+        channels,
+        keep: Vec::new(),
+        held: None,
+    };
+    Ok((plan, None))
 }
 
 /// Place of the time, and seconds per unit of it.
@@ -69,6 +75,8 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
     let plan = ColumnPlan {
         time: time.map(|time| (time, seconds)),
         channels,
+        keep: machine.file.log.keep.clone(),
+        held: None,
     };
     (plan, log.refused().map(|error| refusal(error.to_string())))
 }
@@ -106,10 +114,12 @@ fn place(
             let name = &log.names()[column];
             let mut seen = InspectedChannel::new(name, role, Some(joint), Some(&unit));
             (seen.limits, seen.saturates) = limits(machine, (j, joint), role, raw);
+            seen.factor = channel.factor;
             known[column] = Some(ChannelColumn {
                 column,
                 factor: channel.factor,
                 offset: channel.offset,
+                wrap: channel.wrap,
                 channel: seen,
             });
         }
@@ -124,6 +134,7 @@ fn other(log: &RawReader, column: usize) -> ChannelColumn {
         column,
         factor: 1.0,
         offset: 0.0,
+        wrap: None,
         channel,
     }
 }

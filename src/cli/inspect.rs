@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot};
-use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look};
+use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look, look_again};
 use crate::log::{LogSection, LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::report::json::Document;
@@ -96,9 +96,19 @@ fn inspect(
         Some(machine) => columns::of_robot(&log, machine),
         None => columns::guessed(&mut log)?,
     };
-    let found = look(&mut log, &plan, &|| context.interrupted())?;
+    let stop = || context.interrupted();
+    let found = look(&mut log, &plan, &stop)?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
+    if findings.hides() {
+        let mut again = match &layout {
+            Some(layout) => RawReader::open(spec, Some(layout))?,
+            None => RawReader::open_plain(spec, &section)?,
+        };
+        let found = look_again(&mut again, &plan, &findings, &stop)?;
+        findings = found.ok_or_else(CliError::interrupted)?;
+    }
     findings.faults.splice(0..0, refused);
+    findings.place();
     warnings.extend(
         log.warnings()
             .iter()
@@ -117,6 +127,7 @@ fn inspect(
                     .faults
                     .retain(|fault| fault.kind != FaultKind::Delay);
                 findings.faults.push(found);
+                findings.place();
                 findings.sort();
             }
             Err(error) if error.exit() == Exit::Interrupted => return Err(error),
@@ -141,9 +152,16 @@ pub(super) fn findings(
 ) -> Result<Findings, CliError> {
     let mut log = RawReader::open(spec, Some(&machine.file.layout()))?;
     let (plan, refused) = columns::of_robot(&log, machine);
-    let found = look(&mut log, &plan, &|| context.interrupted())?;
+    let stop = || context.interrupted();
+    let found = look(&mut log, &plan, &stop)?;
     let mut findings = found.ok_or_else(CliError::interrupted)?;
+    if findings.hides() {
+        let mut again = RawReader::open(spec, Some(&machine.file.layout()))?;
+        let found = look_again(&mut again, &plan, &findings, &stop)?;
+        findings = found.ok_or_else(CliError::interrupted)?;
+    }
     findings.faults.splice(0..0, refused);
+    findings.place();
     Ok(findings)
 }
 

@@ -47,8 +47,11 @@ pub fn read_whole(
         let mut open = machine.open(log, control)?;
         origin = origin.or_else(|| Some(open.origin()));
         averaged |= open.is_centred();
-        let (found, summary) = stretches(index, n, &settings, &mut |block| open.read(block))
+        let (mut found, summary) = stretches(index, n, &settings, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&name, e))?;
+        for stretch in &mut found {
+            stretch.zero = open.origin().seconds();
+        }
         samples += found.iter().map(Stretch::len).sum::<usize>();
         if samples > MOST_SAMPLES {
             return Err(IdentifyError::TooManySamples {
@@ -58,7 +61,7 @@ pub fn read_whole(
             });
         }
         warnings.extend(open.warnings());
-        warnings.extend(summary_warnings(&name, &summary));
+        warnings.extend(summary_warnings(&name, open.origin(), &summary));
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);

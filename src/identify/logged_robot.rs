@@ -1,11 +1,13 @@
 //! A robot as its file describes it: its dynamics, and how its logs are read and processed.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::control::Control;
 use super::error::IdentifyError;
+use super::free_swing::moves_freely;
 use super::log::Log;
 use super::open_log::OpenLog;
 use super::reference::LoggedReference;
@@ -14,7 +16,7 @@ use crate::config::RobotFile;
 use crate::config::robot_file::{DifferencesKind, FilterKind};
 use crate::friction::estimate::NARROWER;
 use crate::inspect::{Gate, LogFault};
-use crate::log::{Block, Layout, LogError, Reader, escape};
+use crate::log::{Block, Layout, LogError, Reader, RowFault, escape};
 use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
 use crate::robot::{JointKind, Robot};
 use crate::validate::Validation;
@@ -40,7 +42,7 @@ pub struct LoggedRobot {
 }
 
 /// What the first look at a log found.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct FirstLook {
     /// Faults, and rows to leave out.
     pub(super) gate: Gate,
@@ -80,7 +82,14 @@ impl LoggedRobot {
         if let Some(look) = known().get(&key) {
             return Ok(Arc::clone(look));
         }
-        let look = Arc::new(self.look(log, layout, control)?);
+        let mut look = self.look(log, layout, control)?;
+        let off = look.gate.off();
+        let kept = self.file.log.keep.contains(&RowFault::StuckChannel);
+        if !off.is_empty() && look.gate.refusal().is_none() {
+            let freely = kept || self.moves_freely(log, layout, (&look, &off), control)?;
+            look.gate.set_freely(freely);
+        }
+        let look = Arc::new(look);
         if let Some(fault) = look.gate.refusal() {
             return Err(IdentifyError::Refused {
                 log: escape(&log.name()),
@@ -110,6 +119,29 @@ impl LoggedRobot {
         Ok(speeds)
     }
 
+    /// Whether the robot moves as without its motors where torques are exactly 0.
+    fn moves_freely(
+        &self,
+        log: &Log,
+        layout: &Layout,
+        (look, off): (&FirstLook, &[(usize, [f64; 2])]),
+        control: &Control,
+    ) -> Result<bool, IdentifyError> {
+        let mut open = self.opened(log, layout, Arc::new(look.clone()), control)?;
+        let of_joints = open.reader.layout().conversion.is_none();
+        if self.file.zero_order_hold(open.reader.layout().channels) {
+            open.centre = Some((&self.robot, ZeroOrderHold::new(self.robot.joints())));
+        }
+        // Behind coupled gears the motors' channels are not the joints'.
+        let all =
+            |(_, span): &(usize, [f64; 2])| (0..self.robot.joints()).map(|j| (j, *span)).collect();
+        let off = match of_joints {
+            true => off.to_vec(),
+            false => off.iter().flat_map::<Vec<_>, _>(all).collect(),
+        };
+        moves_freely(&self.robot, &self.settings(), &log.name(), &mut open, &off)
+    }
+
     /// The fault for which a fit refuses a log, where it has one.
     ///
     /// # Errors
@@ -125,18 +157,25 @@ impl LoggedRobot {
         layout: &Layout,
         control: &Control,
     ) -> Result<FirstLook, IdentifyError> {
-        let mut reader = self.reader(log, &layout.clone().as_logged())?;
-        let mut speeds = SpeedMeter::new();
+        let as_logged = layout.clone().as_logged();
+        let speeds = RefCell::new(SpeedMeter::new());
+        let open = || {
+            // Of a second reading, which mends what hides the rest, the speeds are right.
+            speeds.replace(SpeedMeter::new());
+            self.reader(log, &as_logged)
+        };
         let mut meter = |block: &Block, read: &Layout| {
             let layouts = [Some(layout), layout.otherwise.as_deref()];
             let declared = layouts.into_iter().flatten();
             let mut declared = declared.filter(|l| l.channels == read.channels);
-            speeds.take(block, declared.next().and_then(|l| l.conversion.as_ref()));
+            let conversion = declared.next().and_then(|l| l.conversion.as_ref());
+            speeds.borrow_mut().take(block, conversion);
         };
-        let gate = Gate::look(&mut reader, &|| control.stopped(), &mut meter)?;
+        let keep = &self.file.log.keep;
+        let gate = Gate::look(&open, keep, &|| control.stopped(), &mut meter)?;
         Ok(FirstLook {
             gate: gate.ok_or(IdentifyError::Interrupted)?,
-            rest_speed: speeds.resting(),
+            rest_speed: speeds.borrow().resting(),
         })
     }
 
@@ -152,8 +191,21 @@ impl LoggedRobot {
         control: &'a Control,
     ) -> Result<OpenLog<'a>, IdentifyError> {
         let look = self.first_look(log, layout, control)?;
+        self.opened(log, layout, look, control)
+    }
+
+    /// Opens a log that was looked at.
+    fn opened<'a>(
+        &self,
+        log: &Log,
+        layout: &Layout,
+        look: Arc<FirstLook>,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        let mut reader = self.reader(log, layout)?;
+        reader.mend(look.gate.mending());
         Ok(OpenLog {
-            reader: self.reader(log, layout)?,
+            reader,
             control,
             centre: None,
             name: escape(&log.name()),

@@ -23,6 +23,7 @@ mod diagnose;
 mod diagnosis;
 mod error;
 mod estimate;
+mod free_swing;
 mod friction;
 mod geometry;
 mod in_memory;

@@ -58,17 +58,24 @@ impl OpenLog<'_> {
 
     /// What was left out, dropped or chosen, once the last block is read.
     pub fn warnings(&self) -> Vec<String> {
-        let mut out = self.reader.warnings();
-        let found = self.look.gate.warnings().into_iter();
-        out.extend(found.map(|text| format!("{}: {text}", self.name)));
-        let removed = self.cutter.removed();
-        if removed > 0 {
+        let mut out = Vec::new();
+        let (removed, causes) = (self.cutter.removed(), self.look.gate.causes());
+        if removed > 0 || !causes.is_empty() {
+            let rows = self.reader.samples();
+            let told = match removed {
+                0 => format!("none of {rows} rows is left out in all"),
+                _ => format!(
+                    "{removed} of {rows} rows are left out in all, those next to bad ones included"
+                ),
+            };
             out.push(format!(
-                "{}: {removed} of {} rows are left out in all, those next to bad ones included; `cft-ident inspect` tells more",
-                self.name,
-                self.reader.samples()
+                "{}: {told}: {causes}; `cft-ident inspect` tells more",
+                self.name
             ));
         }
+        out.extend(self.reader.warnings());
+        let found = self.look.gate.warnings().into_iter();
+        out.extend(found.map(|text| format!("{}: {text}", self.name)));
         out
     }
 
@@ -87,7 +94,8 @@ impl OpenLog<'_> {
 }
 
 /// Warnings about what the processing left out of a log.
-pub fn summary_warnings(name: &str, summary: &Summary) -> Vec<String> {
+pub fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<String> {
+    let zero = origin.seconds();
     let mut out = Vec::new();
     if summary.skipped.segments > 0 {
         let spans: Vec<String> = summary
@@ -95,7 +103,7 @@ pub fn summary_warnings(name: &str, summary: &Summary) -> Vec<String> {
             .spans_s
             .iter()
             .take(3)
-            .map(|[a, b]| format!("{a:.3}..{b:.3} s"))
+            .map(|[a, b]| format!("{:.3}..{:.3} s", zero + a, zero + b))
             .collect();
         out.push(format!(
             "{name}: {} stretch(es) between gaps are too short to filter and are left out ({} samples; {})",

@@ -105,7 +105,7 @@ impl<'a> Passes<'a> {
             if first {
                 self.warnings.extend(open.warnings());
                 self.warnings
-                    .extend(summary_warnings(&log.name(), &summary));
+                    .extend(summary_warnings(&log.name(), open.origin(), &summary));
                 self.inputs.push(open.provenance()?);
                 self.steps.push(summary.dt);
                 self.summary.get_or_insert(summary);

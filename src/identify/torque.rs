@@ -108,7 +108,7 @@ pub fn torque(
     drop(work);
     control.check()?;
     let mut warnings = open.warnings();
-    warnings.extend(summary_warnings(&log.name(), &summary));
+    warnings.extend(summary_warnings(&log.name(), origin, &summary));
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = machine.robot.joint_names().iter().enumerate();

@@ -45,18 +45,20 @@ pub fn validate(
         if refined.effects.is_empty() {
             let mut open = machine.open(log, control)?;
             let origin = open.origin();
+            all.count_from(origin.seconds());
             let summary = all
                 .add(&settings, &mut |block| open.read(block), &mut |r| {
                     row(r, origin)
                 })
                 .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
             warnings.extend(open.warnings());
-            warnings.extend(summary_warnings(&log.name(), &summary));
+            warnings.extend(summary_warnings(&log.name(), origin, &summary));
             inputs.push(open.provenance()?);
             last = Some(summary);
         } else {
             // effects remember: they need a stretch from its begin
             let whole = read_whole(machine, std::slice::from_ref(log), control)?;
+            all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);
                 let mut told = |r: &Reconstructed| row(r, whole.origin);

@@ -17,6 +17,9 @@ pub struct InspectedChannel {
     pub limits: Option<[f64; 2]>,
     /// Whether a number at its limit is what was really applied: the volts of an amplifier.
     pub saturates: bool,
+    /// Unit of its numbers per unit of the column, so that what is to be written into a robot file
+    /// can be told in the column's.
+    pub factor: f64,
 }
 
 impl InspectedChannel {
@@ -39,6 +42,7 @@ impl InspectedChannel {
             unit: unit.map(str::to_owned),
             limits: None,
             saturates: false,
+            factor: 1.0,
         }
     }
 }

@@ -2,21 +2,41 @@
 
 use super::fault::{Episodes, FaultKind, LogFault, Severity};
 use super::judge::Track;
+use crate::log::RowFault;
 
 /// Faults under construction, and what is to be cut out.
 pub(super) struct FaultList {
     pub(super) faults: Vec<LogFault>,
-    pub(super) cuts: Vec<[f64; 2]>,
+    /// Rows to leave out: from, to [s], and why.
+    pub(super) cuts: Vec<([f64; 2], FaultKind)>,
+    /// Numbers to put in the place of spikes: time [s], place of the channel, number.
+    pub(super) bridges: Vec<(f64, usize, f64)>,
+    /// Positions that begin anew, by their places, and their ranges.
+    pub(super) wraps: Vec<(usize, f64)>,
+    /// Torques that are exactly 0 in motion, by their places: from, to [s].
+    pub(super) off: Vec<(usize, [f64; 2])>,
+    /// Stretches in which everything is frozen [s].
+    pub(super) stalls: Vec<[f64; 2]>,
+    /// Rows for which each sample was held.
+    pub(super) held: Option<usize>,
+    /// Kinds that are told but not acted upon.
+    pub(super) keep: Vec<RowFault>,
     first: f64,
     last: f64,
 }
 
 impl FaultList {
     /// No faults yet, of a log from `first` to `last` [s].
-    pub(super) fn new(first: f64, last: f64) -> Self {
+    pub(super) fn new(first: f64, last: f64, keep: &[RowFault]) -> Self {
         Self {
             faults: Vec::new(),
             cuts: Vec::new(),
+            bridges: Vec::new(),
+            wraps: Vec::new(),
+            off: Vec::new(),
+            stalls: Vec::new(),
+            held: None,
+            keep: keep.to_vec(),
             first,
             last,
         }
@@ -75,12 +95,40 @@ impl FaultList {
         }
     }
 
-    /// Leaves the rows of some stretches out, which were told as this fault of this channel.
-    pub(super) fn cut(&mut self, kind: FaultKind, channel: &str, episodes: &Episodes) {
-        for fault in &mut self.faults {
-            fault.cut |= fault.kind == kind && fault.channel.as_deref() == Some(channel);
+    /// Leaves the rows of some stretches out, which were told as this fault of this channel, unless
+    /// the robot file keeps them.
+    pub(super) fn cut(&mut self, kind: FaultKind, channel: Option<&str>, episodes: &Episodes) {
+        if self.acts(kind, channel) {
+            let spans = episodes.iter().map(|e| ([e.from, e.to], kind));
+            self.cuts.extend(spans);
         }
-        self.cuts.extend(episodes.iter().map(|e| [e.from, e.to]));
+    }
+
+    /// Marks what was told as this fault of this channel as acted upon; false, and told so, where
+    /// the robot file keeps it.
+    pub(super) fn acts(&mut self, kind: FaultKind, channel: Option<&str>) -> bool {
+        let kept = kind.kept(&self.keep);
+        for fault in &mut self.faults {
+            if fault.kind != kind || fault.channel.as_deref() != channel {
+                continue;
+            }
+            if kept {
+                fault.severity = Severity::Info;
+                fault.remedy = format!(
+                    "kept, as `keep` in [log] of the robot file says: {}",
+                    fault.remedy
+                );
+            } else {
+                fault.cut = true;
+            }
+        }
+        !kept
+    }
+
+    /// Whether a time lies in a stretch in which everything is frozen, or within `reach` of it [s].
+    pub(super) fn stalled(&self, t: f64, reach: f64) -> bool {
+        let near = |[from, to]: &[f64; 2]| from - reach <= t && t <= to + reach;
+        self.stalls.iter().any(near)
     }
 }
 

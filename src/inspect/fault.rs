@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::log::RowFault;
+
 /// How much a fault matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -70,6 +72,16 @@ pub enum FaultKind {
     Filter,
     /// Torque and position are not of the same instant.
     Delay,
+    /// Rows that hold each sample for several rows.
+    SampleAndHold,
+    /// A leap of a position that no drive can make, and that stays.
+    PositionStep,
+    /// A position that begins anew after its range.
+    WrappedEncoder,
+    /// All channels frozen while the robot moves.
+    Stall,
+    /// A torque of exactly 0 while the joint moves.
+    MotorOff,
 }
 
 impl FaultKind {
@@ -96,7 +108,29 @@ impl FaultKind {
             Self::WrongSignOrOrder => "wrong-sign-or-order",
             Self::Filter => "filter",
             Self::Delay => "delay",
+            Self::SampleAndHold => "sample-and-hold",
+            Self::PositionStep => "position-step",
+            Self::WrappedEncoder => "wrapped-encoder",
+            Self::Stall => "stall",
+            Self::MotorOff => "motor-off",
         }
+    }
+
+    /// Whether `[log] keep` says that its rows stay as they were logged.
+    pub(super) fn kept(self, keep: &[RowFault]) -> bool {
+        let of = match self {
+            Self::Spike => RowFault::Spike,
+            Self::StuckChannel => RowFault::StuckChannel,
+            Self::Saturation => RowFault::Saturation,
+            Self::Clipping => RowFault::Clipping,
+            Self::RepeatedRows => RowFault::RepeatedRows,
+            Self::SampleAndHold => RowFault::SampleAndHold,
+            Self::PositionStep => RowFault::PositionStep,
+            Self::WrappedEncoder => RowFault::WrappedEncoder,
+            Self::Stall => RowFault::Stall,
+            _ => return false,
+        };
+        keep.contains(&of)
     }
 }
 
@@ -113,8 +147,14 @@ pub struct LogFault {
     pub from_s: f64,
     /// Where it ends [s].
     pub to_s: f64,
+    /// Where it begins and ends by the log's own clock [s].
+    pub log_from_s: f64,
+    pub log_to_s: f64,
     /// Rows concerned.
     pub rows: u64,
+    /// Height of a step, or range of an encoder that begins anew [unit of the channel]; absent for
+    /// other kinds.
+    pub size: Option<f64>,
     /// What it is in numbers, and what it does to a fit.
     pub effect: String,
     /// What to do about it.
@@ -139,18 +179,21 @@ impl LogFault {
             channel: None,
             from_s: 0.0,
             to_s,
+            log_from_s: 0.0,
+            log_to_s: to_s,
             rows: 0,
+            size: None,
             effect,
             remedy: remedy.to_owned(),
             cut: false,
         }
     }
 
-    /// Where it is, for a person: `5.000..5.399`, or `5.000` for a single row.
+    /// Where it is by the log's own clock, for a person: `5.000..5.399`, or `5.000` for a single row.
     pub fn span(&self) -> String {
-        match self.to_s > self.from_s {
-            true => format!("{:.3}..{:.3}", self.from_s, self.to_s),
-            false => format!("{:.3}", self.from_s),
+        match self.log_to_s > self.log_from_s {
+            true => format!("{:.3}..{:.3}", self.log_from_s, self.log_to_s),
+            false => format!("{:.3}", self.log_from_s),
         }
     }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::detectors::excitation::JointMotion;
-use super::fault::{LogFault, Severity};
+use super::fault::{FaultKind, LogFault, Severity};
 use super::words::ChannelRole;
 
 /// What logs hold: of one its findings; of several all of them, with their lists together.
@@ -77,6 +77,8 @@ fn together<T: Clone>(
 pub struct Findings {
     /// Rows.
     pub rows: u64,
+    /// Time of the first row by the log's own clock [s].
+    pub begins_s: f64,
     /// Time from the first to the last row [s].
     pub duration_s: f64,
     /// One over the median step [Hz]; absent where there is none.
@@ -91,10 +93,54 @@ pub struct Findings {
     pub joints: Vec<JointMotion>,
     /// What is wrong, the worst first, then in the order of time.
     pub faults: Vec<LogFault>,
-    /// Rows that a fit leaves out: first and last time, by the log's own clock [s], in order and
-    /// apart.
+    /// Rows that a fit leaves out or mends, by their causes, the most first.
+    pub costs: Vec<RowCost>,
+    /// Rows that a fit leaves out: first and last time [s], in order and apart.
     #[serde(skip)]
     pub cuts: Vec<[f64; 2]>,
+    /// Numbers that a fit puts in the place of spikes: time [s], place of the channel, number; in the
+    /// order of time.
+    #[serde(skip)]
+    pub bridges: Vec<(f64, usize, f64)>,
+    /// Positions that begin anew though no range is known, by the places of their channels.
+    #[serde(skip)]
+    pub wraps: Vec<(usize, f64)>,
+    /// Torques that are exactly 0 in motion, by the places of their channels: from, to [s].
+    #[serde(skip)]
+    pub off: Vec<(usize, [f64; 2])>,
+    /// Rows for which each sample was held.
+    #[serde(skip)]
+    pub held: Option<usize>,
+}
+
+/// What becomes of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RowFate {
+    /// They are not used.
+    LeftOut,
+    /// Numbers between those of their neighbours stand in their place.
+    Bridged,
+}
+
+/// How many rows one cause costs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct RowCost {
+    pub kind: FaultKind,
+    /// Rows, those of several channels at one time counted once.
+    pub rows: u64,
+    pub fate: RowFate,
+}
+
+impl RowCost {
+    /// For a person: `999 stuck-channel`, `12 spike (bridged)`.
+    pub fn text(&self) -> String {
+        let fate = match self.fate {
+            RowFate::LeftOut => "",
+            RowFate::Bridged => " (bridged)",
+        };
+        format!("{} {}{fate}", self.rows, self.kind.word())
+    }
 }
 
 /// A stretch without rows, counted from the log's first row.
@@ -136,6 +182,25 @@ impl Findings {
                 .then(a.from_s.total_cmp(&b.from_s))
                 .then(a.kind.cmp(&b.kind))
         });
+    }
+
+    /// Whether something hides the rest, so that a second look sees more ([`super::look_again`]).
+    pub fn hides(&self) -> bool {
+        !self.wraps.is_empty() || self.held.is_some()
+    }
+
+    /// Gives every fault its time by the log's own clock, which has `zero` where times are 0 [s].
+    pub(super) fn count_from(&mut self, zero: f64) {
+        self.begins_s += zero;
+        self.place();
+    }
+
+    /// Gives every fault its time by the log's own clock.
+    pub fn place(&mut self) {
+        for fault in &mut self.faults {
+            fault.log_from_s = self.begins_s + fault.from_s;
+            fault.log_to_s = self.begins_s + fault.to_s;
+        }
     }
 
     /// The faults of one severity.

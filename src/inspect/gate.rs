@@ -2,10 +2,13 @@
 //! are to be left out.
 
 use super::channel::InspectedChannel;
-use super::fault::{LogFault, Severity};
+use super::fault::{FaultKind, LogFault, Severity};
+use super::findings::{Findings, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge};
 use super::words::ChannelRole;
-use crate::log::{Block, Channels, Instant, Layout, LogError, Reader, escape};
+use crate::log::{
+    Block, Bridge, Channels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
+};
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
 /// clock closes none.
@@ -16,54 +19,96 @@ const WIDER: f64 = 1.1;
 pub struct Gate {
     /// The first fault for which a fit refuses the log.
     refusal: Option<LogFault>,
-    /// Faults whose rows are left out.
+    /// Faults whose rows are left out or mended.
     marked: Vec<LogFault>,
+    /// How many rows each cause costs, the most first.
+    costs: Vec<RowCost>,
     /// First and last time of the rows to leave out [s], in order and apart.
     cuts: Vec<[f64; 2]>,
+    /// Torques that are exactly 0 in motion, by their places: from, to [s].
+    off: Vec<(usize, [f64; 2])>,
+    /// What is told of them, and whether the robot moves as without its motors there, once known.
+    off_told: Vec<LogFault>,
+    freely: Option<bool>,
+    /// Positions among the channels.
+    positions: usize,
     /// Median step of the log [s].
     dt: f64,
     /// The instant from which the log's times are counted.
     origin: Instant,
+    /// What is mended as the log is read.
+    mending: Mending,
 }
 
 impl Gate {
-    /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it. `also` gets every
-    /// block, and the layout that it was read by.
+    /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it. It is read
+    /// once more where the first look found what hides the rest: positions that begin anew, samples
+    /// that were held; `also` gets every block, and the layout that it was read
+    /// by, of the last reading after the blocks of any before it.
     ///
     /// # Errors
     /// Whatever keeps the reader from the log.
     pub fn look(
-        reader: &mut Reader,
+        open: &dyn Fn() -> Result<Reader, LogError>,
+        keep: &[RowFault],
         stop: &dyn Fn() -> bool,
         also: &mut dyn FnMut(&Block, &Layout),
     ) -> Result<Option<Self>, LogError> {
-        let mut judge = LogJudge::new(channels(reader), Depth::Gate);
-        let mut block = Block::default();
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        while reader.read(&mut block)? {
-            if stop() {
-                return Ok(None);
+        let mut mending = Mending {
+            keep_repeats: keep.contains(&RowFault::RepeatedRows),
+            ..Mending::default()
+        };
+        let mut reader = open()?;
+        reader.mend(&mending);
+        let Some(mut found) = findings(&mut reader, keep, stop, also)? else {
+            return Ok(None);
+        };
+        let held = reader
+            .hold()
+            .filter(|_| !keep.contains(&RowFault::SampleAndHold));
+        let mut marked = Vec::new();
+        if held.is_some() || !found.wraps.is_empty() {
+            mending.held = held;
+            mending.wraps = vec![None; reader.layout().positions.len()];
+            for (place, range) in &found.wraps {
+                mending.wraps[*place] = Some(*range);
             }
-            also(&block, reader.layout());
-            let rows = block.len();
-            let torques = block.tau.len().checked_div(rows).unwrap_or(0);
-            columns.resize_with(block.joints() + torques, Vec::new);
-            columns.iter_mut().for_each(Vec::clear);
-            let (positions, others) = columns.split_at_mut(block.joints());
-            part(&block.q, positions);
-            part(&block.tau, others);
-            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            judge.take(&block.t, &columns);
+            let turning = found.faults.into_iter();
+            marked.extend(turning.filter(|fault| fault.kind == FaultKind::WrappedEncoder));
+            reader = open()?;
+            reader.mend(&mending);
+            found = match findings(&mut reader, keep, stop, also)? {
+                Some(found) => found,
+                None => return Ok(None),
+            };
         }
-        let found = judge.finish();
+        let bridge = |(t, channel, value): (f64, usize, f64)| Bridge { t, channel, value };
+        mending.bridges = std::mem::take(&mut found.bridges)
+            .into_iter()
+            .map(bridge)
+            .collect();
+        let off_told = found.of(Severity::Info);
+        let off_told = off_told.filter(|fault| fault.kind == FaultKind::MotorOff);
+        let off_told = off_told.cloned().collect();
         let refusal = found.of(Severity::Error).next().cloned();
-        let marked = found.of(Severity::Warning).filter(|fault| fault.cut);
+        marked.extend(
+            found
+                .of(Severity::Warning)
+                .filter(|fault| fault.cut)
+                .cloned(),
+        );
         Ok(Some(Self {
             refusal,
-            marked: marked.cloned().collect(),
+            marked,
+            costs: found.costs,
             dt: found.rate_hz.map_or(0.0, |rate| 1.0 / rate),
             cuts: found.cuts,
+            off: found.off,
+            off_told,
+            freely: None,
             origin: reader.origin(),
+            positions: reader.layout().positions.len(),
+            mending,
         }))
     }
 
@@ -75,6 +120,37 @@ impl Gate {
     /// The fault for which a fit refuses the log.
     pub fn refusal(&self) -> Option<&LogFault> {
         self.refusal.as_ref()
+    }
+
+    /// What a reader of the log is to mend.
+    pub fn mending(&self) -> &Mending {
+        &self.mending
+    }
+
+    /// Stretches in which a torque is exactly 0 while its joint moves, by the torque's place: from,
+    /// to [s].
+    pub fn off(&self) -> Vec<(usize, [f64; 2])> {
+        let positions = self.positions;
+        let place = |(place, span): &(usize, [f64; 2])| (place.saturating_sub(positions), *span);
+        self.off.iter().map(place).collect()
+    }
+
+    /// Says whether the robot moves in them as it does without its motors: if not, they are left out.
+    pub fn set_freely(&mut self, freely: bool) {
+        self.freely = Some(freely);
+        if freely {
+            return;
+        }
+        let spans = joined(self.off.iter().map(|(_, span)| *span).collect());
+        let rows = |[from, to]: &[f64; 2]| ((to - from) / self.dt).round() as u64 + 1;
+        self.costs.push(RowCost {
+            kind: FaultKind::MotorOff,
+            rows: spans.iter().map(rows).sum(),
+            fate: RowFate::LeftOut,
+        });
+        self.costs
+            .sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+        self.cuts = joined(self.cuts.drain(..).chain(spans).collect());
     }
 
     /// Takes rows out of the log so that a step longer than `gap_factor` median ones is left, which
@@ -92,35 +168,113 @@ impl Gate {
         }
     }
 
-    /// What is left out and where, one sentence for each channel and kind of fault.
+    /// How many rows each cause costs, the most first, as in `999 stuck-channel, 12 spike (bridged)`;
+    /// empty where none does.
+    pub fn causes(&self) -> String {
+        let each = self.costs.iter().map(RowCost::text);
+        each.collect::<Vec<_>>().join(", ")
+    }
+
+    /// What is left out or mended and where, one sentence for each kind of fault.
     pub fn warnings(&self) -> Vec<String> {
-        let mut told: Vec<(&LogFault, u64, Vec<String>)> = Vec::new();
-        for fault in &self.marked {
-            let alike = told
-                .iter_mut()
-                .find(|(first, ..)| (first.kind, &first.channel) == (fault.kind, &fault.channel));
-            match alike {
+        let mut kinds: Vec<(FaultKind, u64)> = Vec::new();
+        for fault in self.marked.iter().chain(&self.off_told) {
+            match kinds.iter_mut().find(|(kind, _)| *kind == fault.kind) {
+                Some((_, rows)) => *rows += fault.rows,
+                None => kinds.push((fault.kind, fault.rows)),
+            }
+        }
+        kinds.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+        kinds
+            .into_iter()
+            .map(|(kind, _)| self.sentence(kind))
+            .collect()
+    }
+
+    /// All that is marked as of one kind, channel by channel.
+    fn sentence(&self, kind: FaultKind) -> String {
+        let mut channels: Vec<(Option<&str>, u64, Vec<String>)> = Vec::new();
+        let all = self.marked.iter().chain(&self.off_told);
+        for fault in all.filter(|fault| fault.kind == kind) {
+            let name = fault.channel.as_deref();
+            match channels.iter_mut().find(|(known, ..)| *known == name) {
                 Some((_, rows, spans)) => {
                     *rows += fault.rows;
                     spans.push(fault.span());
                 }
-                None => told.push((fault, fault.rows, vec![fault.span()])),
+                None => channels.push((name, fault.rows, vec![fault.span()])),
             }
         }
-        let sentence = |(fault, rows, spans): (&LogFault, u64, Vec<String>)| {
-            let channel = fault.channel.as_deref().map(escape).unwrap_or_default();
+        let of = channels.iter().map(|(name, rows, spans)| {
+            let name = name
+                .map(|name| format!(" of `{}`", escape(name)))
+                .unwrap_or_default();
             let more = match spans.len() {
                 0..=4 => String::new(),
                 many => format!(" and {} more", many - 4),
             };
+            let what = match kind {
+                FaultKind::WrappedEncoder | FaultKind::PositionStep => "time(s)",
+                _ => "row(s)",
+            };
             format!(
-                "{} of `{channel}`, {rows} row(s) at {}{more} s: left out, and nothing is differentiated across",
-                fault.kind.word(),
-                spans[..spans.len().min(4)].join(", "),
+                "{name}, {rows} {what} at {}{more} s",
+                spans[..spans.len().min(4)].join(", ")
             )
+        });
+        let of = of.collect::<Vec<_>>().join(";");
+        let then = match kind {
+            FaultKind::WrappedEncoder => {
+                let remedies = self.marked.iter().filter(|fault| fault.kind == kind);
+                let remedies: Vec<&str> = remedies.map(|fault| fault.remedy.as_str()).collect();
+                format!("followed through its turns; {}", remedies.join(", "))
+            }
+            FaultKind::PositionStep => {
+                "the log is parted there; before or after it the position is off".to_owned()
+            }
+            FaultKind::MotorOff if self.freely == Some(true) => {
+                "torques of 0 that are data, for the robot moves as it does without its motors"
+                    .to_owned()
+            }
+            FaultKind::MotorOff => {
+                "torques of 0 in motion that does not go with them: left out, and nothing is differentiated across"
+                    .to_owned()
+            }
+            FaultKind::Spike => "bridged by the rows beside them".to_owned(),
+            _ => "left out, and nothing is differentiated across".to_owned(),
         };
-        told.into_iter().map(sentence).collect()
+        format!("{}{of}: {then}", kind.word())
     }
+}
+
+/// What there is to say of the log that a reader gives; `None` where `stop` asks for it.
+fn findings(
+    reader: &mut Reader,
+    keep: &[RowFault],
+    stop: &dyn Fn() -> bool,
+    also: &mut dyn FnMut(&Block, &Layout),
+) -> Result<Option<Findings>, LogError> {
+    let mut judge = LogJudge::new(channels(reader), Depth::Gate).keeping(keep);
+    let mut block = Block::default();
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    while reader.read(&mut block)? {
+        if stop() {
+            return Ok(None);
+        }
+        also(&block, reader.layout());
+        let rows = block.len();
+        let torques = block.tau.len().checked_div(rows).unwrap_or(0);
+        columns.resize_with(block.joints() + torques, Vec::new);
+        columns.iter_mut().for_each(Vec::clear);
+        let (positions, others) = columns.split_at_mut(block.joints());
+        part(&block.q, positions);
+        part(&block.tau, others);
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        judge.take(&block.t, &columns);
+    }
+    let mut found = judge.finish();
+    found.count_from(reader.origin().seconds());
+    Ok(Some(found))
 }
 
 /// Puts row-major numbers into columns.
@@ -148,6 +302,7 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
             let mut seen = InspectedChannel::new(&channel.column, role, Some(joint), None);
             // Volts are logged as the amplifier gave them.
             seen.saturates = role == ChannelRole::Torque && layout.channels == Channels::Actuator;
+            seen.factor = channel.factor;
             seen
         })
     });

@@ -7,9 +7,12 @@ use super::detectors::excitation::Excitation;
 use super::detectors::flat::Flat;
 use super::detectors::repeats::Repeats;
 use super::detectors::spike::Spikes;
+use super::detectors::step::{FreshRows, Freshness, Leaps};
+use super::detectors::turn::Turns;
 use super::detectors::windows::Windows;
 use super::fault::Episodes;
 use super::words::ChannelRole;
+use crate::log::RowFault;
 
 /// A joint moves where it travels further than this share of what the farthest joint does.
 const TRAVELS: f64 = 0.02;
@@ -43,9 +46,13 @@ pub(super) struct Track {
     pub(super) at_limit: Episodes,
     pub(super) flat: Flat,
     pub(super) spikes: Spikes,
+    pub(super) leaps: Leaps,
+    pub(super) turns: Turns,
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
     pub(super) position: Option<usize>,
+    /// Its number in the row before.
+    latest: f64,
     /// Whether its shape is looked at, or only its numbers.
     shaped: bool,
 }
@@ -68,8 +75,11 @@ impl Track {
             at_limit: Episodes::default(),
             flat: Flat::default(),
             spikes: Spikes::default(),
+            leaps: Leaps::default(),
+            turns: Turns::default(),
             excitation: None,
             position,
+            latest: f64::NAN,
             shaped,
         }
     }
@@ -87,6 +97,8 @@ impl Track {
     pub(super) fn part(&mut self) {
         self.flat.part();
         self.spikes.part();
+        self.leaps.part();
+        self.turns.part();
         if let Some(excitation) = &mut self.excitation {
             excitation.part();
         }
@@ -95,12 +107,13 @@ impl Track {
     fn take(
         &mut self,
         times: &[f64],
-        steps: &[RowStep],
+        (steps, fresh): (&[RowStep], &[Freshness]),
         values: &[f64],
         positions: Option<&[f64]>,
         join: f64,
     ) {
         self.spikes.settle();
+        self.leaps.settle();
         for (k, ((&t, step), &value)) in times.iter().zip(steps).zip(values).enumerate() {
             if !value.is_finite() {
                 self.missing.add(t, t, 1, join);
@@ -117,6 +130,18 @@ impl Track {
             let position = positions.map_or(f64::NAN, |positions| positions[k]);
             self.flat.take(t, value, position);
             self.spikes.take(t, value);
+            if self.channel.role == ChannelRole::Position {
+                self.turns.take(t, value);
+                match fresh[k] {
+                    Freshness::Repeats => {}
+                    Freshness::Fresh => self.leaps.take(t, value),
+                    Freshness::AfterRest(rested) => {
+                        self.leaps.take(rested, self.latest);
+                        self.leaps.take(t, value);
+                    }
+                }
+                self.latest = value;
+            }
             if let Some(excitation) = &mut self.excitation {
                 excitation.take(t, value);
             }
@@ -156,7 +181,12 @@ pub struct LogJudge {
     /// Channels that hold positions.
     pub(super) positions: Vec<usize>,
     pub(super) windows: Windows,
+    /// Kinds of findings that are not acted upon.
+    pub(super) keep: Vec<RowFault>,
     steps: Vec<RowStep>,
+    /// Which rows repeat the positions of the row before.
+    fresh: Vec<Freshness>,
+    fresh_rows: FreshRows,
     /// Channels with torques and velocities.
     others: Vec<usize>,
     row: [Vec<f64>; 2],
@@ -215,6 +245,9 @@ impl LogJudge {
         Self {
             depth,
             clock: LogClock::default(),
+            fresh: Vec::new(),
+            fresh_rows: FreshRows::new(positions.len()),
+            keep: Vec::new(),
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
             compared,
@@ -227,12 +260,18 @@ impl LogJudge {
         }
     }
 
+    /// The same, with kinds of findings that are told but not acted upon.
+    pub fn keeping(mut self, keep: &[RowFault]) -> Self {
+        self.keep = keep.to_vec();
+        self
+    }
+
     /// Takes consecutive rows: times [s], and one column per channel.
     pub fn take(&mut self, times: &[f64], columns: &[&[f64]]) {
         if times.is_empty() {
             return;
         }
-        if self.clock.rows == 0 && self.depth == Depth::Whole {
+        if self.clock.rows == 0 {
             let dt = typical_step(times);
             for &index in &self.positions {
                 self.tracks[index].excitation = Some(Excitation::new(dt));
@@ -242,9 +281,10 @@ impl LogJudge {
         self.clock.take(times, &mut steps);
         // What happens again within a few rows is one event.
         let join = 10.5 * self.clock.step_so_far();
+        self.look_for_fresh(times, columns);
         for (track, values) in self.tracks.iter_mut().zip(columns) {
             let positions = track.position.map(|index| columns[index]);
-            track.take(times, &steps, values, positions, join);
+            track.take(times, (&steps, &self.fresh), values, positions, join);
         }
         let compared: Vec<&[f64]> = self.compared.iter().map(|index| columns[*index]).collect();
         for (k, step) in steps.iter().enumerate() {
@@ -266,9 +306,20 @@ impl LogJudge {
         self.steps = steps;
     }
 
+    /// Says of each row whether it repeats the positions of the row before.
+    fn look_for_fresh(&mut self, times: &[f64], columns: &[&[f64]]) {
+        self.fresh.clear();
+        let row = &mut self.row[0];
+        for (k, &t) in times.iter().enumerate() {
+            for (value, index) in row.iter_mut().zip(&self.positions) {
+                *value = columns[*index][k];
+            }
+            self.fresh.push(self.fresh_rows.look(t, row));
+        }
+    }
+
     fn watch_repeats(&mut self, times: &[f64], steps: &[RowStep], columns: &[&[f64]]) {
-        // At the gate the reader has left them out already.
-        if self.positions.is_empty() || self.depth == Depth::Gate {
+        if self.positions.is_empty() {
             return;
         }
         for (k, (&t, step)) in times.iter().zip(steps).enumerate() {

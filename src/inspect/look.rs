@@ -4,7 +4,8 @@ use super::channel::InspectedChannel;
 use super::fault::{FaultKind, LogFault, Severity};
 use super::findings::Findings;
 use super::judge::{Depth, LogJudge};
-use crate::log::{LogError, RawBlock, RawReader};
+use super::words::ChannelRole;
+use crate::log::{LogError, RawBlock, RawReader, RowFault, Unwrap};
 
 /// One column that is looked at: its number, times `factor`, plus `offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +16,8 @@ pub struct ChannelColumn {
     pub factor: f64,
     /// Added after it.
     pub offset: f64,
+    /// Range after which it begins anew [unit of the channel].
+    pub wrap: Option<f64>,
     /// What it is.
     pub channel: InspectedChannel,
 }
@@ -26,6 +29,53 @@ pub struct ColumnPlan {
     pub time: Option<(usize, f64)>,
     /// The other columns.
     pub channels: Vec<ChannelColumn>,
+    /// Kinds of findings that are told but not acted upon.
+    pub keep: Vec<RowFault>,
+    /// Rows for which each sample was held: only fresh rows are looked at.
+    pub held: Option<usize>,
+}
+
+/// Looks at a log once more where the first look found what hides the rest: positions that begin
+/// anew, samples that were held. `None` where there is none of it, or `stop` asks for it.
+///
+/// # Errors
+/// A file that can no longer be read.
+pub fn look_again(
+    log: &mut RawReader,
+    plan: &ColumnPlan,
+    first: &Findings,
+    stop: &dyn Fn() -> bool,
+) -> Result<Option<Findings>, LogError> {
+    let mut plan = plan.clone();
+    for (place, range) in &first.wraps {
+        plan.channels[*place].wrap = Some(*range);
+    }
+    plan.held = first.held;
+    let Some(mut found) = look(log, &plan, stop)? else {
+        return Ok(None);
+    };
+    let hiding = |fault: &&LogFault| {
+        matches!(
+            fault.kind,
+            FaultKind::WrappedEncoder | FaultKind::SampleAndHold
+        )
+    };
+    found
+        .faults
+        .extend(first.faults.iter().filter(hiding).cloned());
+    let held = first
+        .costs
+        .iter()
+        .filter(|cost| cost.kind == FaultKind::SampleAndHold);
+    found.costs.extend(held);
+    found
+        .costs
+        .sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+    found.rows = first.rows;
+    found.wraps.clone_from(&first.wraps);
+    found.held = first.held;
+    found.sort();
+    Ok(Some(found))
 }
 
 /// Reads a table to its end and says what there is to say; `None` where `stop` asks for it.
@@ -41,18 +91,25 @@ pub fn look(
         log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
-    let mut judge = LogJudge::new(channels.collect(), Depth::Whole);
+    let mut judge = LogJudge::new(channels.collect(), Depth::Whole).keeping(&plan.keep);
+    let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
+        .map(|planned| planned.wrap.map(Unwrap::new))
+        .collect();
+    let mut fresh = plan.held.map(|rows| FreshRows::new(rows, plan));
     let mut block = RawBlock::default();
     while log.read(&mut block)? {
         if stop() {
             return Ok(None);
         }
-        for planned in &plan.channels {
-            scale(
-                &mut block.columns[planned.column],
-                planned.factor,
-                planned.offset,
-            );
+        if let Some(fresh) = &mut fresh {
+            fresh.keep(&mut block);
+        }
+        for (planned, turning) in plan.channels.iter().zip(&mut turning) {
+            let column = &mut block.columns[planned.column];
+            scale(column, planned.factor, planned.offset);
+            if let Some(turning) = turning {
+                column.iter_mut().for_each(|q| *q = turning.take(*q));
+            }
         }
         let columns: Vec<&[f64]> = plan
             .channels
@@ -62,6 +119,7 @@ pub fn look(
         judge.take(&block.t, &columns);
     }
     let mut findings = judge.finish();
+    findings.count_from(log.origin().seconds());
     let rows = log.malformed();
     if rows > 0 {
         let effect = format!(
@@ -104,7 +162,66 @@ pub fn look(
             },
         );
     }
+    findings.place();
     Ok(Some(findings))
+}
+
+/// Leaves out rows that hold the sample of the row before.
+#[derive(Debug)]
+struct FreshRows {
+    rows: usize,
+    /// Columns of positions, torques and velocities.
+    columns: Vec<usize>,
+    last: Vec<f64>,
+    since: usize,
+}
+
+impl FreshRows {
+    fn new(rows: usize, plan: &ColumnPlan) -> Self {
+        let of_motion = plan.channels.iter().filter(|planned| {
+            matches!(
+                planned.channel.role,
+                ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque
+            )
+        });
+        let columns: Vec<usize> = of_motion.map(|planned| planned.column).collect();
+        Self {
+            rows,
+            last: vec![f64::NAN; columns.len()],
+            columns,
+            since: 0,
+        }
+    }
+
+    fn keep(&mut self, block: &mut RawBlock) {
+        let mut kept = 0;
+        for row in 0..block.rows() {
+            let own = self
+                .columns
+                .iter()
+                .map(|column| block.columns[*column][row]);
+            let same = own.eq(self.last.iter().copied());
+            self.since += 1;
+            if same && self.since < self.rows {
+                continue;
+            }
+            self.since = 0;
+            for (last, column) in self.last.iter_mut().zip(&self.columns) {
+                *last = block.columns[*column][row];
+            }
+            block.t[kept] = block.t[row];
+            block
+                .columns
+                .iter_mut()
+                .for_each(|column| column[kept] = column[row]);
+            kept += 1;
+        }
+        block.t.truncate(kept);
+        block
+            .columns
+            .iter_mut()
+            .for_each(|column| column.truncate(kept));
+    }
 }
 
 fn scale(column: &mut [f64], factor: f64, offset: f64) {

@@ -8,6 +8,7 @@ use super::draft::{FaultList, rows_text};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
 use super::judge::{Depth, LogJudge, Track};
+use super::position;
 use super::words::ChannelRole;
 
 /// Rows of one value from which a channel may be stuck.
@@ -16,6 +17,8 @@ const STUCK_ROWS: u64 = 10;
 const ABRUPT: f64 = 6.0;
 /// ... and so many times its smallest usual step.
 const GRAINS: f64 = 4.0;
+/// Smallest usual steps that a joint goes from row to row where it moves.
+const SLOW: f64 = 3.0;
 /// A spike is so many times what 99.5 % of the rows differ from their neighbours...
 const SPIKE: f64 = 8.0;
 /// ... and at least this share of the channel's deviation.
@@ -30,7 +33,8 @@ const COARSE_TORQUE: f64 = 0.1;
 const BAND_HZ: f64 = 20.0;
 
 /// The faults of one channel.
-pub(super) fn faults(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut FaultList) {
+pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
+    let track = &judge.tracks[place];
     match track.channel.role {
         ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque => {}
         ChannelRole::Acceleration | ChannelRole::Command | ChannelRole::Other => return,
@@ -42,11 +46,34 @@ pub(super) fn faults(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft:
         constant(judge, track, draft);
         return;
     }
-    let mut flat = Flatness::of(judge, track);
+    if position::wrapped(judge, place, draft) {
+        // Its shape is seen once it is followed through its turns.
+        return;
+    }
+    let mut flat = Flatness::of(judge, track, clock);
     flat.tops();
     flat.stuck();
+    let stalled =
+        |run: &FlatRun| draft.stalled(run.from, clock.dt) && draft.stalled(run.to, clock.dt);
+    flat.tops.retain(|run| !stalled(run));
+    flat.stuck.retain(|run| !stalled(run));
+    flat.off(place, draft);
     flat.tell(track, draft);
-    spikes(track, &flat, clock, draft);
+    // Where a channel leaps out of a flat stretch it is told already.
+    let reach = 5.5 * clock.dt;
+    let mut told: Vec<[f64; 2]> = (flat.tops.iter().chain(&flat.stuck))
+        .map(|run| [run.from - reach, run.to + reach])
+        .chain(
+            draft
+                .stalls
+                .iter()
+                .map(|[from, to]| [from - reach, to + reach]),
+        )
+        .collect();
+    if track.channel.role == ChannelRole::Position {
+        position::leaps(judge, place, (clock, reach, &mut told), draft);
+    }
+    spikes(judge, place, (clock, &told), draft);
     if judge.depth == Depth::Whole {
         coarse(judge, track, clock, draft);
     }
@@ -105,6 +132,10 @@ struct Flatness<'a> {
     track: &'a Track,
     /// An edge with a larger step is abrupt.
     abrupt: f64,
+    /// A joint moves where its steps are larger.
+    slow: f64,
+    /// Leaps of a position that stay: times before and at them [s].
+    leaps: Vec<[f64; 2]>,
     /// Rows of one value that are usual.
     usual: f64,
     /// A joint has moved where it travelled further.
@@ -114,7 +145,7 @@ struct Flatness<'a> {
 }
 
 impl<'a> Flatness<'a> {
-    fn of(judge: &LogJudge, track: &'a Track) -> Self {
+    fn of(judge: &LogJudge, track: &'a Track, clock: &ClockFacts) -> Self {
         let flat = &track.flat;
         let bends = flat.bends.quantile_not_zero(0.99);
         let grain = flat.steps.quantile_not_zero(0.05);
@@ -126,6 +157,11 @@ impl<'a> Flatness<'a> {
         Self {
             track,
             abrupt: (ABRUPT * bends).max(GRAINS * grain),
+            slow: SLOW * grain,
+            leaps: match track.channel.role {
+                ChannelRole::Position => position::places(track, clock),
+                _ => Vec::new(),
+            },
             usual: flat.lengths.quantile(0.99),
             moved,
             tops: Vec::new(),
@@ -134,7 +170,12 @@ impl<'a> Flatness<'a> {
     }
 
     fn is_abrupt(&self, run: &FlatRun) -> bool {
-        run.entry.abs() > self.abrupt || run.exit.abs() > self.abrupt
+        // A joint at rest whose encoder slips leaps, and is not stuck: it is where it moves on the other
+        // side.
+        let leaps = |edge: &dyn Fn(&[f64; 2]) -> bool| self.leaps.iter().any(edge);
+        let entered = !leaps(&|[_, at]| *at == run.from) || run.exit.abs() > self.slow;
+        let left = !leaps(&|[before, _]| *before == run.to) || run.entry.abs() > self.slow;
+        (run.entry.abs() > self.abrupt && entered) || (run.exit.abs() > self.abrupt && left)
     }
 
     /// Runs at a value that the channel does not exceed.
@@ -174,7 +215,7 @@ impl<'a> Flatness<'a> {
         for run in self.track.flat.runs() {
             let long = run.rows >= STUCK_ROWS
                 && run.rows as f64 >= 5.0 * self.usual.min(STUCK_ROWS as f64);
-            if !long || self.tops.contains(run) {
+            if !long || self.tops.iter().any(|top| top.is(run)) {
                 continue;
             }
             let meanwhile =
@@ -183,6 +224,34 @@ impl<'a> Flatness<'a> {
                 self.stuck.push(*run);
             }
         }
+    }
+
+    /// Takes out the runs in which a torque is exactly 0: a motor that is switched off has none, and
+    /// its joint may swing on. A dead channel looks alike; what tells the two apart is the motion.
+    fn off(&mut self, place: usize, draft: &mut FaultList) {
+        if self.track.channel.role != ChannelRole::Torque {
+            return;
+        }
+        let mut episodes = Episodes::default();
+        let mut runs: Vec<FlatRun> = self.tops.iter().chain(&self.stuck).copied().collect();
+        runs.retain(|run| run.value == 0.0 && run.rows >= STUCK_ROWS);
+        runs.sort_by(|a, b| a.from.total_cmp(&b.from));
+        runs.dedup_by(|a, b| a.is(b));
+        for run in &runs {
+            episodes.add(run.from, run.to, run.rows, 0.0);
+            draft.off.push((place, [run.from, run.to]));
+        }
+        self.tops.retain(|run| !runs.iter().any(|off| off.is(run)));
+        self.stuck.retain(|run| !runs.iter().any(|off| off.is(run)));
+        let effect = |rows: u64, times: usize| {
+            format!(
+                "{} of exactly 0 while the joint moves: data of a motor that is switched off, if the joint moves as the robot does without it; a fit finds out, and leaves the rows out if not",
+                rows_text(rows, times)
+            )
+        };
+        let remedy = "nothing where the motor was off; else check cable, sensor and recorder of this channel";
+        let name = Some(self.track.channel.name.as_str());
+        draft.stretches(FaultKind::MotorOff, Info, name, &episodes, &effect, remedy);
     }
 
     fn tell(&self, track: &Track, draft: &mut FaultList) {
@@ -256,37 +325,37 @@ impl<'a> Flatness<'a> {
         );
         if used {
             if !applied {
-                draft.cut(kind, &track.channel.name, &tops);
+                draft.cut(kind, name, &tops);
             }
-            draft.cut(FaultKind::StuckChannel, &track.channel.name, &stuck);
+            draft.cut(FaultKind::StuckChannel, name, &stuck);
         }
     }
 }
 
-fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut FaultList) {
+fn spikes(
+    judge: &LogJudge,
+    place: usize,
+    (clock, told): (&ClockFacts, &[[f64; 2]]),
+    draft: &mut FaultList,
+) {
+    let track = &judge.tracks[place];
     let usual = track.spikes.differences_seen.quantile(0.995);
     let grain = track.flat.steps.quantile_not_zero(0.05);
     let least = (SPIKE * usual)
         .max(GRAINS * grain)
         .max(match track.channel.role {
-            ChannelRole::Position => 0.0,
+            // A row that is off makes twice its height of the second difference.
+            ChannelRole::Position => 0.5 * position::drive(track, clock),
             _ => SPIKE_SHARE * track.deviation(),
         });
-    // Where a channel leaps out of a flat stretch it is told already.
-    let reach = 5.5 * clock.dt;
-    let told = |t: f64| {
-        let runs = flat.tops.iter().chain(&flat.stuck);
-        runs.into_iter()
-            .any(|run| run.from - reach <= t && t <= run.to + reach)
-    };
+    let told = |t: f64| told.iter().any(|[from, to]| *from <= t && t <= *to);
+    let all = track.spikes.found().iter();
+    let high: Vec<_> = all
+        .filter(|s| s.height.abs() > least && !told(s.t))
+        .collect();
     let mut episodes = Episodes::default();
     let mut highest = 0.0f64;
-    for spike in track
-        .spikes
-        .found()
-        .iter()
-        .filter(|s| s.height.abs() > least && !told(s.t))
-    {
+    for spike in &high {
         episodes.add(spike.t, spike.t, 1, 3.5 * clock.dt);
         highest = highest.max(spike.height.abs());
     }
@@ -300,7 +369,7 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut FaultL
     let (severity, then) = if used {
         (
             Warning,
-            "differentiated or squared they outweigh thousands of good rows; a fit leaves them out",
+            "differentiated or squared they outweigh thousands of good rows; a fit bridges them by their neighbours",
         )
     } else {
         (Info, "a fit does not read this channel")
@@ -320,8 +389,14 @@ fn spikes(track: &Track, flat: &Flatness, clock: &ClockFacts, draft: &mut FaultL
         &effect,
         remedy,
     );
-    if used {
-        draft.cut(FaultKind::Spike, &track.channel.name, &episodes);
+    if used && draft.acts(FaultKind::Spike, Some(&track.channel.name)) {
+        let bad = |t: f64| high.iter().any(|spike| spike.t == t);
+        for spike in &high {
+            match spike.bridge(&bad) {
+                Some(value) => draft.bridges.push((spike.t, place, value)),
+                None => draft.cuts.push(([spike.t; 2], FaultKind::Spike)),
+            }
+        }
     }
 }
 

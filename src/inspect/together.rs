@@ -3,9 +3,9 @@
 use super::detectors::clock::ClockFacts;
 use super::detectors::grain;
 use super::detectors::velocity;
-use super::draft::{FaultList, seconds};
+use super::draft::{FaultList, rows_text, seconds};
 use super::fault::Severity::{Error, Info, Warning};
-use super::fault::{FaultKind, LogFault};
+use super::fault::{Episodes, FaultKind, LogFault};
 use super::judge::{Depth, LogJudge, Track};
 use super::lag;
 use super::words::ChannelRole;
@@ -19,8 +19,11 @@ const NOISELESS: f64 = 1e-8;
 
 /// The faults between channels.
 pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
-    repeated_rows(judge, draft);
     copies(judge, draft);
+    if judge.depth == Depth::Whole {
+        // At the gate the reader has left them out already.
+        repeated_rows(judge, clock, draft);
+    }
     if judge.depth == Depth::Whole {
         velocities(judge, clock, draft);
         lag::faults(judge, clock, draft);
@@ -28,7 +31,31 @@ pub(super) fn faults(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList
     }
 }
 
-fn repeated_rows(judge: &LogJudge, draft: &mut FaultList) {
+/// Stretches in which everything is frozen.
+pub(super) fn stalls(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
+    let flats: Vec<_> = judge
+        .positions
+        .iter()
+        .map(|index| &judge.tracks[*index].flat)
+        .collect();
+    let mut episodes = Episodes::default();
+    for stall in judge.repeats.stalls(&flats).iter() {
+        // The robot leaps on from the last frozen row to the next.
+        episodes.add(stall.from, stall.to + clock.dt, stall.rows, 0.0);
+    }
+    let effect = |rows: u64, times: usize| {
+        format!(
+            "{} in which positions, torques and velocities keep their last digit while the robot moves: controller or recorder froze, and these rows are left out of a fit",
+            rows_text(rows, times)
+        )
+    };
+    let remedy = "look for what held the controller up: a full disk, a blocked bus, another program; record again if much is lost";
+    draft.stretches(FaultKind::Stall, Warning, None, &episodes, &effect, remedy);
+    draft.stalls = episodes.iter().map(|e| [e.from, e.to]).collect();
+    draft.cut(FaultKind::Stall, None, &episodes);
+}
+
+fn repeated_rows(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
     let flats: Vec<_> = judge
         .positions
         .iter()
@@ -43,6 +70,30 @@ fn repeated_rows(judge: &LogJudge, draft: &mut FaultList) {
         (Some((first, _)), Some((last, _))) => (first.from, last.to),
         _ => return,
     };
+    let first = judge.clock.first.unwrap_or(0.0);
+    if let Some(rows) = judge.repeats.hold(stale.moving) {
+        let repeated = judge.repeats.repeated();
+        let effect = format!(
+            "{:.0} % of the rows repeat positions and torques of the row before: samples are held for about {rows} rows, so that there is one every {}; only fresh rows are used",
+            100.0 * repeated as f64 / judge.clock.rows.max(1) as f64,
+            seconds(rows as f64 * clock.dt)
+        );
+        let remedy = "log each sample of the robot once, by the robot's own clock";
+        draft.faults.push(LogFault {
+            rows: repeated,
+            ..LogFault::whole(
+                Warning,
+                FaultKind::SampleAndHold,
+                judge.clock.duration(),
+                effect,
+                remedy,
+            )
+        });
+        if draft.acts(FaultKind::SampleAndHold, None) {
+            draft.held = Some(rows);
+        }
+        return;
+    }
     let effect = format!(
         "{} the positions of the row before while the robot moves, so that it seems to stop and to leap: they are left out of a fit, and the log is interpolated over single ones",
         match stale.rows {
@@ -51,14 +102,17 @@ fn repeated_rows(judge: &LogJudge, draft: &mut FaultList) {
         }
     );
     let remedy = "log each sample of the robot once, by the robot's own clock";
-    let first = judge.clock.first.unwrap_or(0.0);
     draft.faults.push(LogFault {
         from_s: from - first,
         rows: stale.rows,
-        cut: true,
         ..LogFault::whole(Warning, FaultKind::RepeatedRows, to - first, effect, remedy)
     });
-    draft.cuts.extend(stale.cuts);
+    if draft.acts(FaultKind::RepeatedRows, None) {
+        let cuts = stale.cuts.into_iter();
+        draft
+            .cuts
+            .extend(cuts.map(|span| (span, FaultKind::RepeatedRows)));
+    }
 }
 
 fn copies(judge: &LogJudge, draft: &mut FaultList) {

@@ -6,7 +6,7 @@ use super::detectors::grain;
 use super::draft::{FaultList, rows_text, seconds};
 use super::fault::Severity::{Error, Info, Warning};
 use super::fault::{Episodes, FaultKind};
-use super::findings::{ChannelFacts, Findings, Gap, joined};
+use super::findings::{ChannelFacts, Findings, Gap, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge, Track};
 use super::words::ChannelRole;
 use super::{shape, together};
@@ -22,6 +22,7 @@ impl LogJudge {
         for track in &mut self.tracks {
             track.part();
         }
+        self.repeats.part();
         conclude(&self)
     }
 }
@@ -30,16 +31,25 @@ impl LogJudge {
 fn conclude(judge: &LogJudge) -> Findings {
     let clock = judge.clock.facts();
     let first = judge.clock.first.unwrap_or(0.0);
-    let mut draft = FaultList::new(first, first + judge.clock.duration().max(0.0));
+    let mut draft = FaultList::new(first, first + judge.clock.duration().max(0.0), &judge.keep);
     time_faults(judge, &clock, &mut draft);
-    for track in &judge.tracks {
+    together::stalls(judge, &clock, &mut draft);
+    for (place, track) in judge.tracks.iter().enumerate() {
         number_faults(track, &mut draft);
-        shape::faults(judge, track, &clock, &mut draft);
+        shape::faults(judge, place, &clock, &mut draft);
     }
     together::faults(judge, &clock, &mut draft);
+    let costs = costs(&draft, &clock);
     let FaultList {
-        mut faults, cuts, ..
+        mut faults,
+        cuts,
+        mut bridges,
+        wraps,
+        off,
+        held,
+        ..
     } = draft;
+    bridges.sort_by(|a, b| a.0.total_cmp(&b.0));
     faults.sort_by(|a, b| {
         let severity = b.severity.cmp(&a.severity);
         severity
@@ -47,8 +57,9 @@ fn conclude(judge: &LogJudge) -> Findings {
             .then(a.kind.cmp(&b.kind))
     });
     let rate = (clock.dt > 0.0).then(|| 1.0 / clock.dt);
-    Findings {
+    let mut found = Findings {
         rows: judge.clock.rows,
+        begins_s: first,
         duration_s: judge.clock.duration(),
         rate_hz: rate,
         jitter: rate.map(|_| clock.jitter),
@@ -68,8 +79,54 @@ fn conclude(judge: &LogJudge) -> Findings {
             .collect(),
         joints: joints(judge),
         faults,
-        cuts: joined(cuts),
+        costs,
+        cuts: joined(cuts.into_iter().map(|(span, _)| span).collect()),
+        bridges,
+        wraps,
+        off,
+        held,
+    };
+    found.place();
+    found
+}
+
+/// How many rows each cause costs, the most first.
+fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
+    let mut causes: Vec<FaultKind> = draft.cuts.iter().map(|(_, kind)| *kind).collect();
+    causes.sort_unstable();
+    causes.dedup();
+    let left_out = |kind: FaultKind| {
+        let spans = draft.cuts.iter().filter(|(_, of)| *of == kind);
+        let spans = joined(spans.map(|(span, _)| *span).collect());
+        let rows = |[from, to]: &[f64; 2]| ((to - from) / clock.dt).round().clamp(0.0, 1e15) as u64;
+        RowCost {
+            kind,
+            rows: spans.iter().map(|span| rows(span) + 1).sum(),
+            fate: RowFate::LeftOut,
+        }
+    };
+    let mut costs: Vec<RowCost> = causes.into_iter().map(left_out).collect();
+    if !draft.bridges.is_empty() {
+        let mut times: Vec<f64> = draft.bridges.iter().map(|(t, ..)| *t).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        costs.push(RowCost {
+            kind: FaultKind::Spike,
+            rows: times.len() as u64,
+            fate: RowFate::Bridged,
+        });
     }
+    let held = draft
+        .faults
+        .iter()
+        .find(|fault| fault.kind == FaultKind::SampleAndHold);
+    costs.extend(held.filter(|fault| fault.cut).map(|fault| RowCost {
+        kind: fault.kind,
+        rows: fault.rows,
+        fate: RowFate::LeftOut,
+    }));
+    costs.sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
+    costs
 }
 
 fn channel_facts(judge: &LogJudge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {

@@ -30,6 +30,11 @@ impl Instant {
         }
     }
 
+    /// Seconds since the zero of the clock, as near as f64 has them.
+    pub fn seconds(self) -> f64 {
+        self.since(Self::default())
+    }
+
     /// Whole nanoseconds since the zero of the clock, rounded down.
     pub fn nanoseconds(self) -> i128 {
         self.fs.div_euclid(NANOSECOND)

@@ -116,12 +116,15 @@ pub fn look(
             column: *k,
             factor: 1.0,
             offset: 0.0,
+            wrap: None,
             channel: InspectedChannel::new(&column.name, column.role, joint, None),
         }
     });
     let plan = ColumnPlan {
         time: time.as_ref().map(|(at, seconds, _)| (*at, *seconds)),
         channels: channels.collect(),
+        keep: Vec::new(),
+        held: None,
     };
     let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
     for column in &mut columns {

@@ -16,8 +16,11 @@ pub struct Stretch {
     pub dt: f64,
     /// Time of the first sample since the begin of its log \[s\].
     pub began: f64,
-    /// Time stamps as logged \[s\].
+    /// Time stamps of its log \[s\].
     pub t: Vec<f64>,
+    /// Time by the log's own clock where its time stamps are 0 \[s\]: other than 0 for clocks far from
+    /// zero.
+    pub zero: f64,
     /// Positions [m or rad].
     pub q: Vec<Vec<f64>>,
     /// Velocities [m/s or rad/s].
@@ -37,6 +40,11 @@ impl Stretch {
     /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
+    }
+
+    /// Time of a sample by the log's own clock \[s\].
+    pub fn own_time(&self, sample: usize) -> f64 {
+        self.zero + self.t.first().copied().unwrap_or(0.0) + self.dt * sample as f64
     }
 
     /// Number of joints.

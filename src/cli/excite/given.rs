@@ -57,7 +57,7 @@ pub(super) fn add(
         &mut |block| log.read(block),
     )
     .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
-    warnings.extend(summary_warnings(&spec.name(), &summary));
+    warnings.extend(summary_warnings(&spec.name(), log.origin(), &summary));
     bench.inputs.push(log.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())

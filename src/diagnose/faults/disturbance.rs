@@ -105,7 +105,7 @@ pub fn cut(
         let piece = split.pieces[i].clone();
         let stretch = &stretches[piece.stretch];
         let filter = filters.of(stretch);
-        let time = |row: usize| stretch.began + stretch.dt * filter.sample_of(row) as f64;
+        let time = |row: usize| stretch.own_time(filter.sample_of(row));
         let (from_s, to_s) = (time(piece.rows.start), time(piece.rows.end));
         match episodes.last_mut() {
             Some(e) if last == Some((i, joint)) => {

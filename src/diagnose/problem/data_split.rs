@@ -135,9 +135,7 @@ impl DataSplit {
                             _ => RowRole::Holdout,
                         };
                         cut(&mut split, range.clone(), &|_| kind);
-                        let time = |row: usize| {
-                            stretch.began + stretch.dt * parallel.sample_of(row) as f64
-                        };
+                        let time = |row: usize| stretch.own_time(parallel.sample_of(row));
                         split.set_aside.push(SetAside {
                             log: stretch.log,
                             role: *role,

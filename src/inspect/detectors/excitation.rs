@@ -16,6 +16,9 @@ const LONGEST: usize = 4096;
 /// A joint moves where its speed is above this share of the largest.
 const MOVING: f64 = 0.02;
 
+/// Highest accelerations that are remembered with their times.
+const HIGHEST: usize = 64;
+
 /// What one joint did.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct JointMotion {
@@ -63,6 +66,8 @@ pub(in crate::inspect) struct Excitation {
     points: u64,
     direction: f64,
     reversals: u64,
+    /// First and last time [s] of the rows of the highest accelerations, and their sizes.
+    highest: Vec<[f64; 3]>,
 }
 
 impl Excitation {
@@ -84,6 +89,7 @@ impl Excitation {
             points: 0,
             direction: 0.0,
             reversals: 0,
+            highest: Vec::new(),
         }
     }
 
@@ -118,6 +124,7 @@ impl Excitation {
         self.points += 1;
         self.speeds.add(v);
         self.accelerations.add(a);
+        self.remember([t0, t2, a.abs()]);
         let direction = if v == 0.0 { 0.0 } else { v.signum() };
         let row = [a, v, direction, 1.0];
         for (sums, x) in self.gram.iter_mut().zip(row) {
@@ -129,6 +136,27 @@ impl Excitation {
             self.reversals += u64::from(direction == -self.direction);
             self.direction = direction;
         }
+    }
+
+    fn remember(&mut self, point: [f64; 3]) {
+        if self.highest.len() < HIGHEST {
+            self.highest.push(point);
+            return;
+        }
+        let lowest = (self.highest.iter_mut()).min_by(|a, b| a[2].total_cmp(&b[2]));
+        if let Some(lowest) = lowest.filter(|lowest| lowest[2] < point[2]) {
+            *lowest = point;
+        }
+    }
+
+    /// The largest acceleration that no event at these times took part in; where all that are
+    /// remembered did, the smallest of them. 0 where there is none.
+    pub(in crate::inspect) fn highest_apart(&self, events: &[f64]) -> f64 {
+        let inside = |[from, to, _]: &[f64; 3]| events.iter().any(|t| from <= t && t <= to);
+        let apart = self.highest.iter().filter(|point| !inside(point));
+        let all = || self.highest.iter().map(|point| point[2]);
+        let found = apart.map(|point| point[2]).reduce(f64::max);
+        found.or_else(|| all().reduce(f64::min)).unwrap_or(0.0)
     }
 
     /// Root mean square of the acceleration.

@@ -28,6 +28,13 @@ pub(in crate::inspect) struct FlatRun {
     pub(in crate::inspect) travel: f64,
 }
 
+impl FlatRun {
+    /// Whether it is the same run: edges may be no numbers.
+    pub(in crate::inspect) fn is(&self, other: &Self) -> bool {
+        (self.from, self.to) == (other.from, other.to)
+    }
+}
+
 /// The runs of one channel.
 #[derive(Debug, Clone, Default)]
 pub(in crate::inspect) struct Flat {

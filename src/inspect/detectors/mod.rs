@@ -8,5 +8,7 @@ pub(super) mod grain;
 pub(super) mod histogram;
 pub(super) mod repeats;
 pub(super) mod spike;
+pub(super) mod step;
+pub(super) mod turn;
 pub(super) mod velocity;
 pub(super) mod windows;

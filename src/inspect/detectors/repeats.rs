@@ -8,8 +8,16 @@ use crate::inspect::fault::Episodes;
 
 /// Rows of a run that may still be a repetition; longer ones are a stuck channel or a rest.
 const LONGEST: usize = 20;
+/// Rows in motion that repeat, from which samples may have been held.
+const HELD: u64 = 50;
 /// Runs that are kept.
 const MOST: usize = 1 << 18;
+/// Long runs that are kept.
+const LONG_RUNS: usize = 4096;
+/// Usual smallest steps that a joint goes from row to row where it moves.
+const MOVES: f64 = 3.0;
+/// An edge is abrupt where its step is so many times the usual bends of the channel.
+const ABRUPT: f64 = 6.0;
 
 /// Rows that repeat the positions of the row before them.
 #[derive(Debug, Clone)]
@@ -44,6 +52,11 @@ pub(in crate::inspect) struct Repeats {
     changed: u64,
     coincidences: u64,
     runs: Vec<RepeatRun>,
+    /// Longer ones in which all else repeated too.
+    frozen: Vec<RepeatRun>,
+    /// Rows, and those of them in which torques and velocities were those of the row before.
+    seen: u64,
+    same: u64,
 }
 
 impl Repeats {
@@ -60,6 +73,9 @@ impl Repeats {
             changed: 0,
             coincidences: 0,
             runs: Vec::new(),
+            frozen: Vec::new(),
+            seen: 0,
+            same: 0,
         }
     }
 
@@ -67,6 +83,8 @@ impl Repeats {
     #[inline]
     pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) {
         let same = others == self.others;
+        self.seen += 1;
+        self.same += u64::from(same);
         if self.rows > 0 && positions == self.previous {
             self.rows += 1;
             if self.rows == 2 {
@@ -97,6 +115,9 @@ impl Repeats {
 
     /// The next row belongs to another stretch.
     pub(in crate::inspect) fn part(&mut self) {
+        if self.rows > LONGEST {
+            self.end(&vec![f64::NAN; self.joints]);
+        }
         self.previous.fill(f64::NAN);
         self.entry.fill(f64::NAN);
         self.rows = 0;
@@ -104,7 +125,12 @@ impl Repeats {
 
     #[cold]
     fn end(&mut self, next: &[f64]) {
-        if self.rows > LONGEST || self.runs.len() == MOST {
+        let long = self.rows > LONGEST;
+        let full = match long {
+            true => self.frozen.len() == LONG_RUNS || !self.identical,
+            false => self.runs.len() == MOST,
+        };
+        if full {
             return;
         }
         let out = next
@@ -112,7 +138,7 @@ impl Repeats {
             .zip(&self.previous)
             .map(|(next, last)| next - last);
         let [first, second, before_last, last] = self.times;
-        self.runs.push(RepeatRun {
+        let run = RepeatRun {
             first,
             last,
             second,
@@ -125,7 +151,53 @@ impl Repeats {
                 .map(|(entry, exit)| [*entry as f32, exit as f32])
                 .collect(),
             identical: self.identical,
-        });
+        };
+        match long {
+            true => self.frozen.push(run),
+            false => self.runs.push(run),
+        }
+    }
+
+    /// Stretches in which all channels froze while the robot moved; `channels` are the joints' own.
+    ///
+    /// Positions that stand still are a rest. They are frozen where torques and velocities, too, keep
+    /// their last digit, which they do not elsewhere, and the joints moved right before or after; or
+    /// where a joint stops or starts at once.
+    pub(in crate::inspect) fn stalls(&self, channels: &[&Flat]) -> Episodes {
+        let rows = |run: &RepeatRun| u64::from(run.rows);
+        let held: u64 = self.frozen.iter().map(rows).sum();
+        let elsewhere = self.seen.saturating_sub(held);
+        let alive = !self.others.is_empty() && 100 * self.same.saturating_sub(held) < elsewhere;
+        let frozen = |run: &&RepeatRun| {
+            run.steps.iter().zip(channels).any(|(steps, flat)| {
+                let largest = steps.iter().filter(|step| step.is_finite());
+                let largest = largest.fold(0.0, |most, step| f64::from(step.abs()).max(most));
+                let step = flat.steps.quantile_not_zero(0.05);
+                let bend = flat.bends.quantile_not_zero(0.99);
+                let moves = step > 0.0 && largest > MOVES * step;
+                moves && (alive || largest > ABRUPT * bend)
+            })
+        };
+        let mut episodes = Episodes::default();
+        for run in self.frozen.iter().filter(frozen) {
+            episodes.add(run.first, run.last, rows(run) + 1, 0.0);
+        }
+        episodes
+    }
+
+    /// Rows that repeat everything, those of long stretches aside.
+    pub(in crate::inspect) fn repeated(&self) -> u64 {
+        let runs = self.runs.iter().filter(|run| run.identical);
+        runs.map(|run| u64::from(run.rows)).sum()
+    }
+
+    /// Rows for which each sample was held, and the share of the rows that repeat: where at least
+    /// every other row of those that change is one that was held.
+    pub(in crate::inspect) fn hold(&self, repeated: u64) -> Option<usize> {
+        let held = self.repeated();
+        let holds = repeated >= HELD && 2 * held >= self.changed;
+        let rows = 1.0 + held as f64 / self.changed.max(1) as f64;
+        holds.then(|| rows.round() as usize)
     }
 
     /// What was found; `channels` are the joints' own, in the same order.

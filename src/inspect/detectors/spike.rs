@@ -10,6 +10,8 @@ use super::histogram::Histogram;
 /// Rows of the median.
 const WIDTH: usize = 7;
 const HALF: usize = WIDTH / 2;
+/// Rows to each side that are remembered of a spike.
+const REACH: usize = 5;
 /// Rows to each side in which a spike must stand alone.
 const AROUND: usize = 25;
 /// Differences that are remembered.
@@ -23,6 +25,30 @@ pub(in crate::inspect) struct Spike {
     pub(in crate::inspect) t: f64,
     /// Difference from the median of its neighbours.
     pub(in crate::inspect) height: f64,
+    /// Times and numbers of the rows about, itself in the middle.
+    around: [[f64; 2]; 2 * REACH + 1],
+}
+
+impl Spike {
+    /// The number of the cubic through the two nearest rows on each side that are not `bad`; `None`
+    /// where there are none.
+    pub(in crate::inspect) fn bridge(&self, bad: &dyn Fn(f64) -> bool) -> Option<f64> {
+        let good = |row: &&[f64; 2]| !bad(row[0]);
+        let before = self.around[..REACH].iter().rev().filter(good).take(2);
+        let after = self.around[REACH + 1..].iter().filter(good).take(2);
+        let nodes: Vec<[f64; 2]> = before.chain(after).copied().collect();
+        let sides = nodes.iter().filter(|node| node[0] < self.t).count();
+        if (sides, nodes.len()) != (2, 4) {
+            return None;
+        }
+        let weight = |i: usize| -> f64 {
+            let others = (0..4).filter(|j| *j != i);
+            others
+                .map(|j| (self.t - nodes[j][0]) / (nodes[i][0] - nodes[j][0]))
+                .product()
+        };
+        Some((0..4).map(|i| weight(i) * nodes[i][1]).sum())
+    }
 }
 
 /// Looks for the spikes of one channel.
@@ -125,9 +151,15 @@ impl Spikes {
             self.lowest = heights[MOST / 2];
             self.found.retain(|spike| spike.height.abs() > self.lowest);
         }
+        // as far as the cubic reaches, there are rows
+        let around = std::array::from_fn(|i| {
+            let at = (row + i - REACH) % RING;
+            [self.times[at], self.values[at]]
+        });
         self.found.push(Spike {
             t: self.times[row % RING],
             height,
+            around,
         });
     }
 
@@ -217,6 +249,28 @@ mod tests {
             .map(|s| s.t)
             .collect();
         assert_eq!(found, [500.0, 1200.0, 1201.0, 1202.0, 2990.0]);
+    }
+
+    #[test]
+    fn a_spike_is_bridged_by_the_cubic_through_its_neighbours() {
+        let smooth = |k: f64| (k * 0.02).sin();
+        let mut values: Vec<f64> = (0..3000).map(|k| smooth(f64::from(k))).collect();
+        for k in [500, 1200, 1201, 1202] {
+            values[k] += 0.5;
+        }
+        let spikes = fed(&values);
+        let high: Vec<&Spike> = spikes.found().iter().filter(|s| s.height > 0.3).collect();
+        let bad = |t: f64| high.iter().any(|spike| spike.t == t);
+        assert_eq!(high.len(), 4);
+        for spike in &high {
+            let value = spike.bridge(&bad).unwrap();
+            assert!(
+                (value - smooth(spike.t)).abs() < 1e-5,
+                "{} {value}",
+                spike.t
+            );
+        }
+        assert_eq!(high[0].bridge(&|_| true), None);
     }
 
     #[test]

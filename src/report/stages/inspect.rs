@@ -1,6 +1,6 @@
 //! The report of `inspect`: what logs hold and what is wrong with them.
 
-use crate::inspect::{Findings, LogFault, Severity};
+use crate::inspect::{Findings, LogFault, RowCost, Severity};
 use crate::log::escape;
 use crate::number;
 use crate::report::table::{Align, Table};
@@ -129,13 +129,36 @@ fn faults(out: &mut Writer, found: &Findings) {
         count(Severity::Warning),
         count(Severity::Info)
     ));
-    // One channel at several times, or several channels with the same words.
+    if !found.costs.is_empty() {
+        let causes: Vec<String> = found.costs.iter().map(RowCost::text).collect();
+        out.note(
+            "",
+            &format!(
+                "rows that a fit leaves out or bridges: {}",
+                causes.join(", ")
+            ),
+            2,
+        );
+    }
+    // One channel at several times, or several channels with the same words; notes of one kind.
     let alike = |a: &LogFault, b: &LogFault| {
-        (a.kind, a.severity, &a.remedy) == (b.kind, b.severity, &b.remedy)
-            && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span()))
+        let notes = a.severity == Severity::Info && a.kind == b.kind;
+        (a.kind, a.severity) == (b.kind, b.severity)
+            && (notes
+                || a.remedy == b.remedy
+                    && (a.channel == b.channel || (&a.effect, a.span()) == (&b.effect, b.span())))
     };
+    let cost = |fault: &LogFault| {
+        let of_kind = found.costs.iter().find(|cost| cost.kind == fault.kind);
+        of_kind.map_or(0, |cost| cost.rows)
+    };
+    let mut in_order: Vec<&LogFault> = found.faults.iter().collect();
+    in_order.sort_by(|a, b| {
+        let severity = b.severity.cmp(&a.severity);
+        severity.then(cost(b).cmp(&cost(a)))
+    });
     let mut told: Vec<&LogFault> = Vec::new();
-    for fault in &found.faults {
+    for fault in in_order {
         if told.iter().any(|earlier| alike(earlier, fault)) {
             continue;
         }

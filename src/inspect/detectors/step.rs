@@ -1,0 +1,351 @@
+//! Leaps of a position that stay: an encoder that slipped, a new reference, logs that were joined,
+//! rows that were lost without their times.
+//!
+//! Through the four rows about a place goes one parabola, if nothing leapt there. The height of a
+//! leap that brings them onto one is their third divided difference over that of a leap of height 1;
+//! times need not be even. Two things give it a height without a leap: noise, whose heights are seen
+//! all through the log, and the motion, where the acceleration changes from one row to the next.
+
+use super::histogram::Histogram;
+
+/// Rows to each side in which a leap must stand alone.
+const AROUND: usize = 25;
+/// Rows about a leap in which it shows itself.
+const OWN: usize = 4;
+/// Rows to each side by which it is seen that the new level stays.
+const LEVEL: usize = 5;
+/// Rows that are remembered.
+const RING: usize = 64;
+/// Rows that repeat all positions from which the robot is at rest.
+const REST: usize = 6;
+/// Leaps that are kept, the highest.
+const MOST: usize = 4096;
+/// Largest heights that may be leaps, over those of 99 % of the rows.
+const SUSPECT: f64 = 3.0;
+
+/// A leap of a position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::inspect) struct Leap {
+    /// Times of the last row before it and of the first one after it [s].
+    pub(in crate::inspect) before: f64,
+    pub(in crate::inspect) at: f64,
+    pub(in crate::inspect) height: f64,
+}
+
+/// Looks for the leaps of one position.
+#[derive(Debug, Clone)]
+pub(in crate::inspect) struct Leaps {
+    times: [f64; RING],
+    values: [f64; RING],
+    heights: [f64; RING],
+    /// Rows since the stretch began.
+    count: usize,
+    /// Rows whose height was looked at.
+    judged: usize,
+    pub(in crate::inspect) heights_seen: Histogram,
+    suspect: f64,
+    found: Vec<Leap>,
+    lowest: f64,
+}
+
+impl Default for Leaps {
+    fn default() -> Self {
+        Self {
+            times: [0.0; RING],
+            values: [0.0; RING],
+            heights: [0.0; RING],
+            count: 0,
+            judged: 0,
+            heights_seen: Histogram::default(),
+            suspect: 0.0,
+            found: Vec::new(),
+            lowest: 0.0,
+        }
+    }
+}
+
+impl Leaps {
+    /// Takes the next row that is not one of a few that repeat the positions of the row before.
+    #[inline]
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+        let k = self.count;
+        self.times[k % RING] = t;
+        self.values[k % RING] = value;
+        self.heights[k % RING] = 0.0;
+        self.count += 1;
+        if self.count < 4 {
+            return;
+        }
+        // the leap would be between the two rows in the middle
+        let height = self.height(k - 1);
+        self.heights[(k - 1) % RING] = height;
+        self.heights_seen.add(height);
+        if k > AROUND + 1 {
+            self.judge(k - 1 - AROUND, k - 1);
+        }
+    }
+
+    /// Height of a leap between a row and the one before it.
+    #[inline]
+    fn height(&self, row: usize) -> f64 {
+        let at = |i: usize| (row + i - 2) % RING;
+        let t: [f64; 4] = std::array::from_fn(|i| self.times[at(i)]);
+        let (mut all, mut after) = (0.0, 0.0);
+        for i in 0..4 {
+            let mut product = 1.0;
+            for j in 0..4 {
+                if j != i {
+                    product *= t[i] - t[j];
+                }
+            }
+            let weight = 1.0 / product;
+            // from the row before the leap, so that a large constant part leaves no rounding
+            all += weight * (self.values[at(i)] - self.values[at(1)]);
+            after += if i >= 2 { weight } else { 0.0 };
+        }
+        all / after
+    }
+
+    /// The next row belongs to another stretch.
+    pub(in crate::inspect) fn part(&mut self) {
+        if self.count >= 4 {
+            let last = self.count - 2;
+            for row in self.judged.max(2)..=last {
+                self.judge(row, last);
+            }
+        }
+        self.count = 0;
+        self.judged = 0;
+    }
+
+    /// Brings the suspicion up to date with what was seen so far.
+    pub(in crate::inspect) fn settle(&mut self) {
+        self.suspect = SUSPECT * self.heights_seen.quantile(0.99);
+    }
+
+    #[inline]
+    fn judge(&mut self, row: usize, last: usize) {
+        self.judged = row + 1;
+        let height = self.heights[row % RING];
+        if height.abs() > self.suspect.max(self.lowest) {
+            self.judge_closely(row, last, height);
+        }
+    }
+
+    #[cold]
+    fn judge_closely(&mut self, row: usize, last: usize, height: f64) {
+        let from = row.saturating_sub(AROUND).max(2);
+        let others = from..=last.min(row + AROUND);
+        let (mut near, mut far) = (0.0f64, 0);
+        for k in others.filter(|k| *k != row) {
+            let size = self.heights[k % RING].abs();
+            if k.abs_diff(row) <= OWN {
+                near = near.max(size);
+            } else {
+                far += usize::from(size > 0.25 * height.abs());
+            }
+        }
+        // A second leap may be near, a rough stretch may not; of a spike two rows stand out alike.
+        if far > 3 || near >= 0.9 * height.abs() || !self.stays(row, height) {
+            return;
+        }
+        if self.found.len() == MOST {
+            let mut heights: Vec<f64> = self.found.iter().map(|leap| leap.height.abs()).collect();
+            heights.sort_by(f64::total_cmp);
+            self.lowest = heights[MOST / 2];
+            self.found.retain(|leap| leap.height.abs() > self.lowest);
+        }
+        self.found.push(Leap {
+            before: self.times[(row - 1) % RING],
+            at: self.times[row % RING],
+            height,
+        });
+    }
+
+    /// Whether the rows farther away, too, are on one parabola but for a leap of this height: of rows
+    /// one to five on each side a parabola with a leap, without the two rows at the leap itself.
+    fn stays(&self, row: usize, height: f64) -> bool {
+        let from = row.saturating_sub(LEVEL + 1);
+        let rows = (from..(row + LEVEL + 1).min(self.count))
+            .filter(|k| *k + 1 < row || *k > row)
+            .collect::<Vec<_>>();
+        let (before, after) = rows.split_at(rows.partition_point(|k| *k < row));
+        if before.len() < 2 || after.len() < 2 {
+            // too near an end to tell: what stands out there is believed
+            return true;
+        }
+        let begin = self.times[row % RING];
+        let length = (self.times[rows[rows.len() - 1] % RING] - self.times[rows[0] % RING]).abs();
+        let column = |f: &dyn Fn(f64, usize) -> f64| -> Vec<f64> {
+            let each = rows.iter();
+            each.map(|k| f((self.times[k % RING] - begin) / length, *k))
+                .collect()
+        };
+        let mut basis = vec![
+            column(&|_, _| 1.0),
+            column(&|t, _| t),
+            column(&|t, _| t * t),
+        ];
+        let mut leap = column(&|_, k| if k >= row { 1.0 } else { 0.0 });
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        // Gram-Schmidt: what of the leap is no parabola
+        for i in 0..basis.len() {
+            let (done, rest) = basis.split_at_mut(i);
+            for other in done.iter() {
+                let share = dot(&rest[0], other);
+                rest[0]
+                    .iter_mut()
+                    .zip(other)
+                    .for_each(|(x, y)| *x -= share * y);
+            }
+            let norm = dot(&rest[0], &rest[0]).sqrt();
+            if norm < 1e-9 {
+                return true;
+            }
+            rest[0].iter_mut().for_each(|x| *x /= norm);
+            let share = dot(&leap, &rest[0]);
+            leap.iter_mut()
+                .zip(&rest[0])
+                .for_each(|(x, y)| *x -= share * y);
+        }
+        let about = self.values[(row - 1) % RING];
+        let values = column(&|_, k| self.values[k % RING] - about);
+        let found = dot(&leap, &values) / dot(&leap, &leap);
+        (0.5..1.5).contains(&(found / height))
+    }
+
+    /// Those that may be leaps, in the order of time.
+    pub(in crate::inspect) fn found(&self) -> &[Leap] {
+        &self.found
+    }
+
+    /// Height that noise and the usual motion do not reach in a million logs like this one, if the
+    /// share of the rows that pass a height falls exponentially with it, as it does from the 90th to
+    /// the 99th of a hundred (a normal distribution falls faster).
+    pub(in crate::inspect) fn unusual(&self, rows: u64) -> f64 {
+        const LOGS: f64 = 1e6;
+        let (most, nearly_all) = (
+            self.heights_seen.quantile(0.9),
+            self.heights_seen.quantile(0.99),
+        );
+        let decades = (0.01 * LOGS * rows.max(100) as f64).log10();
+        nearly_all + (nearly_all - most) * decades
+    }
+}
+
+/// Leaves out rows that repeat the positions of the row before, unless the robot is at rest: then the
+/// last of them stands for all.
+#[derive(Debug, Clone, Default)]
+pub(in crate::inspect) struct FreshRows {
+    previous: Vec<f64>,
+    /// Time of the last row that repeats, and how many there are in a row.
+    repeated: usize,
+    last: f64,
+}
+
+/// What to do with a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::inspect) enum Freshness {
+    /// Its positions are those of the row before.
+    Repeats,
+    /// Its positions are new.
+    Fresh,
+    /// The same, after a rest, whose last row was at this time [s].
+    AfterRest(f64),
+}
+
+impl FreshRows {
+    pub(in crate::inspect) fn new(positions: usize) -> Self {
+        Self {
+            previous: vec![f64::NAN; positions],
+            ..Self::default()
+        }
+    }
+
+    /// Looks at the positions of the next row.
+    #[inline]
+    pub(in crate::inspect) fn look(&mut self, t: f64, positions: &[f64]) -> Freshness {
+        if positions == self.previous {
+            self.repeated += 1;
+            self.last = t;
+            return Freshness::Repeats;
+        }
+        let rest = self.repeated >= REST;
+        self.repeated = 0;
+        self.previous.copy_from_slice(positions);
+        match rest {
+            true => Freshness::AfterRest(self.last),
+            false => Freshness::Fresh,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fed(rows: impl Iterator<Item = (f64, f64)>) -> Leaps {
+        let mut leaps = Leaps::default();
+        for (k, (t, q)) in rows.enumerate() {
+            if k % 256 == 0 {
+                leaps.settle();
+            }
+            leaps.take(t, q);
+        }
+        leaps.part();
+        leaps
+    }
+
+    fn high(leaps: &Leaps, least: f64) -> Vec<(f64, f64)> {
+        let found = leaps
+            .found()
+            .iter()
+            .filter(|leap| leap.height.abs() > least);
+        found.map(|leap| (leap.at, leap.height)).collect()
+    }
+
+    /// Rows with an uneven clock and the last digits of an encoder.
+    fn rows(alter: impl Fn(usize, f64) -> f64) -> Vec<(f64, f64)> {
+        let row = |k: usize| {
+            let t = k as f64 * 1e-3 + 1e-4 * ((k * 7) % 5) as f64;
+            let q = (2.0 * t).sin() + 0.3 * (9.0 * t).cos();
+            (t, (alter(k, q) / 1e-6).round() * 1e-6)
+        };
+        (0..4000).map(row).collect()
+    }
+
+    #[test]
+    fn a_leap_is_found_at_its_row_with_its_height_whatever_the_clock() {
+        for height in [1e-3, -0.02, 0.1] {
+            let leaps = fed(rows(|k, q| q + if k < 2345 { 0.0 } else { height }).into_iter());
+            let found = high(&leaps, leaps.unusual(4000));
+            assert_eq!(found.len(), 1, "{height}: {found:?}");
+            let (at, size) = found[0];
+            assert!((at - 2.345).abs() < 1e-3 && (size / height - 1.0).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn spikes_and_smooth_turns_are_no_leaps() {
+        let spiky = fed(rows(|k, q| q + if k % 500 == 100 { 0.05 } else { 0.0 }).into_iter());
+        assert!(
+            high(&spiky, spiky.unusual(4000)).is_empty(),
+            "{:?}",
+            spiky.found()
+        );
+        let smooth = fed(rows(|_, q| q).into_iter());
+        assert!(high(&smooth, smooth.unusual(4000)).is_empty());
+    }
+
+    #[test]
+    fn a_rest_is_its_first_and_its_last_row_and_a_few_that_repeat_are_none() {
+        let mut fresh = FreshRows::new(1);
+        let rows = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 3.0];
+        let told: Vec<Freshness> = (0..rows.len())
+            .map(|k| fresh.look(k as f64, &rows[k..=k]))
+            .collect();
+        assert_eq!(told[3], Freshness::Fresh);
+        assert_eq!(told[10], Freshness::AfterRest(9.0));
+        assert_eq!(told.iter().filter(|f| **f == Freshness::Repeats).count(), 7);
+    }
+}

@@ -1,0 +1,181 @@
+//! Positions that begin anew after their range: encoders of one turn, counters that overflow.
+
+/// Share of the travel from which a step may go through the end of the range.
+const LONG: f64 = 0.5;
+/// Long steps that are kept.
+const MOST: usize = 1024;
+/// Usual steps that a range is longer than.
+const COUNTS: f64 = 16.0;
+/// By how much the ranges that several steps tell may differ, as a share.
+const ALIKE: f64 = 0.02;
+/// By how much a range may be off one that is usual, as a share.
+const NEAR: f64 = 0.02;
+
+/// A step that is long against the travel so far.
+#[derive(Debug, Clone, Copy)]
+struct LongStep {
+    t: f64,
+    step: f64,
+    /// What is left of the step when those before and after it are taken off on average.
+    range: f64,
+}
+
+/// Watches one position for its range's ends.
+#[derive(Debug, Clone)]
+pub(in crate::inspect) struct Turns {
+    low: f64,
+    high: f64,
+    /// Position of the row before, and the step to it; NaN where there is none.
+    last: Option<[f64; 2]>,
+    /// The long step that waits for the next row.
+    waiting: Option<LongStep>,
+    long: Vec<LongStep>,
+    full: bool,
+}
+
+impl Default for Turns {
+    fn default() -> Self {
+        Self {
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            last: None,
+            waiting: None,
+            long: Vec::new(),
+            full: false,
+        }
+    }
+}
+
+/// A position that begins anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::inspect) struct Wrapped {
+    pub(in crate::inspect) range: f64,
+    pub(in crate::inspect) times: u64,
+    /// Times of the first and the last [s].
+    pub(in crate::inspect) from: f64,
+    pub(in crate::inspect) to: f64,
+}
+
+impl Turns {
+    /// Takes the next row.
+    #[inline]
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+        self.low = self.low.min(value);
+        self.high = self.high.max(value);
+        let Some([last, before]) = self.last else {
+            self.last = Some([value, f64::NAN]);
+            return;
+        };
+        let step = value - last;
+        if let Some(mut waiting) = self.waiting.take()
+            && step.abs() < LONG * waiting.step.abs()
+        {
+            waiting.range -= 0.5 * step;
+            self.keep(waiting);
+        }
+        // A spike goes and comes back: the motion before a turn's end is no leap.
+        let alone = before.abs() < LONG * step.abs();
+        if alone && step.abs() > LONG * (self.high - self.low) {
+            let range = step - 0.5 * before;
+            self.waiting = Some(LongStep { t, step, range });
+        }
+        self.last = Some([value, step]);
+    }
+
+    #[cold]
+    fn keep(&mut self, step: LongStep) {
+        let least = LONG * (self.high - self.low);
+        if self.long.len() == MOST {
+            self.long.retain(|long| long.step.abs() > least);
+            self.full |= self.long.len() == MOST;
+        }
+        if !self.full {
+            self.long.push(step);
+        }
+    }
+
+    /// The next row belongs to another stretch.
+    pub(in crate::inspect) fn part(&mut self) {
+        self.last = None;
+        self.waiting = None;
+    }
+
+    /// The range, where the position goes through its end; `usual` are ranges that encoders have,
+    /// `step` is a usual step from row to row.
+    ///
+    /// All long steps must tell the same range, and everything must lie within it. One or two alone
+    /// are believed of a usual range only: a reference that was set anew leaps once, too.
+    pub(in crate::inspect) fn wrapped(&self, usual: &[f64], step: f64) -> Option<Wrapped> {
+        let travel = self.high - self.low;
+        let long = || {
+            self.long
+                .iter()
+                .filter(|long| long.step.abs() > LONG * travel)
+        };
+        let (first, last) = (long().next()?, long().next_back()?);
+        let mut ranges: Vec<f64> = long().map(|long| long.range.abs()).collect();
+        ranges.sort_by(f64::total_cmp);
+        let median = ranges[ranges.len() / 2];
+        let spread = ranges[ranges.len() - 1] - ranges[0];
+        let known = usual
+            .iter()
+            .find(|range| (median / **range - 1.0).abs() < NEAR);
+        let range = known.copied().unwrap_or(median);
+        let fits = spread <= ALIKE * median && travel <= (1.0 + ALIKE) * range;
+        let sure = known.is_some() || ranges.len() >= 3;
+        // A joint at rest goes to and fro between two counts.
+        (fits && sure && range > COUNTS * step).then(|| Wrapped {
+            range,
+            times: ranges.len() as u64,
+            from: first.t,
+            to: last.t,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TURN: [f64; 2] = [std::f64::consts::TAU, 360.0];
+
+    fn watched(q: impl Fn(f64) -> f64) -> Turns {
+        let mut turns = Turns::default();
+        for k in 0..20_000 {
+            let t = f64::from(k) * 1e-3;
+            turns.take(t, q(t));
+        }
+        turns
+    }
+
+    #[test]
+    fn a_position_that_begins_anew_is_known_by_its_range() {
+        for range in [360.0, std::f64::consts::TAU, 4096.0, 1.3] {
+            let motion = move |t: f64| range * (1.2 * t.sin() + 0.1 * t);
+            let turns = watched(move |t| motion(t).rem_euclid(range) - 0.3 * range);
+            let found = turns.wrapped(&TURN, 1e-3).unwrap();
+            assert!((found.range / range - 1.0).abs() < 1e-3, "{found:?}");
+            assert!(found.times > 5 && found.from > 0.0 && found.to > found.from);
+        }
+        // once through the end of a turn
+        let once = watched(|t| (3.0 + 0.02 * t).rem_euclid(TURN[0]));
+        assert_eq!(once.wrapped(&TURN, 1e-3), None);
+        let once = watched(|t| (6.1 + 0.02 * t).rem_euclid(TURN[0]));
+        assert_eq!(once.wrapped(&TURN, 1e-3).unwrap().times, 1);
+    }
+
+    #[test]
+    fn leaps_of_other_sizes_and_plain_motions_do_not_begin_anew() {
+        assert_eq!(watched(|t| 3.0 * t.sin()).wrapped(&TURN, 1e-3), None);
+        assert_eq!(
+            watched(|t| 0.1 * t.sin() + if t < 9.0 { 0.0 } else { 2.0 }).wrapped(&TURN, 1e-3),
+            None
+        );
+        assert_eq!(
+            watched(|t| if t < 9.0 { 0.5 } else { 0.6 }).wrapped(&TURN, 1e-3),
+            None
+        );
+        let counts = watched(|t| 1e-4 * f64::from((3.0 * t).sin() > 0.0));
+        assert_eq!(counts.wrapped(&TURN, 1e-4), None);
+    }
+}
