@@ -4,7 +4,6 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::open_log::summary_warnings;
 use crate::log::{Instant, Provenance};
 use crate::motion::{Stretch, Summary, stretches};
 
@@ -60,8 +59,7 @@ pub fn read_whole(
                 most: MOST_SAMPLES,
             });
         }
-        warnings.extend(open.warnings());
-        warnings.extend(summary_warnings(&name, open.origin(), &summary));
+        warnings.extend(open.told(&summary));
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::control::Control;
 use super::error::IdentifyError;
+use super::first_look::FirstLook;
 use super::free_swing::moves_freely;
 use super::log::Log;
 use super::open_log::OpenLog;
@@ -39,15 +40,6 @@ pub struct LoggedRobot {
     pub robot: Robot,
     /// What the first look at each log found: a log is opened several times.
     looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
-}
-
-/// What the first look at a log found.
-#[derive(Debug, Clone)]
-pub(super) struct FirstLook {
-    /// Faults, and rows to leave out.
-    pub(super) gate: Gate,
-    /// Speed up to which each joint rests [m/s or rad/s].
-    pub(super) rest_speed: Vec<f64>,
 }
 
 impl LoggedRobot {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
-use super::logged_robot::FirstLook;
+use super::first_look::FirstLook;
 use crate::inspect::Cutter;
 use crate::log::{Block, Instant, Layout, Provenance, Reader};
 use crate::motion::{Summary, ZeroOrderHold};
@@ -56,21 +56,46 @@ impl OpenLog<'_> {
         self.look.gate.origin()
     }
 
-    /// What was left out, dropped or chosen, once the last block is read.
+    /// What was left out, mended or chosen, once the last block is read: how many rows each cause costs,
+    /// the most first, then what and where.
     pub fn warnings(&self) -> Vec<String> {
+        self.costs_and_places(0)
+    }
+
+    /// The same with what the processing left out.
+    pub fn told(&self, summary: &Summary) -> Vec<String> {
+        let mut out = self.costs_and_places(summary.skipped.samples);
+        out.extend(summary_warnings(&self.name, self.origin(), summary));
+        out
+    }
+
+    fn costs_and_places(&self, too_short: u64) -> Vec<String> {
+        let by_reader = self.reader.left_out();
+        let mut costs: Vec<(u64, String)> = (self.look.gate.costs().iter())
+            .map(|cost| (cost.rows, cost.text()))
+            .chain(by_reader.map(|(rows, kind)| (rows, format!("{rows} {kind}"))))
+            .chain([(
+                too_short,
+                format!("{too_short} in stretches too short to filter"),
+            )])
+            .filter(|(rows, _)| *rows > 0)
+            .collect();
+        costs.sort_by(|a, b| b.0.cmp(&a.0));
         let mut out = Vec::new();
-        let (removed, causes) = (self.cutter.removed(), self.look.gate.causes());
-        if removed > 0 || !causes.is_empty() {
-            let rows = self.reader.samples();
-            let told = match removed {
+        if !costs.is_empty() {
+            let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
+            let rows = self.reader.samples() + dropped;
+            let told = match self.cutter.removed() + dropped + too_short {
                 0 => format!("none of {rows} rows is left out in all"),
-                _ => format!(
+                removed => format!(
                     "{removed} of {rows} rows are left out in all, those next to bad ones included"
                 ),
             };
+            let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
             out.push(format!(
-                "{}: {told}: {causes}; `cft-ident inspect` tells more",
-                self.name
+                "{}: {told}: {}; `cft-ident inspect` tells more",
+                self.name,
+                causes.join(", ")
             ));
         }
         out.extend(self.reader.warnings());
@@ -94,7 +119,7 @@ impl OpenLog<'_> {
 }
 
 /// Warnings about what the processing left out of a log.
-pub fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<String> {
+fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<String> {
     let zero = origin.seconds();
     let mut out = Vec::new();
     if summary.skipped.segments > 0 {

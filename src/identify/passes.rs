@@ -8,7 +8,6 @@ use super::control::{Control, Work};
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
-use super::open_log::summary_warnings;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
 use crate::inertia::closed_loop::Gains;
@@ -103,9 +102,7 @@ impl<'a> Passes<'a> {
             )
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
             if first {
-                self.warnings.extend(open.warnings());
-                self.warnings
-                    .extend(summary_warnings(&log.name(), open.origin(), &summary));
+                self.warnings.extend(open.told(&summary));
                 self.inputs.push(open.provenance()?);
                 self.steps.push(summary.dt);
                 self.summary.get_or_insert(summary);

@@ -7,7 +7,6 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::open_log::summary_warnings;
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
@@ -107,8 +106,7 @@ pub fn torque(
     };
     drop(work);
     control.check()?;
-    let mut warnings = open.warnings();
-    warnings.extend(summary_warnings(&log.name(), origin, &summary));
+    let mut warnings = open.told(&summary);
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = machine.robot.joint_names().iter().enumerate();

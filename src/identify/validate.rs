@@ -8,7 +8,6 @@ use super::error::IdentifyError;
 use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::open_log::summary_warnings;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
@@ -51,8 +50,7 @@ pub fn validate(
                     row(r, origin)
                 })
                 .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
-            warnings.extend(open.warnings());
-            warnings.extend(summary_warnings(&log.name(), origin, &summary));
+            warnings.extend(open.told(&summary));
             inputs.push(open.provenance()?);
             last = Some(summary);
         } else {

@@ -168,11 +168,9 @@ impl Gate {
         }
     }
 
-    /// How many rows each cause costs, the most first, as in `999 stuck-channel, 12 spike (bridged)`;
-    /// empty where none does.
-    pub fn causes(&self) -> String {
-        let each = self.costs.iter().map(RowCost::text);
-        each.collect::<Vec<_>>().join(", ")
+    /// How many rows each cause costs, the most first.
+    pub fn costs(&self) -> &[RowCost] {
+        &self.costs
     }
 
     /// What is left out or mended and where, one sentence for each kind of fault.

@@ -195,6 +195,14 @@ impl Reader {
         found.iter().map(|text| format!("{name}: {text}")).collect()
     }
 
+    /// Rows that were left out so far, by their causes.
+    pub fn left_out(&self) -> [(u64, &'static str); 2] {
+        [
+            (self.held.dropped, "sample-and-hold"),
+            (self.stale.dropped(), "repeated-rows"),
+        ]
+    }
+
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
     ///
     /// # Errors

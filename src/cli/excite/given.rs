@@ -8,7 +8,7 @@ use crate::cli::files;
 use crate::config::RobotFile;
 use crate::excite::machine::Machine;
 use crate::excite::{Given, Motion, foresee};
-use crate::identify::{IdentifyError, Log, LoggedRobot, summary_warnings};
+use crate::identify::{IdentifyError, Log, LoggedRobot};
 use crate::inertia::accumulate;
 use crate::log::LogSpec;
 
@@ -57,7 +57,7 @@ pub(super) fn add(
         &mut |block| log.read(block),
     )
     .map_err(|error| IdentifyError::of_run(&spec.name(), error))?;
-    warnings.extend(summary_warnings(&spec.name(), log.origin(), &summary));
+    warnings.extend(log.told(&summary));
     bench.inputs.push(log.provenance()?);
     given.add_log(&sums, summary.samples as f64);
     Ok(())

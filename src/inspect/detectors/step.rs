@@ -14,6 +14,10 @@ const AROUND: usize = 25;
 const OWN: usize = 4;
 /// Rows to each side by which it is seen that the new level stays.
 const LEVEL: usize = 5;
+/// Share of a leap's height that the rows next to it tell, and those beyond three rows, where the motion
+/// may have bent.
+const NEXT: [f64; 2] = [0.5, 1.5];
+const BEYOND: [f64; 2] = [0.25, 2.0];
 /// Rows that are remembered.
 const RING: usize = 64;
 /// Rows that repeat all positions from which the robot is at rest.
@@ -145,8 +149,15 @@ impl Leaps {
                 far += usize::from(size > 0.25 * height.abs());
             }
         }
-        // A second leap may be near, a rough stretch may not; of a spike two rows stand out alike.
-        if far > 3 || near >= 0.9 * height.abs() || !self.stays(row, height) {
+        // A second leap may be near, a rough stretch may not. A spike of up to three rows is no leap:
+        // the rows beyond it are where those before it were.
+        let stays = |skip: usize, [low, high]: [f64; 2]| {
+            self.level(row, skip).is_none_or(|level| {
+                let share = level / height;
+                low < share && share < high
+            })
+        };
+        if far > 3 || near > height.abs() || !stays(1, NEXT) || !stays(3, BEYOND) {
             return;
         }
         if self.found.len() == MOST {
@@ -162,17 +173,16 @@ impl Leaps {
         });
     }
 
-    /// Whether the rows farther away, too, are on one parabola but for a leap of this height: of rows
-    /// one to five on each side a parabola with a leap, without the two rows at the leap itself.
-    fn stays(&self, row: usize, height: f64) -> bool {
-        let from = row.saturating_sub(LEVEL + 1);
-        let rows = (from..(row + LEVEL + 1).min(self.count))
-            .filter(|k| *k + 1 < row || *k > row)
+    /// Height of a leap by five rows on each side, without `skip` rows next to it on each: what brings
+    /// them onto one parabola. `None` too near an end to tell.
+    fn level(&self, row: usize, skip: usize) -> Option<f64> {
+        let from = row.saturating_sub(LEVEL + skip);
+        let rows = (from..(row + LEVEL + skip).min(self.count))
+            .filter(|k| k + skip < row || *k >= row + skip)
             .collect::<Vec<_>>();
         let (before, after) = rows.split_at(rows.partition_point(|k| *k < row));
         if before.len() < 2 || after.len() < 2 {
-            // too near an end to tell: what stands out there is believed
-            return true;
+            return None;
         }
         let begin = self.times[row % RING];
         let length = (self.times[rows[rows.len() - 1] % RING] - self.times[rows[0] % RING]).abs();
@@ -200,7 +210,7 @@ impl Leaps {
             }
             let norm = dot(&rest[0], &rest[0]).sqrt();
             if norm < 1e-9 {
-                return true;
+                return None;
             }
             rest[0].iter_mut().for_each(|x| *x /= norm);
             let share = dot(&leap, &rest[0]);
@@ -211,7 +221,7 @@ impl Leaps {
         let about = self.values[(row - 1) % RING];
         let values = column(&|_, k| self.values[k % RING] - about);
         let found = dot(&leap, &values) / dot(&leap, &leap);
-        (0.5..1.5).contains(&(found / height))
+        found.is_finite().then_some(found)
     }
 
     /// Those that may be leaps, in the order of time.
@@ -327,7 +337,8 @@ mod tests {
 
     #[test]
     fn spikes_and_smooth_turns_are_no_leaps() {
-        let spiky = fed(rows(|k, q| q + if k % 500 == 100 { 0.05 } else { 0.0 }).into_iter());
+        let spike = |k: usize| (100..100 + 1 + k / 1500).contains(&(k % 500));
+        let spiky = fed(rows(|k, q| q + if spike(k) { 0.05 } else { 0.0 }).into_iter());
         assert!(
             high(&spiky, spiky.unusual(4000)).is_empty(),
             "{:?}",

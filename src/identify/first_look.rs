@@ -1,0 +1,12 @@
+//! What is known of a log before it is used.
+
+use crate::inspect::Gate;
+
+/// What the first look at a log found.
+#[derive(Debug, Clone)]
+pub(super) struct FirstLook {
+    /// Faults, and rows to leave out.
+    pub(super) gate: Gate,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub(super) rest_speed: Vec<f64>,
+}
