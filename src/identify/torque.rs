@@ -106,7 +106,7 @@ pub fn torque(
     };
     drop(work);
     control.check()?;
-    let mut warnings = open.told(&summary);
+    let warnings = open.told(&summary);
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = machine.robot.joint_names().iter().enumerate();
