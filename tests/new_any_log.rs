@@ -9,6 +9,7 @@ use log_support::recording::{JointState, Recording};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use serde_json::Value;
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 const JOINTS: usize = 3;
@@ -63,21 +64,21 @@ fn motion() -> Vec<Row> {
     let theta = robot.base_of(&standard);
     let row = |k: usize| {
         let t = 0.005 * k as f64;
-        let (mut q, mut dq, mut ddq) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        for j in 0..JOINTS {
-            for (n, size) in [(1.0, 0.7), (2.0, 0.25), (5.0, 0.06)] {
-                let w = 2.0 * (1.0 + 0.23 * j as f64) * n;
-                let phase = w * t + 0.4 * n + j as f64;
-                q[j] += size * phase.sin();
-                dq[j] += size * w * phase.cos();
-                ddq[j] -= size * w * w * phase.sin();
-            }
-        }
+        let wave = |joint: usize, order: i32| -> f64 {
+            let of = |(n, size): (f64, f64)| {
+                let w = 2.0 * (1.0 + 0.23 * joint as f64) * n;
+                let phase = w * t + 0.4 * n + joint as f64;
+                size * w.powi(order) * (phase + f64::from(order) * FRAC_PI_2).sin()
+            };
+            [(1.0, 0.7), (2.0, 0.25), (5.0, 0.06)].map(of).iter().sum()
+        };
+        let [q, dq, ddq] =
+            [0, 1, 2].map(|order| std::array::from_fn::<f64, JOINTS, _>(|j| wave(j, order)));
         let mut tau = [0.0; 3];
         robot.torque(&theta, &q, &dq, &ddq, &mut tau);
-        for j in 0..JOINTS {
+        for (j, (tau, dq)) in tau.iter_mut().zip(&dq).enumerate() {
             let noise = ((k * 7919 + j * 104_729) % 1000) as f64 / 1000.0 - 0.5;
-            tau[j] += 3.0 * dq[j] + 2.0 * (40.0 * dq[j]).tanh() + 0.02 * noise;
+            *tau += 3.0 * dq + 2.0 * (40.0 * dq).tanh() + 0.02 * noise;
         }
         Row { t, q, dq, tau }
     };

@@ -229,10 +229,12 @@ mod tests {
     #[test]
     fn one_sentence_tells_of_all_changes_and_none_where_nothing_moved() {
         let mut changes = Changes::default();
-        changes.angle(1.57079632679, "1.57079632679", "rpy of joint a");
+        let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
+        read("1.57079632679", "rpy of joint a");
         assert_eq!(changes.told("r.urdf"), None);
-        changes.angle(1.5708, "1.5708", "rpy of joint a");
-        changes.angle(-2.356, "-2.356", "rpy of joint b");
+        let mut read = |text: &str, place| changes.angle(text.parse().unwrap(), text, place);
+        read("1.5708", "rpy of joint a");
+        read("-2.356", "rpy of joint b");
         let told = changes.told("r.urdf").unwrap();
         assert!(
             told.contains("rpy of joint a 1.5708 as pi/2 and 1 more;"),

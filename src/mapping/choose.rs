@@ -8,7 +8,7 @@ use super::family::{Family, How, Key, families, fit};
 use super::look::{Clock, Seen};
 use super::units::{Unit, of_positions, of_torques};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::words;
+use crate::inspect::words::{joint, words};
 use crate::log::escape;
 use crate::robot::JointKind;
 
@@ -175,7 +175,7 @@ impl Mapping {
                 self.how = "as far as their names fit: CHECK IT";
                 let found = taken.columns.iter().flatten().count();
                 self.checks.push(format!(
-                    "{what}: {pattern} does not fit the {joints} joints in number and order; {found} were mapped"
+                    "{what}: {pattern} does not fit the {joints} joints in number and order; {found} were mapped; where a URDF has joints that the log has not, --tip LINK ends the arm before them"
                 ));
             }
         }
@@ -273,6 +273,14 @@ fn shared_words(a: &str, b: &str) -> i32 {
     i32::try_from(shared.count()).unwrap_or(0)
 }
 
+/// A family that fits, and how well: less is better.
+struct Fitting<'a> {
+    rank: (i32, i32),
+    pattern: String,
+    how: How,
+    columns: Vec<Option<&'a Column>>,
+}
+
 /// The family of a role that fits the joints best.
 fn best<'a>(
     columns: &'a [Column],
@@ -283,41 +291,51 @@ fn best<'a>(
 ) -> Option<Taken<'a>> {
     let of_role = |c: &&Column| c.role == role && c.commanded == commanded;
     let of_role: Vec<&Column> = columns.iter().filter(of_role).collect();
-    let mut found: Vec<((i32, i32), Family, How, Vec<Option<&Column>>)> = Vec::new();
+    let mut found: Vec<Fitting> = Vec::new();
     for family in families(&of_role, joints) {
-        if let Some((how, given)) = fit(&family, joints)
-            && given.iter().any(Option::is_some)
+        if let Some((how, columns)) = fit(&family, joints)
+            && columns.iter().any(Option::is_some)
         {
             let off = match how {
                 How::Fits => 0,
                 How::InOrder => 1,
                 How::InPart => 6,
             };
-            let missing = given.iter().filter(|c| c.is_none()).count() as i32;
+            let missing = columns.iter().filter(|c| c.is_none()).count() as i32;
             let near = beside.map_or(0, |beside| shared_words(&family.pattern, beside));
-            found.push(((off + family.penalty + missing, -near), family, how, given));
+            found.push(Fitting {
+                rank: (off + family.penalty + missing, -near),
+                pattern: family.pattern,
+                how,
+                columns,
+            });
         }
     }
     // the first of equals
-    found.sort_by_key(|(rank, ..)| *rank);
+    found.sort_by_key(|fitting| fitting.rank);
     let mut found = found.into_iter();
-    let (rank, family, how, given) = found.next()?;
+    let Fitting {
+        rank,
+        pattern,
+        how,
+        columns: given,
+    } = found.next()?;
     let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
     let (mut others, mut tie) = (Vec::new(), false);
-    for (other_rank, other, other_how, columns) in found {
+    for other in found {
         // another reading of the same columns is no other family
-        let same = columns
-            .iter()
-            .flatten()
-            .all(|c| taken.contains(&c.name.as_str()));
-        if same || other_how == How::InPart || others.contains(&other.pattern) {
+        let same = |c: &&Column| taken.contains(&c.name.as_str());
+        if other.columns.iter().flatten().all(same)
+            || other.how == How::InPart
+            || others.contains(&other.pattern)
+        {
             continue;
         }
-        tie |= others.is_empty() && other_rank == rank;
+        tie |= others.is_empty() && other.rank == rank;
         others.push(other.pattern);
     }
     Some(Taken {
-        pattern: family.pattern,
+        pattern,
         how,
         columns: given,
         others,
@@ -380,8 +398,12 @@ fn shown(columns: &[Column]) -> Vec<Known> {
     if members.iter().all(|(key, _)| matches!(key, Key::Number(_))) {
         members.sort_by(|a, b| a.0.cmp(&b.0));
     }
-    let joint = |(key, column): &&(Key, &Column)| {
+    let of_member = |(key, column): &&(Key, &Column)| {
         let name = match key {
+            // of `q_fer_joint1` the joint is what the contract says, where all of it names a joint
+            Key::Number(_) if own_name(&column.name).is_some() => {
+                joint_name(own_name(&column.name).unwrap_or_default())
+            }
             Key::Number(number) => format!("q{number}"),
             Key::Name(name) if begins == 0 => joint_name(name),
             Key::Name(name) => {
@@ -391,8 +413,17 @@ fn shown(columns: &[Column]) -> Vec<Known> {
         };
         one(&name, kind_of(column))
     };
-    let joints: Vec<Known> = members.iter().map(joint).collect();
+    let joints: Vec<Known> = members.iter().map(of_member).collect();
     joints
+}
+
+/// The joint of a column `q_<joint>`, where every word of it is of a name and one is no number.
+fn own_name(column: &str) -> Option<&str> {
+    let rest = column.strip_prefix("q_")?;
+    let spoken = words(rest);
+    let whole = joint(&spoken).split('_').count() == spoken.len();
+    let named = spoken.iter().any(|word| word.number().is_none());
+    (whole && named).then_some(rest)
 }
 
 /// Metres slide, everything else turns.
@@ -460,6 +491,20 @@ mod tests {
         // one column too few is no order
         let (found, _) = matched(&["pan", "lift"], &["q1"]);
         assert_eq!(found, [None, None]);
+        // an arm without its fingers
+        let hand = [
+            "arm_joint1",
+            "arm_joint2",
+            "finger_joint1",
+            "finger_joint2",
+            "finger_joint3",
+        ];
+        let (found, how) = matched(&hand, &["q1", "q2"]);
+        assert_eq!(found[..2], some(&["q1", "q2"]));
+        assert_eq!(
+            (&found[2..], how),
+            (&[None, None, None][..], Some(How::InPart))
+        );
         // one too many may begin anywhere
         let (found, how) = matched(&["joint_1", "joint_2"], &["q0", "q1", "q2"]);
         assert_eq!(found.len(), 2);
@@ -490,6 +535,14 @@ mod tests {
         let dotted = ["joint_states.pan.position", "joint_states.lift.position"];
         assert_eq!(names(&dotted), ["pan", "lift"]);
         assert_eq!(names(&["t", "Position", "Iq"]), ["q1"]);
+        let of_messages = [
+            "q_fer_joint1",
+            "q_fer_joint2",
+            "tau_fer_joint1",
+            "tau_fer_joint2",
+        ];
+        assert_eq!(names(&of_messages), ["fer_joint1", "fer_joint2"]);
+        assert_eq!(names(&["q_meas_1", "q_meas_2"]), ["q1", "q2"]);
         assert_eq!(joint_name("left elbow/[x]"), "left_elbow__x_");
     }
 }

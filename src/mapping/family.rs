@@ -193,6 +193,31 @@ fn numbers(names: &[&str]) -> Option<Vec<u32>> {
     of(true).or_else(|| of(false))
 }
 
+/// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which
+/// are in a row.
+fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
+    let mut groups: BTreeMap<String, Vec<(u32, usize)>> = BTreeMap::new();
+    for (k, joint) in joints.iter().enumerate() {
+        for word in words(joint) {
+            if let Some(number) = word.number() {
+                let pattern = format!("{}#{}", &joint[..word.at.start], &joint[word.at.end..]);
+                groups.entry(pattern).or_default().push((number, k));
+            }
+        }
+    }
+    let mut fitting = groups.into_values().filter_map(|mut group| {
+        group.sort_unstable();
+        let first = group.first()?.0;
+        let in_a_row = group
+            .iter()
+            .zip(first..)
+            .all(|((number, _), n)| *number == n);
+        (in_a_row && group.len() == count).then(|| group.iter().map(|(_, k)| *k).collect())
+    });
+    let found = fitting.next()?;
+    fitting.next().is_none().then_some(found)
+}
+
 /// A name without the word `joint`.
 fn bare(name: &str) -> String {
     let spoken = words(name);
@@ -282,7 +307,15 @@ pub(super) fn fit<'a>(
                     let place = |k: usize| by_key(&Key::Number(own[k]));
                     (How::InPart, (0..joints.len()).map(place).collect())
                 }
-                (None, _) => return None,
+                (None, _) => {
+                    // as many joints as columns have numbers in a row: an arm without its fingers
+                    let of = numbered_alike(joints, own.len()).filter(|_| in_a_row)?;
+                    let place = |k: usize| {
+                        let at = of.iter().position(|joint| *joint == k)?;
+                        by_key(&Key::Number(base + at as u32))
+                    };
+                    (How::InPart, (0..joints.len()).map(place).collect())
+                }
             },
         );
     }

@@ -259,31 +259,35 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
     let Some(faults) = faults else {
         return String::new();
     };
-    let told = faults.iter().filter(|f| f.severity != Severity::Info);
-    let lines: String = told
-        .clone()
-        .take(6)
-        .map(|fault| {
-            let kind = match fault.severity {
-                Severity::Error => "error",
-                _ => "warning",
-            };
-            let channel = fault
-                .channel
-                .as_deref()
-                .map(|name| format!("{}: ", escape(name)));
-            format!(
-                "inspect: {kind}: {}{}\n",
-                channel.unwrap_or_default(),
-                fault.effect
-            )
-        })
-        .collect();
-    match told.count() {
-        0 => "inspect: no faults found\n".to_owned(),
-        n if n > 6 => format!("{lines}inspect: and {} more\n", n - 6),
-        _ => lines,
+    // the first of each kind, errors first
+    let mut kinds: Vec<(&LogFault, usize)> = Vec::new();
+    for fault in faults.iter().filter(|f| f.severity != Severity::Info) {
+        let same = |(first, _): &&mut (&LogFault, usize)| {
+            (first.kind, first.severity) == (fault.kind, fault.severity)
+        };
+        match kinds.iter_mut().find(same) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((fault, 1)),
+        }
     }
+    kinds.sort_by_key(|(fault, _)| fault.severity != Severity::Error);
+    if kinds.is_empty() {
+        return "inspect: no faults found\n".to_owned();
+    }
+    let line = |(fault, count): &(&LogFault, usize)| {
+        let kind = match fault.severity {
+            Severity::Error => "error",
+            _ => "warning",
+        };
+        let channel = fault.channel.as_deref();
+        let channel = channel.map_or_else(String::new, |name| format!("{}: ", escape(name)));
+        let more = match count {
+            1 => String::new(),
+            count => format!(" ({} more of the kind)", count - 1),
+        };
+        format!("inspect: {kind}: {channel}{}{more}\n", fault.effect)
+    };
+    kinds.iter().map(line).collect()
 }
 
 /// The independent joints of a URDF, their kinds and their largest torques.
