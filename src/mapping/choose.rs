@@ -390,7 +390,9 @@ fn shown(columns: &[Column]) -> Vec<Known> {
             .iter()
             .all(|head| head.len() > k + 1 && head[k] == heads[0][k])
     };
+    // `q_<joint>` of the contract has the joint's whole name
     let begins = match heads.len() {
+        _ if best.pattern == "q_#" => 0,
         0 | 1 => 0,
         _ => (0..).take_while(|k| common(*k)).count(),
     };

@@ -193,6 +193,12 @@ fn numbers(names: &[&str]) -> Option<Vec<u32>> {
     of(true).or_else(|| of(false))
 }
 
+/// Whether each number is one more than that before it.
+fn in_a_row(sorted: &[u32]) -> bool {
+    let next = |pair: &[u32]| pair[1].checked_sub(pair[0]) == Some(1);
+    sorted.windows(2).all(next)
+}
+
 /// The places of `count` joints whose names differ in a number alone, in the order of the numbers, which
 /// are in a row.
 fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
@@ -207,12 +213,9 @@ fn numbered_alike(joints: &[&str], count: usize) -> Option<Vec<usize>> {
     }
     let mut fitting = groups.into_values().filter_map(|mut group| {
         group.sort_unstable();
-        let first = group.first()?.0;
-        let in_a_row = group
-            .iter()
-            .zip(first..)
-            .all(|((number, _), n)| *number == n);
-        (in_a_row && group.len() == count).then(|| group.iter().map(|(_, k)| *k).collect())
+        let numbers: Vec<u32> = group.iter().map(|(number, _)| *number).collect();
+        let fits = in_a_row(&numbers) && numbers.len() == count;
+        fits.then(|| group.iter().map(|(_, k)| *k).collect())
     });
     let found = fitting.next()?;
     fitting.next().is_none().then_some(found)
@@ -258,19 +261,14 @@ pub(super) fn fit<'a>(
     own.sort_unstable();
     if own.len() == family.members.len() && !own.is_empty() {
         let base = own[0];
-        let in_a_row = own.iter().zip(base..).all(|(a, b)| *a == b) && base <= 1;
+        let from_start = in_a_row(&own) && base <= 1;
         let of_joints = numbers(joints);
         let from_one = |of: &[u32]| {
-            let first = of.iter().min().copied().unwrap_or(0);
             let mut sorted = of.to_vec();
             sorted.sort_unstable();
-            sorted
-                .iter()
-                .zip(first..)
-                .all(|(a, b)| *a == b)
-                .then_some(first)
+            sorted.first().copied().filter(|_| in_a_row(&sorted))
         };
-        let whole = in_a_row && own.len() == joints.len();
+        let whole = from_start && own.len() == joints.len();
         return Some(
             match (&of_joints, of_joints.as_deref().and_then(from_one)) {
                 // the joints have numbers in a row: the first column is the first joint's
@@ -309,7 +307,7 @@ pub(super) fn fit<'a>(
                 }
                 (None, _) => {
                     // as many joints as columns have numbers in a row: an arm without its fingers
-                    let of = numbered_alike(joints, own.len()).filter(|_| in_a_row)?;
+                    let of = numbered_alike(joints, own.len()).filter(|_| from_start)?;
                     let place = |k: usize| {
                         let at = of.iter().position(|joint| *joint == k)?;
                         by_key(&Key::Number(base + at as u32))
