@@ -11,12 +11,12 @@ use super::finding::ChannelKind::{Both, Position};
 use super::fit::Fit;
 use super::hypotheses;
 use super::normal::Problem;
-use super::physics::Positive;
+use super::physics::{Positive, credit, positives};
 use super::search::Trial;
 use crate::robot::JointKind;
 
 /// Gain of log-likelihood, by few rows that are nearly independent, beyond which all is looked for.
-const GAIN: f64 = 3.0;
+const GAIN: f64 = 6.0;
 /// Deviations below zero at which a quantity that must be positive is looked into.
 const BELOW: f64 = -3.0;
 /// A joint whose relative error is larger ..
@@ -25,6 +25,10 @@ const LARGE: f64 = 0.25;
 const ALONE: f64 = 0.6;
 /// Zeros that would be moved by less are no fault \[rad\].
 const MOVED: f64 = 0.02;
+/// A zero is not told by its derivative beyond this \[rad\].
+const FAR: f64 = 0.5;
+/// An error that a zero moves by less than this ratio is not told in the end.
+const SHIFTED: f64 = 1.1;
 /// Rows that positions are tried on.
 const FEWER: usize = 80;
 /// Step of differences \[rad\].
@@ -43,9 +47,9 @@ pub(super) fn doubtful(
     positives.iter().any(|p| p.told && p.deviations() < BELOW)
         || implausible(problem, moving)
         || contradicts(declared)
-        || torques(problem, declared, moving)
+        || torques(problem, declared, credit(positives), moving)
         || zeros(problem, declared, rows)
-        || positions(problem, &declared.by, moving)
+        || positions(problem, &declared.by, credit(positives), moving)
 }
 
 /// Whether a joint moves farther, or less, than a log that excites it can.
@@ -86,11 +90,11 @@ fn contradicts(declared: &Trial) -> bool {
 }
 
 /// Whether other signs, orders or scales of the torques gain.
-fn torques(problem: &Problem, declared: &Trial, moving: &[usize]) -> bool {
+fn torques(problem: &Problem, declared: &Trial, credit: f64, moving: &[usize]) -> bool {
     let gains = |change: &Change| {
         let by = declared.by.with(change);
         let trial = Trial::new(problem, by, &[], 1, Some(declared));
-        trial.is_some_and(|trial| trial.fit.score > declared.fit.score + GAIN)
+        trial.is_some_and(|trial| gained(problem, &trial, declared, credit))
     };
     let changes = hypotheses::of_torques(moving);
     let known = problem.columns.known.iter().any(Option::is_some);
@@ -225,12 +229,28 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
             return false;
         }
         let moved = with_residual[z] / own;
-        0.5 * with_residual[z] * moved > GAIN && moved.abs() > MOVED
+        if 0.5 * with_residual[z] * moved < GAIN || moved.abs() < MOVED {
+            return false;
+        }
+        // far away the derivative tells no more than that something is wrong
+        if moved.abs() > FAR {
+            return true;
+        }
+        let there = by.with(&Change::Zero(z, moved));
+        let trial = Trial::new(problem, there, rows, 1, Some(declared));
+        trial.is_some_and(|trial| {
+            let ratios = fit
+                .left
+                .iter()
+                .zip(&trial.fit.left)
+                .filter(|(_, a)| **a > 0.0);
+            ratios.map(|(b, a)| (b / a).sqrt()).fold(0.0, f64::max) > SHIFTED
+        })
     })
 }
 
 /// Whether turned positions, or joints in each other's place, gain.
-fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
+fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) -> bool {
     if moving.len() < 2 {
         return false;
     }
@@ -248,8 +268,17 @@ fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
     }
     changes.iter().any(|change| {
         let trial = Trial::new(problem, by.with(change), &rows, 1, Some(&declared));
-        trial.is_some_and(|trial| trial.fit.score > declared.fit.score + GAIN)
+        trial.is_some_and(|trial| gained(problem, &trial, &declared, credit))
     })
+}
+
+/// Whether a trial is likelier than the set-up as it is, whose physics has this credit.
+fn gained(problem: &Problem, trial: &Trial, declared: &Trial, before: f64) -> bool {
+    let gain = trial.fit.score - declared.fit.score;
+    gain > GAIN && {
+        let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
+        gain + credit(&positives) - before > GAIN
+    }
 }
 
 impl Fit {

@@ -21,6 +21,9 @@ const REST: f64 = 0.05;
 /// Rows whose poses stand for all of them.
 const POSES: usize = 60;
 
+/// Rows whose motion stands for all of them.
+const MOTIONS: usize = 500;
+
 /// What it is that must be positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quantity {
@@ -106,8 +109,8 @@ pub(super) fn positives(
         }
     }
     inertia.iter_mut().for_each(|f| *f /= f64::max(count, 1.0));
-    let (mut all, most) = (0.0, problem.sample.len());
-    for k in 0..most {
+    let mut all = 0.0;
+    for k in problem.sample.spread(MOTIONS) {
         if !problem
             .channels
             .carry(robot, problem.sample.row(k), by, &mut carried)

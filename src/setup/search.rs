@@ -37,6 +37,8 @@ const TIED: f64 = 3.0;
 const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
+/// Ratio by which its relative error may be larger by chance.
+const NO_WORSE: f64 = 1.005;
 /// A relative error that is more than what real machines leave of a right set-up.
 const THIRD: f64 = 0.33;
 /// Log-likelihood by which what is right may predict worse by chance.
@@ -404,6 +406,7 @@ fn decide(
     if gain < needed
         || held_out < -WORSE
         || fitted < -0.5 * WORSE
+        || a.error() > NO_WORSE * b.error()
         || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
     {
         return None;
