@@ -136,6 +136,7 @@ pub fn lsq(
     let inputs = std::mem::take(&mut passes.inputs);
     let unknowns = unknowns(machine, &columns, &fit, &essential);
     warnings.extend(confounded(&fit, &unknowns));
+    warnings.extend(negative(&unknowns));
     if unknowns
         .iter()
         .all(|u| u.verdict == Verdict::NotIdentifiable)
@@ -232,6 +233,34 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
         format!(
             "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted",
             told.join(", ")
+        )
+    })
+}
+
+/// Friction and inertias that are below zero by more than two deviations, as a warning.
+fn negative(unknowns: &[Unknown]) -> Option<String> {
+    let positive = |u: &&Unknown| {
+        let key = u.key.as_str();
+        let of_drive = key
+            .strip_prefix("Ia")
+            .is_some_and(|joint| joint.parse::<u32>().is_ok());
+        let of_joint = u.joint.is_some() && matches!(key, "viscous" | "coulomb");
+        of_drive || of_joint || key == "inertia"
+    };
+    let below = |u: &&Unknown| u.fitted < -2.0 * u.fitted_std;
+    let names: Vec<String> = unknowns
+        .iter()
+        .filter(positive)
+        .filter(below)
+        .map(|u| match &u.joint {
+            Some(joint) => format!("{}:{joint}", u.key),
+            None => u.key.clone(),
+        })
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "negative by more than two deviations, though no friction and no inertia is: {}; something else is in these numbers: a torque that the model lacks (`diagnose`), or a motion that does not tell them from others; one term of a friction may be negative where all its terms together take power",
+            names.join(", ")
         )
     })
 }
