@@ -3,8 +3,7 @@
 use super::channels::Carried;
 use super::correction::Correction;
 use super::fit::Fit;
-use super::normal::{Normal, Problem};
-use crate::inertia::columns::Own;
+use super::normal::{Normal, Problem, own_column};
 use crate::robot::Robot;
 
 /// Correlation below which rows count as independent.
@@ -69,24 +68,26 @@ fn residuals(problem: &Problem, robot: &Robot, by: &Correction, fit: &Fit) -> Ve
         }
         robot.torque(&theta, &carried.q, &carried.v, &carried.a, &mut tau);
         for (j, out) in out.iter_mut().enumerate() {
-            let target = &fit.targets[j];
-            let torques = &carried.tau[j * n..(j + 1) * n];
-            let mut r: f64 = torques.iter().zip(target.iter()).map(|(x, w)| x * w).sum();
-            if let Some(known) = &problem.columns.known[j] {
-                r += target[n] * known.law.torque(carried.v[j]);
-            }
-            let first = problem.first_own(robot, j);
-            for (i, own) in problem.columns.own[j].iter().enumerate() {
-                r -= fit.theta[first + i]
-                    * match own {
-                        Own::Coulomb => carried.sign[j],
-                        own => own.column(carried.v[j]),
-                    };
-            }
-            out.push(r - tau[j]);
+            out.push(left(problem, robot, fit, &carried, j) - tau[j]);
         }
     }
     out
+}
+
+/// What a fit leaves of a joint's torque in a row, its inertial part not yet taken off.
+pub(super) fn left(problem: &Problem, robot: &Robot, fit: &Fit, row: &Carried, j: usize) -> f64 {
+    let n = robot.joints();
+    let target = &fit.targets[j];
+    let torques = row.tau[j * n..(j + 1) * n].iter();
+    let mut r: f64 = torques.zip(target.iter()).map(|(x, w)| x * w).sum();
+    if let Some(known) = &problem.columns.known[j] {
+        r += target[n] * known.law.torque(row.v[j]);
+    }
+    let first = problem.first_own(robot, j);
+    for (i, own) in problem.columns.own[j].iter().enumerate() {
+        r -= fit.theta[first + i] * own_column(*own, row, j);
+    }
+    r
 }
 
 fn share(r: &[f64]) -> f64 {

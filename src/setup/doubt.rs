@@ -6,13 +6,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Drive};
+use super::confirm;
 use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{Both, Position};
-use super::fit::Fit;
 use super::hypotheses;
-use super::normal::Problem;
+use super::normal::{Problem, own_column};
 use super::physics::{Positive, credit, positives};
-use super::search::Trial;
+use super::trial::Trial;
 use crate::robot::JointKind;
 
 /// Gain of log-likelihood, by few rows that are nearly independent, beyond which all is looked for.
@@ -47,7 +47,7 @@ pub(super) fn doubtful(
     positives.iter().any(|p| p.told && p.deviations() < BELOW)
         || implausible(problem, moving)
         || contradicts(declared)
-        || torques(problem, declared, credit(positives), moving)
+        || torques(problem, declared, credit(positives), rows, moving)
         || zeros(problem, declared, rows)
         || positions(problem, &declared.by, credit(positives), moving)
 }
@@ -90,13 +90,19 @@ fn contradicts(declared: &Trial) -> bool {
 }
 
 /// Whether other signs, orders or scales of the torques gain.
-fn torques(problem: &Problem, declared: &Trial, credit: f64, moving: &[usize]) -> bool {
+fn torques(
+    problem: &Problem,
+    declared: &Trial,
+    credit: f64,
+    rows: &[usize],
+    moving: &[usize],
+) -> bool {
     let gains = |change: &Change| {
         let by = declared.by.with(change);
-        let trial = Trial::new(problem, by, &[], 1, Some(declared));
+        let trial = Trial::new(problem, by, rows, 1, Some(declared));
         trial.is_some_and(|trial| gained(problem, &trial, declared, credit))
     };
-    let changes = hypotheses::of_torques(moving);
+    let changes = hypotheses::of_torques(problem, moving);
     let known = problem.columns.known.iter().any(Option::is_some);
     if problem.channels.drive != Drive::Joints || known {
         let simple = |change: &&Change| change.joints().len() < 2;
@@ -178,7 +184,7 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
         ..
     } = declared;
     let (n, p) = (robot.joints(), robot.parameters().len());
-    if !robot.knows_links() || n < 2 {
+    if !robot.knows_links() || n < 2 || problem.channels.drive == Drive::Motors {
         return false;
     }
     let theta: Vec<f64> = fit.theta.iter().take(p).copied().collect();
@@ -188,7 +194,6 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
     // of each zero: products with the unknowns' columns, with the residual, with itself
     let mut with_unknowns = DMatrix::zeros(normal.unknowns, n);
     let (mut with_residual, mut with_itself) = (vec![0.0; n], vec![0.0; n]);
-    let mut row = vec![0.0; p + 4];
     for &k in rows {
         if !problem
             .channels
@@ -199,7 +204,7 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
         robot.regressor(&carried.q, &carried.v, &carried.a, &mut y);
         robot.torque(&theta, &carried.q, &carried.v, &carried.a, &mut tau);
         let residual: Vec<f64> = (0..n)
-            .map(|j| fit.residual(problem, normal, &carried, j, tau[j]))
+            .map(|j| confirm::left(problem, robot, fit, &carried, j) - tau[j])
             .collect();
         for z in (0..n).filter(|z| robot.joint_kind(*z) == JointKind::Revolute) {
             carried.q[z] += STEP;
@@ -215,8 +220,8 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
                     with_unknowns[(*c, z)] += weighted * y[j * p + c];
                 }
                 for (i, own) in problem.columns.own[j].iter().enumerate() {
-                    row[i] = super::normal::own_column(*own, &carried, j);
-                    with_unknowns[(problem.first_own(robot, j) + i, z)] += weighted * row[i];
+                    let at = problem.first_own(robot, j) + i;
+                    with_unknowns[(at, z)] += weighted * own_column(*own, &carried, j);
                 }
             }
         }
@@ -278,37 +283,5 @@ fn gained(problem: &Problem, trial: &Trial, declared: &Trial, before: f64) -> bo
     gain > GAIN && {
         let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
         gain + credit(&positives) - before > GAIN
-    }
-}
-
-impl Fit {
-    /// What the fit leaves of a joint's torque in a row, where its inertial part is `rigid`.
-    fn residual(
-        &self,
-        problem: &Problem,
-        normal: &super::normal::Normal,
-        carried: &Carried,
-        j: usize,
-        rigid: f64,
-    ) -> f64 {
-        let n = normal.joints;
-        if self.weights[j] == 0.0 {
-            return 0.0;
-        }
-        let torques = carried.tau[j * n..(j + 1) * n].iter();
-        let mut r: f64 = torques
-            .zip(self.targets[j].iter())
-            .map(|(x, w)| x * w)
-            .sum();
-        if let Some(known) = &problem.columns.known[j] {
-            r += self.targets[j][n] * known.law.torque(carried.v[j]);
-        }
-        let places = &normal.places[j];
-        let own = &problem.columns.own[j];
-        let first = places.len() - own.len();
-        for (own, at) in own.iter().zip(&places[first..]) {
-            r -= self.theta[*at] * super::normal::own_column(*own, carried, j);
-        }
-        r - rigid
     }
 }

@@ -1,10 +1,11 @@
 //! Corrections whose number is fitted: zeros of any angle, scales of any factor, gravity of any direction.
 
+use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::finding::ChannelKind;
 use super::hypotheses::angle;
 use super::normal::Problem;
-use super::search::Trial;
+use super::trial::Trial;
 use crate::robot::JointKind;
 
 /// Step of a zero at which a likelihood is compared with its neighbours \[rad\].
@@ -68,7 +69,8 @@ impl Fitted<'_> {
         };
         let mut out = Vec::new();
         let robot = self.problem.robot;
-        if robot.knows_links() && robot.joints() > 1 {
+        let motors = self.problem.channels.drive == Drive::Motors;
+        if robot.knows_links() && robot.joints() > 1 && !motors {
             for j in (0..robot.joints()).filter(|j| robot.joint_kind(*j) == JointKind::Revolute) {
                 let score = |z: f64| self.score(&Change::Zero(j, z));
                 let of = better().filter_map(|(c, s)| match c {
@@ -93,7 +95,7 @@ impl Fitted<'_> {
                 out.push((Change::Gravity(g), score));
             }
         }
-        if moving.len() > 1 {
+        if moving.len() > 1 && !motors {
             for &j in moving {
                 out.extend(self.scaled(ChannelKind::Torque, j, declared));
                 out.extend(self.geared(j, declared));

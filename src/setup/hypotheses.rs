@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
+use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{Both, Position, Torque};
 use super::normal::Problem;
@@ -15,7 +16,20 @@ pub(super) const FACTORS: [f64; 6] = [PI / 180.0, 180.0 / PI, 1e-3, 1e3, 1e-2, 1
 const FREE_FALL: f64 = 9.81;
 
 /// The changes whose rows are those of the set-up as it is: signs, order and units of the torques.
-pub(super) fn of_torques(moving: &[usize]) -> Vec<Change> {
+pub(super) fn of_torques(problem: &Problem, moving: &[usize]) -> Vec<Change> {
+    let mut out = signs(moving);
+    out.extend(pairs(moving).map(|(a, b)| Change::Exchange(Torque, a, b)));
+    if moving.len() > 1 && problem.channels.drive != Drive::Motors {
+        // a factor that all torques share leaves no trace, nor does that of a joint alone
+        for j in moving {
+            out.extend(FACTORS.map(|f| Change::Scale(Torque, vec![*j], f)));
+        }
+    }
+    out
+}
+
+/// Sets of torques with the other sign.
+fn signs(moving: &[usize]) -> Vec<Change> {
     let mut out = Vec::new();
     match moving.len() {
         n @ 1..=ALL_SETS => {
@@ -30,13 +44,6 @@ pub(super) fn of_torques(moving: &[usize]) -> Vec<Change> {
         _ => {
             out.extend(moving.iter().map(|j| Change::Sign(Torque, vec![*j])));
             out.push(Change::Sign(Torque, moving.to_vec()));
-        }
-    }
-    out.extend(pairs(moving).map(|(a, b)| Change::Exchange(Torque, a, b)));
-    if moving.len() > 1 {
-        // a factor that all torques share leaves no trace, nor does that of a joint alone
-        for j in moving {
-            out.extend(FACTORS.map(|f| Change::Scale(Torque, vec![*j], f)));
         }
     }
     out
@@ -56,6 +63,9 @@ pub(super) fn of_positions(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     if joints > 2 && moving.len() == joints {
         out.push(Change::Reverse);
     }
+    if problem.channels.drive == Drive::Motors {
+        return out;
+    }
     for f in FACTORS {
         out.push(Change::Scale(Position, moving.to_vec(), f));
         out.extend(moving.iter().map(|j| Change::Scale(Position, vec![*j], f)));
@@ -66,7 +76,7 @@ pub(super) fn of_positions(problem: &Problem, moving: &[usize]) -> Vec<Change> {
 /// Zeros by multiples of 45 degrees.
 pub(super) fn of_zeros(problem: &Problem) -> Vec<Change> {
     let robot = problem.robot;
-    if !robot.knows_links() {
+    if !robot.knows_links() || problem.channels.drive == Drive::Motors {
         return Vec::new();
     }
     let turning = (0..robot.joints()).filter(|j| robot.joint_kind(*j) == JointKind::Revolute);
@@ -128,10 +138,7 @@ mod tests {
 
     #[test]
     fn every_set_of_signs_is_tried_once_and_single_ones_first() {
-        let signs: Vec<Change> = of_torques(&[0, 1, 2])
-            .into_iter()
-            .filter(|c| matches!(c, Change::Sign(..)))
-            .collect();
+        let signs = signs(&[0, 1, 2]);
         assert_eq!(signs.len(), 7);
         assert_eq!(signs[0], Change::Sign(Torque, vec![0]));
         assert_eq!(signs[6], Change::Sign(Torque, vec![0, 1, 2]));

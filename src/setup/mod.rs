@@ -19,11 +19,14 @@
 //! | `doubt` | whether there is any reason to try them all |
 //! | `hypotheses` | which corrections are tried |
 //! | `fitted` | corrections whose number is fitted: zeros, scales, gravity of any direction |
-//! | `search` | which one is told |
+//! | `trial` | one hypothesis, fitted |
+//! | `decide` | the best one, and whether the evidence is enough |
+//! | `search` | all of it, round by round |
 
 mod channels;
 mod confirm;
 mod correction;
+mod decide;
 mod doubt;
 mod finding;
 mod fit;
@@ -33,13 +36,17 @@ mod normal;
 mod physics;
 mod sample;
 mod search;
+#[cfg(test)]
+mod tests;
+mod trial;
 
 pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
+pub use decide::{Found, Negative};
 pub use finding::{
     Alternative, ChannelKind, Evidence, Finding, FindingKind, FrictionPower, Setting, SetupReport,
 };
 pub use normal::Problem;
 pub use physics::tells_friction;
 pub use sample::{MOST_ROWS, Sample, Thinner};
-pub use search::{Found, Negative, Searched, search};
+pub use search::{Searched, search};

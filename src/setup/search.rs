@@ -4,76 +4,24 @@
 //! forbids, are fitted to all of them, and the best one is judged on blocks that did not choose it. What is
 //! found is applied and the search begins anew, for two things may be wrong.
 
-use std::sync::Arc;
-
-use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::channels::Drive;
-use super::confirm;
 use super::correction::{Change, Correction};
+use super::decide::{
+    BLOCKS, Found, Judged, NEGATIVE, Negative, decide, joints_below, judged, negative,
+};
 use super::doubt::doubtful;
-use super::finding::ChannelKind;
-use super::fit::Fit;
 use super::fitted::Fitted;
 use super::hypotheses;
-use super::normal::{Normal, Problem};
-use super::physics::{Positive, Quantity, credit, positives};
-use crate::robot::Robot;
+use super::normal::Problem;
+use super::trial::Trial;
 
 /// Rows that hypotheses are chosen by.
 const SCREENED: usize = 160;
 /// Hypotheses that are fitted to all rows.
 const SHORT_LIST: usize = 10;
-/// Blocks of time that are held out in turn.
-const BLOCKS: usize = 24;
 /// Rounds: so many things at most are told.
 const ROUNDS: usize = 5;
-/// Log-likelihood that one right hypothesis must gain: odds of e^8, some 3000 to 1.
-const ODDS: f64 = 8.0;
-/// Readings that are as likely to within e^3, 20 to 1, are told as tied.
-const TIED: f64 = 3.0;
-/// The error must move by more than a tenth..
-const TENTH: f64 = 1.1;
-/// .. or a quantity that is negative by so many deviations become positive.
-const FORBIDDEN: f64 = -4.0;
-/// Ratio by which its relative error may be larger by chance.
-const NO_WORSE: f64 = 1.005;
-/// A relative error that is more than what real machines leave of a right set-up.
-const THIRD: f64 = 0.33;
-/// Log-likelihood by which what is right may predict worse by chance.
-const WORSE: f64 = 1.0;
-/// Logarithm of a factor by which scales differ that cannot both be right.
-const FLAT: f64 = 0.7;
-/// A quantity is told as negative beyond so many deviations.
-const NEGATIVE: f64 = -2.0;
-
-/// A correction that was found.
-#[derive(Debug, Clone)]
-pub struct Found {
-    pub change: Change,
-    /// Deviation of the number in it, where it was fitted.
-    pub std: Option<f64>,
-    /// Mean relative error over the joints before and after it.
-    pub error: [f64; 2],
-    /// Log-likelihood gained on held-out blocks, physics included, and what is needed.
-    pub gain: f64,
-    pub needed: f64,
-    pub tried: usize,
-    /// Joints with an inertia or a friction power below zero, before and after it.
-    pub violated: [Vec<String>; 2],
-    /// Other changes that explain as much.
-    pub tied: Vec<Change>,
-    pub sure: bool,
-}
-
-/// Power of a joint's friction, where it is negative.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Negative {
-    pub joint: usize,
-    pub power: f64,
-    pub std: f64,
-}
 
 /// What a search found.
 #[derive(Debug, Clone)]
@@ -84,112 +32,6 @@ pub struct Searched {
     pub correction: Correction,
     /// Joints whose friction drives them, under the correction.
     pub negative: Vec<Negative>,
-}
-
-/// A hypothesis as it was fitted.
-pub(super) struct Trial {
-    pub by: Correction,
-    pub robot: Robot,
-    pub normal: Arc<Normal>,
-    pub fit: Fit,
-    pub power: Vec<f64>,
-}
-
-/// The same with what physics says of it.
-struct Judged {
-    change: Option<Change>,
-    std: Option<f64>,
-    trial: Trial,
-    positives: Vec<Positive>,
-    /// Log-posterior but for a constant.
-    worth: f64,
-}
-
-impl Trial {
-    pub fn new(
-        problem: &Problem,
-        by: Correction,
-        rows: &[usize],
-        blocks: usize,
-        shared: Option<&Trial>,
-    ) -> Option<Self> {
-        let same = shared.filter(|s| problem.channels.same_rows(&s.by, &by));
-        let (robot, normal) = match same {
-            Some(s) => (s.robot.clone(), Arc::clone(&s.normal)),
-            None => {
-                let robot = problem.robot_under(&by)?;
-                let normal = problem.normal(&robot, &by, rows, blocks)?;
-                (robot, Arc::new(normal))
-            }
-        };
-        let mix = problem.channels.mix(&by);
-        let power = power(problem, &by, &normal, &mix, rows);
-        // friction that is known may have been found with the sign as it is declared, or without
-        let known = |turned: bool| {
-            let of = |(j, mix): (usize, &DVector<f64>)| {
-                let sign = by.torque_factor[j].signum();
-                Normal::target(mix, if turned { sign } else { 1.0 })
-            };
-            mix.iter().enumerate().map(of).collect::<Vec<_>>()
-        };
-        let turned = by.torque_factor.iter().any(|f| *f < 0.0)
-            && problem.columns.known.iter().any(Option::is_some);
-        let fit = Fit::new(&normal, known(false), &power);
-        let other = turned
-            .then(|| Fit::new(&normal, known(true), &power))
-            .flatten();
-        let fit = match (fit, other) {
-            (Some(a), Some(b)) if b.score > a.score => Some(b),
-            (a, b) => a.or(b),
-        }?;
-        Some(Self {
-            by,
-            robot,
-            normal,
-            fit,
-            power,
-        })
-    }
-}
-
-/// Squares of each joint's torque, by which residuals are measured.
-fn power(
-    problem: &Problem,
-    by: &Correction,
-    normal: &Normal,
-    mix: &[DVector<f64>],
-    rows: &[usize],
-) -> Vec<f64> {
-    let n = normal.joints;
-    match problem.channels.drive {
-        Drive::Joints => (0..n)
-            .map(|j| {
-                let first = normal.places[j].len();
-                match normal.total[j].nrows() == first + n + 1 && first > 0 {
-                    true => {
-                        let k = normal.total[j].view((first, first), (n, n));
-                        mix[j].dot(&(k * &mix[j]))
-                    }
-                    false => 0.0,
-                }
-            })
-            .collect(),
-        // channels share joints: their sizes count together
-        _ => {
-            let scale = (2.0 * by.torque_size() / n as f64).exp();
-            let mut sums = vec![0.0; n];
-            for &k in rows {
-                for (sum, tau) in sums.iter_mut().zip(problem.sample.row(k).tau) {
-                    *sum += scale * tau * tau;
-                }
-            }
-            let moving = problem.moving();
-            sums.iter()
-                .zip(moving)
-                .map(|(s, m)| if m { *s } else { 0.0 })
-                .collect()
-        }
-    }
 }
 
 /// Looks for what is wrong with the set-up. `stopped` ends it early with what is found so far.
@@ -246,7 +88,7 @@ fn round(
     if !doubtful(problem, declared, &few_judged.positives, &few, moving) {
         return Some((None, negative(&few_judged.positives)));
     }
-    let mut changes = hypotheses::of_torques(moving);
+    let mut changes = hypotheses::of_torques(problem, moving);
     changes.extend(hypotheses::of_positions(problem, moving));
     changes.extend(hypotheses::of_zeros(problem));
     changes.extend(hypotheses::of_gravity(problem, base));
@@ -328,224 +170,4 @@ fn round(
     };
     let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
     Some((decide(problem, &whole, list, tried), negative))
-}
-
-fn judged(problem: &Problem, change: Option<Change>, std: Option<f64>, trial: Trial) -> Judged {
-    let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
-    Judged {
-        change,
-        std,
-        worth: 0.0,
-        positives,
-        trial,
-    }
-}
-
-/// The best of the list, where it is better than the set-up as it is.
-fn decide(
-    problem: &Problem,
-    declared: &Judged,
-    mut list: Vec<Judged>,
-    tried: usize,
-) -> Option<Found> {
-    let likeliest = list
-        .iter()
-        .max_by(|a, b| a.trial.fit.score.total_cmp(&b.trial.fit.score))
-        .filter(|j| j.trial.fit.score > declared.trial.fit.score)
-        .unwrap_or(declared);
-    let t = &likeliest.trial;
-    let independent = confirm::independent(problem, &t.robot, &t.by, &t.fit);
-    let moving = problem.moving();
-    let of_moving = independent
-        .iter()
-        .zip(&moving)
-        .filter(|(_, m)| **m)
-        .map(|(x, _)| *x);
-    let share = of_moving.clone().sum::<f64>() / of_moving.count().max(1) as f64;
-    let worth = |judged: &Judged| {
-        let fit = &judged.trial.fit;
-        let rows = share * judged.trial.normal.rows as f64;
-        let unknowns = judged.trial.normal.unknowns + usize::from(judged.std.is_some());
-        share * fit.score + credit(&judged.positives) - 0.5 * unknowns as f64 * rows.max(1.0).ln()
-    };
-    for judged in &mut list {
-        judged.worth = worth(judged);
-        judged.std = judged
-            .std
-            .map(|curvature| (share * curvature).max(1e-12).sqrt().recip());
-    }
-    drop_flat(&mut list);
-    let most = list
-        .iter()
-        .map(|j| j.worth)
-        .fold(f64::NEG_INFINITY, f64::max);
-    // the simplest of those that are worth as much
-    let simplest = list.iter().position(|j| j.worth >= most - 0.5)?;
-    // a round number before a fitted one that is hardly better
-    let round = list.iter().position(|j| {
-        let alike = same_place(&j.change, &list[simplest].change);
-        alike && j.std.is_none() && j.worth >= most - TIED
-    });
-    let best = round.unwrap_or(simplest);
-    if list[best].worth <= worth(declared) {
-        return None;
-    }
-    let chosen = &list[best];
-    let parts = |j: &'_ Judged| -> (Fit, Vec<f64>) { (j.trial.fit.clone(), j.trial.power.clone()) };
-    let ((b, pb), (a, pa)) = (parts(declared), parts(chosen));
-    let held_out = confirm::gain(
-        (&b, &declared.trial.normal, &pb),
-        (&a, &chosen.trial.normal, &pa),
-        &independent,
-    )?;
-    let physics = credit(&chosen.positives) - credit(&declared.positives);
-    let needed = ODDS + (tried.max(1) as f64).ln();
-    let gain = held_out + physics;
-    // what is right predicts no worse, and wins in both halves of the logs
-    let fitted = share * (a.score - b.score);
-    if gain < needed
-        || held_out < -WORSE
-        || fitted < -0.5 * WORSE
-        || a.error() > NO_WORSE * b.error()
-        || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
-    {
-        return None;
-    }
-    let error = [b.error(), a.error()];
-    let largest = b
-        .left
-        .iter()
-        .zip(&a.left)
-        .filter(|(b, a)| **b > 0.0 && **a > 0.0)
-        .map(|(b, a)| (b / a).sqrt())
-        .fold(error[0] / error[1], f64::max);
-    // what leaves a third of the torque unexplained must explain much more than that
-    let poor = error[1] > THIRD && error[0] < 1.5 * error[1];
-    let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
-        && joints_below(&chosen.positives, FORBIDDEN).is_empty();
-    let sure = !poor && (largest > TENTH || forbidden);
-    if !sure {
-        return None;
-    }
-    let name = |p: &Positive| {
-        let joint = &problem.robot.joint_names()[p.joint];
-        match p.quantity {
-            Quantity::Inertia => format!("inertia of {joint}"),
-            Quantity::FrictionPower => format!("friction power of {joint}"),
-        }
-    };
-    let violated = |of: &[Positive]| -> Vec<String> {
-        of.iter()
-            .filter(|p| p.told && p.deviations() < NEGATIVE)
-            .map(name)
-            .collect()
-    };
-    let mut tied: Vec<Change> = Vec::new();
-    let mut order: Vec<&Judged> = list
-        .iter()
-        .filter(|j| j.worth >= chosen.worth - TIED)
-        .collect();
-    order.sort_by(|a, b| b.worth.total_cmp(&a.worth));
-    for change in order.into_iter().filter_map(|j| j.change.clone()) {
-        let there = |other: &Change| same_place(&Some(change.clone()), &Some(other.clone()));
-        if !tied.iter().any(there) && !chosen.change.as_ref().is_some_and(there) {
-            tied.push(change);
-        }
-    }
-    tied.truncate(3);
-    Some(Found {
-        tied,
-        change: chosen.change.clone()?,
-        std: chosen.std,
-        error,
-        gain,
-        needed,
-        tried,
-        violated: [violated(&declared.positives), violated(&chosen.positives)],
-        sure,
-    })
-}
-
-/// Whether two changes are of the same kind and channels, with other numbers.
-fn same_place(a: &Option<Change>, b: &Option<Change>) -> bool {
-    match (a, b) {
-        (Some(Change::Zero(i, _)), Some(Change::Zero(j, _))) => i == j,
-        (Some(Change::Gravity(_)), Some(Change::Gravity(_))) => true,
-        (Some(Change::Scale(c, i, _)), Some(Change::Scale(d, j, _))) => c == d && i == j,
-        _ => a == b,
-    }
-}
-
-/// Whether a hypothesis gains in the first half of the rows and in the second, each fitted by itself.
-fn wins_in_halves(
-    problem: &Problem,
-    declared: &Judged,
-    chosen: &Judged,
-    share: f64,
-    needed: f64,
-) -> bool {
-    let rows = problem.sample.len();
-    [(0, rows / 2), (rows / 2, rows)]
-        .into_iter()
-        .all(|(from, to)| {
-            let half: Vec<usize> = (from..to).collect();
-            let Some(before) = Trial::new(problem, declared.trial.by.clone(), &half, BLOCKS, None)
-            else {
-                return false;
-            };
-            let by = chosen.trial.by.clone();
-            let Some(after) = Trial::new(problem, by, &half, BLOCKS, Some(&before)) else {
-                return false;
-            };
-            let gain = share * (after.fit.score - before.fit.score);
-            let before = judged(problem, None, None, before);
-            let after = judged(problem, None, None, after);
-            gain + credit(&after.positives) - credit(&before.positives) > needed
-        })
-}
-
-/// Leaves out a scale of a joint where another one, far from it, is worth as much: such a scale only takes the
-/// joint's torque out of the fit of the others, which leaves no trace of its size.
-fn drop_flat(list: &mut Vec<Judged>) {
-    let scale = |j: &Judged| match &j.change {
-        Some(Change::Scale(channel, joints, f)) => {
-            Some((*channel, joints.clone(), f.ln(), j.worth))
-        }
-        _ => None,
-    };
-    let scales: Vec<_> = list.iter().filter_map(scale).collect();
-    let flat = |of: &(ChannelKind, Vec<usize>, f64, f64)| {
-        let best = scales.iter().filter(|s| s.0 == of.0 && s.1 == of.1);
-        let most = best.clone().map(|s| s.3).fold(f64::NEG_INFINITY, f64::max);
-        let near: Vec<f64> = best.filter(|s| s.3 >= most - TIED).map(|s| s.2).collect();
-        let (low, high) = near
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-                (l.min(*x), h.max(*x))
-            });
-        high - low > FLAT
-    };
-    list.retain(|j| scale(j).is_none_or(|of| !flat(&of)));
-}
-
-/// Joints with a quantity below so many deviations.
-fn joints_below(of: &[Positive], deviations: f64) -> Vec<usize> {
-    let mut out: Vec<usize> = of
-        .iter()
-        .filter(|p| p.told && p.deviations() < deviations)
-        .map(|p| p.joint)
-        .collect();
-    out.dedup();
-    out
-}
-
-fn negative(of: &[Positive]) -> Vec<Negative> {
-    of.iter()
-        .filter(|p| p.quantity == Quantity::FrictionPower && p.value < NEGATIVE * p.std)
-        .map(|p| Negative {
-            joint: p.joint,
-            power: p.value,
-            std: p.std,
-        })
-        .collect()
 }
