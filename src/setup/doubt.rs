@@ -15,6 +15,8 @@ use super::physics::{Positive, credit, positives};
 use super::trial::Trial;
 use crate::robot::JointKind;
 
+/// A robot of so few joints has all hypotheses tried: that costs little.
+const SMALL: usize = 3;
 /// Gain of log-likelihood, by few rows that are nearly independent, beyond which all is looked for.
 const GAIN: f64 = 6.0;
 /// Deviations below zero at which a quantity that must be positive is looked into.
@@ -31,6 +33,8 @@ const FAR: f64 = 0.5;
 const SHIFTED: f64 = 1.1;
 /// Rows that positions are tried on.
 const FEWER: usize = 80;
+/// A joint that is slower by this stands still on purpose.
+const SLOW: f64 = 3e-3;
 /// Step of differences \[rad\].
 const STEP: f64 = 1e-4;
 /// A motion in turns or in thousandths is looked into \[rad\].
@@ -44,7 +48,8 @@ pub(super) fn doubtful(
     rows: &[usize],
     moving: &[usize],
 ) -> bool {
-    positives.iter().any(|p| p.told && p.deviations() < BELOW)
+    problem.robot.joints() <= SMALL
+        || positives.iter().any(|p| p.told && p.deviations() < BELOW)
         || implausible(problem, moving)
         || contradicts(declared)
         || torques(problem, declared, credit(positives), rows, moving)
@@ -54,6 +59,8 @@ pub(super) fn doubtful(
 
 /// Whether a joint moves farther, or less, than a log that excites it can.
 fn implausible(problem: &Problem, moving: &[usize]) -> bool {
+    let speeds = problem.sample.rms(&problem.sample.v);
+    let fastest = speeds.iter().copied().fold(0.0, f64::max);
     moving.len() > 1
         && moving.iter().any(|&j| {
             let sample = &problem.sample;
@@ -61,7 +68,9 @@ fn implausible(problem: &Problem, moving: &[usize]) -> bool {
             let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
             let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
             let turns = problem.robot.joint_kind(j) == JointKind::Revolute;
-            turns && !(PLAUSIBLE[0]..PLAUSIBLE[1]).contains(&(high - low))
+            turns
+                && speeds[j] > SLOW * fastest
+                && !(PLAUSIBLE[0]..PLAUSIBLE[1]).contains(&(high - low))
         })
 }
 
@@ -267,6 +276,9 @@ fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) 
         .iter()
         .map(|j| Change::Sign(Position, vec![*j]))
         .collect();
+    if moving.len() == problem.robot.joints() {
+        changes.push(Change::Reverse);
+    }
     for pair in moving.windows(2) {
         changes.push(Change::Exchange(Both, pair[0], pair[1]));
         changes.push(Change::Exchange(Position, pair[0], pair[1]));
