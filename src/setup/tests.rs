@@ -72,6 +72,7 @@ fn searched(declared: [f64; 3], alter: &dyn Fn(&mut [f64])) -> Searched {
         shared: robot_here.parameters().len(),
         own: vec![vec![Own::Viscous, Own::Coulomb, Own::Offset]; 2],
         known: vec![None, None],
+        rest_speed: Default::default(),
     };
     let in_gravity = |gravity: [f64; 3]| Some(robot(gravity));
     let problem = Problem {
