@@ -117,15 +117,16 @@ fn channels_of(machine: &LoggedRobot, log: &Log, layout: &Layout) -> Channels {
         return Channels::of_joints(n);
     }
     let gears = machine.file.gear_matrix();
+    let gears = gears.and_then(|r| Some((r.clone().try_inverse()?, r)));
     let drive = match (layout.channels, gears) {
         (Logged::Actuator, _) => Drive::Motors,
-        (Logged::Joint, Some(r)) => Drive::Gears(r),
+        (Logged::Joint, Some((inverse, r))) => Drive::Gears(r, inverse),
         (Logged::Joint, None) => Drive::Joints,
     };
     let joint = |name: &String| machine.file.log.joint.get(name);
     let offsets = match drive {
         // behind gears they belong to the joints
-        Drive::Gears(_) => machine
+        Drive::Gears(..) => machine
             .robot
             .joint_names()
             .iter()

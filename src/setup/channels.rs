@@ -11,8 +11,8 @@ use crate::robot::Robot;
 pub enum Drive {
     /// Joints.
     Joints,
-    /// Motors behind coupled gears, p = R q and tau = R' c.
-    Gears(DMatrix<f64>),
+    /// Motors behind coupled gears, p = R q and tau = R' c: R and its inverse.
+    Gears(DMatrix<f64>, DMatrix<f64>),
     /// Motors behind the robot's linkage.
     Motors,
 }
@@ -38,7 +38,10 @@ pub(super) struct Carried {
     pub tau: Vec<f64>,
     /// Work space.
     x: [Vec<f64>; 3],
+    before: [Vec<f64>; 3],
     u: Vec<f64>,
+    volts: Vec<f64>,
+    force: Vec<f64>,
 }
 
 impl Carried {
@@ -51,7 +54,10 @@ impl Carried {
             sign: zeros(),
             tau: vec![0.0; n * n],
             x: [zeros(), zeros(), zeros()],
+            before: [zeros(), zeros(), zeros()],
             u: zeros(),
+            volts: zeros(),
+            force: zeros(),
         }
     }
 }
@@ -113,7 +119,10 @@ impl Channels {
                 }
                 true
             }
-            Drive::Gears(r) => self.through_gears(r, row, by, out),
+            Drive::Gears(r, inverse) => {
+                self.through_gears([r, inverse], row, by, out);
+                true
+            }
             Drive::Motors => self.through_linkage(robot, row, by, out).is_some(),
         }
     }
@@ -125,39 +134,37 @@ impl Channels {
 
     fn through_gears(
         &self,
-        r: &DMatrix<f64>,
+        [r, inverse]: [&DMatrix<f64>; 2],
         row: Row,
         by: &Correction,
         out: &mut Carried,
-    ) -> bool {
+    ) {
         let n = row.q.len();
-        let Some(inverse) = r.clone().try_inverse() else {
-            return false;
-        };
-        let times = |m: &DMatrix<f64>, x: &[f64]| m * DVector::from_column_slice(x);
-        let off = DVector::from_column_slice(&self.position_offset);
-        let p = r * (DVector::from_column_slice(row.q) - &off);
-        let turned = |x: &DVector<f64>| {
-            DVector::from_fn(n, |j, _| {
-                self.position_factor(by, j) * x[by.position_from[j]]
-            })
-        };
-        let q = &inverse * turned(&p) + off + DVector::from_column_slice(&by.zero);
-        let v = &inverse * turned(&times(r, row.v));
-        let a = &inverse * turned(&times(r, row.a));
-        let c = inverse.transpose() * DVector::from_column_slice(row.tau);
-        out.q.copy_from_slice(q.as_slice());
-        out.v.copy_from_slice(v.as_slice());
-        out.a.copy_from_slice(a.as_slice());
+        let [position, velocity, acceleration] = &mut out.before;
         for j in 0..n {
+            let times = |x: &dyn Fn(usize) -> f64| (0..n).map(|i| r[(j, i)] * x(i)).sum::<f64>();
+            position[j] = times(&|i| row.q[i] - self.position_offset[i]);
+            velocity[j] = times(&|i| row.v[i]);
+            acceleration[j] = times(&|i| row.a[i]);
+        }
+        for j in 0..n {
+            let times = |x: &[f64]| -> f64 {
+                let motor = |i: usize| self.position_factor(by, i) * x[by.position_from[i]];
+                (0..n).map(|i| inverse[(j, i)] * motor(i)).sum()
+            };
+            out.q[j] = times(position) + self.position_offset[j] + by.zero[j];
+            out.v[j] = times(velocity);
+            out.a[j] = times(acceleration);
             out.sign[j] = crate::robot::friction::sign(out.v[j]);
-            for k in 0..n {
-                let from = by.torque_from[k];
-                let gain = self.torque_gain[k] / self.torque_gain[from];
-                out.tau[j * n + k] = r[(k, j)] * gain * c[from];
+        }
+        for k in 0..n {
+            let from = by.torque_from[k];
+            let gain = self.torque_gain[k] / self.torque_gain[from];
+            let motor: f64 = (0..n).map(|i| inverse[(i, from)] * row.tau[i]).sum();
+            for j in 0..n {
+                out.tau[j * n + k] = r[(k, j)] * gain * motor;
             }
         }
-        true
     }
 
     fn through_linkage(
@@ -169,31 +176,42 @@ impl Channels {
     ) -> Option<()> {
         let n = row.q.len();
         let drive = robot.transmission();
-        let Carried { q, v, a, x, u, .. } = out;
-        drive.positions(row.q, &mut x[0]);
-        drive.velocities(row.q, row.v, &mut x[1]);
-        drive.accelerations(row.q, row.v, row.a, &mut x[2]);
-        drive.volts(row.q, row.tau, u).ok()?;
-        let before = x.clone();
-        for j in 0..n {
+        let Carried {
+            q,
+            v,
+            a,
+            x,
+            before,
+            u,
+            volts,
+            force,
+            ..
+        } = out;
+        let [position, velocity, acceleration] = before;
+        drive.positions(row.q, position);
+        drive.velocities(row.q, row.v, velocity);
+        drive.accelerations(row.q, row.v, row.a, acceleration);
+        drive.volts(row.q, row.tau, volts).ok()?;
+        let offset = &self.position_offset;
+        let [moved, speed, change] = x;
+        let coordinates = moved.iter_mut().zip(speed).zip(change).enumerate();
+        for (j, ((x, xd), xdd)) in coordinates {
             let (k, f) = (by.position_from[j], self.position_factor(by, j));
-            x[0][j] =
-                f * (before[0][k] - self.position_offset[k]) + self.position_offset[j] + by.zero[j];
-            x[1][j] = f * before[1][k];
-            x[2][j] = f * before[2][k];
+            *x = f * (position[k] - offset[k]) + offset[j] + by.zero[j];
+            *xd = f * velocity[k];
+            *xdd = f * acceleration[k];
         }
-        drive.joints(&x[0], q).ok()?;
-        drive.joint_velocities(q, &x[1], v).ok()?;
-        drive.joint_accelerations(q, v, &x[2], a).ok()?;
-        let volts = u.clone();
-        let mut tau = vec![0.0; n];
+        let [moved, speed, change] = x;
+        drive.joints(moved, q).ok()?;
+        drive.joint_velocities(q, speed, v).ok()?;
+        drive.joint_accelerations(q, v, change, a).ok()?;
         for k in 0..n {
             let from = by.torque_from[k];
             u.fill(0.0);
             u[k] = volts[from] * self.torque_gain[k] / self.torque_gain[from];
-            drive.torques(q, u, &mut tau);
-            for j in 0..n {
-                out.tau[j * n + k] = tau[j];
+            drive.torques(q, u, force);
+            for (j, force) in force.iter().enumerate() {
+                out.tau[j * n + k] = *force;
             }
         }
         for (sign, v) in out.sign.iter_mut().zip(&out.v) {
@@ -201,5 +219,87 @@ impl Channels {
         }
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         (finite(&out.q) && finite(&out.v) && finite(&out.a) && finite(&out.tau)).then_some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::cft::{Setup, Structure};
+    use crate::setup::{Change, ChannelKind};
+
+    fn carried(channels: &Channels, robot: &Robot, row: [&[f64]; 4], by: &Correction) -> Carried {
+        let n = row[0].len();
+        let mut out = Carried::new(n);
+        let sign = vec![0.0; n];
+        let [q, v, a, tau] = row;
+        let row = Row {
+            q,
+            v,
+            a,
+            sign: &sign,
+            tau,
+        };
+        assert!(channels.carry(robot, row, by, &mut out));
+        out
+    }
+
+    fn torques(channels: &Channels, row: &Carried, by: &Correction) -> Vec<f64> {
+        let mix = channels.mix(by);
+        let of =
+            |(tau, mix): (&[f64], &DVector<f64>)| tau.iter().zip(mix).map(|(t, m)| t * m).sum();
+        row.tau.chunks_exact(mix.len()).zip(&mix).map(of).collect()
+    }
+
+    const ROW: [[f64; 4]; 4] = [
+        [0.35, 0.2, 0.9, 0.8],
+        [0.1, -0.4, 0.3, 0.6],
+        [1.0, 2.0, -3.0, 0.5],
+        [20.0, 3.0, -4.0, 5.0],
+    ];
+
+    #[test]
+    fn rows_are_as_declared_without_a_correction_and_motors_turn_joints_together() {
+        let robot = Robot::cft(Setup::default(), Structure::Printed12);
+        let r = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.5, 1.0,
+            ],
+        );
+        let inverse = r.clone().try_inverse().unwrap();
+        for drive in [Drive::Joints, Drive::Gears(r, inverse), Drive::Motors] {
+            let channels = Channels {
+                drive,
+                ..Channels::of_joints(4)
+            };
+            let row = ROW.each_ref().map(|x| &x[..]);
+            let none = Correction::none(4);
+            let plain = carried(&channels, &robot, row, &none);
+            let found = torques(&channels, &plain, &none);
+            for j in 0..4 {
+                let pairs = [
+                    (plain.q[j], ROW[0][j]),
+                    (plain.v[j], ROW[1][j]),
+                    (plain.a[j], ROW[2][j]),
+                ];
+                for (x, y) in pairs.into_iter().chain([(found[j], ROW[3][j])]) {
+                    assert!((x - y).abs() < 1e-9, "{:?} {x} {y}", channels.drive);
+                }
+            }
+            let turned = none.with(&Change::Sign(ChannelKind::Torque, vec![3]));
+            let other = torques(&channels, &plain, &turned);
+            let changed = (0..4)
+                .filter(|j| (other[*j] - found[*j]).abs() > 1e-9)
+                .count();
+            // behind these gears the last motor turns two joints
+            let least = if matches!(channels.drive, Drive::Gears(..)) {
+                2
+            } else {
+                1
+            };
+            assert!(changed >= least, "{:?} {changed}", channels.drive);
+        }
     }
 }

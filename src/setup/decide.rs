@@ -26,6 +26,8 @@ const THIRD: f64 = 0.33;
 const WORSE: f64 = 1.0;
 /// Logarithm of a factor by which scales differ that cannot both be right.
 const FLAT: f64 = 0.7;
+/// A deviation that says nothing.
+const UNKNOWN: f64 = 1e5;
 /// A quantity is told as negative beyond so many deviations.
 pub(super) const NEGATIVE: f64 = -2.0;
 
@@ -187,7 +189,9 @@ pub(super) fn decide(
         .iter()
         .filter(|j| j.worth >= chosen.worth - TIED)
         .collect();
-    order.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+    // a round number stands for a fitted one that is hardly better
+    let fitted = |j: &Judged| j.std.is_some();
+    order.sort_by(|a, b| fitted(a).cmp(&fitted(b)).then(b.worth.total_cmp(&a.worth)));
     for change in order.into_iter().filter_map(|j| j.change.clone()) {
         let there = |other: &Change| same_place(&Some(change.clone()), &Some(other.clone()));
         if !tied.iter().any(there) && !chosen.change.as_ref().is_some_and(there) {
@@ -198,7 +202,8 @@ pub(super) fn decide(
     Some(Found {
         tied,
         change: chosen.change.clone()?,
-        std: chosen.std,
+        // of a direction there is none
+        std: chosen.std.filter(|std| *std < UNKNOWN),
         error,
         gain,
         needed,
