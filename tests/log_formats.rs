@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cft_ident::config::RobotFile;
-use cft_ident::log::{Block, Channels, Layout, LogSpec, Reader};
+use cft_ident::log::{Block, Channels, Layout, LogSpec, Reader, TimeUnit};
 use cft_ident::output::LogWriter;
 use cft_ident::robot::cft::actuation::ENCODER_SCALE;
 use cft_ident::robot::cft::{Setup, pantograph};
@@ -168,7 +168,10 @@ fn blocks_hold_at_most_4096_rows_and_know_their_first_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, text).unwrap();
-    let mut reader = Reader::open(&LogSpec::whole(&path), &Layout::joint_columns(&["q1"])).unwrap();
+    // whole seconds are said to be seconds: a log whose times count 0, 1, 2, .. is one in milliseconds
+    let mut layout = Layout::joint_columns(&["q1"]);
+    layout.section.time_unit = Some(TimeUnit::Second);
+    let mut reader = Reader::open(&LogSpec::whole(&path), &layout).unwrap();
     let mut block = Block::default();
     let mut found = Vec::new();
     while reader.read(&mut block).unwrap() {

@@ -403,12 +403,11 @@ fn one_row_spikes_are_bridged_and_cost_no_row() {
         let n = log.joints();
         let (plain, before) = log.read();
         for joint in 0..n {
-            let size = |x: &[f64]| {
-                let mean = x.iter().sum::<f64>() / x.len() as f64;
-                (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
-            };
+            let of =
+                |most: fn(f64, f64) -> f64| log.tau[joint].iter().copied().reduce(most).unwrap();
+            let range = of(f64::max) - of(f64::min);
             let mut spiky = log.clone();
-            let height = 20.0 * size(&log.tau[joint]);
+            let height = 5.0 * range;
             let rows: Vec<usize> = (1..=5).map(|k| k * log.t.len() / 6).collect();
             for row in &rows {
                 spiky.tau[joint][*row] += height;

@@ -140,24 +140,17 @@ impl Leaps {
     fn judge_closely(&mut self, row: usize, last: usize, height: f64) {
         let from = row.saturating_sub(AROUND).max(2);
         let others = from..=last.min(row + AROUND);
-        let (mut near, mut far) = (0.0f64, 0);
-        for k in others.filter(|k| *k != row) {
-            let size = self.heights[k % RING].abs();
-            if k.abs_diff(row) <= OWN {
-                near = near.max(size);
-            } else {
-                far += usize::from(size > 0.25 * height.abs());
-            }
+        let far = others.filter(|k| k.abs_diff(row) > OWN);
+        let far = far.filter(|k| self.heights[k % RING].abs() > 0.25 * height.abs());
+        // A second leap may be near, a rough stretch may not.
+        if far.count() > 3 || !self.stays(row) {
+            return;
         }
-        // A second leap may be near, a rough stretch may not. A spike of up to three rows is no leap:
-        // the rows beyond it are where those before it were.
-        let stays = |skip: usize, [low, high]: [f64; 2]| {
-            self.level(row, skip).is_none_or(|level| {
-                let share = level / height;
-                low < share && share < high
-            })
-        };
-        if far > 3 || near > height.abs() || !stays(1, NEXT) || !stays(3, BEYOND) {
+        // Windows beside a leap show it, too, and on an uneven clock higher, but it is not there that
+        // the rows part.
+        let near = row.saturating_sub(OWN).max(2)..=last.min(row + OWN);
+        let higher = |k: &usize| self.heights[k % RING].abs() > height.abs();
+        if near.filter(higher).any(|k| self.stays(k)) {
             return;
         }
         if self.found.len() == MOST {
@@ -171,6 +164,18 @@ impl Leaps {
             at: self.times[row % RING],
             height,
         });
+    }
+
+    /// Whether a leap of the height that the window at a row shows is one that stays. A spike of up to three
+    /// rows is none: the rows beyond it are where those before it were.
+    fn stays(&self, row: usize) -> bool {
+        let height = self.heights[row % RING];
+        [(1, NEXT), (3, BEYOND)].iter().all(|(skip, [low, high])| {
+            self.level(row, *skip).is_none_or(|level| {
+                let share = level / height;
+                *low < share && share < *high
+            })
+        })
     }
 
     /// Height of a leap by five rows on each side, without `skip` rows next to it on each: what brings
