@@ -87,7 +87,6 @@ pub fn check_setup(
         channels: channels.ok_or(IdentifyError::NoLog)?,
         columns: &columns,
         sample: thinner.finish(),
-        ranges: machine.ranges(),
     };
     let searched = search(&problem, &|| control.stopped());
     control.check()?;

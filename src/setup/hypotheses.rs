@@ -52,6 +52,11 @@ fn signs(moving: &[usize]) -> Vec<Change> {
 /// The changes that give other rows: signs, order and units of positions, and the order of joints.
 pub(super) fn of_positions(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let mut out: Vec<Change> = Vec::new();
+    let alone = problem.moving().iter().filter(|m| **m).count() < 2;
+    if alone && problem.channels.drive == Drive::Motors {
+        // another sign is another pose, which one joint's torque does not tell
+        return out;
+    }
     out.extend(moving.iter().map(|j| Change::Sign(Position, vec![*j])));
     if moving.len() == 1 {
         return out;

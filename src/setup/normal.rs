@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::{Carried, Channels};
+use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
 use super::sample::Sample;
 use crate::inertia::columns::{Own, RegressorColumns};
-use crate::robot::Robot;
+use crate::robot::{JointKind, Robot};
 
-/// A joint whose speed is below this share of the fastest one's stands still: its torque tells nothing of
-/// signs and zeros. One whose unit is mistaken for a thousandth moves.
-const STILL: f64 = 1e-5;
+/// A joint that travels less than this stands still where others are moved: its torque tells nothing of signs
+/// and zeros \[rad, m\].
+const STILL: [f64; 2] = [0.01, 0.003];
 
 /// A robot file and a sample of its logs.
 pub struct Problem<'a> {
@@ -21,8 +21,6 @@ pub struct Problem<'a> {
     /// Friction terms of each joint, fitted or known.
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
-    /// Travel of each joint, by which motions of metres and radians are compared.
-    pub ranges: Vec<f64>,
 }
 
 /// Sums of products by block and joint. Of joint j the columns are its shared parameters, its own terms, the
@@ -41,17 +39,44 @@ pub(super) struct Normal {
 }
 
 impl Problem<'_> {
-    /// Joints that move, and whose torques are not all zero.
+    /// Joints that move, and whose torques are not all zero. In a log that moves one joint the others stand
+    /// still; where several move, one that seems not to may be in thousandths of its unit.
     pub(super) fn moving(&self) -> Vec<bool> {
-        let speeds = self.sample.rms(&self.sample.v);
-        let speeds = speeds.iter().zip(&self.ranges);
-        // of one joint there is nothing to compare with
-        let range = |r: &f64| if self.ranges.len() == 1 { 1.0 } else { *r };
-        let speeds: Vec<f64> = speeds.map(|(v, r)| v / range(r)).collect();
-        let most = speeds.iter().copied().fold(0.0, f64::max);
+        let n = self.sample.joints;
+        let travels = |j: usize| {
+            let q = self.sample.q.iter().skip(j).step_by(n.max(1));
+            let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
+            let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+            let least = match self.robot.joint_kind(j) {
+                JointKind::Revolute => STILL[0],
+                JointKind::Prismatic => STILL[1],
+            };
+            high - low > least
+        };
+        let moved: Vec<bool> = (0..n).map(travels).collect();
+        let alone = n > 1 && moved.iter().filter(|m| **m).count() < 2;
         let torques = self.sample.rms(&self.sample.tau);
-        let moving = |(v, tau): (&f64, f64)| *v > STILL * most && tau > 0.0;
-        speeds.iter().zip(torques).map(moving).collect()
+        let speeds = self.sample.rms(&self.sample.v);
+        let moving = |j: usize| torques[j] > 0.0 && speeds[j] > 0.0 && (moved[j] || !alone);
+        (0..n).map(moving).collect()
+    }
+
+    /// Channels whose motion or torque the joints that move feel.
+    pub(super) fn channels_that_move(&self) -> Vec<usize> {
+        let moving = self.moving();
+        let drive = self.robot.transmission();
+        let felt = |c: &usize| match (&self.channels.drive, drive.joint_of(*c)) {
+            (Drive::Motors, Some((joint, _))) => moving[joint],
+            // behind the linkage
+            (Drive::Motors, None) => {
+                let direct: Vec<usize> = (0..moving.len())
+                    .filter_map(|c| drive.joint_of(c).map(|(joint, _)| joint))
+                    .collect();
+                (0..moving.len()).any(|j| moving[j] && !direct.contains(&j))
+            }
+            _ => moving[*c],
+        };
+        (0..moving.len()).filter(felt).collect()
     }
 
     /// The robot in the gravity of a correction.

@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::decide::{
     BLOCKS, Found, Judged, NEGATIVE, Negative, decide, joints_below, judged, negative,
@@ -42,13 +43,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         correction: Correction::none(n),
         negative: Vec::new(),
     };
-    let moving: Vec<usize> = problem
-        .moving()
-        .iter()
-        .enumerate()
-        .filter(|m| *m.1)
-        .map(|m| m.0)
-        .collect();
+    let moving = problem.channels_that_move();
     if moving.is_empty()
         || problem.sample.len() < 4 * problem.robot.parameters().len() / n.max(1) + 40
     {
@@ -129,6 +124,10 @@ fn round(
     });
     let forbidden = joints_below(&whole.positives, NEGATIVE);
     let forced = |change: &Change| match change {
+        // a motor behind a linkage is no joint
+        Change::Sign(_, joints) if problem.channels.drive == Drive::Motors => {
+            !forbidden.is_empty() && (joints.len() == 1 || *joints == moving)
+        }
         Change::Sign(_, joints) => {
             !forbidden.is_empty()
                 && (*joints == forbidden

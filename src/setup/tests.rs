@@ -81,7 +81,6 @@ fn searched(declared: [f64; 3], alter: &dyn Fn(&mut [f64])) -> Searched {
         channels: Channels::of_joints(2),
         columns: &columns,
         sample: sample(alter),
-        ranges: vec![6.3; 2],
     };
     search(&problem, &|| false)
 }
