@@ -391,8 +391,9 @@ fn shown(columns: &[Column]) -> Vec<Known> {
             .all(|head| head.len() > k + 1 && head[k] == heads[0][k])
     };
     // `q_<joint>` of the contract has the joint's whole name
+    let named = |(_, column): &(Key, &Column)| own_name(&column.name).is_some();
     let begins = match heads.len() {
-        _ if best.pattern == "q_#" => 0,
+        _ if best.pattern == "q_#" && best.members.iter().all(named) => 0,
         0 | 1 => 0,
         _ => (0..).take_while(|k| common(*k)).count(),
     };
@@ -544,7 +545,8 @@ mod tests {
             "tau_fer_joint2",
         ];
         assert_eq!(names(&of_messages), ["fer_joint1", "fer_joint2"]);
-        assert_eq!(names(&["q_meas_1", "q_meas_2"]), ["q1", "q2"]);
+        let measured = ["q_meas_1", "q_meas_2", "tau_meas_1", "tau_meas_2"];
+        assert_eq!(names(&measured), ["q1", "q2"]);
         assert_eq!(joint_name("left elbow/[x]"), "left_elbow__x_");
     }
 }
