@@ -80,7 +80,7 @@ impl OpenLog<'_> {
             )])
             .filter(|(rows, _)| *rows > 0)
             .collect();
-        costs.sort_by(|a, b| b.0.cmp(&a.0));
+        costs.sort_by_key(|(rows, _)| std::cmp::Reverse(*rows));
         let mut out = Vec::new();
         if !costs.is_empty() {
             let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();

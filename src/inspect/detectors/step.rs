@@ -196,7 +196,7 @@ impl Leaps {
             each.map(|k| f((self.times[k % RING] - begin) / length, *k))
                 .collect()
         };
-        let mut basis = vec![
+        let mut basis = [
             column(&|_, _| 1.0),
             column(&|t, _| t),
             column(&|t, _| t * t),

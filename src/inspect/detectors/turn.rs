@@ -124,7 +124,7 @@ impl Turns {
         let fits = spread <= ALIKE * median && travel <= (1.0 + ALIKE) * range;
         let sure = known.is_some() || ranges.len() >= 3;
         // A joint at rest goes to and fro between two counts.
-        (fits && sure && range > COUNTS * step).then(|| Wrapped {
+        (fits && sure && range > COUNTS * step).then_some(Wrapped {
             range,
             times: ranges.len() as u64,
             from: first.t,
