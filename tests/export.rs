@@ -567,6 +567,27 @@ fn a_urdf_says_what_the_data_determine() {
         made.urdf
     );
     assert!(made.urdf.contains("<dynamics damping="));
+    assert!(!made.urdf.contains("which would drive it"));
+    // a coefficient below zero would drive a simulated joint
+    model.friction[1] = JointFriction::ViscousCoulomb(ViscousCoulomb {
+        viscous: -0.09,
+        coulomb: 0.4,
+    });
+    let robot = RobotFile::parse("panda.toml", panda).unwrap();
+    let made = export::urdf::urdf(&file_of(robot, &model), &model, "arm.urdf", &[]).unwrap();
+    assert!(
+        made.urdf
+            .contains("<dynamics damping=\"0.0\" friction=\"0.4\"/>")
+    );
+    assert!(
+        made.urdf.contains("the viscous friction of q2 is -0.09"),
+        "{}",
+        made.urdf
+    );
+    assert!(
+        made.side.contains("-0.09"),
+        "the side file keeps what was identified"
+    );
 }
 
 #[test]

@@ -16,7 +16,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("log", &["math", "robot"]),
     ("config", &["robot", "log", "verdict"]),
     ("output", &["log"]),
-    ("export", &["robot", "config"]),
+    ("export", &["number", "robot", "config"]),
     ("motion", &["math", "robot", "log"]),
     ("effect", &["math", "robot", "motion"]),
     ("friction", &["math", "robot", "log", "motion", "verdict"]),

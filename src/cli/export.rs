@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::outputs::write_text;
 use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::ModelFile;
+use crate::export::dissipative::below_zero;
 use crate::export::{self, ExportError, Note, Program};
 use crate::log::escape;
 use crate::report::json::Document;
@@ -161,10 +162,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     for (path, what, _) in &texts {
         table.row([path.display().to_string().as_str(), what]);
     }
-    let warnings: Vec<String> = match left_out.is_empty() {
+    let mut warnings: Vec<String> = match left_out.is_empty() {
         true => Vec::new(),
         false => vec![format!("left out: {}", left_out.join(", "))],
     };
+    if args.urdf.is_some() {
+        warnings.extend(below_zero(&given.value, &model));
+    }
     let written = texts.iter().map(|(path, what, _)| Written {
         file: name(path),
         what: (*what).to_owned(),

@@ -135,7 +135,14 @@ fn execute(
         validation: logs_of(&unseen),
     };
     training.extend(one_joint.iter().cloned());
-    let checked = setup::checked(machine, &robot, &logs_of(&training), None, args, context)?;
+    let checked = setup::checked(
+        machine,
+        (&robot, &[]),
+        &logs_of(&training),
+        None,
+        args,
+        context,
+    )?;
     checked.write(context)?;
     warnings.extend(checked.warnings.iter().cloned());
     let machine = checked.machine;

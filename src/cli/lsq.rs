@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::known_payload::KnownPayload;
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
 };
@@ -14,7 +15,8 @@ use crate::report::stages;
 const EXAMPLE: &str = "\
 Example:
   cft-ident lsq identification.csv -r robot.toml -m friction.toml -o m.toml
-  cft-ident lsq emps_id.csv -r configs/emps.toml -o emps.toml --json -";
+  cft-ident lsq emps_id.csv -r configs/emps.toml -o emps.toml --json -
+  cft-ident lsq empty.csv -r arm.toml --fit-gains loaded.csv:mass=2.8+-0.05 -o m.toml";
 
 /// Fit the inertial parameters by linear least squares, friction taken from a model file.
 ///
@@ -34,6 +36,10 @@ pub struct Args {
     /// How parameters are estimated from the rows
     #[arg(long, value_enum, default_value_t = EstimatorKind::Wls)]
     pub estimator: EstimatorKind,
+    /// Fit the gain of every torque channel too, from a log in which the last link carries a known mass
+    /// [kg] besides those without it; with no log given, ratios of gains alone
+    #[arg(long, value_name = "LOG:mass=KG[+-STD]", num_args = 0..=1, conflicts_with = "model")]
+    pub fit_gains: Option<Option<KnownPayload>>,
     /// Only parameters of links that can exist; the model file then holds the links too
     #[arg(long)]
     pub feasible: bool,
@@ -52,7 +58,13 @@ pub struct Args {
 /// # Errors
 /// Every [`CliError`]; nothing is written then.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
+    let mut inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
+    inputs.extend(
+        args.fit_gains
+            .iter()
+            .flatten()
+            .map(|p| p.log.path.as_path()),
+    );
     let mut outputs = vec![args.output.as_path()];
     outputs.extend(args.report.as_deref());
     outputs.extend(args.setup.fix_setup.as_deref());
@@ -76,14 +88,32 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = friction
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
+    let logs = logs_of(&args.logs);
+    let fitted = match &args.fit_gains {
+        None => None,
+        Some(payload) => {
+            let payload = payload.as_ref().map(KnownPayload::known);
+            let control = context.control();
+            Some(identify::fit_gains(
+                &machine,
+                &logs,
+                payload.as_ref(),
+                control,
+            )?)
+        }
+    };
+    let (machine, gains, edits) = match fitted {
+        None => (machine, None, Vec::new()),
+        Some(fitted) => (fitted.machine, Some(fitted.gains), fitted.edits),
+    };
     let settings = LsqSettings {
         estimator: args.estimator,
         consistent: args.feasible,
         friction: known,
+        gains: gains.as_ref(),
     };
-    let logs = logs_of(&args.logs);
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, robot, &logs, known, &args.setup, context)?;
+    let checked = setup::checked(machine, (robot, &edits), &logs, known, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
     found

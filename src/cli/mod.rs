@@ -27,6 +27,7 @@ mod context;
 mod error;
 mod exit;
 mod files;
+mod known_payload;
 mod outcome;
 mod outputs;
 mod pictures;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, outputs};
-use crate::config::correction::edited;
+use crate::config::correction::{Edit, edited};
 use crate::config::{self, ModelFile, RobotFile};
 use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
 use crate::setup::{Finding, SetupReport};
@@ -41,18 +41,24 @@ impl Checked {
     }
 }
 
-/// Checks the set-up by these logs. `robot` is the path of the robot file.
+/// Checks the set-up by these logs. `robot` is the path of the robot file, in which `before` is what the
+/// machine has that the file lacks.
 ///
 /// # Errors
 /// A set-up that the torques plainly contradict, where the arguments do not say what to do with it.
 pub fn checked(
     machine: LoggedRobot,
-    robot: &Path,
+    (robot, before): (&Path, &[Edit]),
     logs: &[Log],
     friction: Option<(&str, &ModelFile)>,
     args: &SetupArgs,
     context: &Context,
 ) -> Result<Checked, CliError> {
+    let machine = match args.as_declared {
+        true => machine.as_declared(),
+        false => machine,
+    };
+    machine.check_gains()?;
     let CheckedSetup {
         report,
         corrected,
@@ -74,16 +80,24 @@ pub fn checked(
                 .iter()
                 .map(|f| format!("kept as declared: {}", told(f))),
         );
+        let new_file = match args.fix_setup.as_ref().filter(|_| !before.is_empty()) {
+            Some(path) => {
+                let text = new_text(robot, before, &machine.file, path)?;
+                Some((path.clone(), text))
+            }
+            None => None,
+        };
         return Ok(Checked {
             machine,
             report,
             warnings,
-            new_file: None,
+            new_file,
         });
     }
     let (Some(path), Some(corrected)) = (&args.fix_setup, corrected) else {
         return Err(refused(robot, &refusals));
     };
+    let edits = [before, &edits].concat();
     let text = new_text(robot, &edits, &corrected, path)?;
     warnings.extend(
         refusals
@@ -127,7 +141,7 @@ pub fn report(
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.
 fn new_text(
     robot: &Path,
-    edits: &[crate::config::correction::Edit],
+    edits: &[Edit],
     corrected: &RobotFile,
     path: &Path,
 ) -> Result<String, CliError> {

@@ -47,14 +47,44 @@ impl RobotFile {
             .unwrap_or(channels == Channels::Actuator)
     }
 
-    /// Unit of a joint's torque channel: "N", "Nm", or "A" where currents are not scaled to torques.
+    /// Unit of a joint's torque: "N", "Nm", or that of its channel ("A", "V", "counts", "%") where no gain
+    /// takes it to a torque.
     pub fn torque_unit(&self, joint: usize) -> &'static str {
+        self.unit_without_gain(joint)
+            .unwrap_or_else(|| self.joint_kind(joint).torque_unit())
+    }
+
+    /// Unit of a joint's channel, where it is no torque and nothing says what torque it is.
+    fn unit_without_gain(&self, joint: usize) -> Option<&'static str> {
         let names = self.joint_names();
-        let channels = names.get(joint).and_then(|name| self.log.joint.get(name));
-        match channels {
-            Some(c) if c.torque_unit == Some(TorqueUnit::Ampere) && c.torque_scale.is_none() => "A",
-            _ => self.joint_kind(joint).torque_unit(),
-        }
+        let channels = self.log.joint.get(names.get(joint)?)?;
+        let unit = channels.torque_unit.filter(|unit| !unit.is_torque())?;
+        let scaled = channels.torque_scale.is_some() && !self.log.relative_gains;
+        (!scaled).then(|| unit.label())
+    }
+
+    /// Joints whose torque channels nothing relates to those of the others: channels that are no torques
+    /// of a robot of several joints, without a `torque_scale`. Each with its unit.
+    pub fn without_gains(&self) -> Vec<(usize, &'static str)> {
+        let names = self.joint_names();
+        let alone = |joint: &usize| {
+            let channels = names.get(*joint).and_then(|name| self.log.joint.get(name));
+            channels.is_some_and(|c| c.torque_scale.is_none())
+        };
+        let joints = (0..names.len()).filter(|_| names.len() > 1);
+        joints
+            .filter(alone)
+            .filter_map(|joint| Some((joint, self.unit_without_gain(joint)?)))
+            .collect()
+    }
+
+    /// Unit that stands for that of the torque in inertial parameters, which joints share: the first
+    /// that is no torque, else N or Nm.
+    pub fn inertial_torque_unit(&self) -> &'static str {
+        let mut joints = 0..self.joint_names().len();
+        joints
+            .find_map(|joint| self.unit_without_gain(joint))
+            .unwrap_or_else(|| self.joint_kind(0).torque_unit())
     }
 
     /// The layout of a log's references as if they were its positions; `None` where a joint has none,

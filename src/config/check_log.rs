@@ -183,10 +183,12 @@ fn joint_channels(
     }
     let scaled = channels.torque_scale.is_some();
     let torque_fits = match channels.torque_unit {
-        None | Some(TorqueUnit::Ampere) => true,
         Some(TorqueUnit::Newton) => kind == JointKind::Prismatic || scaled,
         Some(TorqueUnit::NewtonMetre) => kind == JointKind::Revolute || scaled,
-        Some(TorqueUnit::Volt) => scaled,
+        None
+        | Some(TorqueUnit::Ampere | TorqueUnit::Volt | TorqueUnit::Counts | TorqueUnit::Percent) => {
+            true
+        }
     };
     if !torque_fits {
         return Err(document.value(
@@ -211,7 +213,9 @@ fn joint_channels(
             &at("torque_scale"),
             "the gear ratio that takes motor torque to the joint (1 where there is no gear)",
         )),
-        (Some(TorqueIs::Current), _) if !scaled && channels.torque_unit != Some(TorqueUnit::Ampere) => {
+        (Some(TorqueIs::Current), _)
+            if !scaled && channels.torque_unit.is_none_or(TorqueUnit::is_torque) =>
+        {
             Err(document.missing(
                 &at("torque_scale"),
                 "torque constant times gear ratio, or `torque_unit = \"A\"` to have the model in A",

@@ -19,10 +19,7 @@ pub fn friction_unit(robot: &Robot, j: usize, name: &str, torque_unit: &str) -> 
 /// Unit of an inertial parameter: the robot's own `si`, or, for a joint whose torque channel is left
 /// in A, current per acceleration.
 pub fn inertia_unit(robot: &Robot, si: &str, torque_unit: &str) -> String {
-    match (robot.parameters(), torque_unit) {
-        ([_], "A") => format!("A s^2/{}", robot.joint_kind(0).position_unit()),
-        _ => si.to_owned(),
-    }
+    robot.joint_kind(0).inertial_unit(si, torque_unit)
 }
 
 /// Meaning of a friction parameter.

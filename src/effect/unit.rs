@@ -48,7 +48,8 @@ impl Unit {
         let (position, other) = (kind.position_unit(), from.position_unit());
         match self {
             Self::One => "1".to_owned(),
-            Self::Fixed(text) => text.to_owned(),
+            // a body's numbers count in the unit of the torques that tell of it
+            Self::Fixed(text) => kind.inertial_unit(text, torque),
             Self::Torque => torque.to_owned(),
             Self::TorqueRate => format!("{torque}/s"),
             Self::TorqueWalk => format!("{torque}/s^0.5"),
@@ -63,7 +64,9 @@ impl Unit {
             Self::Cubic => format!("{torque}/{position}^3"),
             Self::Inertia => Self::CoupledInertia.text(kind, kind, torque),
             Self::CoupledViscous => format!("{torque} s/{other}"),
-            Self::CoupledInertia if torque == "A" => format!("A s^2/{other}"),
+            Self::CoupledInertia if !matches!(torque, "N" | "Nm") => {
+                format!("{torque} s^2/{other}")
+            }
             Self::CoupledInertia => match (kind, from) {
                 (Prismatic, Prismatic) => "kg".to_owned(),
                 (Revolute, Revolute) => "kg m^2".to_owned(),

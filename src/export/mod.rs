@@ -7,10 +7,12 @@
 //! | [`header`] | the C99 header |
 //! | [`module`] | the Rust module |
 //! | [`standard`] | standard parameters of links from base parameters |
+//! | [`dissipative`] | friction and drive inertias below zero |
 //! | `single` | a single joint as a chain of one link |
 //! | [`urdf`] | the URDF, and what it cannot hold beside it |
 
 mod code;
+pub mod dissipative;
 pub mod header;
 pub mod module;
 pub mod note;

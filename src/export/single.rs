@@ -3,7 +3,6 @@
 //! The joint stands where gravity does nothing to it, which its model does not know either: it turns about
 //! the vertical axis, or slides along a level one.
 
-use super::ExportError;
 use crate::config::ModelFile;
 use crate::config::model_file::LinkBody;
 use crate::config::robot_file::ModelKind;
@@ -19,17 +18,7 @@ const TURNING_MASS: f64 = 1.0;
 const SLIDING_SIZE: f64 = 1e-3;
 
 /// The same model as a serial robot of one link: a ball of the inertia that was identified.
-///
-/// # Errors
-/// [`ExportError::NotInUrdf`] where the torque is a current.
-pub(super) fn chain(file: &ModelFile, model: &Model) -> Result<(ModelFile, Model), ExportError> {
-    if file.robot.torque_unit(0) == "A" {
-        return Err(ExportError::NotInUrdf {
-            what: "an inertia in A per acceleration".to_owned(),
-            remedy: "give `torque_scale` in [log.joint] of the robot file and fit again, or export it with \
-                     --c or --rust",
-        });
-    }
+pub(super) fn chain(file: &ModelFile, model: &Model) -> (ModelFile, Model) {
     let kind = model.robot.joint_kind(0);
     let inertia = model.theta.first().copied().unwrap_or_default();
     let mut file = file.clone();
@@ -62,5 +51,5 @@ pub(super) fn chain(file: &ModelFile, model: &Model) -> Result<(ModelFile, Model
         robot: file.robot.robot(),
         ..model.clone()
     };
-    Ok((file, model))
+    (file, model)
 }

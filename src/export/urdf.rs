@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use super::dissipative::{below_zero, dissipative};
 use super::standard::{Identifiability, Standard, nearest};
 use super::{ExportError, single};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::config::serial_section::InertialSection;
-use crate::robot::model::{JointFriction, Model};
+use crate::robot::model::Model;
 use crate::robot::standard::{Body, STANDARD, STANDARD_NAMES};
 use crate::robot::tree::space::{Vector, about, add, product, roll_pitch_yaw, times, turn};
 use crate::robot::tree::{Coordinate, Link};
@@ -41,8 +42,16 @@ pub fn urdf(
             remedy: "export it with --c or --rust",
         });
     }
+    let unit = file.robot.inertial_torque_unit();
+    if !matches!(unit, "N" | "Nm") {
+        return Err(ExportError::NotInUrdf {
+            what: format!("an inertia in {unit} per acceleration"),
+            remedy: "give `torque_scale` in [log.joint] of the robot file and fit again, or export it with \
+                     --c or --rust",
+        });
+    }
     if !robot.knows_links() {
-        let (file, model) = single::chain(file, model)?;
+        let (file, model) = single::chain(file, model);
         return urdf(&file, &model, urdf_name, notes);
     }
     let found = feasible(file, robot);
@@ -60,7 +69,9 @@ pub fn urdf(
         (None, _) => &NEAREST,
     };
     let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
-    let lines = notes.iter().map(String::as_str).chain([""]);
+    let below = below_zero(file, model);
+    let below = below.iter().map(String::as_str);
+    let lines = notes.iter().map(String::as_str).chain(below).chain([""]);
     for line in lines.chain(of_inertials.iter().copied()).chain(IN_GENERAL) {
         // two hyphens would end the comment early
         let _ = writeln!(out, "  {}", line.replace("--", "- -"));
@@ -291,11 +302,10 @@ fn joint(
     }
     match drive {
         Drive::Joint(j) => {
-            if let JointFriction::ViscousCoulomb(law) = &model.friction[j] {
+            if let Some([damping, friction]) = dissipative(model, j) {
                 let _ = writeln!(
                     out,
-                    "    <dynamics damping=\"{:?}\" friction=\"{:?}\"/>",
-                    law.viscous, law.coulomb
+                    "    <dynamics damping=\"{damping:?}\" friction=\"{friction:?}\"/>"
                 );
             }
         }

@@ -2,7 +2,8 @@
 
 use super::control::Control;
 use super::diagnose::{DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, diagnose};
-use super::error::{ErrorKind, IdentifyError};
+use super::error::IdentifyError;
+use super::error_kind::ErrorKind;
 use super::friction::{FrictionSettings, IdentifiedFriction, friction};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -98,6 +99,7 @@ pub fn identify<E: From<IdentifyError>>(
         estimator: settings.estimator,
         consistent: settings.consistent,
         friction: of_friction.map(|model| ("friction.toml", model)),
+        gains: None,
     };
     let dynamics = lsq(machine, &logs.identification, &lsq_settings, control)?;
     let model = dynamics.model(machine, of_friction);

@@ -85,7 +85,7 @@ pub fn diagnose(
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
     let given = refined(file, name)?;
-    if let Some(fault) = refused(machine, logs.train, control)? {
+    if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
     let groups = [
@@ -138,6 +138,18 @@ pub fn diagnose(
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     })))
+}
+
+/// Channels that are no torques, as a fault: gains that differ look like friction and loads.
+fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
+    let error = machine.check_gains().err()?.to_string();
+    let (effect, remedy) = error.split_once("; ").unwrap_or((&error, ""));
+    Some(DataFault {
+        kind: "gains".to_owned(),
+        channel: Some("torque".to_owned()),
+        effect: effect.to_owned(),
+        remedy: remedy.to_owned(),
+    })
 }
 
 /// The first fault for which a fit refuses one of the logs.

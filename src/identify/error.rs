@@ -1,5 +1,7 @@
 //! Why a stage ends without a result.
 
+use super::error_kind::ErrorKind;
+use super::gain_error::GainError;
 use crate::config::ConfigError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
@@ -8,19 +10,6 @@ use crate::inertia::solution::FitError;
 use crate::inspect::LogFault;
 use crate::log::{LogError, did_you_mean, escape};
 use crate::motion::{MotionError, RunError};
-
-/// What an error is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ErrorKind {
-    /// FilterSettings that contradict each other or the robot.
-    Usage,
-    /// A log, robot or model that cannot be used.
-    Input,
-    /// The data determine nothing that was asked.
-    Undetermined,
-    /// The stage was asked to stop.
-    Interrupted,
-}
 
 /// An error of a stage. Its text reads `what is wrong; what to do`.
 #[derive(Debug, thiserror::Error)]
@@ -67,6 +56,17 @@ pub enum IdentifyError {
         "these data determine none of the parameters; excite every joint with more speed and acceleration"
     )]
     NothingDetermined,
+    /// Channels of several joints in a unit that is no torque.
+    #[error(
+        "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them; give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]; or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`; or go on with one gain for all joints, and a model in {unit}, by `--as-declared`"
+    )]
+    WithoutGains {
+        robot: String,
+        joints: String,
+        unit: &'static str,
+    },
+    #[error(transparent)]
+    Gains(#[from] GainError),
     #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
     Effect { model: String, error: EffectError },
     #[error(transparent)]
@@ -102,7 +102,9 @@ impl IdentifyError {
             | Self::NothingDetermined => ErrorKind::Undetermined,
             Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
             Self::Diagnose(_) => ErrorKind::Undetermined,
-            Self::Log(_)
+            Self::Gains(error) => error.kind(),
+            Self::WithoutGains { .. }
+            | Self::Log(_)
             | Self::Config(_)
             | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
             | Self::Refused { .. }

@@ -136,6 +136,7 @@ pub fn friction(
     settings: &FrictionSettings,
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
+    machine.check_gains()?;
     let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
     let mut warnings = [machine.file.notes.0.clone(), found].concat();
     let work = control.begin("friction filter", Some(groups.len() as u64));

@@ -65,6 +65,14 @@ impl Log {
         }
     }
 
+    /// The same log with the torques of each joint times a factor of its own, where it is in memory.
+    pub(super) fn with_torques_times(&self, factors: &[f64]) -> Result<Self, LogError> {
+        Ok(match self {
+            Self::File(_) => self.clone(),
+            Self::Arrays(arrays) => Self::Arrays(Arc::new(arrays.with_torques_times(factors)?)),
+        })
+    }
+
     /// What tells it from other logs.
     pub(super) fn key(&self) -> String {
         match self {

@@ -38,6 +38,8 @@ pub struct LoggedRobot {
     pub name: String,
     pub file: RobotFile,
     pub robot: Robot,
+    /// Channels that are no torques are taken as they are, one gain for all joints.
+    pub(super) as_declared: bool,
     /// What the first look at each log found: a log is opened several times.
     looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
 }
@@ -59,7 +61,43 @@ impl LoggedRobot {
             file,
             robot,
             looks: Arc::default(),
+            as_declared: false,
         }
+    }
+
+    /// The same robot with another file, which its logs are looked at again by.
+    pub(super) fn with_file(&self, file: RobotFile) -> Self {
+        LoggedRobot {
+            as_declared: self.as_declared,
+            ..LoggedRobot::new(&self.name, file)
+        }
+    }
+
+    /// The same robot, its file taken at its word: a set-up that contradicts itself or the logs ends no
+    /// stage.
+    pub fn as_declared(self) -> Self {
+        LoggedRobot {
+            as_declared: true,
+            ..self
+        }
+    }
+
+    /// Whether torques of all joints count in units that gains relate to each other.
+    ///
+    /// # Errors
+    /// [`IdentifyError::WithoutGains`] for a robot of several joints whose channels are currents, say.
+    pub fn check_gains(&self) -> Result<(), IdentifyError> {
+        let found = self.file.without_gains();
+        let Some((_, unit)) = found.first().filter(|_| !self.as_declared) else {
+            return Ok(());
+        };
+        let names = self.robot.joint_names();
+        let joints: Vec<&str> = found.iter().map(|(j, _)| names[*j].as_str()).collect();
+        Err(IdentifyError::WithoutGains {
+            robot: escape(&self.name),
+            joints: joints.join(", "),
+            unit,
+        })
     }
 
     /// Looks at a log before it is used, once.

@@ -7,6 +7,8 @@ use super::consistent::{ConsistentLinks, consistent};
 use super::control::Control;
 use super::error::IdentifyError;
 use super::estimate::{Account, Estimated, estimate};
+use super::gain_error::GainError;
+use super::gains::{Gain, Gains};
 use super::geometry::geometry;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -20,8 +22,9 @@ use crate::config::model_file::Parameter;
 use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::essential::{Essential, essential};
+use crate::inertia::gains::by_gains;
 use crate::inertia::instruments::ReferenceSource;
-use crate::inertia::solution::{ConditionNumbers, Confounded};
+use crate::inertia::solution::{ConditionNumbers, Confounded, FitError};
 use crate::inertia::solve::{Fit, factor, residual_of, weights_of};
 use crate::log::Provenance;
 use crate::math::descent::Ending;
@@ -41,6 +44,8 @@ pub struct LsqSettings<'a> {
     /// The model that holds the friction of every joint, and its name for messages; without one,
     /// friction is fitted together with the inertias.
     pub friction: Option<(&'a str, &'a ModelFile)>,
+    /// Gains that were fitted before, whose uncertainty the parameters share.
+    pub gains: Option<&'a Gains>,
 }
 
 /// What `lsq` found.
@@ -48,6 +53,9 @@ pub struct LsqSettings<'a> {
 pub struct IdentifiedDynamics {
     #[serde(rename = "parameters")]
     pub unknowns: Vec<Unknown>,
+    /// Gains of the torque channels, where they were fitted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gains: Vec<Gain>,
     pub essential: EssentialFit,
     /// Physically consistent links, where they were asked for.
     #[serde(rename = "feasible")]
@@ -102,6 +110,10 @@ pub fn lsq(
         friction,
         ..
     } = *settings;
+    machine.check_gains()?;
+    if settings.gains.is_some() && friction.is_some() {
+        return Err(GainError::FrictionGiven.into());
+    }
     let law = friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh;
     if law && !matches!(estimator, EstimatorKind::Wls | EstimatorKind::Oe) {
         return Err(IdentifyError::LawIsNotLinear {
@@ -112,6 +124,9 @@ pub fn lsq(
     let mut linear = columns(machine, friction)?;
     linear.rest_at(machine.rest_speeds(logs, control)?);
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    if let Some(gains) = settings.gains {
+        share_uncertainty(&mut estimated, gains)?;
+    }
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
     let consistent = match settings.consistent {
@@ -125,6 +140,7 @@ pub fn lsq(
         ..
     } = estimated;
     let mut warnings = machine.file.notes.0.clone();
+    warnings.extend(settings.gains.iter().flat_map(|g| g.warnings.clone()));
     warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
     if friction.is_none() {
         warnings.push(with_friction(law).to_owned());
@@ -133,7 +149,8 @@ pub fn lsq(
     warnings.append(&mut passes.warnings);
     warnings.extend(rests(machine, &resting));
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
-    let inputs = std::mem::take(&mut passes.inputs);
+    let mut inputs = std::mem::take(&mut passes.inputs);
+    inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
     let unknowns = unknowns(machine, &columns, &fit, &essential);
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
@@ -170,6 +187,7 @@ pub fn lsq(
         columns,
         fit,
         account,
+        gains: settings.gains.map_or(Vec::new(), |g| g.joints.clone()),
         consistent,
         unknowns,
         summary,
@@ -177,6 +195,16 @@ pub fn lsq(
         warnings,
         setup: found,
     })
+}
+
+/// Adds to the covariance of a fit that of the gains by which its torques were made.
+fn share_uncertainty(estimated: &mut Estimated, gains: &Gains) -> Result<(), FitError> {
+    let (fit, basis) = (&mut estimated.fit, &estimated.basis);
+    let std = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let weights = weights_of(&basis.sums, &std);
+    let slopes = by_gains(&basis.sums, &weights, &basis.shift)?;
+    fit.covariance += &slopes * &gains.covariance * slopes.transpose();
+    Ok(())
 }
 
 fn with_friction(law: bool) -> &'static str {

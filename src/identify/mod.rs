@@ -7,6 +7,7 @@
 //! | stage | from | to |
 //! |---|---|---|
 //! | [`friction()`] | one-joint logs | [`IdentifiedFriction`]: theta 13..32 with covariance |
+//! | [`fit_gains()`] | logs of currents, one with a known payload | [`FittedGains`]: torque per ampere of each joint |
 //! | [`lsq()`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
 //! | [`diagnose()`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
 //! | [`validate()`] | logs that were not used, a model | [`Validated`]: torque errors |
@@ -22,10 +23,13 @@ mod curve;
 mod diagnose;
 mod diagnosis;
 mod error;
+mod error_kind;
 mod estimate;
 mod first_look;
 mod free_swing;
 mod friction;
+mod gain_error;
+mod gains;
 mod geometry;
 mod in_memory;
 mod log;
@@ -53,11 +57,14 @@ pub use control::{Control, Progress};
 pub use curve::friction_curve;
 pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
 pub use diagnosis::{DiagnosisResult, DiagnosisVerdict};
-pub use error::{ErrorKind, IdentifyError, ReadError};
+pub use error::{IdentifyError, ReadError};
+pub use error_kind::ErrorKind;
 pub use estimate::{Account, JointAccount};
 pub use friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };
+pub use gain_error::GainError;
+pub use gains::{FittedGains, Gain, Gains, PayloadLog, fit_gains};
 pub use in_memory::{InMemory, read_whole};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};

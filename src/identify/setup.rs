@@ -10,6 +10,7 @@ use crate::setup::{Channels, Drive, Problem, Searched, SetupReport, Thinner, sea
 
 use super::control::Control;
 use super::error::IdentifyError;
+use super::gains;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::setup_words;
@@ -38,6 +39,17 @@ pub fn check_setup(
     friction: Option<(&str, &ModelFile)>,
     control: &Control,
 ) -> Result<CheckedSetup, IdentifyError> {
+    let findings = gains::findings(machine);
+    if !findings.is_empty() {
+        // gains that differ look like signs, scales and loads
+        return Ok(CheckedSetup {
+            report: SetupReport {
+                findings,
+                ..SetupReport::default()
+            },
+            ..CheckedSetup::default()
+        });
+    }
     let n = machine.robot.joints();
     let settings = machine.settings();
     let _work = control.begin("checking the set-up", None);

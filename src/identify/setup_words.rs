@@ -402,7 +402,7 @@ pub(super) fn edits(file: &RobotFile, by: &Correction, motors: bool) -> Vec<Edit
     out
 }
 
-fn differences<T: serde::Serialize>(
+pub(super) fn differences<T: serde::Serialize>(
     table: &str,
     new: &std::collections::BTreeMap<String, T>,
     old: &std::collections::BTreeMap<String, T>,

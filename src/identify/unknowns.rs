@@ -145,7 +145,7 @@ pub(super) fn unknowns(
     };
     let mut out = Vec::with_capacity(columns.unknowns());
     for (i, info) in robot.parameters().iter().enumerate() {
-        let unit = inertia_unit(robot, &info.unit, machine.file.torque_unit(0));
+        let unit = inertia_unit(robot, &info.unit, machine.file.inertial_torque_unit());
         let mut unknown = rated(i, &info.name, unit, &info.meaning);
         if i < robot.groupings().len() {
             unknown.name.clone_from(&unknown.meaning);

@@ -3,7 +3,8 @@
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
 //! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
-//! several times; `essential` and `feasible` work on the R factor of a fit.
+//! several times; `essential` and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque
+//! channel is at its joint.
 
 pub mod accumulate;
 pub mod closed_loop;
@@ -12,6 +13,7 @@ mod covariance;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
+pub mod gains;
 pub mod instruments;
 pub mod law_start;
 pub mod refine;

@@ -76,6 +76,18 @@ impl Arrays {
         Ok(self)
     }
 
+    /// The same log with the torques of each joint times a factor of its own.
+    ///
+    /// # Errors
+    /// Another number of factors than there are joints.
+    pub fn with_torques_times(&self, factors: &[f64]) -> Result<Self, LogError> {
+        let tau = self.tau.chunks(factors.len().max(1));
+        let tau = tau.flat_map(|row| row.iter().zip(factors).map(|(tau, factor)| tau * factor));
+        let references = self.references.clone();
+        let of = Self::new(&self.name, self.t.clone(), self.q.clone(), tau.collect())?;
+        Ok(Self { references, ..of })
+    }
+
     /// Name of the log.
     pub fn name(&self) -> &str {
         &self.name

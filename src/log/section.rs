@@ -62,9 +62,15 @@ pub enum TorqueUnit {
     /// Ampere of motor current, kept as such: the model is then in A.
     #[serde(rename = "A")]
     Ampere,
-    /// Volt at the amplifier.
+    /// Volt at the amplifier, kept as such likewise.
     #[serde(rename = "V")]
     Volt,
+    /// Counts of a drive, kept as such likewise.
+    #[serde(rename = "counts")]
+    Counts,
+    /// Percent of a drive's rated torque or current, kept as such likewise.
+    #[serde(rename = "%")]
+    Percent,
 }
 
 impl TorqueUnit {
@@ -75,7 +81,14 @@ impl TorqueUnit {
             Self::NewtonMetre => "Nm",
             Self::Ampere => "A",
             Self::Volt => "V",
+            Self::Counts => "counts",
+            Self::Percent => "%",
         }
+    }
+
+    /// Whether it is a unit of force or torque, and not one that a gain takes to them.
+    pub const fn is_torque(self) -> bool {
+        matches!(self, Self::Newton | Self::NewtonMetre)
     }
 }
 
@@ -320,6 +333,10 @@ pub struct LogSection {
     /// What the torque channel is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_is: Option<TorqueIs>,
+    /// `torque_scale` of the joints is right but for one factor that all have in common, as `lsq
+    /// --fit-gains` finds it without a payload: the model stays in the unit of the channels.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub relative_gains: bool,
     /// The logged torque (or volt) was held from its own sample to the next.
     #[serde(rename = "torque_held", skip_serializing_if = "Option::is_none")]
     pub zero_order_hold: Option<bool>,

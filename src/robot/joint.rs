@@ -39,6 +39,22 @@ impl JointKind {
             Self::Revolute => "kg m^2",
         }
     }
+
+    /// Unit of an inertial parameter where torques of joints of this kind count in `torque`: as it is in N
+    /// and Nm, else `torque` per acceleration, e.g. "A s^2/rad" for "kg m^2" and "A s^2/m" for "kg m".
+    pub fn inertial_unit(self, si: &str, torque: &str) -> String {
+        if matches!(torque, "N" | "Nm") {
+            return si.to_owned();
+        }
+        match (self, si) {
+            (Self::Revolute, "kg m^2") => format!("{torque} s^2/rad"),
+            (Self::Revolute, "kg m") | (Self::Prismatic, "kg") => format!("{torque} s^2/m"),
+            (Self::Revolute, "kg") => format!("{torque} s^2/m^2"),
+            (Self::Prismatic, "kg m") => format!("{torque} s^2/rad"),
+            (Self::Prismatic, "kg m^2") => format!("{torque} s^2 m"),
+            (_, other) => other.to_owned(),
+        }
+    }
 }
 
 /// Name, unit and meaning of one inertial parameter.

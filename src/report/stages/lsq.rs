@@ -2,7 +2,9 @@
 
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
-use crate::identify::{Account, ConsistentLinks, IdentifiedDynamics, JointAccount, LoggedRobot};
+use crate::identify::{
+    Account, ConsistentLinks, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
+};
 use crate::log::{Provenance, escape};
 use crate::math::descent::Ending;
 use crate::motion::MotionError;
@@ -29,6 +31,7 @@ pub fn lsq(of: &Lsq) -> Report {
     let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
     let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
     let mut terminal = report.terminal();
+    gains(&mut terminal, &of.found.gains);
     fitted(&mut terminal, of.found);
     groupings(&mut terminal, of.found);
     terminal.line("");
@@ -39,6 +42,7 @@ pub fn lsq(of: &Lsq) -> Report {
     let mut page = report.page();
     let (text, good) = parameters::tally(of.file);
     page.verdict(&format!("{text}."), good);
+    gains(&mut page, &of.found.gains);
     residuals(&mut page, of.found);
     page.paragraph(
         "These errors are those of the data that were fitted; `validate` gives those of others.",
@@ -94,6 +98,28 @@ pub fn residuals(page: &mut Writer, found: &IdentifiedDynamics) {
         &["joint", "relative error", "residual rms", "torque rms"],
         rows.collect(),
     );
+}
+
+/// Gains of the torque channels, where they were fitted.
+fn gains(writer: &mut Writer, gains: &[Gain]) {
+    if gains.is_empty() {
+        return;
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("gain", Align::Decimal),
+        ("std", Align::Decimal),
+        ("unit", Align::Left),
+        ("verdict", Align::Left),
+    ])
+    .caption("gains of the torque channels");
+    for gain in gains {
+        let (value, std) = number::value_and_std(gain.value, gain.std);
+        let verdict = gain.verdict.word();
+        table.row([&gain.joint, &value, &std, &gain.unit, verdict]);
+    }
+    writer.table(table);
+    writer.line("");
 }
 
 /// The parameters for a terminal.

@@ -1,0 +1,219 @@
+//! How sure the gains are, and which functions of them the rows leave open.
+//!
+//! Deviations come from leaving out one stretch of time after the other, each as long as residuals are
+//! correlated (the jackknife of groups: Bell and McCaffrey 2002, Survey Methodology 28; one Gauss-Newton step
+//! each). A gain often rests on few moments of a log, whose residuals the fit has made small: what the sandwich
+//! of [`crate::inertia::covariance`] takes from them is too sure, and leaving them out is not.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::GainFit;
+use super::problem::Problem;
+use super::search::{Found, RANK_TOLERANCE};
+use crate::inertia::covariance::{at_least, bandwidth};
+use crate::inertia::solution::FitError;
+use crate::math::rank;
+
+/// Share of a function's gradient that may lie in an open direction: rounding of the Jacobian, squared
+/// away from the tolerance of its rank.
+const OPEN: f64 = 1e-4;
+
+/// Inverse of the weighted normal matrix, and the directions that it leaves open.
+struct Solved {
+    /// Directions that the rows tell of, unknowns x their number: the normal matrix is 1 in them, and its
+    /// inverse is their square.
+    told: DMatrix<f64>,
+    /// Columns in scaled unknowns.
+    open: DMatrix<f64>,
+    scale: Vec<f64>,
+}
+
+impl Solved {
+    fn of(problem: &Problem, x: &DVector<f64>, weights: &[f64]) -> Result<Self, FitError> {
+        let r = problem.linearised(x, weights);
+        let u = r.ncols() - 1;
+        let scale: Vec<f64> = (0..u).map(|c| r.column(c).norm()).collect();
+        let unscale = |c: usize| if scale[c] > 0.0 { 1.0 / scale[c] } else { 0.0 };
+        let scaled = DMatrix::from_fn(r.nrows(), u, |a, c| r[(a, c)] * unscale(c));
+        let svd = rank::svd(&scaled)?;
+        let kept = |k: &usize| svd.s[*k] > RANK_TOLERANCE * svd.s[0];
+        let (told, open): (Vec<usize>, Vec<usize>) = (0..svd.s.len()).partition(kept);
+        Ok(Solved {
+            told: DMatrix::from_fn(u, told.len(), |a, c| {
+                svd.v[(a, told[c])] * unscale(a) / svd.s[told[c]]
+            }),
+            open: svd.v.select_columns(&open),
+            scale,
+        })
+    }
+
+    /// Whether a function of this gradient is told by the rows.
+    fn determines(&self, gradient: &DVector<f64>) -> bool {
+        // an unknown of a zero column is told by nothing
+        let told = gradient.iter().zip(&self.scale);
+        if told.clone().any(|(g, s)| *g != 0.0 && *s <= 0.0) {
+            return false;
+        }
+        let scaled = told.map(|(g, s)| if *s > 0.0 { g / s } else { 0.0 });
+        let scaled = DVector::from_iterator(gradient.len(), scaled);
+        self.open.tr_mul(&scaled).norm() <= OPEN * scaled.norm()
+    }
+}
+
+/// One block of time: its stretch, its score, and its weighted slopes in the directions that are told.
+struct Moment {
+    stretch: usize,
+    score: DVector<f64>,
+    normal: DMatrix<f64>,
+}
+
+fn moments(
+    problem: &Problem,
+    x: &DVector<f64>,
+    weights: &[f64],
+    told: &DMatrix<f64>,
+) -> Vec<Moment> {
+    let mut out = Vec::new();
+    let mut shift = 0;
+    for set in &problem.sets {
+        for block in &set.factors.blocks {
+            let mut score = DVector::zeros(problem.unknowns());
+            let mut normal = DMatrix::zeros(told.ncols(), told.ncols());
+            for (j, r) in block.r.iter().enumerate() {
+                let rows = problem.rows_of(x, r, j, set.loaded);
+                let own = rows.slopes.tr_mul(&rows.residual);
+                let places: Vec<usize> = (0..own.len()).map(|c| problem.unknown(j, c)).collect();
+                for (c, s) in places.iter().zip(&own) {
+                    score[*c] += weights[j] * weights[j] * s;
+                }
+                let slopes = rows.slopes * told.select_rows(&places) * weights[j];
+                normal += slopes.tr_mul(&slopes);
+            }
+            out.push(Moment {
+                stretch: shift + block.stretch,
+                score,
+                normal,
+            });
+        }
+        shift += set.factors.blocks.last().map_or(0, |b| b.stretch) + 1;
+    }
+    out
+}
+
+/// What keeps the rest of a log apart from singular where one stretch tells all of a direction.
+const LEFT: f64 = 1e-9;
+
+/// Covariance of all unknowns.
+fn covariance(
+    problem: &Problem,
+    x: &DVector<f64>,
+    weights: &[f64],
+    solved: &Solved,
+) -> DMatrix<f64> {
+    let u = problem.unknowns();
+    let told = &solved.told;
+    let n = problem.joints() as f64;
+    let rows = problem.rows.iter().sum::<f64>() / n;
+    let freedom = rows / (rows - u as f64 / n).max(1.0);
+    // weights are one over each joint's own noise: the normal matrix is the middle as well
+    let textbook = told * told.transpose() * freedom;
+    let moments = moments(problem, x, weights, told);
+    let scores: Vec<(usize, DVector<f64>)> = moments
+        .iter()
+        .map(|m| (m.stretch, m.score.clone()))
+        .collect();
+    let length = bandwidth(&scores, u) + 1;
+    let mut spread = DMatrix::zeros(u, u);
+    let mut groups = 0;
+    for stretch in moments.chunk_by(|a, b| a.stretch == b.stretch) {
+        for group in stretch.chunks(length) {
+            let mut left = DMatrix::identity(told.ncols(), told.ncols()) * (1.0 + LEFT);
+            let mut score = DVector::zeros(u);
+            for moment in group {
+                left -= &moment.normal;
+                score += &moment.score;
+            }
+            let Some(step) = left.lu().solve(&told.tr_mul(&score)) else {
+                continue;
+            };
+            let step = told * step;
+            spread.ger(1.0, &step, &step, 1.0);
+            groups += 1;
+        }
+    }
+    let share = 1.0 - 1.0 / f64::from(groups.max(1));
+    at_least(spread * share, &textbook)
+}
+
+/// Rates the end of the search.
+pub(super) fn certain(problem: &Problem, found: Found) -> Result<GainFit, FitError> {
+    let n = problem.joints();
+    let weights: Vec<f64> = found.residual_std.iter().map(|s| 1.0 / s).collect();
+    let solved = Solved::of(problem, &found.x, &weights)?;
+    let covariance = covariance(problem, &found.x, &weights, &solved);
+    let x = &found.x;
+    // of ln |c_j|, and with a payload of ln |c_j mu|
+    let gradient = |j: usize| {
+        let mut g = DVector::zeros(x.len());
+        g[j] = 1.0 / x[j];
+        if problem.loads() > 0 {
+            g[problem.mass()] = 1.0 / x[problem.mass()];
+        }
+        g
+    };
+    let gradients: Vec<DVector<f64>> = (0..n).map(gradient).collect();
+    let variance = |g: &DVector<f64>| g.dot(&(&covariance * g));
+    let (gradients, reference) = match problem.loads() {
+        0 => {
+            let (reference, beside) = beside_one(&gradients, &solved, &variance);
+            (beside, Some(reference))
+        }
+        _ => (gradients, None),
+    };
+    let mass = match reference {
+        None => x[problem.mass()],
+        Some(_) => 1.0,
+    };
+    Ok(GainFit {
+        channel: (0..n).map(|j| x[j] * mass).collect(),
+        covariance: DMatrix::from_fn(n, n, |a, b| {
+            gradients[a].dot(&(&covariance * &gradients[b]))
+        }),
+        determined: gradients
+            .iter()
+            .map(|g| g.iter().all(|x| x.is_finite()) && solved.determines(g))
+            .collect(),
+        reference,
+        residual_std: found.residual_std,
+        iterations: found.iterations,
+        ending: found.ending,
+    })
+}
+
+/// The joint beside which most others are told, and best; and the gradients of their differences to it.
+fn beside_one(
+    gradients: &[DVector<f64>],
+    solved: &Solved,
+    variance: &dyn Fn(&DVector<f64>) -> f64,
+) -> (usize, Vec<DVector<f64>>) {
+    let beside = |reference: usize| -> Vec<DVector<f64>> {
+        gradients
+            .iter()
+            .map(|g| g - &gradients[reference])
+            .collect()
+    };
+    let rated = |reference: usize| {
+        let differences = beside(reference);
+        let told: Vec<&DVector<f64>> = differences
+            .iter()
+            .filter(|g| solved.determines(g))
+            .collect();
+        let spread: f64 = told.iter().map(|g| variance(g)).sum();
+        (told.len(), spread)
+    };
+    let best = (0..gradients.len())
+        .map(|j| (rated(j), j))
+        .max_by(|((a, x), i), ((b, y), j)| a.cmp(b).then(y.total_cmp(x)).then(j.cmp(i)));
+    let reference = best.map_or(0, |(_, j)| j);
+    (reference, beside(reference))
+}

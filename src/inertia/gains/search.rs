@@ -1,0 +1,153 @@
+//! The most likely gains: Gauss-Newton on the bilinear problem, the linear unknowns solved anew for every
+//! trial of the gains (Golub and Pereyra 2003, Inverse Problems 19).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::Problem;
+use super::start::total_least_squares;
+use crate::inertia::solution::FitError;
+use crate::math::descent::Ending;
+use crate::math::rank;
+
+/// Where the search ended.
+pub(super) struct Found {
+    pub x: DVector<f64>,
+    pub residual_std: Vec<f64>,
+    pub iterations: usize,
+    pub ending: Ending,
+}
+
+const MOST_STEPS: usize = 100;
+/// Rounds of total least squares, whose weights come from the round before.
+const ROUNDS: usize = 3;
+/// Fall of the criterion that ends the search: the square of a step in deviations is twice the fall times the
+/// number of rows, which is below a millionth for 5 million rows.
+const SETTLED: f64 = 1e-13;
+/// Singular values of the scaled columns below this share of the largest are rounding.
+pub(super) const RANK_TOLERANCE: f64 = 1e-8;
+
+/// Searches from equal channels and from the total least squares; the more likely end stands.
+pub(super) fn search(problem: &Problem) -> Result<Found, FitError> {
+    let n = problem.joints();
+    let mut starts = vec![vec![1.0; n]];
+    let mut gains: Vec<f64> = vec![1.0; n];
+    let mut std = problem.channel_rms.clone();
+    for _ in 0..ROUNDS {
+        let found = total_least_squares(problem, &gains, &std)?;
+        // a joint that the others do not tie to them has no gain here
+        let largest = found.iter().fold(0.0, |a: f64, g| a.max(g.abs()));
+        if found.iter().any(|g| g.abs() <= 1e-9 * largest) {
+            break;
+        }
+        let c = DVector::from_iterator(n, found.iter().map(|g| 1.0 / g));
+        std = problem.residual_std(&linear(problem, &c, &inverse(&std))?);
+        starts.push(c.as_slice().to_vec());
+        gains = found;
+    }
+    let starts = [starts.first(), starts.last()].into_iter().flatten();
+    let mut best: Option<(f64, Found)> = None;
+    for c in starts {
+        let found = descend(problem, DVector::from_column_slice(c))?;
+        let value = criterion(problem, &found.residual_std);
+        if best.as_ref().is_none_or(|(least, _)| value < *least) {
+            best = Some((value, found));
+        }
+    }
+    best.map(|(_, found)| found).ok_or(FitError::NothingExcited)
+}
+
+fn descend(problem: &Problem, start: DVector<f64>) -> Result<Found, FitError> {
+    let n = problem.joints();
+    let mut std = problem.channel_rms.clone();
+    let mut x = linear(problem, &levelled(start), &inverse(&std))?;
+    std = problem.residual_std(&x);
+    let mut value = criterion(problem, &std);
+    for iterations in 1..=MOST_STEPS {
+        let weights = inverse(&std);
+        let step = least_squares(&problem.linearised(&x, &weights), 0)?;
+        let mut share = 1.0;
+        let better = loop {
+            let c = x.rows(0, n) + step.rows(0, n) * share;
+            let trial = linear(problem, &levelled(c), &weights)?;
+            let trial_std = problem.residual_std(&trial);
+            let trial_value = criterion(problem, &trial_std);
+            if trial_value < value {
+                break Some((trial, trial_std, trial_value));
+            }
+            share *= 0.5;
+            if share < 1e-6 {
+                break None;
+            }
+        };
+        let settled = match better {
+            None => true,
+            Some((next, next_std, next_value)) => {
+                let fall = value - next_value;
+                (x, std, value) = (next, next_std, next_value);
+                fall < SETTLED
+            }
+        };
+        if settled {
+            return Ok(Found {
+                x,
+                residual_std: std,
+                iterations,
+                ending: Ending::Converged,
+            });
+        }
+    }
+    Ok(Found {
+        x,
+        residual_std: std,
+        iterations: MOST_STEPS,
+        ending: Ending::IterationLimit,
+    })
+}
+
+/// Minus the logarithm of the likelihood over the mean number of rows, but for a constant.
+fn criterion(problem: &Problem, std: &[f64]) -> f64 {
+    let all: f64 = problem.rows.iter().sum();
+    let share = |rows: &f64| rows * std.len() as f64 / all;
+    let each = std.iter().zip(&problem.rows);
+    each.map(|(s, rows)| share(rows) * s.ln()).sum()
+}
+
+fn inverse(std: &[f64]) -> Vec<f64> {
+    std.iter().map(|s| 1.0 / s).collect()
+}
+
+/// The common factor taken out, which the parameters have too.
+fn levelled(c: DVector<f64>) -> DVector<f64> {
+    let norm = c.norm() / (c.len() as f64).sqrt();
+    if norm > 0.0 { c / norm } else { c }
+}
+
+/// All unknowns with the gains given.
+fn linear(problem: &Problem, c: &DVector<f64>, weights: &[f64]) -> Result<DVector<f64>, FitError> {
+    let n = problem.joints();
+    let mut x = DVector::zeros(problem.unknowns());
+    x.rows_mut(0, n).copy_from(c);
+    let rest = least_squares(&problem.linearised(&x, weights), n)?;
+    x += rest;
+    Ok(x)
+}
+
+/// Least-squares solution of an R factor whose last column is the target, unknowns before `first` held at
+/// zero and open directions too.
+fn least_squares(r: &DMatrix<f64>, first: usize) -> Result<DVector<f64>, FitError> {
+    let u = r.ncols() - 1;
+    let free = u - first;
+    let scale: Vec<f64> = (first..u).map(|c| r.column(c).norm()).collect();
+    let unscale = |c: usize| if scale[c] > 0.0 { 1.0 / scale[c] } else { 0.0 };
+    let scaled = DMatrix::from_fn(r.nrows(), free, |a, c| r[(a, first + c)] * unscale(c));
+    let svd = rank::svd(&scaled)?;
+    let mut z = DVector::zeros(free);
+    for k in (0..svd.s.len()).filter(|&k| svd.s[k] > RANK_TOLERANCE * svd.s[0]) {
+        z += svd.v.column(k) * (svd.u.column(k).dot(&r.column(u)) / svd.s[k]);
+    }
+    let mut x = DVector::zeros(u);
+    for c in 0..free {
+        x[first + c] = z[c] * unscale(c);
+    }
+    Ok(x)
+}
