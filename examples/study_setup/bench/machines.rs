@@ -168,7 +168,8 @@ fn measured(
     time: &str,
     files: &[&str],
 ) -> Option<Machine> {
-    let robot = robot(name);
+    let mut robot = robot(name);
+    robot_text::forget_velocities(&mut robot);
     let mut names: Vec<String> = joints.iter().map(|&j| j.to_owned()).collect();
     if names.is_empty() {
         names = robot_text::joint_names(&robot);

@@ -23,6 +23,15 @@ pub fn below<'a>(table: &'a mut Table, name: &str) -> &'a mut Table {
     entry.as_table_mut().expect("a table")
 }
 
+/// Takes the columns of velocities out: the logs of the bench have none.
+pub fn forget_velocities(robot: &mut Table) {
+    for (_, channels) in below(below(robot, "log"), "joint") {
+        if let Some(channels) = channels.as_table_mut() {
+            channels.remove("velocity");
+        }
+    }
+}
+
 /// Declares another direction of gravity.
 pub fn declare_gravity(robot: &mut Table, gravity: [f64; 3]) {
     let vector = gravity.map(Value::Float).to_vec();
