@@ -86,8 +86,12 @@ fn faults(machine: &Machine) -> Vec<Fault> {
         out.push(Fault::Reverse);
     }
     for side in [Side::Torque, Side::Position] {
-        for factor in FACTORS {
-            out.extend(all.iter().map(|j| Fault::Scale(side, vec![*j], factor)));
+        for (k, factor) in FACTORS.into_iter().enumerate() {
+            // each joint has two of the factors in its torque and the other two in its position
+            let other = usize::from(side == Side::Position);
+            let turn = |j: &&usize| n == 1 || (**j + k + other).is_multiple_of(2);
+            let of = all.iter().filter(turn);
+            out.extend(of.map(|j| Fault::Scale(side, vec![*j], factor)));
             if n > 1 {
                 out.push(Fault::Scale(side, all.clone(), factor));
             }
@@ -111,8 +115,9 @@ fn faults(machine: &Machine) -> Vec<Fault> {
     }
     let turning = all.iter().filter(|j| machine.joints[**j].turn.is_some());
     out.extend(turning.map(|j| Fault::Wrap(*j)));
-    for size in STEPS {
-        out.extend(all.iter().map(|j| Fault::Step(*j, size)));
+    for (k, size) in STEPS.into_iter().enumerate() {
+        let turn = |j: &&usize| n < 3 || (**j + k).is_multiple_of(3);
+        out.extend(all.iter().filter(turn).map(|j| Fault::Step(*j, size)));
     }
     out.extend((2..=5).map(Fault::Hold));
     // a model whose torque at rest is known is needed
