@@ -237,9 +237,13 @@ impl Heard {
         if fault.in_rows() {
             let words = fault.kinds_of_rows();
             let said = mended.said();
-            let named = words
-                .iter()
-                .any(|word| kinds.iter().any(|kind| kind.contains(word)) || said.contains(word));
+            let heard = |word: &&str| kinds.iter().any(|k| k.contains(word)) || said.contains(word);
+            let named = match fault {
+                Fault::Rest(_) => rows(&mended.document["joints"])
+                    .iter()
+                    .any(|joint| joint["relative_error_rest"].is_number()),
+                _ => words.iter().any(heard),
+            };
             return Self {
                 named,
                 first: named,
