@@ -343,7 +343,8 @@ pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> Robo
         let c = out.log.joint.entry(name.clone()).or_default();
         if p != j {
             c.position = of(p).position.or(column(p, "q"));
-            c.velocity = of(p).velocity.or(column(p, "dq"));
+            // one that the file does not name is optional, and the log may have none
+            c.velocity = of(p).velocity;
             c.reference = of(p).reference;
         }
         if t != j {
