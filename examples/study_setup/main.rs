@@ -40,7 +40,7 @@ fn main() {
         let Some(machine) = machine(name, &folder) else {
             continue;
         };
-        let clean = Clean::new(machine, &folder);
+        let clean = Clean::new(machine);
         let done = |case: &str| {
             known
                 .iter()

@@ -24,8 +24,10 @@ pub struct Clean {
 }
 
 impl Clean {
-    /// Fits it in `folder`.
-    pub fn new(machine: Machine, folder: &Path) -> Self {
+    /// Fits it.
+    pub fn new(machine: Machine) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path();
         let words = write(&machine, &Given::right(&machine), folder);
         let (done, fit) = fitted(&machine, &machine.logs, folder, &words, "--as-declared", "");
         let fit = fit.unwrap_or_else(|| panic!("{}: {}", machine.name, done.message));
