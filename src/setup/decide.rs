@@ -145,13 +145,13 @@ pub(super) fn decide(
     let physics = credit(&chosen.positives) - credit(&declared.positives);
     let needed = ODDS + (tried.max(1) as f64).ln();
     let gain = held_out + physics;
-    // what is right predicts no worse, and wins in both halves of the logs where physics does not decide
+    // what is right predicts no worse, and wins in both halves of the logs
     let fitted = share * (a.score - b.score);
     if gain < needed
         || held_out < -WORSE
         || fitted < -0.5 * WORSE
         || a.error() > NO_WORSE * b.error()
-        || physics < needed && !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
+        || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
     {
         return None;
     }
