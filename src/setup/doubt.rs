@@ -3,6 +3,8 @@
 //! Signs, order and scales of torques are quadratic forms of one set of normal equations; zeros are looked
 //! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Drive};
@@ -263,7 +265,7 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
     })
 }
 
-/// Whether turned positions, or joints in each other's place, gain.
+/// Whether turned positions, joints in each other's place, or zeros a quarter turn away gain.
 fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) -> bool {
     if moving.len() < 2 {
         return false;
@@ -283,6 +285,12 @@ fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) 
         changes.push(Change::Exchange(Both, pair[0], pair[1]));
         changes.push(Change::Exchange(Position, pair[0], pair[1]));
     }
+    // quarter turns, where the derivative tells nothing
+    let quarter = |change: &Change| match change {
+        Change::Zero(_, angle) => (angle / FRAC_PI_2).fract() == 0.0,
+        _ => false,
+    };
+    changes.extend(hypotheses::of_zeros(problem).into_iter().filter(quarter));
     changes.iter().any(|change| {
         let trial = Trial::new(problem, by.with(change), &rows, 1, Some(&declared));
         trial.is_some_and(|trial| gained(problem, &trial, &declared, credit))
