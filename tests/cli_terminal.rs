@@ -144,7 +144,8 @@ fn results_and_warnings_have_no_colour_even_where_it_is_forced() {
 }
 
 /// Files that a reader has and the built-in campaign has not.
-const READERS_OWN: [&str; 6] = [
+const READERS_OWN: [&str; 7] = [
+    "arm.toml",
     "bag_0.mcap",
     "emps_id.csv",
     "loaded.csv",

@@ -557,6 +557,12 @@ fn a_urdf_says_what_the_data_determine() {
     let robot = RobotFile::parse("panda.toml", panda).unwrap();
     let mut model = model(robot.robot(), false, 9);
     model.theta = bodies(&model, 13);
+    model
+        .friction
+        .fill(JointFriction::ViscousCoulomb(ViscousCoulomb {
+            viscous: 0.3,
+            coulomb: 0.2,
+        }));
     let made = export::urdf::urdf(&file_of(robot, &model), &model, "arm.urdf", &[]).unwrap();
     // of the first link only its inertia about z tells, in a sum with what hangs on it
     assert!(

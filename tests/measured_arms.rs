@@ -14,11 +14,14 @@ fn fitted(robot: &str, more: &[&str], log: &str, fit: &str, unseen: &str) -> (Ve
     words.extend(more);
     run(folder.path(), &words);
     let found = run(folder.path(), &["validate", &unseen, "-m", "model.toml"]);
+    (errors(&found, "relative_error"), found)
+}
+
+/// One kind of error of every joint in per cent.
+fn errors(found: &Value, kind: &str) -> Vec<f64> {
     let joints = found["joints"].as_array().unwrap();
-    let errors = joints
-        .iter()
-        .map(|j| 100.0 * j["relative_error"].as_f64().unwrap());
-    (errors.collect(), found)
+    let error = |j: &Value| 100.0 * j[kind].as_f64().unwrap();
+    joints.iter().map(error).collect()
 }
 
 /// Each error is at most the limit, both to the limit's one decimal.
@@ -37,16 +40,20 @@ fn the_tx40_is_as_others_have_it_without_and_with_the_coupling_of_its_wrist() {
         return;
     };
     let log = log.to_str().unwrap();
-    let (plain, _) = fitted("configs/tx40.toml", &[], log, "", "");
-    assert_at_most(&plain, &[5.9, 7.1, 9.4, 11.5, 53.5, 32.2]);
+    // The arm rests for 17 to 19 % of the time. Others fitted those rows too; here they are not fitted, so that
+    // the rows that are fitted stand beside the published figures.
+    let (_, plain) = fitted("configs/tx40.toml", &[], log, "", "");
+    let moving = errors(&plain, "relative_error_moving");
+    assert_at_most(&moving, &[5.9, 7.1, 9.4, 11.5, 53.5, 32.2]);
 
     let text = std::fs::read_to_string("configs/tx40.toml").unwrap();
     let coupling = "[[robot.coupling]]\nmotor = \"q6\"\nother = \"q5\"\nratio = 1.0\n\n[friction]";
     let folder = tempfile::tempdir().unwrap();
     let robot = folder.path().join("coupled.toml");
     std::fs::write(&robot, text.replace("[friction]", coupling)).unwrap();
-    let (coupled, _) = fitted(robot.to_str().unwrap(), &[], log, "", "");
-    assert_at_most(&coupled, &[5.9, 7.0, 9.6, 11.6, 14.2, 13.9]);
+    let (_, coupled) = fitted(robot.to_str().unwrap(), &[], log, "", "");
+    let moving = errors(&coupled, "relative_error_moving");
+    assert_at_most(&moving, &[5.9, 7.0, 9.6, 11.6, 14.2, 13.9]);
 }
 
 #[test]

@@ -129,9 +129,12 @@ fn compare(file: &RobotFile, oracle: &str, count: usize) -> f64 {
     worst
 }
 
+/// Pinocchio read the angles as they are written.
+const AS_WRITTEN: &str = "angles_as_written = true\n";
+
 #[test]
 fn a_made_up_arm_moves_as_pinocchio_says() {
-    let file = file_of(&fixture("urdf/gantry.urdf"), "");
+    let file = file_of(&fixture("urdf/gantry.urdf"), AS_WRITTEN);
     let worst = compare(&file, "serial_gantry.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
 }
@@ -141,7 +144,7 @@ fn the_tx40_moves_as_pinocchio_says() {
     let Some(urdf) = shared("tx40/tx40_mdh_modified.urdf") else {
         return;
     };
-    let worst = compare(&file_of(&urdf, ""), "serial_tx40.json", 20);
+    let worst = compare(&file_of(&urdf, AS_WRITTEN), "serial_tx40.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
 }
 
@@ -150,13 +153,13 @@ fn the_ur10_moves_as_pinocchio_says() {
     let Some(urdf) = shared("ur10/ur10_robot.urdf") else {
         return;
     };
-    let worst = compare(&file_of(&urdf, ""), "serial_ur10.json", 20);
+    let worst = compare(&file_of(&urdf, AS_WRITTEN), "serial_ur10.json", 20);
     assert!(worst < 1e-11, "{worst:e}");
 }
 
 #[test]
 fn a_pair_of_arms_moves_as_pinocchio_says() {
-    let file = file_of(&fixture("urdf/two_arms.urdf"), "");
+    let file = file_of(&fixture("urdf/two_arms.urdf"), AS_WRITTEN);
     assert_eq!(file.joint_names().len(), 14);
     let worst = compare(&file, "serial_two_arms.json", 6);
     assert!(worst < 1e-11, "{worst:e}");
@@ -172,7 +175,7 @@ fn a_pair_of_arms_on_a_torso_that_turns_moves_as_pinocchio_says() {
         "name=\"stand\" type=\"continuous\"",
     );
     std::fs::write(&path, turning).unwrap();
-    let file = file_of(&path, "");
+    let file = file_of(&path, AS_WRITTEN);
     assert_eq!(file.joint_names().len(), 15);
     let worst = compare(&file, "serial_two_arms_turning.json", 6);
     assert!(worst < 1e-11, "{worst:e}");
@@ -180,7 +183,7 @@ fn a_pair_of_arms_on_a_torso_that_turns_moves_as_pinocchio_says() {
 
 #[test]
 fn what_a_joint_does_not_move_has_no_part_in_its_torque() {
-    let robot = file_of(&fixture("urdf/two_arms.urdf"), "").robot();
+    let robot = file_of(&fixture("urdf/two_arms.urdf"), AS_WRITTEN).robot();
     let (n, p) = (robot.joints(), robot.parameters().len());
     let mut y = vec![f64::NAN; n * p];
     robot.regressor(&[0.4; 14], &[0.7; 14], &[-0.9; 14], &mut y);
@@ -201,7 +204,7 @@ fn what_a_joint_does_not_move_has_no_part_in_its_torque() {
 
 #[test]
 fn a_urdf_becomes_link_tables_and_the_file_stands_alone() {
-    let file = file_of(&fixture("urdf/gantry.urdf"), "");
+    let file = file_of(&fixture("urdf/gantry.urdf"), AS_WRITTEN);
     assert_eq!((&file.robot.urdf, &file.robot.tip), (&None, &None));
     assert_eq!(
         file.joint_names(),

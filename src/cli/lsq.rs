@@ -16,7 +16,8 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident lsq identification.csv -r robot.toml -m friction.toml -o m.toml
   cft-ident lsq emps_id.csv -r configs/emps.toml -o emps.toml --json -
-  cft-ident lsq empty.csv -r arm.toml --fit-gains loaded.csv:mass=2.8+-0.05 -o m.toml";
+  cft-ident lsq empty.csv -r arm.toml -o m.toml \\
+    --fit-gains loaded.csv:mass=2.8+-0.05";
 
 /// Fit the inertial parameters by linear least squares, friction taken from a model file.
 ///
