@@ -187,7 +187,7 @@ fn matters(clean: &Fit, declared: Option<&Fit>) -> (bool, String) {
         None => format!("error {moved:+.2}"),
     };
     // an error that is no number is no fit either
-    (!(moved <= 0.1) || !impossible.is_empty(), why)
+    (moved.is_nan() || moved > 0.1 || !impossible.is_empty(), why)
 }
 
 /// The fit with rows as they stand in the file: what the tool would mend is kept.
