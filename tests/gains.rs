@@ -1,11 +1,11 @@
 //! Currents of an arm: gains from a known payload, and what is said where there are none.
 
 mod currents_arm;
+mod serial_arm;
 
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{
     Control, ErrorKind, GainError, IdentifyError, Log, LoggedRobot, LsqSettings, PayloadLog,
@@ -13,7 +13,7 @@ use cft_ident::identify::{
 };
 use cft_ident::log::LogSpec;
 use currents_arm::{Chance, DECLARED, JOINTS, Payload, log, log_section, plant, robot_file};
-use serde_json::Value;
+use serial_arm::run;
 
 const SECONDS: f64 = 15.0;
 
@@ -205,19 +205,6 @@ fn of_slides(folder: &Path) {
         fs::write(folder.join(name), text).unwrap();
     }
     fs::write(folder.join("arm.toml"), APART).unwrap();
-}
-
-fn run(folder: &Path, words: &[&str]) -> (i32, String, Value) {
-    let output = Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    let document = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code().unwrap(), message, document)
 }
 
 #[test]

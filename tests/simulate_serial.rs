@@ -1,10 +1,11 @@
 //! A simulated serial robot, and what is identified from its logs.
 
-use std::fs;
-use std::path::Path;
+mod serial_arm;
 
-use assert_cmd::Command;
+use std::fs;
+
 use serde_json::Value;
+use serial_arm::run;
 
 /// Two links in a vertical plane, 0.4 m between the axes.
 const ROBOT: &str = r#"[robot]
@@ -59,19 +60,6 @@ fn model(inertia: f64) -> String {
         );
     }
     text
-}
-
-fn run(folder: &Path, words: &[&str]) -> (i32, String, Value) {
-    let output = Command::cargo_bin("cft-ident")
-        .unwrap()
-        .current_dir(folder)
-        .args(words)
-        .args(["--json", "-", "-q"])
-        .output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    let document = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code().unwrap(), message, document)
 }
 
 #[test]
