@@ -69,6 +69,8 @@
 //! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`report`] tells
 //! results as text, page and JSON, and [`cli`] is the command line.
 
+#![forbid(unsafe_code)]
+
 pub mod math;
 pub mod number;
 pub mod robot;

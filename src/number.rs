@@ -1,7 +1,30 @@
-//! Numbers as a person reads them: as many digits as they deserve.
+//! Numbers as a person reads them: as many digits as they deserve. And how large one may be that a file
+//! or the command line gives.
 
 /// What stands for a number that is not there.
 pub const ABSENT: &str = "-";
+
+/// Largest magnitude of a number that is given, in whatever unit: far beyond every quantity of a machine
+/// (nanoseconds since 1970 are 2e18), and small enough that products of ten of them are still numbers.
+pub const LARGEST: f64 = 1e30;
+
+/// Smallest of a number that is given and must be above 0: one over it is usable too.
+pub const SMALLEST: f64 = 1e-30;
+
+/// Whether a number that is given can be worked with: neither inf nor nan, nor beyond [`LARGEST`].
+#[inline]
+pub fn is_usable(value: f64) -> bool {
+    // false for nan too
+    value.abs() <= LARGEST
+}
+
+/// What is wrong with a number that [`is_usable`] refuses, to be told behind it.
+pub fn beyond(value: f64) -> &'static str {
+    match value.is_finite() {
+        true => ", beyond 1e30 in SI units",
+        false => "",
+    }
+}
 
 /// `value` with `digits` significant digits, `1.23e-7` style where zeros would pile up.
 pub fn significant(value: f64, digits: usize) -> String {

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
 use crate::config::campaign::EstimatorKind;
+use crate::number::{LARGEST, SMALLEST, is_usable};
 use crate::output::LogForm;
 
 /// Where a document goes: `-` is standard output.
@@ -50,8 +51,10 @@ impl fmt::Display for Destination {
 /// A finite number above zero (a duration, a limit).
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        Ok(_) => Err("must be a finite number above 0".into()),
+        Ok(value) if is_usable(value) && value >= SMALLEST => Ok(value),
+        Ok(_) => Err(format!(
+            "must be a number above 0, from {SMALLEST:e} to {LARGEST:e}"
+        )),
         Err(_) => Err("is not a number".into()),
     }
 }
@@ -68,8 +71,8 @@ pub(super) fn part(text: &str) -> Result<f64, String> {
 /// A finite number (a position, a speed).
 pub(super) fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err("must be a finite number".into()),
+        Ok(value) if is_usable(value) => Ok(value),
+        Ok(_) => Err(format!("must be a number of at most {LARGEST:e}")),
         Err(_) => Err("is not a number".into()),
     }
 }

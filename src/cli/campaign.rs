@@ -9,7 +9,6 @@ use super::simulate::{simulate_to, warnings};
 use super::{CliError, Context};
 use crate::config::campaign::{CampaignLogs, CampaignSettings};
 use crate::config::{self, Campaign, RobotFile, Trajectory};
-use crate::output::write_whole;
 use crate::simulate::{EffectSpec, Experiment, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
@@ -94,9 +93,9 @@ pub(super) fn simulate(
         .map_err(|e| CliError::output(format!("the campaign cannot be expressed in TOML: {e}")))?;
     let robot_text = config::text(Path::new(ROBOT))?;
     let head = "# The built-in campaign: repeat it with `cft-ident identify campaign.toml`.\n\n";
-    write_whole(&folder.join("robot.toml"), |f| {
-        f.write_all(robot_text.as_bytes())
-    })?;
-    write_whole(&folder.join("campaign.toml"), |f| write!(f, "{head}{text}"))?;
+    context.write_text(&folder.join("robot.toml"), &robot_text)?;
+    context.write_text(&folder.join("campaign.toml"), &format!("{head}{text}"))?;
+    // what is identified next reads them
+    context.files().commit()?;
     Ok(said)
 }

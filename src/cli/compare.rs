@@ -47,7 +47,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
     let given = |path: &Path| {
-        let given = files::model(path)?;
+        let given = files::model(path, context)?;
         Ok::<_, CliError>(GivenModel {
             name: given.name,
             file: given.value,
@@ -84,10 +84,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     if let Some(path) = &args.report {
-        outputs::write_text(path, &report.html())?;
+        context.write_text(path, &report.html())?;
     }
     for path in &args.plot {
-        outputs::write_picture(path, &stages::compare::figure(&of).svg())?;
+        context.write_picture(path, &stages::compare::figure(&of).svg())?;
     }
     Ok(Outcome {
         text: report.text(),

@@ -12,6 +12,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
 use crate::identify::{self, Control};
+use crate::output::Together;
+use crate::report::figure;
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]
@@ -22,6 +24,9 @@ pub struct Context {
     interrupted: Arc<AtomicBool>,
     command: String,
     control: Control,
+    files: Arc<Together>,
+    /// Warnings that stand before those of the command's own result.
+    told: Arc<Mutex<Vec<String>>>,
 }
 
 impl Context {
@@ -47,6 +52,8 @@ impl Context {
             interrupted,
             command: String::new(),
             control,
+            files: Arc::default(),
+            told: Arc::default(),
         }
     }
 
@@ -100,6 +107,46 @@ impl Context {
         let mut all = outputs.to_vec();
         all.extend(self.json.as_deref());
         outputs::check(inputs, &all)
+    }
+
+    /// The outputs, which get their names together when the command has ended well.
+    pub(crate) fn files(&self) -> &Together {
+        &self.files
+    }
+
+    /// Writes a text that gets its name with the other outputs.
+    pub(crate) fn write_text(&self, path: &Path, text: &str) -> Result<(), CliError> {
+        Ok(self.files.write(path, text.as_bytes())?)
+    }
+
+    /// Writes a figure, as SVG or as PNG by the path's ending.
+    pub(crate) fn write_picture(&self, path: &Path, svg: &str) -> Result<(), CliError> {
+        let png = path
+            .extension()
+            .is_some_and(|end| end.eq_ignore_ascii_case("png"));
+        if !png {
+            return self.write_text(path, svg);
+        }
+        let picture =
+            figure::png(svg).map_err(|e| CliError::output(format!("{}: {e}", path.display())))?;
+        Ok(self.files.write(path, &picture)?)
+    }
+
+    /// A warning about what was given, for the document and for standard error; once, however often it is
+    /// found.
+    pub(crate) fn warn(&self, text: &str) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if !told.iter().any(|known| known == text) {
+            told.push(text.to_owned());
+        }
+    }
+
+    /// The warnings so far.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.told
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 
     /// A line on standard error for the person who waits; `-q` silences it.

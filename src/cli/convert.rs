@@ -298,7 +298,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let document = Document::new("convert", &provenance, &warnings, &result)?;
     if let Some(writer) = target.writer {
-        writer.commit()?;
+        context.files().add_log(writer)?;
     }
     Ok(Outcome {
         text: format!(

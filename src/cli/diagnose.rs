@@ -61,7 +61,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .collect();
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
-    let given = files::model(&args.model)?;
+    let given = files::model(&args.model, context)?;
     let (name, file) = (given.name, given.value);
     let machine = LoggedRobot::new(&name, file.robot.clone());
     let (train, veto) = (logs_of(&args.logs), logs_of(&args.veto));
@@ -94,7 +94,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 let (inputs, made_from) = ([given.provenance], &file.provenance.inputs);
                 let (robot, command) = (&machine.file, context.command());
                 provenance::section(&mut page, robot, &inputs, made_from, None, command);
-                outputs::write_text(path, &report.html())?;
+                context.write_text(path, &report.html())?;
             }
             return Ok(Outcome {
                 text: report.text(),
@@ -129,18 +129,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let figure = stages::diagnose::figure(&machine, &found).map_err(CliError::input)?;
         let figure = figure.svg();
         for path in &args.plot {
-            outputs::write_picture(path, &figure)?;
+            context.write_picture(path, &figure)?;
         }
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;
             let mut page = report.page();
             stages::diagnose::pictures(&mut page, &of, &figure, &quality, context.command())
                 .map_err(CliError::input)?;
-            outputs::write_text(path, &report.html())?;
+            context.write_text(path, &report.html())?;
         }
     }
     if let Some(path) = &args.output {
-        outputs::write_text(path, &found.model(&machine, &file).to_toml()?)?;
+        context.write_text(path, &found.model(&machine, &file).to_toml()?)?;
         let written = format!("written: {}", path.display());
         report.terminal().line(&written);
     }

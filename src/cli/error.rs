@@ -11,7 +11,7 @@ use std::io::{IsTerminal, Write};
 use super::exit::Exit;
 use crate::config::ConfigError;
 use crate::identify::{ErrorKind, IdentifyError};
-use crate::log::LogError;
+use crate::log::{LogError, is_hidden};
 use crate::mapping::MappingError;
 use crate::output::OutputError;
 use crate::report::json::JsonError;
@@ -212,7 +212,7 @@ pub(super) fn indented(text: &str) -> String {
         match c {
             '\n' => shown.push_str("\n  "),
             '\t' => shown.push(' '),
-            c if c.is_control() => shown.extend(c.escape_default()),
+            c if is_hidden(c) => shown.extend(c.escape_default()),
             c => shown.push(c),
         }
     }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::outputs::write_text;
 use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::ModelFile;
 use crate::export::dissipative::below_zero;
@@ -98,7 +97,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let outputs = [&args.urdf, &side, &args.c, &args.rust];
     let outputs: Vec<&Path> = outputs.iter().filter_map(|path| path.as_deref()).collect();
     context.check_outputs(&[&args.model], &outputs)?;
-    let given = files::model(&args.model)?;
+    let given = files::model(&args.model, context)?;
     let model = given.value.model(&given.name)?;
     let left_out = effects(&given.value);
     if !left_out.is_empty() && !args.without_effects {
@@ -155,7 +154,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         texts.push((path, "Rust module", export::module::module(&program, &note)));
     }
     for (path, _, text) in &texts {
-        write_text(path, text)?;
+        context.write_text(path, text)?;
     }
     let mut table = Table::new(&[("file", Align::Left), ("what", Align::Left)])
         .caption(&format!("{} for other programs", given.name));

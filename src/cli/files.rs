@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::Context;
 use super::error::CliError;
 use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory};
 use crate::log::{Provenance, escape};
@@ -38,16 +39,28 @@ pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
     })
 }
 
-/// A model file.
-pub fn model(path: &Path) -> Result<Given<ModelFile>, CliError> {
-    read(path, |name, text| {
+/// A model file; what is told of it becomes a warning of the command.
+pub fn model(path: &Path, context: &Context) -> Result<Given<ModelFile>, CliError> {
+    let model = read(path, |name, text| {
         ModelFile::parse_in(name, text, path.parent())
-    })
+    })?;
+    model
+        .value
+        .robot
+        .notes
+        .0
+        .iter()
+        .for_each(|told| context.warn(told));
+    Ok(model)
 }
 
 /// A model file of the robot given.
-pub(crate) fn model_of(path: &Path, robot: &RobotFile) -> Result<Given<ModelFile>, CliError> {
-    let model = model(path)?;
+pub(crate) fn model_of(
+    path: &Path,
+    robot: &RobotFile,
+    context: &Context,
+) -> Result<Given<ModelFile>, CliError> {
+    let model = model(path, context)?;
     model.value.belongs_to(&model.name, robot)?;
     Ok(model)
 }

@@ -65,7 +65,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let old = match &args.model {
         None => None,
         Some(path) => {
-            let model = files::model_of(path, &machine.file)?;
+            let model = files::model_of(path, &machine.file, context)?;
             given.push(model.provenance);
             Some(model.value)
         }
@@ -103,15 +103,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let mut page = report.page();
         stages::friction::pictures(&mut page, &of, &given, &quality, context.command());
         context.check()?;
-        outputs::write_text(path, &report.html())?;
+        context.write_text(path, &report.html())?;
     }
     context.check()?;
     for path in &args.plot {
         let figure = stages::friction::figure(machine, &found);
-        outputs::write_picture(path, &figure.svg())?;
+        context.write_picture(path, &figure.svg())?;
     }
     checked.write(context)?;
-    outputs::write_text(&args.output, &model.to_toml()?)?;
+    context.write_text(&args.output, &model.to_toml()?)?;
     report
         .terminal()
         .line(&format!("written: {}", args.output.display()));

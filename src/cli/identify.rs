@@ -14,7 +14,6 @@ use crate::identify::{
     LoggedRobot, RoleLogs, StageEnd, Validated,
 };
 use crate::log::LogSpec;
-use crate::output::write_whole;
 use crate::report::json::Document;
 use crate::report::stages;
 use crate::setup::Finding;
@@ -54,7 +53,7 @@ const SEED: u64 = 1;
 /// Runs the command.
 ///
 /// # Errors
-/// Every [`CliError`]; what was finished before stands in the folder, whole.
+/// Every [`CliError`]; nothing is written then but the logs of the built-in campaign, which it reads.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let folder = args.output.clone().unwrap_or_else(|| match &args.campaign {
         None => PathBuf::from(FOLDER),
@@ -64,7 +63,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         // read again below: no folder is made for a campaign that cannot be run
         Campaign::load(file)?;
     }
-    std::fs::create_dir_all(&folder).map_err(|e| {
+    context.files().make_folder(&folder).map_err(|e| {
         CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
             .hint("name another one with -o")
     })?;
@@ -153,7 +152,7 @@ fn execute(
     };
     let control = context.control();
     let found = identify::identify(&machine, &role_logs, &settings, control, &mut |end| {
-        keep(end, &machine, &title, folder, &mut files)
+        keep(end, &machine, &title, (folder, context), &mut files)
     })?;
     warnings.extend(found.warnings.iter().cloned());
     let (mut diagnosis, mut residuals) = (None, String::new());
@@ -200,10 +199,10 @@ fn execute(
         .map_err(CliError::input)?;
     context.check()?;
     if !residuals.is_empty() {
-        write(folder, "residual.svg", &residuals, &mut files)?;
+        write((folder, context), "residual.svg", &residuals, &mut files)?;
     }
-    write(folder, "report.html", &report.html(), &mut files)?;
-    write(folder, "summary.txt", &report.text(), &mut files)?;
+    write((folder, context), "report.html", &report.html(), &mut files)?;
+    write((folder, context), "summary.txt", &report.text(), &mut files)?;
     files.push("result.json".into());
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = Identified {
@@ -216,9 +215,7 @@ fn execute(
         files,
     };
     let document = Document::new("identify", &found.inputs, &warnings, &result)?;
-    write_whole(&folder.join("result.json"), |f| {
-        f.write_all(document.text().as_bytes())
-    })?;
+    context.write_text(&folder.join("result.json"), &document.text())?;
     let missed = found
         .validated
         .as_ref()
@@ -294,7 +291,7 @@ fn keep(
     end: StageEnd,
     machine: &LoggedRobot,
     unseen: &str,
-    folder: &Path,
+    folder: (&Path, &Context),
     files: &mut Vec<String>,
 ) -> Result<(), CliError> {
     match end {
@@ -312,8 +309,13 @@ fn keep(
     }
 }
 
-fn write(folder: &Path, name: &str, text: &str, files: &mut Vec<String>) -> Result<(), CliError> {
-    write_whole(&folder.join(name), |f| f.write_all(text.as_bytes()))?;
+fn write(
+    (folder, context): (&Path, &Context),
+    name: &str,
+    text: &str,
+    files: &mut Vec<String>,
+) -> Result<(), CliError> {
+    context.write_text(&folder.join(name), text)?;
     files.push(name.to_owned());
     Ok(())
 }
@@ -325,8 +327,8 @@ fn load_truth(path: &Path) -> Result<TruthFile, CliError> {
             "leave `truth` out of the campaign file, or name a .truth.toml that simulate wrote",
         )
     };
-    let text = std::fs::read_to_string(path).map_err(|e| unusable(&e))?;
-    toml::from_str(&text).map_err(|e| unusable(&e.message()))
+    let text = config::text(path).map_err(|e| unusable(&e))?;
+    TruthFile::parse(&text).map_err(|e| unusable(&e.message()))
 }
 
 /// The truth of a parameter, where it is known.

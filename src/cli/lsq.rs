@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
-use super::{
-    CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
-};
+use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, pictures, setup};
 use crate::config::campaign::EstimatorKind;
 use crate::identify::{self, LoggedRobot, LsqSettings, refined};
 use crate::log::LogSpec;
@@ -76,7 +74,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let friction = match &args.model {
         None => None,
         Some(path) => {
-            let model = files::model_of(path, &machine.file)?;
+            let model = files::model_of(path, &machine.file, context)?;
             given.push(model.provenance);
             Some((model.name, model.value))
         }
@@ -149,11 +147,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         )
         .map_err(CliError::input)?;
         context.check()?;
-        outputs::write_text(path, &report.html())?;
+        context.write_text(path, &report.html())?;
     }
     context.check()?;
     checked.write(context)?;
-    outputs::write_text(&args.output, &model.to_toml()?)?;
+    context.write_text(&args.output, &model.to_toml()?)?;
     report
         .terminal()
         .line(&format!("written: {}", args.output.display()));

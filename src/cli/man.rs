@@ -6,7 +6,6 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 use serde_json::json;
 
-use super::outputs::write_text;
 use super::{Cli, CliError, Context, Outcome};
 use crate::report::json::Document;
 
@@ -27,7 +26,7 @@ pub struct Args {
 ///
 /// # Errors
 /// A folder that is not there, or cannot be written.
-pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if !args.folder.is_dir() {
         return Err(
             CliError::output(format!("{} is no folder", args.folder.display()))
@@ -53,7 +52,7 @@ pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
             .date("")
             .render(&mut page)
             .map_err(|error| CliError::output(format!("{file}: {error}")))?;
-        write_text(&args.folder.join(&file), &String::from_utf8_lossy(&page))?;
+        context.write_text(&args.folder.join(&file), &String::from_utf8_lossy(&page))?;
         written.push(file);
     }
     let text = format!("written: {}\n", written.join(", "));

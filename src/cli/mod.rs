@@ -227,10 +227,12 @@ fn execute(
     .called(arguments);
     // Told before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
-    let outcome = cli.command.run(&context)?;
+    let mut outcome = cli.command.run(&context)?;
+    outcome.document.warn_first(context.warnings());
     outcome::show(
         &outcome,
         json,
+        context.files(),
         &mut std::io::stdout().lock(),
         &mut std::io::stderr().lock(),
     )

@@ -7,6 +7,8 @@ use std::io::{self, Write};
 use super::Destination;
 use super::error::{CliError, indented, tell};
 use super::exit::Exit;
+use crate::log::is_hidden;
+use crate::output::Together;
 use crate::report::json::Document;
 
 /// What a command hands back.
@@ -22,10 +24,12 @@ pub struct Outcome {
 
 /// Shows `outcome` and returns the status that it stands for.
 ///
+/// The files get their names once everything else is told: a document that nobody could be given leaves none.
 /// `stdout` receives either the tables or, for `--json -`, the document, and nothing else.
 pub(super) fn show(
     outcome: &Outcome,
     json: Option<&Destination>,
+    files: &Together,
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
@@ -35,11 +39,12 @@ pub(super) fn show(
     match json {
         Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
         Some(Destination::File(path)) => {
-            super::outputs::write_text(path, &outcome.document.text())?;
+            files.write(path, outcome.document.text().as_bytes())?;
             write_for_a_person(stdout, &outcome.text)?;
         }
         None => write_for_a_person(stdout, &outcome.text)?,
     }
+    files.commit()?;
     for limit in &outcome.missed {
         tell(stderr, &format!("limit missed: {}", indented(limit)));
     }
@@ -59,8 +64,16 @@ fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
 
 /// Like [`write`], but a reader that has seen enough (`| head`) is no error.
 fn write_for_a_person(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
+    // Names come from files and folders.
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_hidden(c) && !matches!(c, '\n' | '\t') {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
     let written = stdout
-        .write_all(text.as_bytes())
+        .write_all(shown.as_bytes())
         .and_then(|()| stdout.flush());
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(no_standard_output(&error)),
@@ -94,6 +107,7 @@ mod tests {
         let exit = show(
             &outcome(&[]),
             Some(&Destination::Stdout),
+            &Together::default(),
             &mut out,
             &mut err,
         );
@@ -112,6 +126,7 @@ mod tests {
         let exit = show(
             &outcome(&["q4 1.4 % > 1 %"]),
             Some(&to_file),
+            &Together::default(),
             &mut out,
             &mut err,
         );
@@ -141,17 +156,30 @@ mod tests {
     fn a_closed_pipe_ends_the_tables_quietly_but_not_the_document() {
         let result = outcome(&[]);
         let mut pipe = Failing(io::ErrorKind::BrokenPipe);
-        let tables = show(&result, None, &mut pipe, &mut Vec::new());
+        let tables = show(
+            &result,
+            None,
+            &Together::default(),
+            &mut pipe,
+            &mut Vec::new(),
+        );
         assert_eq!(tables.unwrap(), Exit::Success);
         let json = show(
             &result,
             Some(&Destination::Stdout),
+            &Together::default(),
             &mut pipe,
             &mut Vec::new(),
         );
         assert_eq!(json.unwrap_err().exit(), Exit::OutputFailed);
         let mut full = Failing(io::ErrorKind::StorageFull);
-        let tables = show(&result, None, &mut full, &mut Vec::new());
+        let tables = show(
+            &result,
+            None,
+            &Together::default(),
+            &mut full,
+            &mut Vec::new(),
+        );
         assert_eq!(tables.unwrap_err().exit(), Exit::OutputFailed);
     }
 }

@@ -4,8 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use crate::output::write_whole;
-use crate::report::figure;
 
 /// Checks the files that a command is going to write: see [`super::Context::check_outputs`].
 pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<(), CliError> {
@@ -41,24 +39,6 @@ pub(super) fn listed<'a>(
 ) -> Vec<&'a Path> {
     let plot = plot.iter().map(PathBuf::as_path);
     output.into_iter().chain(plot).chain(report).collect()
-}
-
-/// Writes a text file whole or not at all.
-pub(super) fn write_text(path: &Path, text: &str) -> Result<(), CliError> {
-    Ok(write_whole(path, |file| file.write_all(text.as_bytes()))?)
-}
-
-/// Writes a figure, as SVG or as PNG by the path's ending.
-pub(super) fn write_picture(path: &Path, svg: &str) -> Result<(), CliError> {
-    let png = path
-        .extension()
-        .is_some_and(|end| end.eq_ignore_ascii_case("png"));
-    if !png {
-        return write_text(path, svg);
-    }
-    let picture =
-        figure::png(svg).map_err(|e| CliError::output(format!("{}: {e}", path.display())))?;
-    Ok(write_whole(path, |file| file.write_all(&picture))?)
 }
 
 fn folder(path: &Path) -> &Path {
@@ -130,16 +110,5 @@ mod tests {
         assert!(error.to_string().contains("mkdir -p"));
         let error = check(&[], &[folder.path()]).unwrap_err();
         assert_eq!(error.exit(), Exit::OutputFailed);
-    }
-
-    #[test]
-    fn a_text_is_written_whole_and_nothing_is_left_beside_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.json");
-        write_text(&path, "{}\n").unwrap();
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "{}\n");
-        let error = write_text(&folder.path().join("no").join("a"), "x").unwrap_err();
-        assert_eq!(error.exit(), Exit::OutputFailed);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

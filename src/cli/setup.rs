@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, outputs};
+use super::{CliError, Context};
 use crate::config::correction::{Edit, edited};
 use crate::config::{self, ModelFile, RobotFile};
 use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
@@ -34,7 +34,7 @@ impl Checked {
     /// Writes the new robot file, where there is one, and says so.
     pub fn write(&self, context: &Context) -> Result<(), CliError> {
         if let Some((path, text)) = &self.new_file {
-            outputs::write_text(path, text)?;
+            context.write_text(path, text)?;
             context.note(&format!("written: {}", path.display()));
         }
         Ok(())

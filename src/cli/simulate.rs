@@ -13,7 +13,7 @@ use crate::config::RobotFile;
 use crate::config::model_file::Parameter;
 use crate::log::{Block, LogSpec, Provenance, Reader};
 use crate::number;
-use crate::output::{LogWriter, write_whole};
+use crate::output::LogWriter;
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::simulate::effects::EffectValue;
@@ -101,7 +101,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs = vec![robot.provenance];
     let robot = robot.value;
     let model = match &args.model {
-        Some(path) => Some(files::model_of(path, &robot)?),
+        Some(path) => Some(files::model_of(path, &robot, context)?),
         None => None,
     };
     inputs.extend(model.iter().map(|model| model.provenance.clone()));
@@ -193,8 +193,8 @@ pub(super) fn simulate_to(
     let simulated = simulate::simulate_from(order, initial)?;
     // The log gets its name last: where it stands, its truth stands too.
     let log = write_log(path, &simulated, context)?;
-    write_truth(&truth_beside(path), &simulated)?;
-    log.commit()?;
+    write_truth(&truth_beside(path), &simulated, context)?;
+    context.files().add_log(log)?;
     Ok(simulated)
 }
 
@@ -239,12 +239,12 @@ fn write_log(
     Ok(writer)
 }
 
-fn write_truth(path: &Path, simulated: &SimulatedLog) -> Result<(), CliError> {
+fn write_truth(path: &Path, simulated: &SimulatedLog, context: &Context) -> Result<(), CliError> {
     let text = simulated.truth.to_toml().map_err(|error| {
         CliError::output(format!("the truth cannot be expressed in TOML: {error}"))
     })?;
     let head = "# What was true in the simulated log beside this file. SI units and radians.";
-    Ok(write_whole(path, |file| write!(file, "{head}\n\n{text}"))?)
+    context.write_text(path, &format!("{head}\n\n{text}"))
 }
 
 fn file_name(path: &Path) -> String {

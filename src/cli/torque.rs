@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments};
-use crate::config::ModelFile;
+use super::{CliError, Context, Outcome, arguments, files};
 use crate::identify::{self, Log, LoggedRobot, refined};
 use crate::log::LogSpec;
 use crate::number;
@@ -37,8 +36,8 @@ pub struct Args {
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: [&Path; 2] = [&args.log.path, &args.model];
     context.check_outputs(&inputs, &[args.output.as_path()])?;
-    let name = args.model.display().to_string();
-    let file = ModelFile::load(&args.model)?;
+    let given = files::model(&args.model, context)?;
+    let (name, file) = (given.name, given.value);
     let refined = refined(&file, &name)?;
     let machine = LoggedRobot::new(&name, file.robot.clone());
     let joints = machine.robot.joint_names();
@@ -82,7 +81,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ]);
     }
     let document = Document::new("torque", &found.inputs, &found.warnings, &found.along)?;
-    out.commit()?;
+    context.files().add_log(out)?;
     Ok(Outcome {
         text: format!("{table}written: {}\n", args.output.display()),
         document,

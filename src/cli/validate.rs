@@ -91,7 +91,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .collect();
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
-    let given = files::model(&args.model)?;
+    let given = files::model(&args.model, context)?;
     let (name, file) = (given.name, given.value);
     let model = refined(&file, &name)?;
     let machine = LoggedRobot::new(&name, file.robot.clone());
@@ -143,14 +143,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     context.check()?;
     if let Some(path) = &args.report {
-        outputs::write_text(path, &report.html())?;
+        context.write_text(path, &report.html())?;
     }
     for path in &args.plot {
         let figure = stages::validate::figure(&found.validation, &names.join(", "));
-        outputs::write_picture(path, &figure.svg())?;
+        context.write_picture(path, &figure.svg())?;
     }
     if let Some(file) = residual {
-        file.commit()?;
+        context.files().add_log(file)?;
     }
     Ok(Outcome {
         text: report.text(),

@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::ConfigError;
 use crate::log::{escape, escape_whole, list, nearest};
+use crate::number;
 
 /// A TOML text and the name under which errors speak of it.
 pub(crate) struct Document<'a> {
@@ -20,9 +21,71 @@ impl<'a> Document<'a> {
         Self { file, text }
     }
 
-    /// Deserialises the text.
+    /// Deserialises the text, in which no number may be one that cannot be worked with.
     pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
-        toml::from_str(self.text).map_err(|error| self.explain(&error))
+        let root = DeTable::parse(self.text).map_err(|error| self.explain(&error))?;
+        let mut path = Vec::new();
+        for (key, value) in root.get_ref() {
+            path.push(key.get_ref().to_string());
+            self.numbers(value, &mut path)?;
+            path.pop();
+        }
+        T::deserialize(toml::Deserializer::from(root)).map_err(|error| self.explain(&error))
+    }
+
+    /// Refuses inf, nan and numbers beyond [`number::LARGEST`] in the value at `path`.
+    fn numbers(
+        &self,
+        value: &toml::Spanned<DeValue<'_>>,
+        path: &mut Vec<String>,
+    ) -> Result<(), ConfigError> {
+        match value.get_ref() {
+            DeValue::Float(float) => {
+                let number: f64 = float.as_str().parse().unwrap_or(f64::NAN);
+                // a variance has the square of its quantity's range
+                let size = match path.first().is_some_and(|key| key == "covariance") {
+                    true => number.abs().sqrt(),
+                    false => number,
+                };
+                if number::is_usable(size) {
+                    return Ok(());
+                }
+                let written = match number.is_finite() {
+                    true => float.as_str().to_owned(),
+                    false => number.to_string(),
+                };
+                let path: Vec<&str> = path.iter().map(String::as_str).collect();
+                return Err(ConfigError::Value {
+                    file: self.file.to_owned(),
+                    line: self.line(value.span().start),
+                    key: dotted(&path),
+                    problem: format!("holds {written}{}", number::beyond(number)),
+                    remedy: format!("give finite numbers of at most {:e}", number::LARGEST),
+                });
+            }
+            DeValue::Table(table) => {
+                for (key, value) in table {
+                    path.push(key.get_ref().to_string());
+                    self.numbers(value, path)?;
+                    path.pop();
+                }
+            }
+            DeValue::Array(array) => {
+                for (index, value) in array.iter().enumerate() {
+                    // an array of numbers is named as a whole, its line says the rest
+                    let inner = matches!(value.get_ref(), DeValue::Table(_));
+                    if inner {
+                        path.push(index.to_string());
+                    }
+                    self.numbers(value, path)?;
+                    if inner {
+                        path.pop();
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     /// Turns an error of the TOML reader into ours.
@@ -185,33 +248,29 @@ impl<'a> Document<'a> {
         Err(self.value(&path, "is nothing that this robot has", &remedy))
     }
 
-    /// Refuses what is not a finite number above 0.
+    /// Refuses what is not above 0.
     pub(crate) fn positive(&self, path: &[&str], value: f64) -> Result<(), ConfigError> {
-        if value.is_finite() && value > 0.0 {
+        if value >= number::SMALLEST {
             return Ok(());
         }
-        Err(self.value(path, &format!("is {value}"), "give a number above 0"))
+        let remedy = match value > 0.0 {
+            true => format!("give a number of at least {:e}", number::SMALLEST),
+            false => "give a number above 0".to_owned(),
+        };
+        Err(self.value(path, &format!("is {value:?}"), &remedy))
     }
 
-    /// Refuses what is not a finite number of at least 0, where it is given.
+    /// Refuses what is below 0, where it is given.
     pub(crate) fn not_negative(
         &self,
         path: &[&str],
         value: Option<f64>,
     ) -> Result<(), ConfigError> {
         match value {
-            Some(value) if !(value.is_finite() && value >= 0.0) => {
+            Some(value) if value < 0.0 => {
                 Err(self.value(path, &format!("is {value}"), "give 0 or a number above it"))
             }
             _ => Ok(()),
-        }
-    }
-
-    /// Refuses inf and nan.
-    pub(crate) fn finite(&self, path: &[&str], values: &[f64]) -> Result<(), ConfigError> {
-        match values.iter().find(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(value) => Err(self.value(path, &format!("holds {value}"), "give finite numbers")),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Reading of configuration files; those that come with the tool are found anywhere.
 
+use std::io::Read;
 use std::path::Path;
 
 use super::campaign::Campaign;
@@ -58,12 +59,29 @@ pub fn embedded(path: &Path) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
+/// Largest file of text that is read whole: a model of 200 links with its covariance has less, and a URDF
+/// names its meshes and does not hold them.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// The text of a file that is not too large, whatever stands under its name.
+pub(super) fn text_of(path: &Path) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?
+        .take(MOST_BYTES + 1)
+        .read_to_end(&mut bytes)?;
+    let unusable = |what| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(unusable("it has more than 16 MB"));
+    }
+    String::from_utf8(bytes).map_err(|_| unusable("it is no UTF-8 text"))
+}
+
 /// Text of a configuration file: the one on the disk, else the one that comes with the tool.
 ///
 /// # Errors
 /// [`ConfigError::Read`] where there is neither.
 pub fn text(path: &Path) -> Result<String, ConfigError> {
-    let error = match std::fs::read_to_string(path) {
+    let error = match text_of(path) {
         Ok(text) => return Ok(text),
         Err(error) => error,
     };
@@ -88,13 +106,16 @@ pub fn text(path: &Path) -> Result<String, ConfigError> {
     }
     Err(ConfigError::Read {
         file: shown(path),
-        remedy: remedy(&error).to_owned(),
+        remedy: match error.kind() {
+            std::io::ErrorKind::InvalidData => "name a text file of below 16 MB".to_owned(),
+            _ => remedy(&error).to_owned(),
+        },
         source: error,
     })
 }
 
 /// What a file is that is no TOML text: a URDF, or a log.
-fn other_kind(path: &Path, text: &str) -> Option<ConfigError> {
+pub(super) fn other_kind(path: &Path, text: &str) -> Option<ConfigError> {
     let file = shown(path);
     let ends = path
         .extension()

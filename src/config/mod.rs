@@ -8,6 +8,7 @@ pub mod campaign;
 mod channels;
 mod check;
 mod check_log;
+mod contents;
 pub mod correction;
 mod document;
 mod embedded;

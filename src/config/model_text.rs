@@ -7,7 +7,9 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::contents::{self, Contents};
 use super::document::Document;
+use super::embedded::other_kind;
 use super::model_file::{Covariance, Effect, LinkBody, ModelFile, ModelProvenance, Parameter};
 use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
@@ -21,6 +23,7 @@ use crate::log::LogSection;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ModelToml {
+    contents: Option<Contents>,
     robot: RobotSection,
     #[serde(default)]
     friction: FrictionSection,
@@ -63,6 +66,9 @@ impl ModelFile {
     /// The same for the text of a file in `folder`, from where the URDF is read that it may name:
     /// base parameters that the file does not give are then those of the URDF's inertials.
     pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
+        if let Some(kind) = other_kind(Path::new(file), text) {
+            return Err(kind);
+        }
         let document = Document::new(file, text);
         let mut raw: ModelToml = document.read()?;
         let mut robot = RobotFile {
@@ -88,7 +94,7 @@ impl ModelFile {
                 "[[parameter]] tables (this looks like a robot file: give it as -r, not as -m)",
             ));
         }
-        let model = Self {
+        let mut model = Self {
             robot,
             parameters: raw.parameter,
             covariance: raw.covariance,
@@ -98,6 +104,13 @@ impl ModelFile {
             drive_inertia: raw.drive_inertia,
             provenance: raw.provenance.unwrap_or_default(),
         };
+        match &raw.contents {
+            Some(contents) => contents.check(&model, &document)?,
+            None => {
+                contents::check_by_robot(&model, file)?;
+                model.robot.notes.0.push(contents::without_list(file));
+            }
+        }
         model.check_parameters(&document)?;
         model.check_covariance(&document)?;
         model.check_rest(&document)?;
@@ -129,6 +142,10 @@ impl ModelFile {
             line: 1,
             message: format!("cannot be written: {error}"),
         };
+        text.push_str("# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n");
+        let contents = BTreeMap::from([("contents", Contents::of(self))]);
+        text.push_str(&toml::to_string_pretty(&contents).map_err(unwritable)?);
+        text.push('\n');
         text.push_str(&toml::to_string(&self.robot).map_err(unwritable)?);
         text.push_str("\n# Parameters: value and standard deviation in `unit`, theta as in the report's Table 4.\n");
         for parameter in &self.parameters {
@@ -181,7 +198,6 @@ impl ModelFile {
         for (index, parameter) in self.parameters.iter().enumerate() {
             let index_text = index.to_string();
             let at = |key| ["parameter", index_text.as_str(), key];
-            document.finite(&at("value"), &[parameter.value])?;
             document.not_negative(&at("std"), parameter.std)?;
             if let Some(joint) = &parameter.joint
                 && !joints.contains(joint)
@@ -230,9 +246,6 @@ impl ModelFile {
                 &remedy,
             ));
         }
-        for row in &covariance.matrix {
-            document.finite(&["covariance", "matrix"], row)?;
-        }
         Ok(())
     }
 
@@ -248,13 +261,6 @@ impl ModelFile {
                 ));
             }
             document.not_negative(&["residual_std", joint], Some(*std))?;
-        }
-        for (index, link) in self.links.iter().enumerate() {
-            let index_text = index.to_string();
-            let at = |key| ["link", index_text.as_str(), key];
-            document.finite(&at("mass"), &[link.mass])?;
-            document.finite(&at("centre"), &link.centre)?;
-            document.finite(&at("inertia"), &link.inertia)?;
         }
         for (joint, inertia) in &self.drive_inertia {
             document.not_negative(&["drive_inertia", joint], Some(*inertia))?;
@@ -284,7 +290,6 @@ impl ModelFile {
                         what,
                     ]
                 };
-                document.finite(&at("value"), &[parameter.value])?;
                 document.not_negative(&at("std"), parameter.std)?;
             }
         }

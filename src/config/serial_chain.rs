@@ -7,10 +7,14 @@ use super::angles::Changes;
 use super::document::Document;
 use super::robot_file::RobotSection;
 use super::serial_section::{BASE, CouplingSection, FollowsSection, LinkSection, SineSection};
+use super::urdf::MOST_MOVING;
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector};
 use crate::robot::tree::{Coordinate, Coupling, Dependence, Link, Sine, Tree, TreeError};
 use crate::robot::{JointKind, Robot};
+
+/// Most links of a robot file: as many as a URDF may have that move.
+const MOST_LINKS: usize = MOST_MOVING;
 
 /// Free fall, where the file says nothing: along -z of the base \[m/s^2\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -289,7 +293,8 @@ pub(super) fn take_as_meant(
     document: &Document,
     file: &str,
 ) -> Option<String> {
-    if section.angles_as_written == Some(true) {
+    // more links than a file may have are refused by the check
+    if section.angles_as_written == Some(true) || section.link.len() > MOST_LINKS {
         return None;
     }
     let mut changes = Changes::default();
@@ -365,6 +370,14 @@ pub(super) fn check(section: &RobotSection, document: &Document) -> Result<(), C
         return Err(document.missing(
             &["robot", "link"],
             "[[robot.link]] tables, or `urdf = \"FILE\"`",
+        ));
+    }
+    if section.link.len() > MOST_LINKS {
+        let at = MOST_LINKS.to_string();
+        return Err(document.value(
+            &["robot", "link", at.as_str()],
+            &format!("is one of {} links", section.link.len()),
+            &format!("give at most {MOST_LINKS}: the chain that was measured"),
         ));
     }
     filled_in(section, document)?;

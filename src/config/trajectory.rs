@@ -192,7 +192,6 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigEr
         .fundamental_hz
         .ok_or_else(|| document.missing(&["fundamental_hz"], "the fundamental frequency in Hz"))?;
     document.positive(&["fundamental_hz"], fundamental_hz)?;
-    document.finite(&["start_s"], raw.start_s.as_slice())?;
     document.not_negative(&["blend_s"], raw.blend_s)?;
     if raw.coordinate.is_empty() {
         return Err(document.missing(
@@ -226,9 +225,6 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigEr
                 "give a_l and b_l for the same l = 1..N, at least one",
             ));
         }
-        document.finite(&["coordinate", &index, "offset"], &[coordinate.offset])?;
-        document.finite(&["coordinate", &index, "a"], &coordinate.a)?;
-        document.finite(&["coordinate", &index, "b"], &coordinate.b)?;
     }
     Ok(Fourier {
         coordinates,
@@ -254,7 +250,6 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
         document.positive(&["speeds"], speed)?;
     }
     if let Some([low, high]) = raw.range {
-        document.finite(&["range"], &[low, high])?;
         if low >= high {
             return Err(document.value(&["range"], "is empty", "write the lower end first"));
         }
@@ -284,7 +279,6 @@ fn points(document: &Document, raw: TrajectoryToml) -> Result<Points, ConfigErro
     }
     for (index, pair) in raw.point.windows(2).enumerate() {
         let index = (index + 1).to_string();
-        document.finite(&["point", &index, "t"], &[pair[0].t, pair[1].t])?;
         if pair[1].t <= pair[0].t {
             return Err(document.value(
                 &["point", &index, "t"],
@@ -299,9 +293,6 @@ fn points(document: &Document, raw: TrajectoryToml) -> Result<Points, ConfigErro
                 "give every coordinate in every point",
             ));
         }
-    }
-    for (index, point) in raw.point.iter().enumerate() {
-        document.finite(&["point", &index.to_string(), "position"], &point.position)?;
     }
     Ok(Points {
         coordinates,

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::trajectory::Trajectory;
+use crate::log::is_hidden;
 
 impl Trajectory {
     /// The file's text, which [`Trajectory::parse`] reads back to the same numbers. `head` is put
@@ -19,9 +20,9 @@ impl Trajectory {
     }
 }
 
-/// A comment must not contain control characters.
+/// A comment must not contain control characters, and none that forges what it says.
 fn printable(line: &str) -> String {
-    line.chars().filter(|c| !c.is_control()).collect()
+    line.chars().filter(|c| !is_hidden(*c)).collect()
 }
 
 #[cfg(test)]

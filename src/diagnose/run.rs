@@ -24,6 +24,7 @@ use super::uncertainty::covariance::covariance;
 use super::unexplained::errors::{Counted, Errors, errors};
 use super::unexplained::{noise, part_unexplained, unexplained};
 use crate::effect::{AugmentedModel, Cover, Torques, stationary_joints};
+use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
@@ -34,10 +35,14 @@ pub enum DiagnoseError {
     Motion(#[from] MotionError),
     #[error(
         "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
-         unknowns: give a longer log, or logs of their own by --veto and --holdout"
+         unknowns; give a longer log, or logs of their own by --veto and --holdout"
     )]
     TooFewRows { rows: usize, unknowns: usize },
-    #[error("the torque of joint {joint} is zero throughout")]
+    #[error(
+        "these logs determine none of the {unknowns} unknowns of the model; log a motion of every joint"
+    )]
+    NothingDetermined { unknowns: usize },
+    #[error("the torque of joint {joint} is zero throughout; check its channel")]
     NoTorque { joint: String },
     #[error("a torque channel has another sign or place than the model knows")]
     Channels(Suspicion),
@@ -124,6 +129,10 @@ impl<'a> Diagnosing<'a> {
         problem.rest_weight = rest_weight(&at.model, &case.stretches, &case.filters, &noise);
         if problem.rest_weight.iter().any(|weight| *weight > 0.0) {
             at = fit(&case.given, &problem)?;
+        }
+        let inverse = RankRevealingInverse::of(&at.normal);
+        if (0..at.normal.nrows()).all(|i| inverse.redundant(i)) {
+            return Err(DiagnoseError::NothingDetermined { unknowns });
         }
         Ok(Diagnosing {
             case,

@@ -92,6 +92,19 @@ pub enum ExciteError {
         did_you_mean(name, known)
     )]
     UnknownCoordinate { name: String, known: String },
+    #[error(
+        "a blend of {blend_s:?} s is {periods:.3e} periods of {fundamental_hz:?} Hz, and at most {most} are judged; give a lower `fundamental_hz` or a shorter `blend_s`"
+    )]
+    LongBlend {
+        blend_s: f64,
+        fundamental_hz: f64,
+        periods: f64,
+        most: f64,
+    },
+    #[error(
+        "the motion lasts {seconds:?} s, and at most {most:.0} s are judged; give a shorter one"
+    )]
+    LongMotion { seconds: f64, most: f64 },
     #[error("joint {joint} has no friction in the model; give one with -m that has")]
     NoLaw { joint: String },
     #[error(transparent)]

@@ -22,6 +22,11 @@ const PARTS: f64 = 400.0;
 /// Blend of a series whose file names none, which is the simulator's \[s\].
 const BLEND: f64 = 2.0;
 
+/// Most periods that a blend may last: each is looked through in parts.
+const MOST_PERIODS: f64 = 1000.0;
+/// Longest motion that is looked through \[s\]: some hours.
+const LONGEST: f64 = 1e5;
+
 /// Coordinates over time.
 type At = Box<dyn Fn(f64) -> Kinematics + Send + Sync>;
 
@@ -47,11 +52,21 @@ impl Motion {
         if let Trajectory::Fourier(fourier) = file
             && fourier.coordinates == machine.designed()
         {
-            return Ok(Self::Periodic {
-                series: series_of(machine, fourier)?,
-                blend: blend_of(fourier),
-            });
+            let blend = blend_of(fourier);
+            let periods = blend.seconds * fourier.fundamental_hz;
+            if periods > MOST_PERIODS {
+                return Err(ExciteError::LongBlend {
+                    blend_s: blend.seconds,
+                    fundamental_hz: fourier.fundamental_hz,
+                    periods,
+                    most: MOST_PERIODS,
+                });
+            }
+            let series = series_of(machine, fourier)?;
+            return Ok(Self::Periodic { series, blend });
         }
+        // before a ladder of that length is built
+        short_enough(seconds)?;
         let reference = experiment::of_file(&machine.mechanism, file, Some(seconds), seed)?;
         reference.path.check()?;
         let seconds = match (reference.path.seconds(), file) {
@@ -60,6 +75,7 @@ impl Motion {
             (None, Trajectory::Fourier(fourier)) => 1.0 / fourier.fundamental_hz,
             (None, _) => seconds,
         };
+        short_enough(seconds)?;
         let robot = machine.model.robot.clone();
         Ok(Self::Path {
             at: Box::new(move |t| kinematics(&reference, &robot, t)),
@@ -101,6 +117,16 @@ impl Motion {
                 along(machine, channels, &path)
             }
         }
+    }
+}
+
+fn short_enough(seconds: f64) -> Result<(), ExciteError> {
+    match seconds > LONGEST {
+        true => Err(ExciteError::LongMotion {
+            seconds,
+            most: LONGEST,
+        }),
+        false => Ok(()),
     }
 }
 

@@ -13,12 +13,12 @@ use crate::math::rfactor::RFactor;
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum FitError {
     #[error(
-        "{rows} rows are left after filtering and decimation, too few for {unknowns} unknowns: \
+        "{rows} rows are left after filtering and decimation, too few for {unknowns} unknowns; \
          give a longer log, a lower decimation or a higher cut-off"
     )]
     TooFewRows { rows: u64, unknowns: usize },
     #[error(
-        "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero"
+        "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero; log a motion of every joint"
     )]
     NothingExcited,
     #[error(

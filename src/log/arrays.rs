@@ -7,6 +7,7 @@ use super::rows::LogRows;
 use super::source::Checksum;
 use super::time::Stamped;
 use super::{Block, LogError};
+use crate::number::{beyond, is_usable};
 
 /// Times, joint positions and joint torques of one log, in SI units, row after row.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,7 +155,7 @@ impl ArrayRows {
         LogError::NotFinite {
             at: self.place(),
             column: column.to_owned(),
-            text: value.to_string(),
+            text: format!("{value:?}{}", beyond(value)),
             remedy: "leave such rows out: a step without rows is taken as a gap",
         }
     }
@@ -170,7 +171,7 @@ impl LogRows for ArrayRows {
             return Ok(None);
         };
         self.row += 1;
-        match t.is_finite() {
+        match is_usable(t) {
             true => Ok(Some(Stamped::Seconds(t))),
             false => Err(self.not_finite("t", t)),
         }
@@ -182,7 +183,7 @@ impl LogRows for ArrayRows {
 
     fn append(&self, block: &mut Block) -> Result<(), LogError> {
         for ((column, name), value) in self.names.iter().enumerate().zip(self.values()) {
-            if !value.is_finite() {
+            if !is_usable(value) {
                 return Err(self.not_finite(name, value));
             }
             match column < self.joints {

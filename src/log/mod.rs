@@ -49,5 +49,5 @@ pub use time::Instant;
 
 pub(crate) use columns::unit_of;
 pub(crate) use layout::channel;
-pub(crate) use names::{did_you_mean, list};
+pub(crate) use names::{did_you_mean, is_hidden, list};
 pub(crate) use source::{named_beside, remedy, shown};

@@ -15,16 +15,20 @@ pub fn escape(name: &str) -> String {
 pub fn escape_whole(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for character in text.chars() {
-        // Direction overrides and zero-width characters can forge a message as well.
-        let invisible = matches!(character,
-            '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}');
-        if character.is_control() || invisible {
-            shown.extend(character.escape_default());
-        } else {
-            shown.push(character);
+        match is_hidden(character) {
+            true => shown.extend(character.escape_default()),
+            false => shown.push(character),
         }
     }
     shown
+}
+
+/// Whether a character is no mark on the screen: control characters, and direction overrides and zero-width
+/// characters, which can forge a message as well.
+pub(crate) fn is_hidden(character: char) -> bool {
+    character.is_control()
+        || matches!(character,
+            '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
 /// The known name nearest to `name`, where one is near enough to be meant.

@@ -10,6 +10,7 @@ use super::rows::Strictness;
 use super::source::Provenance;
 use super::time::Instant;
 use super::{LogError, LogSection, LogSpec};
+use crate::number::is_usable;
 
 /// The machines whose joint states a recording holds, by their topics; none of a text log.
 ///
@@ -182,7 +183,8 @@ impl RawReader {
                     self.pass.rows.refuse_comma(index)?;
                     self.words[index] += 1;
                 }
-                column.push(number.unwrap_or(f64::NAN));
+                // what cannot be worked with is no measurement
+                column.push(number.filter(|x| is_usable(*x)).unwrap_or(f64::NAN));
             }
         }
         Ok(block.rows() > 0)

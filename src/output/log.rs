@@ -183,6 +183,11 @@ impl LogWriter {
     /// # Errors
     /// A full disk, a lost connection; then there is no file.
     pub fn commit(self) -> Result<(), OutputError> {
+        self.finish()?.commit()
+    }
+
+    /// The file with all rows in it, which lacks its name.
+    pub(super) fn finish(self) -> Result<AtomicFile, OutputError> {
         let packed = match self.sink {
             Sink::Text(text) => text.finish().and_then(|buffered| {
                 buffered
@@ -192,8 +197,7 @@ impl LogWriter {
             Sink::Messages(recording) => recording.finish(),
         };
         let file = packed.and_then(Packed::finish);
-        file.map_err(|error| OutputError::new(&self.path, error))?
-            .commit()
+        file.map_err(|error| OutputError::new(&self.path, error))
     }
 }
 

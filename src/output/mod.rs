@@ -8,14 +8,16 @@ mod columns;
 mod log;
 mod mcap;
 mod text;
+mod together;
 
 pub use log::{LogForm, LogWriter};
+pub use together::Together;
 
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 use thiserror::Error;
@@ -58,17 +60,25 @@ impl OutputError {
     }
 }
 
-/// Temporary files that are not yet renamed: what an interruption must remove.
+/// Temporary files that are not yet renamed, and folders made for them: what an interruption must remove.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Removes every file that is not finished, right before an interrupted process ends.
 ///
 /// From then on no file can be begun or finished: a thread that tries waits for the end.
 pub fn remove_unfinished() {
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    while let Some(path) = unfinished.pop_first() {
-        // It may be gone already; then nothing is left to do.
-        let _ = std::fs::remove_file(path);
+    let mut unfinished = unfinished();
+    // From the end: what a folder holds comes before it.
+    while let Some(path) = unfinished.pop_last() {
+        // It may be gone already, or a folder hold something of the user's; then nothing is left to do.
+        let _ = match path.is_dir() {
+            true => std::fs::remove_dir(path),
+            false => std::fs::remove_file(path),
+        };
     }
     // Never unlocked: a file begun now would be left behind.
     std::mem::forget(unfinished);
@@ -107,10 +117,18 @@ impl AtomicFile {
     ///
     /// # Errors
     /// A full disk, a lost connection; then there is no file.
-    pub fn commit(mut self) -> Result<(), OutputError> {
+    pub fn commit(self) -> Result<(), OutputError> {
+        let files = Together::default();
+        files.add(self)?;
+        files.commit()
+    }
+
+    /// Brings the file to the disk, under its temporary name still, with the name that it is to have;
+    /// `None` where there is nothing to rename.
+    fn ready(mut self) -> Result<Option<(NamedTempFile, PathBuf)>, OutputError> {
         let target = self.target.take();
         let finished = match target.map(BufWriter::into_inner) {
-            None => Ok(()),
+            None => Ok(None),
             Some(Err(error)) => {
                 let (error, writer) = error.into_parts();
                 // Dropping the writer would try the same write once more.
@@ -118,7 +136,15 @@ impl AtomicFile {
                 forget(&target);
                 Err(error)
             }
-            Some(Ok(target)) => finish(target),
+            Some(Ok(OutputTarget::Direct(_))) => Ok(None),
+            // Delayed writes may fail only here.
+            Some(Ok(OutputTarget::Temporary(file, path))) => match file.as_file().sync_all() {
+                Ok(()) => Ok(Some((file, path))),
+                Err(error) => {
+                    forget(&OutputTarget::Temporary(file, path));
+                    Err(error)
+                }
+            },
         };
         finished.map_err(|error| OutputError::new(&self.path, error))
     }
@@ -159,7 +185,7 @@ fn open(path: &Path) -> io::Result<OutputTarget> {
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     // The lock comes first, so that no interruption finds the file before it is known.
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut unfinished = unfinished();
     let file = builder.tempfile_in(folder).map_err(plain)?;
     unfinished.insert(file.path().to_owned());
     Ok(OutputTarget::Temporary(file, path))
@@ -174,23 +200,10 @@ fn plain(error: io::Error) -> io::Error {
     code.map_or(error, io::Error::from_raw_os_error)
 }
 
-fn finish(target: OutputTarget) -> io::Result<()> {
-    let OutputTarget::Temporary(file, path) = target else {
-        return Ok(());
-    };
-    // Delayed writes may fail only here.
-    file.as_file().sync_all()?;
-    let temporary = file.path().to_owned();
-    // Under the lock, so that an interruption finds either the temporary file or the finished one.
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    unfinished.remove(&temporary);
-    file.persist(path).map(|_| ()).map_err(|error| error.error)
-}
-
 /// A temporary file that removes itself need not be removed by an interruption.
 fn forget(target: &OutputTarget) {
     if let OutputTarget::Temporary(file, _) = target {
-        let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut unfinished = unfinished();
         unfinished.remove(file.path());
     }
 }
@@ -235,22 +248,19 @@ impl Drop for AtomicFile {
     }
 }
 
-/// Writes a file whole or not at all.
-///
-/// # Errors
-/// Whatever `content` or the system gives; then there is no file.
-pub fn write_whole(
-    path: &Path,
-    content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    let mut file = AtomicFile::create(path)?;
-    content(&mut file).map_err(|error| OutputError::new(path, error))?;
-    file.commit()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Writes a file whole or not at all.
+    fn write_whole(
+        path: &Path,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
+        let mut file = AtomicFile::create(path)?;
+        content(&mut file).map_err(|error| OutputError::new(path, error))?;
+        file.commit()
+    }
 
     fn folder() -> tempfile::TempDir {
         tempfile::tempdir().unwrap()

@@ -94,6 +94,15 @@ impl Document {
             .filter_map(Value::as_str)
     }
 
+    /// Puts further warnings before those that are in it; none stands there twice.
+    pub fn warn_first(&mut self, further: Vec<String>) {
+        let own: Vec<String> = self.warnings().map(str::to_owned).collect();
+        let mut all = further;
+        all.retain(|text| !own.contains(text));
+        all.extend(own);
+        self.fields.insert("warnings".into(), all.into());
+    }
+
     /// The fields, the envelope's first.
     pub fn fields(&self) -> &Map<String, Value> {
         &self.fields

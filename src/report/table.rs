@@ -5,6 +5,8 @@
 
 use std::fmt;
 
+use crate::log::escape_whole;
+
 /// Columns of a terminal that a table keeps to where it can.
 pub const WIDTH: usize = 80;
 /// A column of words is not wrapped below this.
@@ -38,7 +40,7 @@ impl Table {
             caption: None,
             columns: columns
                 .iter()
-                .map(|(name, align)| (printable(name), *align))
+                .map(|(name, align)| (escape_whole(name), *align))
                 .collect(),
             rows: Vec::new(),
         }
@@ -54,7 +56,7 @@ impl Table {
 
     /// A line above the headers.
     pub fn caption(mut self, text: &str) -> Self {
-        self.caption = Some(printable(text));
+        self.caption = Some(escape_whole(text));
         self
     }
 
@@ -63,7 +65,7 @@ impl Table {
         let mut row: Vec<String> = cells
             .into_iter()
             .take(self.columns.len())
-            .map(|cell| printable(cell.as_ref()))
+            .map(|cell| escape_whole(cell.as_ref()))
             .collect();
         row.resize(self.columns.len(), String::new());
         self.rows.push(row);
@@ -215,7 +217,7 @@ fn line_up(rows: &mut [Vec<String>], j: usize) {
 /// each with its line end.
 pub fn hanging(head: &str, text: &str, indent: usize) -> String {
     let room = WIDTH.saturating_sub(indent.max(length(head)));
-    let lines = flowed(&printable(text), room);
+    let lines = flowed(&escape_whole(text), room);
     let mut out = String::new();
     for (i, line) in lines.iter().enumerate() {
         match i {
@@ -328,19 +330,6 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 fn length(text: &str) -> usize {
     text.chars().count()
-}
-
-/// Names come from files: control characters are shown, never sent to the terminal.
-fn printable(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_control() {
-            shown.extend(c.escape_default());
-        } else {
-            shown.push(c);
-        }
-    }
-    shown
 }
 
 #[cfg(test)]

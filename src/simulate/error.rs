@@ -109,6 +109,17 @@ pub enum SimulateError {
         name: String,
         source: Box<SimulateError>,
     },
+    /// A log that does not fit into memory.
+    #[error(
+        "{seconds:?} s at {rate_hz:?} Hz are more than the {most} rows that are simulated at once; give at most \
+         --seconds {most_s:.0}, and several runs with seeds of their own for more"
+    )]
+    TooLong {
+        seconds: f64,
+        rate_hz: f64,
+        most: usize,
+        most_s: f64,
+    },
     /// More extra states than the integrator is compiled for.
     #[error(
         "the effects need {states} states of their own and at most {most} are possible; use fewer effects"

@@ -116,11 +116,14 @@ fn run_order<const J: usize>(
     let plant = Plant::<J>::of(order.robot, order.model)?;
     let (effects, effect_values) = built_effects(order, &Sites::of(&plant)?)?;
     let mechanism = &plant.mechanism;
+    let mut settings = settings_file::settings(order.robot, mechanism)?;
+    settings.seconds = order.seconds.unwrap_or(SECONDS);
+    settings.seed = order.seed;
+    // before a ladder of that length is built
+    settings.samples()?;
     let (drive, own_seconds) = drive(order, &plant)?;
     let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
-    let mut settings = settings_file::settings(order.robot, mechanism)?;
     settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
-    settings.seed = order.seed;
     let recording = run(&plant, effects, &start, &drive, &settings)?;
     let (header, values) = lay_out(order.robot, &recording);
     let truth = truth_of(order, &plant, &recording, effect_values);

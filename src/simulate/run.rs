@@ -121,7 +121,7 @@ fn march<const J: usize, const N: usize>(
 ) -> Result<SimulatedRun<J>, SimulateError> {
     let plant = moving.plant;
     let mechanism = &plant.mechanism;
-    let samples = (settings.seconds * settings.rate_hz).round().max(1.0) as usize;
+    let samples = settings.samples()?;
     let instants = settings
         .sensors
         .instants(samples, settings.rate_hz, settings.seed);

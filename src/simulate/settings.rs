@@ -29,7 +29,30 @@ pub struct Settings<const J: usize> {
     pub seed: u64,
 }
 
+/// Most numbers that a simulated log may have in memory, 2 GB of them.
+const MOST_NUMBERS: f64 = (1u64 << 28) as f64;
+/// Numbers of a row for each joint: positions, volts, torques, status, and what was true.
+const NUMBERS_OF_JOINT: usize = 13;
+
 impl<const J: usize> Settings<J> {
+    /// Rows of the log.
+    ///
+    /// # Errors
+    /// [`SimulateError::TooLong`] where they would not fit into memory, before any is made.
+    pub(super) fn samples(&self) -> Result<usize, SimulateError> {
+        let rows = (self.seconds * self.rate_hz).round().max(1.0);
+        let most = (MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor();
+        if rows > most {
+            return Err(SimulateError::TooLong {
+                seconds: self.seconds,
+                rate_hz: self.rate_hz,
+                most: most as usize,
+                most_s: most / self.rate_hz,
+            });
+        }
+        Ok(rows as usize)
+    }
+
     /// 1 kHz, 10 V, encoders as they are, no noise, stop at a limit.
     pub fn new(seconds: f64) -> Self {
         Self {

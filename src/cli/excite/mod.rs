@@ -11,7 +11,6 @@ use super::context::Context;
 use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
-use super::outputs::{write_picture, write_text};
 use super::{arguments, files, keep_what_there_is};
 use crate::config::trajectory::Fourier;
 use crate::config::{RobotFile, Trajectory};
@@ -70,7 +69,7 @@ pub struct Args {
     #[arg(long = "parameter", value_name = "NAME")]
     pub parameters: Vec<String>,
     /// Fundamental frequency [Hz]
-    #[arg(long, value_name = "HZ", default_value_t = 0.4, value_parser = arguments::positive)]
+    #[arg(long, value_name = "HZ", default_value_t = 0.4, value_parser = frequency)]
     pub frequency: f64,
     /// Harmonics of each coordinate
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=32))]
@@ -115,7 +114,7 @@ pub struct Args {
     #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = arguments::positive)]
+    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
     #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
@@ -136,6 +135,23 @@ pub enum CriterionName {
     DOptimal,
     /// Sum of the parameters' variances, given each joint's noise
     AOptimal,
+}
+
+/// A duration of a motion: some hours at most.
+fn seconds(text: &str) -> Result<f64, String> {
+    match arguments::positive(text)? {
+        value if value <= 1e5 => Ok(value),
+        _ => Err("must be at most 100000 s".into()),
+    }
+}
+
+/// A frequency of a machine's motion: a robot follows some Hz.
+fn frequency(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (1e-4..=1e3).contains(&value) => Ok(value),
+        Ok(_) => Err("must lie in 0.0001..1000 Hz".into()),
+        Err(_) => Err("is not a number".into()),
+    }
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -191,7 +207,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut inputs = vec![robot.provenance];
     let model = match &args.model {
         Some(path) => {
-            let given = files::model_of(path, &robot.value)?;
+            let given = files::model_of(path, &robot.value, context)?;
             inputs.push(given.provenance);
             Some((given.name, given.value))
         }
@@ -333,7 +349,9 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
     let file = names.trajectory.clone().unwrap_or_default();
     let shown = file.display().to_string();
     let mut report = written(bench, &motion, &judged, names, &shown)?;
-    write_text(&file, &trajectory.to_toml(&head(&judged)))?;
+    bench
+        .context
+        .write_text(&file, &trajectory.to_toml(&head(&judged)))?;
     report.terminal().line(&format!("written: {shown}"));
     Ok(Outcome {
         text: report.text(),
@@ -373,13 +391,15 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         let file = names.trajectory.clone().unwrap_or_default();
         let shown = file.display().to_string();
         let mut report = written(bench, &motion, &judged, names, &shown)?;
-        write_text(&file, &Trajectory::Fourier(fourier).to_toml(&head(&judged)))?;
+        let context = bench.context;
+        context.write_text(&file, &Trajectory::Fourier(fourier).to_toml(&head(&judged)))?;
         report.terminal().line(&format!("written: {shown}"));
         text += &report.text();
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {
             let stopped = Stopped { file: shown };
+            context.files().commit()?;
             return Err(CliError::from_room(Exit::Interrupted, &stopped));
         }
         let (information, rows) =
@@ -460,13 +480,13 @@ fn written(
         stages::excite::course(&mut page, judged, &figure(&escape(&title)));
         let (file, command) = (&bench.file, bench.context.command());
         provenance::section(&mut page, file, &bench.inputs, &[], None, command);
-        write_text(path, &report.html())?;
+        bench.context.write_text(path, &report.html())?;
         report
             .terminal()
             .line(&format!("written: {}", path.display()));
     }
     if let Some(path) = &names.plot {
-        write_picture(path, &figure(&title).svg())?;
+        bench.context.write_picture(path, &figure(&title).svg())?;
         report
             .terminal()
             .line(&format!("written: {}", path.display()));

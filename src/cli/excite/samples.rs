@@ -6,8 +6,11 @@ use super::Bench;
 use crate::cli::error::CliError;
 use crate::config::trajectory::Coordinates;
 use crate::excite::{ExciteError, Motion};
+use crate::number;
 use crate::output::LogWriter;
 
+/// Most samples that a file may have.
+const MOST_ROWS: f64 = 1e8;
 /// Rows between two looks at Ctrl-C.
 const BLOCK: usize = 4096;
 
@@ -28,6 +31,14 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
             header.extend(names.map(|name| format!("{prefix}{name}")));
         }
     }
+    if motion.seconds() * bench.rate_hz > MOST_ROWS {
+        return Err(CliError::input(format!(
+            "{} s at {} Hz are more than {MOST_ROWS:e} samples",
+            number::significant(motion.seconds(), 4),
+            number::significant(bench.rate_hz, 4),
+        ))
+        .hint("give a lower --rate, or a shorter motion"));
+    }
     let mut writer = LogWriter::create(path, &header)?;
     let rows = (motion.seconds() * bench.rate_hz + 1e-6).floor() as usize + 1;
     for k in 0..rows {
@@ -43,5 +54,5 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
         let values = values.flat_map(|values| values[..n].iter().copied());
         writer.row(std::iter::once(t).chain(values))?;
     }
-    Ok(writer.commit()?)
+    Ok(bench.context.files().add_log(writer)?)
 }

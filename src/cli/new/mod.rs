@@ -7,7 +7,6 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::outputs::write_text;
 use super::{CliError, Context, Outcome, inspect};
 use crate::config::{RobotFile, UrdfChain};
 use crate::identify::LoggedRobot;
@@ -183,7 +182,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             faults = Some(found?.faults);
         }
     }
-    write_text(&target, &text)?;
+    context.write_text(&target, &text)?;
     let mut provenance = Vec::new();
     if let Some(path) = &args.urdf {
         provenance.push(Provenance::of_file(path)?);

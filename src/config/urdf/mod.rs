@@ -16,18 +16,17 @@ mod parts;
 mod tree;
 mod xml;
 
-use std::io::Read;
+pub(super) use tree::MOST_MOVING;
+
 use std::path::Path;
 
 use super::ConfigError;
 use super::document::Document;
+use super::embedded::text_of;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
 use crate::log::{named_beside, remedy, shown};
 use crate::robot::tree::space::{Rotation, product};
-
-/// Largest file. A URDF names its meshes and does not hold them.
-const MOST_BYTES: u64 = 16 << 20;
 
 /// What a URDF gives to a robot file.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,19 +126,6 @@ impl UrdfChain {
         })?;
         Self::parse_with(&file, &text, tip, angles)
     }
-}
-
-/// The text of a file that is not too large.
-fn text_of(path: &Path) -> std::io::Result<String> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)?
-        .take(MOST_BYTES + 1)
-        .read_to_end(&mut bytes)?;
-    let unusable = |what| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(unusable("it has more than 16 MB"));
-    }
-    String::from_utf8(bytes).map_err(|_| unusable("it is no UTF-8 text"))
 }
 
 /// Reads the URDF that a robot file names into its links and limits, so that the file stands alone.

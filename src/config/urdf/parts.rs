@@ -8,6 +8,7 @@ use crate::config::ConfigError;
 use crate::config::angles::Changes;
 use crate::config::robot_file::CoordinateLimits;
 use crate::log::{escape, list, nearest};
+use crate::number::is_usable;
 use crate::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
 
 /// A mass with its centre and inertia, in the frame of the link that carries it.
@@ -325,7 +326,7 @@ impl Reading<'_> {
         let Some(text) = element.attribute(key) else {
             return absent.ok_or_else(|| self.lacks(element, key));
         };
-        let value = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let value = text.trim().parse::<f64>().ok().filter(|x| is_usable(*x));
         value.ok_or_else(|| {
             self.place.wrong(
                 element.line(),
@@ -342,7 +343,7 @@ impl Reading<'_> {
         };
         let numbers: Vec<f64> = text
             .split_whitespace()
-            .map_while(|word| word.parse().ok().filter(|x: &f64| x.is_finite()))
+            .map_while(|word| word.parse().ok().filter(|x| is_usable(*x)))
             .collect();
         match numbers[..] {
             [x, y, z] if text.split_whitespace().count() == 3 => Ok([x, y, z]),

@@ -17,7 +17,7 @@ use crate::robot::tree::space::{
 };
 
 /// Most moving links that are gathered; what a robot may have is fewer, and told by the chain.
-const MOST_MOVING: usize = 200;
+pub(in crate::config) const MOST_MOVING: usize = 200;
 
 /// Where a link of the URDF is: in which moving link, and how it lies there.
 #[derive(Clone, Copy)]

@@ -92,11 +92,14 @@ const LEAST_OTHERS: f64 = 0.1;
 const TURNS: usize = 10_000;
 
 impl Jackknife {
-    /// None where the normal matrix has no Cholesky factor.
+    /// None where the data determine nothing, or the normal matrix has no Cholesky factor.
     fn of(normal: &DMatrix<f64>, inverse: &RankRevealingInverse) -> Option<Self> {
         let kept: Vec<usize> = (0..normal.nrows())
             .filter(|i| !inverse.redundant(*i))
             .collect();
+        if kept.is_empty() {
+            return None;
+        }
         let scale =
             DVector::from_iterator(kept.len(), kept.iter().map(|i| normal[(*i, *i)].sqrt()));
         let factor = scaled(normal, &kept, &scale).cholesky()?.l();

@@ -8,6 +8,7 @@ use super::value::Value;
 use crate::log::layout::{Channel, Layout, column_number};
 use crate::log::section::Stamp;
 use crate::log::time::{FAR_S, Instant, Stamped};
+use crate::number::is_usable;
 
 /// The fields of one robot in messages, each with the paths that it may have.
 #[derive(Debug, Clone)]
@@ -122,7 +123,7 @@ impl RobotFields {
                 Value::Absent => None,
                 Value::Float(value) => {
                     let seconds = value * self.time_factor;
-                    if !seconds.is_finite() {
+                    if !is_usable(seconds) {
                         return None;
                     }
                     Some(match seconds.abs() < FAR_S {

@@ -16,6 +16,7 @@ use crate::log::layout::{Channel, Layout};
 use crate::log::rows::LogRows;
 use crate::log::time::Stamped;
 use crate::log::{Block, LogError, escape, source};
+use crate::number::{beyond, is_usable};
 
 /// The rows of a recording.
 pub(in crate::log) struct MessageRows {
@@ -119,11 +120,11 @@ impl MessageRows {
     ) -> Result<(), LogError> {
         for (channel, number) in channels.iter().zip(numbers) {
             let value = number * channel.factor + channel.offset;
-            if !value.is_finite() {
+            if !is_usable(value) {
                 return Err(LogError::NotFinite {
                     at: self.place(),
                     column: escape(&channel.column),
-                    text: number.to_string(),
+                    text: format!("{number:?}{}", beyond(value)),
                     remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
                 });
             }

@@ -12,6 +12,7 @@ use crate::log::layout::Layout;
 use crate::log::rows::Strictness;
 use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
+use crate::number::beyond;
 
 /// Bytes that one row may take.
 const LONGEST_ROW: usize = 1 << 20;
@@ -261,11 +262,11 @@ impl TextFile {
         let name = self.header.get(column).map(|name| escape(name));
         let (at, column_index) = (self.place(), column);
         let column = name.unwrap_or_default();
-        if number::parse(field).is_some() {
+        if let Some(value) = number::parse(field) {
             return LogError::NotFinite {
                 at,
                 column,
-                text: escape(text),
+                text: escape(text) + beyond(value),
                 remedy: "delete the rows without a measurement: a gap in time is handled, a made-up number is not",
             };
         }

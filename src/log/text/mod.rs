@@ -13,6 +13,7 @@ use super::layout::Layout;
 use super::rows::{LogRows, Strictness};
 use super::time::{FAR_S, Stamped};
 use super::{Block, LogError};
+use crate::number::is_usable;
 
 /// The time of a text log.
 #[derive(Debug, Clone, Copy)]
@@ -81,7 +82,7 @@ impl TextRows {
         let (file, time) = (&self.file, self.time.as_mut()?);
         let seconds = || {
             let seconds = file.number(time.index)? * time.seconds;
-            seconds.is_finite().then_some(seconds)
+            is_usable(seconds).then_some(seconds)
         };
         let exact = match time.exact {
             Some(exact) => exact,
@@ -139,7 +140,7 @@ impl LogRows for TextRows {
             for column in columns {
                 let value = self.file.number(column.index);
                 match value.map(|value| value * column.factor + column.offset) {
-                    Some(value) if value.is_finite() => to.push(value),
+                    Some(value) if is_usable(value) => to.push(value),
                     _ => return Err(self.file.no_number(column.index)),
                 }
             }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::colour;
+use crate::log::is_hidden;
 
 /// Fonts that are likely to be there; all measures leave room for the widest of them.
 const FONTS: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
@@ -306,7 +307,7 @@ fn px(value: f64) -> String {
     format!("{}", rounded + 0.0)
 }
 
-/// Text inside an element: markup is escaped, control characters (which XML forbids) are dropped.
+/// Text inside an element: markup is escaped, control characters (which XML forbids) and what forges text are dropped.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -315,7 +316,7 @@ fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
+            c if is_hidden(c) || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
             c => out.push(c),
         }
     }

@@ -10,7 +10,7 @@ use std::fmt::Write;
 use super::encode;
 use super::table::Table;
 use super::value::{Part, Report, Shown};
-use crate::log::Provenance;
+use crate::log::{Provenance, is_hidden};
 
 const STYLE: &str = include_str!("style.css");
 const VIEWER: &str = include_str!("viewer.js");
@@ -194,7 +194,7 @@ fn escaped(text: &str) -> String {
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&#39;"),
-            c if c.is_control() && c != '\n' => out.push('\u{fffd}'),
+            c if is_hidden(c) && c != '\n' => out.push('\u{fffd}'),
             c => out.push(c),
         }
     }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{LAWS, Machine, PlantLaw, Site, Sites};
 use crate::effect::{Entry, Key, Place, Places};
+use crate::number::is_usable;
 use crate::robot::JointKind;
 use crate::simulate::SimulateError;
 
@@ -74,7 +75,7 @@ impl FromStr for EffectSpec {
                 let key = key.trim();
                 let value: f64 = value.trim().parse().map_err(|_| malformed(pair))?;
                 let twice = spec.values.iter().any(|(known, _)| known == key);
-                if !value.is_finite() || key.is_empty() || twice {
+                if !is_usable(value) || key.is_empty() || twice {
                     return Err(malformed(pair));
                 }
                 spec.values.push((key.to_owned(), value));

@@ -1,0 +1,225 @@
+//! The files of a command: they get their names together, or none of them does.
+//!
+//! Each is written whole under a temporary name in its own folder first. A rename cannot be made of several
+//! files at once: a machine that loses its power between two of them leaves some new files beside old ones,
+//! each of them whole, and the old ones that were replaced under `.cft-ident-*.part.old`.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::NamedTempFile;
+
+use super::{AtomicFile, LogWriter, OutputError, unfinished};
+
+/// Files that are ready, and the folders that were made for them.
+#[derive(Debug, Default)]
+pub struct Together {
+    inner: Mutex<Inner>,
+}
+
+#[derive(Debug, Default)]
+struct Inner {
+    ready: Vec<Ready>,
+    folders: Vec<PathBuf>,
+}
+
+/// A file that lacks only its name.
+#[derive(Debug)]
+struct Ready {
+    file: NamedTempFile,
+    path: PathBuf,
+    /// As the user named it.
+    named: PathBuf,
+}
+
+/// A file that has its name.
+struct Renamed {
+    path: PathBuf,
+    /// What had the name before, under another.
+    old: Option<PathBuf>,
+}
+
+impl Together {
+    /// Writes a file that gets its name with the others. What is no regular file is written at once.
+    ///
+    /// # Errors
+    /// A place that cannot be written to, a full disk.
+    pub fn write(&self, path: &Path, content: &[u8]) -> Result<(), OutputError> {
+        use std::io::Write;
+        let mut file = AtomicFile::create(path)?;
+        let written = file.write_all(content);
+        written.map_err(|error| OutputError::new(path, error))?;
+        self.add(file)
+    }
+
+    /// Takes a file that is written.
+    ///
+    /// # Errors
+    /// A full disk, a lost connection.
+    pub fn add(&self, file: AtomicFile) -> Result<(), OutputError> {
+        let named = file.path.clone();
+        if let Some((file, path)) = file.ready()? {
+            self.lock().ready.push(Ready { file, path, named });
+        }
+        Ok(())
+    }
+
+    /// Takes a log that is written.
+    ///
+    /// # Errors
+    /// A full disk, a lost connection.
+    pub fn add_log(&self, log: LogWriter) -> Result<(), OutputError> {
+        self.add(log.finish()?)
+    }
+
+    /// Makes a folder, and those above it; without files in the end, it is gone again.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn make_folder(&self, path: &Path) -> std::io::Result<()> {
+        let missing: Vec<PathBuf> = path
+            .ancestors()
+            .filter(|folder| !folder.as_os_str().is_empty())
+            .take_while(|folder| !folder.exists())
+            .map(Path::to_owned)
+            .collect();
+        unfinished().extend(missing.iter().cloned());
+        // the deepest first, as they are removed
+        self.lock().folders.splice(0..0, missing);
+        std::fs::create_dir_all(path)
+    }
+
+    /// Gives all files their names, in the order in which they were added.
+    ///
+    /// # Errors
+    /// A name that cannot be given: then what was there before is there again.
+    pub fn commit(&self) -> Result<(), OutputError> {
+        let ready = std::mem::take(&mut self.lock().ready);
+        let several = ready.len() > 1;
+        // Under the lock: an interruption finds all of them finished or none.
+        let mut unfinished = unfinished();
+        let mut renamed: Vec<Renamed> = Vec::with_capacity(ready.len());
+        for Ready { file, path, named } in ready {
+            let temporary = file.path().to_owned();
+            unfinished.remove(&temporary);
+            let old = match several {
+                true => kept(&path, &temporary),
+                false => None,
+            };
+            if let Err(error) = file.persist(&path) {
+                // what stands under the other name is the same file
+                old.iter().for_each(|old| drop(std::fs::remove_file(old)));
+                renamed.into_iter().rev().for_each(Renamed::undo);
+                return Err(OutputError::new(&named, error.error));
+            }
+            renamed.push(Renamed { path, old });
+        }
+        for old in renamed.into_iter().filter_map(|file| file.old) {
+            // one that is left is a file too many, and no half one
+            let _ = std::fs::remove_file(old);
+        }
+        Ok(())
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Renamed {
+    fn undo(self) {
+        // As far as the system lets us: it has just refused something.
+        let _ = match self.old {
+            Some(old) => std::fs::rename(old, self.path),
+            None => std::fs::remove_file(self.path),
+        };
+    }
+}
+
+/// A second name for the file at `path`, where there is one and the disk knows second names.
+fn kept(path: &Path, temporary: &Path) -> Option<PathBuf> {
+    let mut old = temporary.as_os_str().to_owned();
+    old.push(".old");
+    let old = PathBuf::from(old);
+    std::fs::hard_link(path, &old).ok().map(|()| old)
+}
+
+impl Drop for Together {
+    fn drop(&mut self) {
+        let mut inner = self.lock();
+        let ready = std::mem::take(&mut inner.ready);
+        let folders = std::mem::take(&mut inner.folders);
+        drop(inner);
+        let mut unfinished = unfinished();
+        for file in ready {
+            unfinished.remove(file.file.path());
+        }
+        for folder in folders {
+            unfinished.remove(&folder);
+            // One that holds something stays.
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_appear_together_and_not_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a"), "old").unwrap();
+        let files = Together::default();
+        files.write(&at("a"), b"new").unwrap();
+        files.write(&at("b"), b"new").unwrap();
+        assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "old");
+        assert!(!at("b").exists());
+        files.commit().unwrap();
+        assert_eq!(names(folder.path()), ["a", "b"]);
+        assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_name_that_cannot_be_given_takes_the_others_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a"), "old").unwrap();
+        let files = Together::default();
+        for name in ["a", "b", "c"] {
+            files.write(&at(name), b"new").unwrap();
+        }
+        // a folder takes the last name before its file does
+        std::fs::create_dir_all(at("c").join("inside")).unwrap();
+        assert!(files.commit().is_err());
+        assert_eq!(names(folder.path()), ["a", "c"]);
+        assert_eq!(std::fs::read_to_string(at("a")).unwrap(), "old");
+    }
+
+    #[test]
+    fn what_is_dropped_leaves_neither_files_nor_folders() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("runs").join("monday");
+        let files = Together::default();
+        files.make_folder(&inside).unwrap();
+        files.write(&inside.join("a"), b"new").unwrap();
+        drop(files);
+        assert!(names(folder.path()).is_empty());
+        let files = Together::default();
+        files.make_folder(&inside).unwrap();
+        files.write(&inside.join("a"), b"new").unwrap();
+        files.commit().unwrap();
+        drop(files);
+        assert_eq!(names(&inside), ["a"]);
+    }
+}
