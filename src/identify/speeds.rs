@@ -4,6 +4,8 @@ use crate::log::{Block, Conversion};
 
 /// Time over which a speed is formed [s]: long against the steps of an encoder, short against a motion.
 const SPACING_S: f64 = 0.02;
+/// Share of a time that is as good as all of it.
+const ROUNDED: f64 = 0.999;
 /// Speed up to which a joint rests, over its rms speed.
 const RESTING: f64 = 0.01;
 
@@ -36,8 +38,10 @@ impl SpeedMeter {
         self.squares.resize(n, 0.0);
         for (t, q) in block.t.iter().zip(block.q.chunks_exact(n)) {
             let step = self.last.map_or(f64::INFINITY, |last| t - last);
+            // times are rounded, and otherwise where the clock's zero lies
+            let short = ROUNDED * SPACING_S;
             // a step back is a fault of the clock, and another begin
-            if (0.0..SPACING_S).contains(&step) {
+            if (0.0..short).contains(&step) {
                 continue;
             }
             self.now.clear();

@@ -19,7 +19,8 @@ pub struct BlockFactor {
     pub stretch: usize,
     /// Instants.
     pub rows: u64,
-    /// Upper triangle per joint, columns as in [`RegressorColumns::row_width`].
+    /// Upper triangle per joint, or its rows where they are fewer than the columns, which are those of
+    /// [`RegressorColumns::row_width`].
     pub r: Vec<DMatrix<f64>>,
 }
 
@@ -30,8 +31,9 @@ pub struct Accumulator {
     open: Vec<RFactor>,
     open_rows: u64,
     stretch: usize,
-    began: f64,
+    /// Length of a block now [s], and in rows once the first is there.
     block_seconds: f64,
+    block_rows: Option<u64>,
     blocks: Vec<BlockFactor>,
     /// Rows in which each joint moves, in a block or in the open one.
     moving: Vec<JointRows>,
@@ -76,25 +78,29 @@ impl Accumulator {
             open,
             open_rows: 0,
             stretch: 0,
-            began: 0.0,
             block_seconds,
+            block_rows: None,
             blocks: Vec::new(),
             rows: 0,
         }
     }
 
-    /// Adds one row of every joint; `channels` as [`RegressorColumns::fill`] writes them. A new `stretch`
-    /// closes the open block.
-    pub fn add(&mut self, stretch: usize, t: f64, channels: &[f64]) {
+    /// Adds one row of every joint, `step` \[s\] after the one before; `channels` as [`RegressorColumns::fill`]
+    /// writes them. A new `stretch` closes the open block. Blocks are counted in rows: times are rounded, and
+    /// otherwise where the clock's zero lies.
+    pub fn add(&mut self, stretch: usize, step: f64, channels: &[f64]) {
+        let block_rows = *self.block_rows.get_or_insert_with(|| {
+            // a step that is rounded must not cost a row
+            let rows = (self.block_seconds / step - 1e-3).ceil().max(1.0);
+            self.block_seconds = rows * step;
+            rows as u64
+        });
         if stretch != self.stretch {
             self.close();
             self.stretch = stretch;
         }
-        if self.open_rows > 0 && t - self.began >= self.block_seconds {
+        if self.open_rows >= block_rows {
             self.close();
-        }
-        if self.open_rows == 0 {
-            self.began = t;
         }
         let torques = self.columns.offset(self.columns.joints);
         let mut at = 0;
@@ -123,10 +129,8 @@ impl Accumulator {
         if self.open_rows == 0 {
             return;
         }
-        let r = self.open.iter().map(RFactor::r).collect();
-        for (j, open) in self.open.iter_mut().enumerate() {
-            *open = RFactor::new(self.columns.row_width(j));
-        }
+        let r = self.open.iter().map(RFactor::short).collect();
+        self.open.iter_mut().for_each(RFactor::clear);
         self.blocks.push(BlockFactor {
             stretch: self.stretch,
             rows: self.open_rows,
@@ -139,13 +143,14 @@ impl Accumulator {
     }
 
     fn halve(&mut self) {
+        self.block_rows = self.block_rows.map(|rows| 2 * rows);
         self.block_seconds *= 2.0;
         let old = std::mem::take(&mut self.blocks);
         let mut old = old.into_iter().peekable();
         while let Some(mut first) = old.next() {
             if let Some(second) = old.next_if(|b| b.stretch == first.stretch) {
                 for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
-                    *a = merged([&*a, b], self.columns.row_width(j));
+                    *a = stacked([&*a, b], self.columns.row_width(j)).short();
                 }
                 first.rows += second.rows;
             }
@@ -160,6 +165,7 @@ impl Accumulator {
         BlockFactors {
             columns: self.columns,
             blocks: self.blocks,
+            block_seconds: self.block_seconds,
             moving: self.moving,
             resting,
             at_rest: at_rest.iter().map(RFactor::r).collect(),
@@ -168,8 +174,8 @@ impl Accumulator {
     }
 }
 
-/// R factor of several stacked triangles.
-fn merged<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> DMatrix<f64> {
+/// Several triangles, one under the other.
+fn stacked<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize) -> RFactor {
     let mut factor = RFactor::new(columns);
     let mut row = vec![0.0; columns];
     for part in parts {
@@ -180,7 +186,7 @@ fn merged<'a>(parts: impl IntoIterator<Item = &'a DMatrix<f64>>, columns: usize)
             factor.fold(&row);
         }
     }
-    factor.r()
+    factor
 }
 
 /// A joint's residual: its norm over that of the filtered torque, fractions.
@@ -213,6 +219,8 @@ impl RelativeResidual {
 pub struct BlockFactors {
     pub columns: RegressorColumns,
     pub blocks: Vec<BlockFactor>,
+    /// Length of the shortest whole block [s].
+    pub block_seconds: f64,
     /// Rows of each joint in the blocks: those in which it moves.
     pub moving: Vec<JointRows>,
     /// Those in which it rests; they are in no block.
@@ -235,9 +243,10 @@ impl BlockFactors {
             self.moving[j].merge(other.moving[j]);
             if other.resting[j].count > 0 {
                 self.resting[j].merge(other.resting[j]);
-                self.at_rest[j] = merged([&self.at_rest[j], r], self.columns.row_width(j));
+                self.at_rest[j] = stacked([&self.at_rest[j], r], self.columns.row_width(j)).r();
             }
         }
+        self.block_seconds = self.block_seconds.min(other.block_seconds);
         self.rows += other.rows;
     }
 
@@ -270,6 +279,7 @@ impl BlockFactors {
         });
         BlockFactors {
             blocks: blocks.collect(),
+            block_seconds: self.block_seconds,
             at_rest: self
                 .at_rest
                 .iter()
@@ -293,6 +303,7 @@ impl BlockFactors {
                 rows: self.rows,
                 r,
             }],
+            block_seconds: self.block_seconds,
             moving: self.moving.clone(),
             resting: self.resting.clone(),
             at_rest: self.at_rest.clone(),
@@ -340,10 +351,8 @@ impl BlockFactors {
 
     /// R factor of the rows of joint j in which it moves.
     pub fn joint(&self, j: usize) -> DMatrix<f64> {
-        merged(
-            self.blocks.iter().map(|b| &b.r[j]),
-            self.columns.row_width(j),
-        )
+        let parts = self.blocks.iter().map(|b| &b.r[j]);
+        stacked(parts, self.columns.row_width(j)).r()
     }
 
     /// Restriction of the global unknowns to those of joint j.

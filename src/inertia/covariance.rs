@@ -67,7 +67,7 @@ pub(super) fn covariance(
         })
         .collect();
     let sandwich = &solution.inverse
-        * (long_run(&scores, u, bandwidth(&scores, u)) + known)
+        * (long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds)) + known)
         * &solution.inverse
         * freedom;
     // Correlation can only take certainty away here: where the estimate of the middle comes out
@@ -96,35 +96,45 @@ pub(super) fn covariance(
     (Covariances { sandwich, total }, textbook, sensitivity)
 }
 
-/// Least number of neighbouring blocks whose scores count as correlated.
+/// Time over whose sums of scores the correlation from one to the next is taken [s]; filters alone make shorter
+/// ones alike.
+const NEIGHBOUR_SECONDS: f64 = 0.25;
+/// Least number of such neighbours that count as correlated.
 const LEAST_LAG: f64 = 4.0;
 
-/// Andrews' automatic bandwidth for Bartlett's kernel from first-order autoregressions of each
-/// score, equal weights after normalisation.
-pub(super) fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize) -> usize {
-    let n = scores.len();
+/// Andrews' automatic bandwidth for Bartlett's kernel, in blocks of `block_seconds`, from first-order autoregressions
+/// of each score, equal weights after normalisation. Sums begin at every block, so that it does not matter
+/// where the first one does.
+pub(super) fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize, block_seconds: f64) -> f64 {
+    let k = (NEIGHBOUR_SECONDS / block_seconds).round().max(1.0) as usize;
+    let n = scores.len() as f64 / k as f64;
+    let (mut c0, mut c1) = (DVector::<f64>::zeros(u), DVector::<f64>::zeros(u));
+    let sum = |part: &[(usize, DVector<f64>)]| {
+        let mut sum = DVector::<f64>::zeros(u);
+        part.iter().for_each(|(_, score)| sum += score);
+        sum
+    };
+    for pair in scores.windows(2 * k) {
+        if pair[0].0 == pair[2 * k - 1].0 {
+            let (a, b) = (sum(&pair[..k]), sum(&pair[k..]));
+            c0 += a.component_mul(&a);
+            c1 += a.component_mul(&b);
+        }
+    }
     let (mut above, mut below) = (0.0, 0.0);
-    for i in 0..u {
-        let (mut c0, mut c1) = (0.0, 0.0);
-        for w in scores.windows(2) {
-            if w[0].0 == w[1].0 {
-                c0 += w[0].1[i] * w[0].1[i];
-                c1 += w[0].1[i] * w[1].1[i];
-            }
-        }
-        if c0 > 0.0 {
-            let rho = (c1 / c0).clamp(-0.97, 0.97);
-            above += 4.0 * rho * rho / ((1.0 - rho).powi(6) * (1.0 + rho).powi(2));
-            below += 1.0 / (1.0 - rho).powi(4);
-        }
+    for (c0, c1) in c0.iter().zip(&c1).filter(|(c0, _)| **c0 > 0.0) {
+        let rho = (c1 / c0).clamp(-0.97, 0.97);
+        above += 4.0 * rho * rho / ((1.0 - rho).powi(6) * (1.0 + rho).powi(2));
+        below += 1.0 / (1.0 - rho).powi(4);
     }
     if below <= 0.0 {
-        return 0;
+        return 0.0;
     }
-    let lag = 1.1447 * (above / below * n as f64).cbrt();
+    let lag = 1.1447 * (above / below * n).cbrt();
     // the parallel filter alone correlates neighbouring blocks; and a fifth of the record is the
     // longest correlation that it can still show
-    lag.ceil().max(LEAST_LAG).min(n as f64 / 5.0) as usize
+    let lag = lag.max(LEAST_LAG).min(n / 5.0);
+    (lag + 1.0) * k as f64 - 1.0
 }
 
 /// Scales rows and columns of a covariance so that no variance is below that of `floor`.

@@ -135,7 +135,7 @@ pub fn accumulate<E: Send>(
                 None,
                 wide.channels(),
                 &|s, out| fill(robot, columns, &wide, s, out),
-                &mut |row| factors.add(row.segment, row.t, row.filtered),
+                &mut |row| factors.add(row.segment, row.step, row.filtered),
             )
         },
     )?;
@@ -334,7 +334,11 @@ fn solve(factors: &BlockFactors, columns: &RegressorColumns, plain: &Fit) -> Res
     let freedom = rows / (rows - u as f64 / n as f64).max(1.0);
     let about = |middle: DMatrix<f64>| &inverse * middle * inverse.transpose() * freedom;
     fit.textbook = about(system.square);
-    let long = about(long_run(&scores, u, bandwidth(&scores, u)));
+    let long = about(long_run(
+        &scores,
+        u,
+        bandwidth(&scores, u, factors.block_seconds),
+    ));
     fit.covariance = at_least(long, &fit.textbook);
     add_known_friction(&mut fit, &joints, columns, &weights, &inverse);
     fit.theta = theta;

@@ -31,8 +31,9 @@ use accumulate::{Accumulator, BlockFactors};
 use columns::RegressorColumns;
 use robust::Weigher;
 
-/// Length of the blocks whose scores make the covariance, to begin with [s].
-const BLOCK_SECONDS: f64 = 0.25;
+/// Length of the blocks whose scores make the covariance, to begin with [s]: so short beside the time over which
+/// residuals are correlated that it does not matter where they begin.
+const BLOCK_SECONDS: f64 = 0.05;
 
 /// Reads one log and reduces its filtered, decimated rows to block factors. Those of several logs merge.
 ///
@@ -71,7 +72,7 @@ pub fn accumulate_weighted<E>(
                 Some(weigher) => weigher.weigh(columns, row.filtered),
                 None => row.filtered,
             };
-            factors.add(row.segment, row.t, channels);
+            factors.add(row.segment, row.step, channels);
         },
     )?;
     Ok((factors.finish(), summary))

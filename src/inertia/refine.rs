@@ -357,6 +357,7 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
 
 #[cfg(test)]
 mod tests {
+    use super::super::BLOCK_SECONDS;
     use super::super::accumulate::Accumulator;
     use super::super::columns::KnownFriction;
     use super::super::law_start::begin;
@@ -384,7 +385,7 @@ mod tests {
         let law = DoubleTanh::from_parameters(LAW);
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
-        let mut all = Accumulator::new(columns.clone(), 0.25);
+        let mut all = Accumulator::new(columns.clone(), BLOCK_SECONDS);
         let mut channels = vec![0.0; columns.channels()];
         for k in 0..6000 {
             let t = f64::from(k) * 0.01;
@@ -392,7 +393,7 @@ mod tests {
             let a = draw();
             let tau = INERTIA * a + law.torque(v) + 0.3 + noise * draw();
             columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, t, &channels);
+            all.add(0, 0.01, &channels);
         }
         Ok(all.finish())
     }

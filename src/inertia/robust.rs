@@ -314,6 +314,7 @@ pub fn irls<E: From<FitError>>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::BLOCK_SECONDS;
     use super::super::accumulate::Accumulator;
     use super::super::columns::Own;
     use super::*;
@@ -340,7 +341,7 @@ mod tests {
         };
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
-        let mut all = Accumulator::new(columns.clone(), 0.25);
+        let mut all = Accumulator::new(columns.clone(), BLOCK_SECONDS);
         let mut channels = vec![0.0; columns.channels()];
         let mut pick = ChaCha8Rng::seed_from_u64(seed + 1000);
         for k in 0..4000 {
@@ -352,8 +353,8 @@ mod tests {
             }
             columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
             match &mut weigher {
-                Some(weigher) => all.add(0, t, weigher.weigh(&columns, &channels)),
-                None => all.add(0, t, &channels),
+                Some(weigher) => all.add(0, 0.01, weigher.weigh(&columns, &channels)),
+                None => all.add(0, 0.01, &channels),
             }
         }
         Ok(all.finish())

@@ -179,6 +179,7 @@ fn finish(
 
 #[cfg(test)]
 mod tests {
+    use super::super::BLOCK_SECONDS;
     use super::super::accumulate::Accumulator;
     use super::super::columns::{KnownFriction, Own, RegressorColumns};
     use super::*;
@@ -214,7 +215,7 @@ mod tests {
         correlation: f64,
         seed: u64,
     ) -> BlockFactors {
-        in_blocks(0.25, columns, rows, noise, correlation, seed)
+        in_blocks(BLOCK_SECONDS, columns, rows, noise, correlation, seed)
     }
 
     fn in_blocks(
@@ -240,7 +241,7 @@ mod tests {
             };
             let tau = 3.0 * a + friction + e;
             columns.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, t, &channels);
+            all.add(0, 0.01, &channels);
         }
         all.finish()
     }
@@ -306,16 +307,16 @@ mod tests {
     #[test]
     fn columns_that_the_motion_cannot_part_are_named_and_not_numbered() {
         let c = columns(vec![Own::Viscous, Own::Coulomb, Own::Offset], None);
-        let mut all = Accumulator::new(c.clone(), 0.25);
+        let mut all = Accumulator::new(c.clone(), BLOCK_SECONDS);
         let robot = Robot::single_joint("q1", JointKind::Prismatic);
         let mut channels = vec![0.0; c.channels()];
         let mut chance = Chance(99);
-        for k in 0..2000 {
+        for _ in 0..2000 {
             // always forward: Coulomb friction and offset are one column
             let (v, a) = (1.0 + 0.5 * chance.next(), chance.next());
             let tau = 3.0 * a + 2.0 * v + 0.7;
             c.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-            all.add(0, k as f64 * 0.01, &channels);
+            all.add(0, 0.01, &channels);
         }
         let fit = fit(&all.finish(), Weighting::Wls).unwrap();
         assert_eq!(fit.rank, 3);
@@ -351,7 +352,7 @@ mod tests {
                     covariance,
                 }),
             );
-            let mut all = Accumulator::new(off.clone(), 0.25);
+            let mut all = Accumulator::new(off.clone(), BLOCK_SECONDS);
             let mut channels = vec![0.0; off.channels()];
             let mut chance = Chance(4 * 2 + 12345);
             for i in 0..3000 {
@@ -360,7 +361,7 @@ mod tests {
                 chance.next();
                 let tau = 3.0 * a + law.torque(v);
                 off.fill(&robot, &[0.0], &[v], &[a], &[tau], &mut channels);
-                all.add(0, t, &channels);
+                all.add(0, 0.01, &channels);
             }
             let moved = fit(&all.finish(), Weighting::Ols).unwrap();
             let difference = (moved.theta[0] - base.theta[0]) / step;

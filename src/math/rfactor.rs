@@ -119,6 +119,25 @@ impl RFactor {
         DMatrix::from_row_slice(n, n, &triangle)
     }
 
+    /// The rows themselves while they are fewer than the columns, `k x columns`, otherwise R: either has the products
+    /// of the stacked matrix, and few rows need no reflection.
+    pub fn short(&self) -> DMatrix<f64> {
+        let few = self.rows == self.pending as u64 && self.pending < self.columns;
+        match few {
+            true => DMatrix::from_fn(self.pending, self.columns, |k, j| {
+                self.block[j * BLOCK_ROWS + k]
+            }),
+            false => self.r(),
+        }
+    }
+
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        self.triangle.fill(0.0);
+        self.pending = 0;
+        self.rows = 0;
+    }
+
     fn push(&mut self, row: &[f64]) {
         for (column, &x) in self.block.chunks_exact_mut(BLOCK_ROWS).zip(row) {
             column[self.pending] = x;

@@ -74,6 +74,8 @@ pub struct FilteredRow<'a> {
     pub t: f64,
     /// Segment of the log, counted from 0 over the segments that are used.
     pub segment: usize,
+    /// Time from one row that is kept to the next, the same for all of a log (s).
+    pub step: f64,
     /// Positions after the position filter [m or rad].
     pub q: &'a [f64],
     /// Velocities [m/s or rad/s].

@@ -19,6 +19,8 @@ pub(super) struct FilterWindow {
     pub core: std::ops::Range<usize>,
     /// Whether the window reaches the segment's end.
     pub ends: bool,
+    /// Time from one row that is kept to the next [s].
+    step: f64,
     pub t: Vec<f64>,
     pub q: Vec<f64>,
     pub tau: Vec<f64>,
@@ -46,6 +48,7 @@ impl FilterWindow {
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) -> Result<(), MotionError> {
         let samples = self.t.len();
+        self.step = chain.dt * chain.decimation as f64;
         let dt = step_of(&self.t, chain.dt);
         if let Some(filter) = &chain.position {
             filter.run(&mut self.q, joints)?;
@@ -99,6 +102,7 @@ impl FilterWindow {
             FilteredRow {
                 t: self.t[k],
                 segment: self.segment,
+                step: self.step,
                 q: &self.q[state.clone()],
                 v: &self.v[state.clone()],
                 a: &self.a[state],

@@ -318,7 +318,7 @@ impl<'a> CandidateTest<'a> {
         }
         let count = scores.len() as f64;
         let lag = LAG.min((count / 8.0) as usize);
-        let mut middle = long_run(&scores, k, lag);
+        let mut middle = long_run(&scores, k, lag as f64);
         // as if rows were independent: weighted residuals have variance 1 by construction
         let (_, after, rows) = self.touched(columns, s, total);
         let variance = after / rows.max(1.0);

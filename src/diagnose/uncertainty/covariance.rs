@@ -56,7 +56,7 @@ fn of_residual(at: &FittedModel, problem: &FitProblem) -> DMatrix<f64> {
     let found: Vec<(usize, (usize, DVector<f64>))> = fitted.map(of_piece).collect();
     let rows = found.iter().map(|(rows, _)| *rows as f64).sum::<f64>();
     let scores: Vec<(usize, DVector<f64>)> = found.into_iter().map(|(_, score)| score).collect();
-    let mut middle = long_run(&scores, u, LAG);
+    let mut middle = long_run(&scores, u, LAG as f64);
     // the prior is data too
     middle += &at.information * problem.prior.rows_per_independent.max(1.0);
     let total = base.total(&problem.split, &at.weights, &RowRole::fitted);

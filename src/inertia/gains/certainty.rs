@@ -122,7 +122,9 @@ fn covariance(
         .iter()
         .map(|m| (m.stretch, m.score.clone()))
         .collect();
-    let length = bandwidth(&scores, u) + 1;
+    let sets = problem.sets.iter();
+    let seconds = sets.fold(f64::INFINITY, |s, set| s.min(set.factors.block_seconds));
+    let length = bandwidth(&scores, u, seconds).ceil() as usize + 1;
     let mut spread = DMatrix::zeros(u, u);
     let mut groups = 0;
     for stretch in moments.chunk_by(|a, b| a.stretch == b.stretch) {
