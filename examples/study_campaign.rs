@@ -119,6 +119,7 @@ fn campaign(seed: u64) -> Value {
         known.push(Some(KnownFriction {
             law: e.law,
             covariance: e.covariance,
+            held: [true; 5],
         }));
     }
 

@@ -49,6 +49,7 @@ fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFrict
         Some(KnownFriction {
             law: e.law,
             covariance: e.covariance,
+            held: [true; 5],
         })
     };
     (0..JOINTS.len()).map(of).collect()

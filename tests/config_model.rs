@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use cft_ident::config::model_file::{
-    Covariance, Effect, EffectParameter, ModelFile, ModelProvenance, Parameter, Verdict,
+    Covariance, Effect, EffectParameter, FrictionPrior, ModelFile, ModelProvenance, Parameter,
+    Verdict,
 };
 use cft_ident::config::{ConfigError, RobotFile};
 use cft_ident::log::Provenance;
@@ -68,6 +69,14 @@ fn model(values: &[f64]) -> ModelFile {
             matrix: vec![vec![at(0), at(1)], vec![at(1), at(2)]],
         }),
         residual_std: BTreeMap::from([("q1".to_owned(), at(4).abs())]),
+        friction_prior: vec![FrictionPrior {
+            joint: "q4".to_owned(),
+            speeds_covered: Some([at(7).abs(), at(8).abs()]),
+            values: Some(std::array::from_fn(at)),
+            covariance: Some(std::array::from_fn(|a| std::array::from_fn(|b| at(a * b)))),
+            logs: Vec::new(),
+            refined_by: Vec::new(),
+        }],
         effects: vec![Effect {
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),

@@ -332,6 +332,7 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         parameters.push(parameter("offset", Some(joint), model.offset[j]));
     }
     ModelFile {
+        friction_prior: Vec::new(),
         robot,
         parameters,
         covariance: None,

@@ -36,6 +36,7 @@ fn fitted(robot: &Robot, truth: &CftTruth, recording: &SimulatedRun<4>) -> Fit {
         Some(KnownFriction {
             law,
             covariance: [[0.0; 5]; 5],
+            held: [true; 5],
         })
     });
     let columns = RegressorColumns {

@@ -252,6 +252,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     let mut parameters = synthetic.truth.parameters.clone();
     parameters[0].value = 130.0;
     let model = ModelFile {
+        friction_prior: Vec::new(),
         robot: robot.clone(),
         parameters,
         covariance: None,
@@ -315,6 +316,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
             verdict: None,
         };
     let model = ModelFile {
+        friction_prior: Vec::new(),
         robot: robot.clone(),
         parameters: vec![
             parameter("inertia", None, 95.1089),

@@ -500,6 +500,7 @@ impl Campaign {
             known.push(Some(KnownFriction {
                 law: e.law,
                 covariance: e.covariance,
+                held: [true; 5],
             }));
             if !keep {
                 all.extend(arm(all.len(), &lab.log(&recording)));

@@ -41,6 +41,9 @@ pub struct Args {
     /// Seed of the simulation and of the starting points [default: the campaign's]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Leave the friction of the one-joint logs as it is in the fit of the inertias
+    #[arg(long)]
+    pub hold_friction: bool,
     #[command(flatten)]
     pub setup: setup::SetupArgs,
 }
@@ -82,7 +85,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         (&name, &campaign),
         &base,
         &folder,
-        (&args.setup, context),
+        (args, context),
         warnings,
     )?;
     outcome.text += &format!(
@@ -117,7 +120,7 @@ fn execute(
     (name, campaign): (&str, &Campaign),
     base: &Path,
     folder: &Path,
-    (args, context): (&setup::SetupArgs, &Context),
+    (args, context): (&Args, &Context),
     mut warnings: Vec<String>,
 ) -> Result<Outcome, CliError> {
     let robot = resolve(base, &campaign.robot);
@@ -139,7 +142,7 @@ fn execute(
         (&robot, &[]),
         &logs_of(&training),
         None,
-        args,
+        &args.setup,
         context,
     )?;
     checked.write(context)?;
@@ -148,6 +151,7 @@ fn execute(
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
         consistent: campaign.settings.feasible,
+        hold_friction: args.hold_friction,
         ..IdentifySettings::default()
     };
     let control = context.control();

@@ -39,6 +39,9 @@ pub struct Args {
     /// [kg] besides those without it; with no log given, ratios of gains alone
     #[arg(long, value_name = "LOG:mass=KG[+-STD]", num_args = 0..=1, conflicts_with = "model")]
     pub fit_gains: Option<Option<KnownPayload>>,
+    /// Leave the friction of the model file as it is; its covariance stays in the deviations
+    #[arg(long, requires = "model")]
+    pub hold_friction: bool,
     /// Only parameters of links that can exist; the model file then holds the links too
     #[arg(long)]
     pub feasible: bool,
@@ -109,6 +112,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         estimator: args.estimator,
         consistent: args.feasible,
         friction: known,
+        hold_friction: args.hold_friction,
         gains: gains.as_ref(),
     };
     let robot = Path::new(&args.robot);

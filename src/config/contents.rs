@@ -22,6 +22,9 @@ pub struct Contents {
     covariance: usize,
     /// Joints whose residual is known.
     residual_std: Vec<String>,
+    /// Joints of which it keeps what one-joint logs told.
+    #[serde(default)]
+    friction_prior: Vec<String>,
     /// Number of physically consistent links.
     links: usize,
     /// Joints whose drive's inertia is given beside them.
@@ -49,6 +52,11 @@ impl Contents {
             effects: model.effects.iter().map(effect_key).collect(),
             covariance: model.covariance.as_ref().map_or(0, |c| c.names.len()),
             residual_std: model.residual_std.keys().cloned().collect(),
+            friction_prior: model
+                .friction_prior
+                .iter()
+                .map(|p| p.joint.clone())
+                .collect(),
             links: model.links.len(),
             drive_inertia: model.drive_inertia.keys().cloned().collect(),
             inputs: model.provenance.inputs.len(),
@@ -63,6 +71,7 @@ impl Contents {
             ("effects", &self.effects, found.effects),
             ("residual_std", &self.residual_std, found.residual_std),
             ("drive_inertia", &self.drive_inertia, found.drive_inertia),
+            ("friction_prior", &self.friction_prior, found.friction_prior),
         ];
         for (list, wanted, mut found) in names {
             for name in wanted {

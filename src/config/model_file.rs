@@ -73,6 +73,30 @@ pub struct EffectParameter {
     pub unit: String,
 }
 
+/// What the one-joint logs of a joint told of its friction, before a fit of other logs refined it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionPrior {
+    /// Joint.
+    pub joint: String,
+    /// Least and greatest speed of its one-joint logs [m/s or rad/s].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speeds_covered: Option<[f64; 2]>,
+    /// Parameters in the order of [`DoubleTanh::NAMES`], in the units of `[[parameter]]`; absent where those of the
+    /// file are meant, which nothing has refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub values: Option<[f64; 5]>,
+    /// Their covariance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[[f64; 5]; 5]>,
+    /// The logs that tell it.
+    #[serde(default)]
+    pub logs: Vec<Provenance>,
+    /// The logs that refined it to the parameters of the file.
+    #[serde(default)]
+    pub refined_by: Vec<Provenance>,
+}
+
 /// An effect that was added to the declared model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -130,6 +154,8 @@ pub struct ModelFile {
     pub covariance: Option<Covariance>,
     /// Standard deviation of the torque residual by joint [N or Nm], for prediction bands.
     pub residual_std: BTreeMap<String, f64>,
+    /// What one-joint logs told of the friction, joint by joint.
+    pub friction_prior: Vec<FrictionPrior>,
     /// Effects added to the declared model.
     pub effects: Vec<Effect>,
     /// Physically consistent links that give these parameters, where they were asked for.

@@ -10,7 +10,9 @@ use serde::Deserialize;
 use super::contents::{self, Contents};
 use super::document::Document;
 use super::embedded::other_kind;
-use super::model_file::{Covariance, Effect, LinkBody, ModelFile, ModelProvenance, Parameter};
+use super::model_file::{
+    Covariance, Effect, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
+};
 use super::robot_file::{
     ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
     RobotSection, SensorsSection,
@@ -44,6 +46,8 @@ pub(super) struct ModelToml {
     covariance: Option<Covariance>,
     #[serde(default)]
     residual_std: BTreeMap<String, f64>,
+    #[serde(default)]
+    friction_prior: Vec<FrictionPrior>,
     #[serde(default)]
     effect: Vec<Effect>,
     #[serde(default)]
@@ -99,6 +103,7 @@ impl ModelFile {
             parameters: raw.parameter,
             covariance: raw.covariance,
             residual_std: raw.residual_std,
+            friction_prior: raw.friction_prior,
             effects: raw.effect,
             links: raw.link,
             drive_inertia: raw.drive_inertia,
@@ -169,6 +174,11 @@ impl ModelFile {
                 "\n# Standard deviation of the torque residual by joint.\n[residual_std]\n",
             );
             text.push_str(&toml::to_string(&self.residual_std).map_err(unwritable)?);
+        }
+        if !self.friction_prior.is_empty() {
+            text.push_str("\n# Friction as one-joint logs tell it: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
+            let priors = BTreeMap::from([("friction_prior", &self.friction_prior)]);
+            text.push_str(&toml::to_string(&priors).map_err(unwritable)?);
         }
         if !self.effects.is_empty() {
             text.push_str("\n# Effects added to the declared model.\n");
@@ -261,6 +271,14 @@ impl ModelFile {
                 ));
             }
             document.not_negative(&["residual_std", joint], Some(*std))?;
+        }
+        for (index, prior) in self.friction_prior.iter().enumerate() {
+            let index_text = index.to_string();
+            let at = |key| ["friction_prior", index_text.as_str(), key];
+            if !joints.contains(&prior.joint) {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
+            }
         }
         for (joint, inertia) in &self.drive_inertia {
             document.not_negative(&["drive_inertia", joint], Some(*inertia))?;

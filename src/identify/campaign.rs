@@ -33,6 +33,8 @@ pub struct IdentifySettings {
     pub estimator: EstimatorKind,
     /// Only physically consistent parameters.
     pub consistent: bool,
+    /// The friction of the one-joint logs stays as it is.
+    pub hold_friction: bool,
     /// How effects are looked for.
     pub diagnose: DiagnoseSettings,
 }
@@ -99,6 +101,7 @@ pub fn identify<E: From<IdentifyError>>(
         estimator: settings.estimator,
         consistent: settings.consistent,
         friction: of_friction.map(|model| ("friction.toml", model)),
+        hold_friction: settings.hold_friction,
         gains: None,
     };
     let dynamics = lsq(machine, &logs.identification, &lsq_settings, control)?;

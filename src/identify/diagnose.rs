@@ -6,12 +6,13 @@ use serde::Serialize;
 use super::control::Control;
 use super::error::IdentifyError;
 use super::in_memory::{InMemory, read_whole};
+use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::prior::{information, moved_alone, open};
 use crate::config::ModelFile;
-use crate::config::model_file::Parameter;
+use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
     self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion,
     Unknown,
@@ -60,6 +61,8 @@ pub struct Diagnosed {
     pub logs: Vec<String>,
     /// The model as it was given.
     pub given: AugmentedModel,
+    /// What a refined model keeps of the friction before these logs.
+    friction_prior: Vec<FrictionPrior>,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
@@ -97,9 +100,13 @@ pub fn diagnose(
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
     let mut in_memory = read_whole(machine, &all, control)?;
+    let known = logs.train.iter().filter(|_| !settings.keep);
+    let known = known.map(|log| machine.open(log, control)?.provenance());
+    let known = known.collect::<Result<Vec<_>, _>>()?;
+    let (before, friction_prior) = before_these((name, file), &known)?;
     let case = case(
         machine,
-        (name, file),
+        (name, file, &before),
         given,
         &mut in_memory,
         (roles, settings),
@@ -135,6 +142,7 @@ pub fn diagnose(
         in_memory,
         logs,
         given: case.given,
+        friction_prior,
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     })))
@@ -171,10 +179,11 @@ fn refused(
     Ok(None)
 }
 
-/// What the search is about; it takes the stretches of the logs.
+/// What the search is about; it takes the stretches of the logs. `before` is the model `file` with the friction
+/// that is known without these logs.
 fn case(
     machine: &LoggedRobot,
-    (name, file): (&str, &ModelFile),
+    (name, file, before): (&str, &ModelFile, &ModelFile),
     given: AugmentedModel,
     in_memory: &mut InMemory,
     (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
@@ -186,8 +195,8 @@ fn case(
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
     let prior = ParameterPrior {
-        information: information(file, &given, &open, settings.keep, &alone),
-        centre: given.clone(),
+        information: information(before, &given, &open, settings.keep, &alone),
+        centre: refined(before, name)?,
         rows_per_independent: (rate / (2.0 * processing.cutoff_hz)).max(1.0),
     };
     Ok(Case {
@@ -256,6 +265,7 @@ impl Diagnosed {
         let diagnosis = &self.diagnosis;
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
+        model.friction_prior.clone_from(&self.friction_prior);
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();
         for (i, unknown) in diagnosis.unknowns.iter().enumerate() {

@@ -1,16 +1,17 @@
 //! The estimators of `lsq` on logs that are read once per pass.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::error::IdentifyError;
+use super::known_friction::{of_refinement, with_friction};
 use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter, Simulated};
 use crate::config::campaign::EstimatorKind;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::add_processing;
-use crate::inertia::columns::RegressorColumns;
+use crate::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use crate::inertia::encoder::{GRIDS, add_scatter};
 use crate::inertia::feasible::nearest;
 use crate::inertia::instruments::{self, Instrumental};
@@ -88,6 +89,8 @@ impl Account {
 pub struct Estimated {
     pub columns: RegressorColumns,
     pub fit: Fit,
+    /// Covariance of the unknowns and of the known friction of each joint, in this order.
+    pub covariance: DMatrix<f64>,
     pub basis: Basis,
     pub account: Account,
 }
@@ -152,6 +155,16 @@ pub fn estimate(
 ) -> Result<Estimated, IdentifyError> {
     let mut account = Account::of(estimator);
     let told = &mut account;
+    let moves = columns.known.iter().flatten().any(KnownFriction::moves);
+    let mut columns = columns;
+    if moves && estimator != EstimatorKind::Oe {
+        let found = with_known_friction(passes, columns, told)?;
+        if estimator == EstimatorKind::Wls {
+            return Ok(Estimated { account, ..found });
+        }
+        // rows weighted otherwise tell of the inertias; the friction is what it was refined to
+        columns = found.columns;
+    }
     let (mut fit, sums, solver) = match estimator {
         EstimatorKind::Oe => refined(passes, &columns, law, told)?,
         EstimatorKind::Wls if law => refined(passes, &columns, law, told)?,
@@ -166,10 +179,54 @@ pub fn estimate(
         _ => (columns, DVector::zeros(fit.theta.len())),
     };
     Ok(Estimated {
+        covariance: with_friction(&columns, &fit),
         columns,
         fit,
         basis: Basis { sums, shift },
         account,
+    })
+}
+
+/// Refines the friction that is known with the inertias, from it and drawn to it by its covariance. What is left is
+/// the fit of the inertias with the friction as it was refined; their covariance is that of both.
+fn with_known_friction(
+    passes: &mut Passes,
+    mut columns: RegressorColumns,
+    account: &mut Account,
+) -> Result<Estimated, IdentifyError> {
+    let refined = refinement(passes, columns.clone(), account)?;
+    let (mut fit, sums) = refined.without_laws()?;
+    let (laws, free) = (
+        refined.columns.known.clone(),
+        refined.columns.with_free_friction(),
+    );
+    let mut whole = refined.fit.clone();
+    widen(
+        passes,
+        &columns,
+        &Solver::Refined(Box::new(refined)),
+        &mut whole,
+    )?;
+    let covariance = of_refinement(&columns, &free, &whole.covariance, &columns.known);
+    let u = fit.theta.len();
+    fit.covariance = covariance.view((0, 0), (u, u)).into_owned();
+    let known = columns.known.iter_mut().flatten();
+    for (place, (known, law)) in known.zip(laws.into_iter().flatten()).enumerate() {
+        let at = u + GRADIENT * place;
+        let of = |a: usize, b: usize| covariance[(at + a, at + b)];
+        *known = KnownFriction {
+            law: law.law,
+            covariance: std::array::from_fn(|a| std::array::from_fn(|b| of(a, b))),
+            held: [true; GRADIENT],
+        };
+    }
+    let shift = DVector::zeros(u);
+    Ok(Estimated {
+        columns,
+        fit,
+        covariance,
+        basis: Basis { sums, shift },
+        account: account.clone(),
     })
 }
 
@@ -191,14 +248,31 @@ fn refined(
     law: bool,
     account: &mut Account,
 ) -> Result<Found, IdentifyError> {
-    passes.work.doing("friction law");
-    let mut pass =
-        |columns: &RegressorColumns| passes.read(PositionFilter::Declared, columns, None);
     let start = match law {
-        true => law_start::begin(columns, &mut pass)?,
+        true => law_start::begin(columns, &mut |columns| {
+            passes.read(PositionFilter::Declared, columns, None)
+        })?,
         false => columns.clone(),
     };
-    let refined = refine::refine(start, &mut pass)?;
+    let refined = refinement(passes, start, account)?;
+    let sums = refined.factors.in_one_block();
+    Ok((
+        refined.fit.clone(),
+        sums,
+        Solver::Refined(Box::new(refined)),
+    ))
+}
+
+/// The refinement from a law of every joint.
+fn refinement(
+    passes: &mut Passes,
+    start: RegressorColumns,
+    account: &mut Account,
+) -> Result<RefinedFit, IdentifyError> {
+    passes.work.doing("friction law");
+    let refined = refine::refine(start, &mut |columns| {
+        passes.read(PositionFilter::Declared, columns, None)
+    })?;
     account.law_refined = refined.columns.known.iter().any(Option::is_some);
     account.status = refined.ending;
     account.iterations = refined.iterations;
@@ -206,12 +280,7 @@ fn refined(
         relative_error_before: Some(refined.before[j].all),
         ..JointAccount::default()
     });
-    let sums = refined.factors.in_one_block();
-    Ok((
-        refined.fit.clone(),
-        sums,
-        Solver::Refined(Box::new(refined)),
-    ))
+    Ok(refined)
 }
 
 /// Rows with large residuals count less.

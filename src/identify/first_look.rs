@@ -9,4 +9,6 @@ pub(super) struct FirstLook {
     pub(super) gate: Gate,
     /// Speed up to which each joint rests [m/s or rad/s].
     pub(super) rest_speed: Vec<f64>,
+    /// Greatest speed of each joint [m/s or rad/s].
+    pub(super) fastest: Vec<f64>,
 }

@@ -13,7 +13,7 @@ use super::logged_robot::LoggedRobot;
 use super::one_joint::{self, OneJointLog};
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit};
-use crate::config::model_file::Parameter;
+use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::friction::estimate::{JointEstimate, Nis, Options, estimate};
 use crate::friction::excitation::{FrictionError, moving_joint};
 use crate::friction::inputs::Inputs;
@@ -53,6 +53,9 @@ pub struct FrictionOfJoint {
     /// Place of the joint in the robot.
     #[serde(skip)]
     pub index: usize,
+    /// The logs that moved it.
+    #[serde(skip)]
+    pub logs: Vec<Provenance>,
     pub converged: bool,
     pub parameters: LawParameters,
     #[serde(flatten)]
@@ -97,7 +100,12 @@ impl LawParameters {
 }
 
 impl FrictionOfJoint {
-    fn of(machine: &LoggedRobot, index: usize, estimate: JointEstimate) -> Self {
+    fn of(
+        machine: &LoggedRobot,
+        index: usize,
+        logs: Vec<Provenance>,
+        estimate: JointEstimate,
+    ) -> Self {
         let parameter = |k: usize| {
             let v = &estimate.values[k];
             let known = v.verdict != Verdict::NotIdentifiable;
@@ -113,6 +121,7 @@ impl FrictionOfJoint {
         FrictionOfJoint {
             joint: machine.robot.joint_names()[index].clone(),
             index,
+            logs,
             converged: estimate.ending == Ending::Converged,
             parameters: LawParameters {
                 viscous: parameter(0),
@@ -149,7 +158,7 @@ pub fn friction(
             control.check()?;
             let estimate = one_joint(machine, j, &group, &parameter_names)?;
             work.advance(1);
-            Ok(FrictionOfJoint::of(machine, j, estimate))
+            Ok(FrictionOfJoint::of(machine, j, group.inputs, estimate))
         })
         .collect();
     let joints = found.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -193,7 +202,7 @@ fn by_joint(
             provenance,
             warnings: found,
         } = one_joint::read(machine, log, control)?;
-        inputs.push(provenance);
+        inputs.push(provenance.clone());
         warnings.extend(found);
         let moving = match named {
             Some(j) => j,
@@ -209,6 +218,7 @@ fn by_joint(
         group.motions.extend(motions);
         group.narrower.extend(narrower);
         group.logs.push(log.name());
+        group.inputs.push(provenance);
     }
     Ok((groups, inputs, warnings))
 }
@@ -220,6 +230,7 @@ struct Group {
     narrower: Vec<SmoothedMotion>,
     zero_order_hold: bool,
     logs: Vec<String>,
+    inputs: Vec<Provenance>,
 }
 
 fn one_joint(
@@ -368,6 +379,15 @@ impl IdentifiedFriction {
                 .map(|n| format!("{n}:{joint}"))
                 .collect();
             model.replace_covariance(&keys, &|a, b| found.estimate.covariance[a][b]);
+            model.friction_prior.retain(|prior| prior.joint != *joint);
+            model.friction_prior.push(FrictionPrior {
+                joint: joint.clone(),
+                speeds_covered: Some(found.estimate.speeds.covered),
+                values: None,
+                covariance: None,
+                logs: found.logs.clone(),
+                refined_by: Vec::new(),
+            });
         }
     }
 }

@@ -101,7 +101,7 @@ pub fn fit_gains(
         return Err(GainError::MassHidden.into());
     }
     let loaded: Vec<Log> = payload.iter().map(|p| p.log.clone()).collect();
-    let mut columns = columns(machine, None)?;
+    let mut columns = columns(machine, None);
     columns.rest_at(machine.rest_speeds(&[logs, &loaded].concat(), control)?);
     let mut reading = Reading {
         unloaded: Passes::new(machine, logs, control),

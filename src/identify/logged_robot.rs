@@ -149,6 +149,25 @@ impl LoggedRobot {
         Ok(speeds)
     }
 
+    /// Greatest speed of every joint in these logs [m/s or rad/s].
+    ///
+    /// # Errors
+    /// Those of [`Self::rest_speeds`].
+    pub(super) fn fastest(
+        &self,
+        logs: &[Log],
+        control: &Control,
+    ) -> Result<Vec<f64>, IdentifyError> {
+        let mut speeds = vec![0.0_f64; self.robot.joints()];
+        for log in logs {
+            let look = self.first_look(log, &self.file.layout(), control)?;
+            for (speed, of_log) in speeds.iter_mut().zip(&look.fastest) {
+                *speed = of_log.max(*speed);
+            }
+        }
+        Ok(speeds)
+    }
+
     /// Whether the robot moves as without its motors where torques are exactly 0.
     fn moves_freely(
         &self,
@@ -206,6 +225,7 @@ impl LoggedRobot {
         Ok(FirstLook {
             gate: gate.ok_or(IdentifyError::Interrupted)?,
             rest_speed: speeds.borrow().resting(),
+            fastest: speeds.borrow().fastest(),
         })
     }
 

@@ -1,5 +1,6 @@
 //! The inertial parameters by linear least squares, and friction with them where it is not known.
 
+use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -10,6 +11,7 @@ use super::estimate::{Account, Estimated, estimate};
 use super::gain_error::GainError;
 use super::gains::{Gain, Gains};
 use super::geometry::geometry;
+use super::known_friction::{FrictionBefore, FrictionOfFit};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::new_model;
@@ -18,7 +20,8 @@ use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
-use crate::config::model_file::Parameter;
+use crate::config::identified::friction_meaning;
+use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::essential::{Essential, essential};
@@ -44,6 +47,8 @@ pub struct LsqSettings<'a> {
     /// The model that holds the friction of every joint, and its name for messages; without one,
     /// friction is fitted together with the inertias.
     pub friction: Option<(&'a str, &'a ModelFile)>,
+    /// The friction of `friction` stays as it is; otherwise it is refined with the inertias, but for `ols`.
+    pub hold_friction: bool,
     /// Gains that were fitted before, whose uncertainty the parameters share.
     pub gains: Option<&'a Gains>,
 }
@@ -53,6 +58,9 @@ pub struct LsqSettings<'a> {
 pub struct IdentifiedDynamics {
     #[serde(rename = "parameters")]
     pub unknowns: Vec<Unknown>,
+    /// The friction that was known, before and after the fit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub friction: Vec<FrictionOfFit>,
     /// Gains of the torque channels, where they were fitted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gains: Vec<Gain>,
@@ -79,6 +87,12 @@ pub struct IdentifiedDynamics {
     pub columns: RegressorColumns,
     #[serde(skip)]
     pub fit: Fit,
+    /// Covariance of the unknowns and of the known friction of each joint.
+    #[serde(skip)]
+    pub covariance: DMatrix<f64>,
+    /// What a model file keeps of the friction before the fit.
+    #[serde(skip)]
+    pub friction_prior: Vec<FrictionPrior>,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
@@ -121,7 +135,12 @@ pub fn lsq(
         });
     }
     let mut passes = Passes::new(machine, logs, control);
-    let mut linear = columns(machine, friction)?;
+    let before = friction.map(|given| {
+        let hold = settings.hold_friction || estimator == EstimatorKind::Ols;
+        FrictionBefore::of(machine, given, logs, (estimator, hold), control)
+    });
+    let before = before.transpose()?;
+    let mut linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
     linear.rest_at(machine.rest_speeds(logs, control)?);
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
     if let Some(gains) = settings.gains {
@@ -136,9 +155,14 @@ pub fn lsq(
     let Estimated {
         columns,
         fit,
+        mut covariance,
         account,
         ..
     } = estimated;
+    let u = fit.theta.len();
+    covariance
+        .view_mut((0, 0), (u, u))
+        .copy_from(&fit.covariance);
     let mut warnings = machine.file.notes.0.clone();
     warnings.extend(settings.gains.iter().flat_map(|g| g.warnings.clone()));
     warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
@@ -148,6 +172,17 @@ pub fn lsq(
     warnings.extend(account.warnings());
     warnings.append(&mut passes.warnings);
     warnings.extend(rests(machine, &resting));
+    let mut friction_of_fit = Vec::new();
+    let mut friction_prior = Vec::new();
+    if let (Some(before), Some((_, file))) = (&before, friction) {
+        friction_prior = before.kept(file, &passes.inputs);
+        // `oe` has the friction among its unknowns
+        if estimator != EstimatorKind::Oe {
+            friction_of_fit = before.after(machine, &columns, &covariance);
+            let fastest = machine.fastest(logs, control)?;
+            warnings.extend(before.beyond(machine, &columns, &covariance, &fastest));
+        }
+    }
     let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
     let mut inputs = std::mem::take(&mut passes.inputs);
     inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
@@ -184,8 +219,11 @@ pub fn lsq(
         samples: fit.rows * machine.robot.joints() as u64,
         effective_samples: fit.effective_rows * machine.robot.joints() as f64,
         joints: joints.collect(),
+        friction: friction_of_fit,
+        friction_prior,
         columns,
         fit,
+        covariance,
         account,
         gains: settings.gains.map_or(Vec::new(), |g| g.joints.clone()),
         consistent,
@@ -342,45 +380,38 @@ impl IdentifiedDynamics {
         let mut model = new_model(machine, "lsq", &self.inputs);
         model.parameters = self.unknowns.iter().map(Unknown::parameter).collect();
         let robot = &machine.robot;
-        let u = self.unknowns.len();
         let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
-        let mut joint_of = Vec::new();
         if let Some(friction) = friction {
             let known = &self.columns.known;
             let names = robot.joint_names().iter().enumerate();
             // where it was refined it is among what was fitted
             for (j, joint) in names.filter(|(j, _)| known[*j].is_some()) {
-                for (k, name) in DoubleTanh::NAMES.iter().enumerate() {
-                    if let Some(p) = friction.find(name, Some(joint)) {
-                        keys.push(p.key());
-                        joint_of.push((j, k));
-                        model.parameters.push(p.clone());
-                    }
+                for name in DoubleTanh::NAMES {
+                    let Some(p) = friction.find(name, Some(joint)) else {
+                        continue;
+                    };
+                    keys.push(p.key());
+                    let found = self.friction.get(j).and_then(|f| f.parameters.get(name));
+                    model.parameters.push(match found {
+                        Some(found) if !found.held => Parameter {
+                            value: found.value,
+                            std: found.std,
+                            verdict: found.verdict,
+                            meaning: friction_meaning(name).to_owned(),
+                            ..p.clone()
+                        },
+                        found => Parameter {
+                            value: found.map_or(p.value, |found| found.value),
+                            ..p.clone()
+                        },
+                    });
                 }
             }
             model.effects = friction.effects.clone();
+            model.friction_prior.clone_from(&self.friction_prior);
         }
         let fit = &self.fit;
-        let known = |j: usize, a: usize, b: usize| {
-            self.columns.known[j]
-                .as_ref()
-                .map_or(0.0, |k| k.covariance[a][b])
-        };
-        // cov(theta, theta_f) = S Sigma_f, with S = d theta / d theta_f
-        let cross = |i: usize, (j, k): (usize, usize)| -> f64 {
-            fit.friction_sensitivity[j]
-                .as_ref()
-                .map_or(0.0, |s| (0..5).map(|m| s[(i, m)] * known(j, m, k)).sum())
-        };
-        model.replace_covariance(&keys, &|a, b| match (a < u, b < u) {
-            (true, true) => fit.covariance[(a, b)],
-            (true, false) => cross(a, joint_of[b - u]),
-            (false, true) => cross(b, joint_of[a - u]),
-            (false, false) => {
-                let ((ja, ka), (jb, kb)) = (joint_of[a - u], joint_of[b - u]);
-                if ja == jb { known(ja, ka, kb) } else { 0.0 }
-            }
-        });
+        model.replace_covariance(&keys, &|a, b| self.covariance[(a, b)]);
         for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
             model.residual_std.insert(joint.clone(), *std);
         }

@@ -32,6 +32,7 @@ mod gain_error;
 mod gains;
 mod geometry;
 mod in_memory;
+mod known_friction;
 mod log;
 mod logged_robot;
 mod lsq;
@@ -66,6 +67,7 @@ pub use friction::{
 pub use gain_error::GainError;
 pub use gains::{FittedGains, Gain, Gains, PayloadLog, fit_gains};
 pub use in_memory::{InMemory, read_whole};
+pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
 pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};

@@ -70,6 +70,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         parameters: Vec::new(),
         covariance: None,
         residual_std: BTreeMap::new(),
+        friction_prior: Vec::new(),
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),

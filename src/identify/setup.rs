@@ -11,11 +11,13 @@ use crate::setup::{Channels, Drive, Problem, Searched, SetupReport, Thinner, sea
 use super::control::Control;
 use super::error::IdentifyError;
 use super::gains;
+use super::known_friction::FrictionBefore;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::setup_words;
 use super::unknowns::columns;
 use crate::config::RobotFile;
+use crate::config::campaign::EstimatorKind;
 use crate::config::correction::Edit;
 
 /// What the check found, and the robot file that is right by it.
@@ -87,7 +89,13 @@ pub fn check_setup(
         )
         .map_err(|error| IdentifyError::of_run(&log.name(), error))?;
     }
-    let columns = columns(machine, friction)?;
+    let held = (EstimatorKind::Ols, true);
+    let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
+    let known = known.transpose()?;
+    let columns = columns(
+        machine,
+        known.as_ref().map(|before| before.known.as_slice()),
+    );
     let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
         let mut file = machine.file.clone();
         file.robot.gravity = Some(gravity);

@@ -15,6 +15,7 @@ pub(super) struct SpeedMeter {
     before: Vec<f64>,
     now: Vec<f64>,
     squares: Vec<f64>,
+    fastest: Vec<f64>,
     seconds: f64,
 }
 
@@ -25,6 +26,7 @@ impl SpeedMeter {
             before: Vec::new(),
             now: Vec::new(),
             squares: Vec::new(),
+            fastest: Vec::new(),
             seconds: 0.0,
         }
     }
@@ -36,6 +38,7 @@ impl SpeedMeter {
             return;
         }
         self.squares.resize(n, 0.0);
+        self.fastest.resize(n, 0.0);
         for (t, q) in block.t.iter().zip(block.q.chunks_exact(n)) {
             let step = self.last.map_or(f64::INFINITY, |last| t - last);
             // times are rounded, and otherwise where the clock's zero lies
@@ -53,14 +56,21 @@ impl SpeedMeter {
             let known = known && self.now.iter().all(|q| q.is_finite());
             if known && step.is_finite() && step > 0.0 {
                 let moved = self.now.iter().zip(&self.before);
-                for ((now, before), square) in moved.zip(&mut self.squares) {
+                let sums = self.squares.iter_mut().zip(&mut self.fastest);
+                for ((now, before), (square, fastest)) in moved.zip(sums) {
                     *square += (now - before).powi(2) / step;
+                    *fastest = fastest.max((now - before).abs() / step);
                 }
                 self.seconds += step;
             }
             self.last = known.then_some(*t);
             std::mem::swap(&mut self.now, &mut self.before);
         }
+    }
+
+    /// Greatest speed of each joint [m/s or rad/s].
+    pub(super) fn fastest(&self) -> Vec<f64> {
+        self.fastest.clone()
     }
 
     /// Speed up to which each joint rests [m/s or rad/s].

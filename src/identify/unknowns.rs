@@ -3,16 +3,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
-use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit, inertia_unit};
 use crate::config::model_file::Parameter;
 use crate::inertia::columns::{KnownFriction, Own, RegressorColumns};
 use crate::inertia::essential::Essential;
 use crate::inertia::solve::Fit;
 use crate::inertia::verdict::verdict;
-use crate::robot::friction::DoubleTanh;
 use crate::verdict::Verdict;
 
 /// One unknown of the fit with what the data say about it.
@@ -74,38 +71,29 @@ impl Unknown {
 /// Which columns this robot's rows have.
 pub(super) fn columns(
     machine: &LoggedRobot,
-    friction: Option<(&str, &ModelFile)>,
-) -> Result<RegressorColumns, IdentifyError> {
+    friction: Option<&[KnownFriction]>,
+) -> RegressorColumns {
     let robot = &machine.robot;
     let n = robot.joints();
     let section = &machine.file.friction;
     let mut own = vec![Vec::new(); n];
     let mut known = vec![None; n];
-    for (j, joint) in robot.joint_names().iter().enumerate() {
+    for j in 0..n {
         match friction {
-            Some((file, model)) => {
-                let law = model.double_tanh(file, joint)?;
-                let keys: Vec<String> = DoubleTanh::NAMES
-                    .iter()
-                    .map(|n| format!("{n}:{joint}"))
-                    .collect();
-                let flat = model.covariance_of(&keys);
-                let covariance = std::array::from_fn(|a| std::array::from_fn(|b| flat[a * 5 + b]));
-                known[j] = Some(KnownFriction { law, covariance });
-            }
+            Some(of_joints) => known[j] = Some(of_joints[j].clone()),
             None => own[j].extend([Own::Viscous, Own::Coulomb]),
         }
         if section.offset {
             own[j].push(Own::Offset);
         }
     }
-    Ok(RegressorColumns {
+    RegressorColumns {
         joints: n,
         shared: robot.parameters().len(),
         own,
         known,
         rest_speed: Vec::new(),
-    })
+    }
 }
 
 /// Every unknown, in the order of the columns.

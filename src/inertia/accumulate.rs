@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::columns::RegressorColumns;
+use super::columns::{GRADIENT, RegressorColumns};
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
@@ -250,8 +250,20 @@ impl BlockFactors {
         self.rows += other.rows;
     }
 
-    /// The same rows with the parameters of the known friction among the unknowns.
+    /// The same rows with the parameters of the known friction among the unknowns, but for those that are held.
     pub fn with_free_friction(mut self) -> BlockFactors {
+        for (j, known) in self.columns.known.iter().enumerate() {
+            let Some(known) = known.as_ref().filter(|k| k.held.contains(&true)) else {
+                continue;
+            };
+            let first = self.columns.unknowns_of(j);
+            let free = (0..GRADIENT).filter(|k| !known.held[*k]).map(|k| first + k);
+            let places: Vec<usize> = (0..first).chain(free).chain([first + GRADIENT]).collect();
+            self.at_rest[j] = self.at_rest[j].select_columns(&places);
+            for block in &mut self.blocks {
+                block.r[j] = block.r[j].select_columns(&places);
+            }
+        }
         self.columns = self.columns.with_free_friction();
         self
     }

@@ -52,6 +52,15 @@ pub struct KnownFriction {
     pub law: DoubleTanh,
     /// Covariance of (Bv, Bf1, Bf2, w1, w2), row-major 5 x 5; zero where it is taken as exact.
     pub covariance: [[f64; 5]; 5],
+    /// Which of them a refinement leaves where they are.
+    pub held: [bool; GRADIENT],
+}
+
+impl KnownFriction {
+    /// Whether a refinement moves any of its parameters.
+    pub fn moves(&self) -> bool {
+        self.held.contains(&false)
+    }
 }
 
 /// Columns of the rows of every joint.
@@ -139,13 +148,14 @@ impl RegressorColumns {
         !self.rest_speed.is_empty() && rest::rests(channels[moving])
     }
 
-    /// The same columns with the parameters of the known friction among the unknowns: their
-    /// gradient, which stands after the own terms, becomes own terms. Rows need no change.
+    /// The same columns with the parameters of the known friction among the unknowns, but for those that are
+    /// held: their gradient, which stands after the own terms, becomes own terms.
     pub fn with_free_friction(&self) -> RegressorColumns {
         let mut own = self.own.clone();
         for (own, known) in own.iter_mut().zip(&self.known) {
-            if known.is_some() {
-                own.extend((0..GRADIENT).map(Own::Law));
+            if let Some(known) = known {
+                let free = (0..GRADIENT).filter(|k| !known.held[*k]);
+                own.extend(free.map(Own::Law));
             }
         }
         RegressorColumns {
@@ -155,6 +165,16 @@ impl RegressorColumns {
             known: vec![None; self.joints],
             rest_speed: self.rest_speed.clone(),
         }
+    }
+
+    /// Unknowns of joint j that are changes of its law, each with its place in the law.
+    pub fn law_unknowns(&self, j: usize) -> impl Iterator<Item = (usize, usize)> {
+        let first = self.first_own(j);
+        let own = self.own[j].iter().enumerate();
+        own.filter_map(move |(c, own)| match own {
+            Own::Law(k) => Some((first + c, *k)),
+            _ => None,
+        })
     }
 
     /// Fills the channels of one sample.

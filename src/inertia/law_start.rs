@@ -137,6 +137,7 @@ impl<'a> SlopeLadder<'a> {
                     flat,
                 ]),
                 covariance: [[0.0; GRADIENT]; GRADIENT],
+                held: [false; GRADIENT],
             });
         }
         Ok(start)

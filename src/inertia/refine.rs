@@ -62,6 +62,15 @@ impl RefinedFit {
 }
 
 impl RefinedFit {
+    /// The fit of all but the laws, as they were refined, and the rows that it is about.
+    ///
+    /// # Errors
+    /// [`FitError`].
+    pub fn without_laws(&self) -> Result<(Fit, BlockFactors), FitError> {
+        let rows = self.factors.with_own(&without_law(&self.factors.columns));
+        Ok((fit(&rows, Weighting::Wls)?, rows.in_one_block()))
+    }
+
     /// What the unknowns of [`Self::factors`] lack to those of [`Self::fit`]: the laws as they stand.
     pub fn shift(&self) -> DVector<f64> {
         let mut shift = DVector::zeros(self.fit.theta.len());
@@ -75,16 +84,15 @@ fn add_laws(columns: &RegressorColumns, theta: &mut DVector<f64>) {
     let free = columns.with_free_friction();
     for (j, known) in columns.known.iter().enumerate() {
         if let Some(known) = known {
-            let first = free.first_own(j) + columns.own[j].len();
-            for (k, p) in known.law.parameters().into_iter().enumerate() {
-                theta[first + k] += p;
-            }
+            let p = known.law.parameters();
+            free.law_unknowns(j).for_each(|(i, k)| theta[i] += p[k]);
         }
     }
 }
 
 /// Rows of the friction that was known before: L (phi - phi_0) of unit noise, L'L the inverse of its
-/// covariance, times the root of `strength`. `None` where nothing was known.
+/// covariance, times the root of `strength`. What is held stays at phi_0, and its column is left out: what remains is
+/// known under that condition. `None` where nothing was known.
 fn prior(
     before: &RegressorColumns,
     now: &RegressorColumns,
@@ -113,12 +121,11 @@ fn prior(
             .zip(known.law.parameters())
             .map(|(now, before)| before - now)
             .collect();
-        let first = free.first_own(j) + now.own[j].len();
         for (i, s) in svd.s.iter().enumerate().filter(|(_, s)| **s > 1e-10) {
             let mut row = vec![0.0; u + 1];
-            for k in (0..GRADIENT).filter(|k| size[*k] > 0.0) {
-                row[first + k] = (strength / s).sqrt() * svd.v[(k, i)] / size[k];
-                row[u] += row[first + k] * off[k];
+            for (at, k) in free.law_unknowns(j).filter(|(_, k)| size[*k] > 0.0) {
+                row[at] = (strength / s).sqrt() * svd.v[(k, i)] / size[k];
+                row[u] += row[at] * off[k];
             }
             rows.push(row);
         }
@@ -310,19 +317,15 @@ pub fn refine<E: From<FitError>>(
     })
 }
 
-/// The steeper part first.
+/// The steeper part first, where no covariance says which part is which.
 fn sorted(mut columns: RegressorColumns) -> RegressorColumns {
     for known in columns.known.iter_mut().flatten() {
+        let open =
+            !known.held.contains(&true) && (0..GRADIENT).all(|k| known.covariance[k][k] <= 0.0);
         let law = &mut known.law;
-        if law.slope_1 < law.slope_2 {
+        if open && law.slope_1 < law.slope_2 {
             std::mem::swap(&mut law.slope_1, &mut law.slope_2);
             std::mem::swap(&mut law.coulomb_1, &mut law.coulomb_2);
-            for row in &mut known.covariance {
-                row.swap(1, 2);
-                row.swap(3, 4);
-            }
-            known.covariance.swap(1, 2);
-            known.covariance.swap(3, 4);
         }
     }
     columns
@@ -334,10 +337,10 @@ fn moved(columns: &RegressorColumns, step: &DVector<f64>, speed: &[f64]) -> Regr
     let mut next = columns.clone();
     for (j, known) in next.known.iter_mut().enumerate() {
         let Some(known) = known else { continue };
-        let first = free.first_own(j) + columns.own[j].len();
         let mut p = known.law.parameters();
-        for (k, p) in p.iter_mut().enumerate() {
-            let wanted = *p + step[first + k];
+        for (at, k) in free.law_unknowns(j) {
+            let p = &mut p[k];
+            let wanted = *p + step[at];
             *p = if k >= 3 {
                 let steepest = if speed[j] > 0.0 {
                     STEEPEST / speed[j]
@@ -467,7 +470,14 @@ mod tests {
                 row[k] = (sure * LAW[k]).powi(2);
             }
             let law = DoubleTanh::from_parameters(off);
-            let known = columns(vec![Own::Offset], Some(KnownFriction { law, covariance }));
+            let known = columns(
+                vec![Own::Offset],
+                Some(KnownFriction {
+                    law,
+                    covariance,
+                    held: [false; GRADIENT],
+                }),
+            );
             let found = refine(known, &mut |c: &RegressorColumns| read(c, 0.02, 5)).unwrap();
             let viscous = found.fit.theta[2];
             let near = if stays { off[0] } else { LAW[0] };

@@ -336,7 +336,14 @@ mod tests {
         for (i, row) in covariance.iter_mut().enumerate() {
             row[i] = (0.05 * law.parameters()[i]).powi(2);
         }
-        let with = columns(vec![], Some(KnownFriction { law, covariance }));
+        let with = columns(
+            vec![],
+            Some(KnownFriction {
+                law,
+                covariance,
+                held: [false; 5],
+            }),
+        );
         let base = fit(&factors(&with, 3000, 0.0, 0.0, 4), Weighting::Ols).unwrap();
         let s = base.friction_sensitivity[0].clone().unwrap();
         // the same torque, read with each friction parameter a little off
@@ -350,6 +357,7 @@ mod tests {
                 Some(KnownFriction {
                     law: DoubleTanh::from_parameters(p),
                     covariance,
+                    held: [false; 5],
                 }),
             );
             let mut all = Accumulator::new(off.clone(), BLOCK_SECONDS);

@@ -114,6 +114,7 @@ pub fn write_model(path: &Path) {
         seed: 11,
     });
     let model = ModelFile {
+        friction_prior: Vec::new(),
         robot: robot.clone(),
         parameters: truth.unwrap().truth.parameters,
         covariance: None,

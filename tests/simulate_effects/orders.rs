@@ -223,6 +223,7 @@ fn units_follow_the_joint() {
 /// A model of the robot with the synthetic parameters.
 fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
     ModelFile {
+        friction_prior: Vec::new(),
         robot: robot.clone(),
         parameters: CftTruth::synthetic(Setup::Tuedacs)
             .plant()

@@ -3,7 +3,7 @@
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::identify::{
-    Account, ConsistentLinks, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
+    Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
 };
 use crate::log::{Provenance, escape};
 use crate::math::descent::Ending;
@@ -34,6 +34,7 @@ pub fn lsq(of: &Lsq) -> Report {
     gains(&mut terminal, &of.found.gains);
     fitted(&mut terminal, of.found);
     groupings(&mut terminal, of.found);
+    known_friction(&mut terminal, &of.found.friction);
     terminal.line("");
     fit_quality(&mut terminal, of.found);
     if let Some(links) = &of.found.consistent {
@@ -43,6 +44,7 @@ pub fn lsq(of: &Lsq) -> Report {
     let (text, good) = parameters::tally(of.file);
     page.verdict(&format!("{text}."), good);
     gains(&mut page, &of.found.gains);
+    known_friction(&mut page, &of.found.friction);
     residuals(&mut page, of.found);
     page.paragraph(
         "These errors are those of the data that were fitted; `validate` gives those of others.",
@@ -120,6 +122,52 @@ fn gains(writer: &mut Writer, gains: &[Gain]) {
     }
     writer.table(table);
     writer.line("");
+}
+
+/// The friction that was known before, and what the fit made of it: the shift in deviations of before.
+fn known_friction(writer: &mut Writer, friction: &[FrictionOfFit]) {
+    let moved = |joint: &&FrictionOfFit| joint.parameters.values().any(|p| !p.held);
+    if !friction.iter().any(|joint| moved(&joint)) {
+        return;
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("parameter", Align::Left),
+        ("value", Align::Decimal),
+        ("std", Align::Decimal),
+        ("before", Align::Decimal),
+        ("std before", Align::Decimal),
+        ("shift", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption("friction refined with the inertias; the shift is in deviations of before");
+    for joint in friction.iter().filter(moved) {
+        for (name, p) in &joint.parameters {
+            let pair = |value: f64, std: Option<f64>| match std {
+                Some(std) => number::value_and_std(value, std),
+                None => (number::significant(value, 4), String::new()),
+            };
+            let (value, std) = pair(p.value, p.std);
+            let (before, std_before) = pair(p.prior, p.prior_std);
+            let shift = match (p.held, p.prior_std) {
+                (true, _) => "held".to_owned(),
+                (false, Some(std)) => format!("{:+.1}", (p.value - p.prior) / std),
+                (false, None) => String::new(),
+            };
+            table.row([
+                joint.joint.as_str(),
+                name.as_str(),
+                value.as_str(),
+                std.as_str(),
+                before.as_str(),
+                std_before.as_str(),
+                shift.as_str(),
+                p.unit.as_str(),
+            ]);
+        }
+    }
+    writer.line("");
+    writer.table(table);
 }
 
 /// The parameters for a terminal.
