@@ -1,18 +1,19 @@
 //! The estimate of one joint: parameters with verdicts, curve, consistency.
 
 use nalgebra::{DMatrix, DVector};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::excitation::{FrictionError, Speeds, speeds};
 use super::inputs::Inputs;
-use super::passes::{GivenNoise, Maximum, add_choices, bands, maximise};
-use super::plateau::{Plateau, plateaus};
+pub use super::joint_estimate::{
+    EstimatedValue, FilterNoise, FrictionCurvePoint, JointEstimate, Nis, Nuisance,
+};
+use super::passes::{GivenNoise, Maximum, add_choices, bands, fewer_terms, maximise, settle_on};
+use super::plateau::plateaus;
 use super::prepare::Prepared;
 use super::problem::{FRICTION, FrictionProblem};
 use super::slope::{open_above, profile_slope};
 use super::start::{FilterStart, constant_inertia, from_log};
-use crate::math::descent::Ending;
+use super::thinned::thinned;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 
@@ -29,111 +30,13 @@ pub struct Options {
     pub noise: GivenNoise,
 }
 
-/// One friction parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EstimatedValue {
-    pub value: f64,
-    pub std: f64,
-    pub verdict: Verdict,
-}
-
-/// One point of the friction curve.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct FrictionCurvePoint {
-    /// Velocity [m/s or rad/s].
-    pub v: f64,
-    /// Friction torque [N or Nm].
-    pub torque: f64,
-    /// Its standard deviation [N or Nm].
-    pub std: f64,
-}
-
-/// A nuisance quantity.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Nuisance {
-    pub name: String,
-    pub value: f64,
-    pub std: f64,
-    pub unit: String,
-}
-
-/// Normalised innovations squared with their 95 % bounds.
-///
-/// The noise levels are estimated, so that single innovations have about their own variance under
-/// any model. What tells a wrong one is that its innovations are alike: so the mean is over windows
-/// of 50 samples, each the square of the window's summed normalised innovations over their number.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Nis {
-    /// Mean over windows; 1 where the filter's covariance is true and the innovations are white.
-    pub mean: f64,
-    /// 95 % bounds of that mean.
-    pub lower_95: f64,
-    pub upper_95: f64,
-    /// Number of windows.
-    pub windows: usize,
-    /// Mean over single innovations.
-    pub per_sample: f64,
-    /// Share of single innovations inside their own 95 % bound.
-    pub share_inside: f64,
-}
-
-impl Nis {
-    /// Whether the mean is inside its bounds.
-    pub fn consistent(&self) -> bool {
-        (self.lower_95..=self.upper_95).contains(&self.mean)
-    }
-}
-
-/// Friction of one joint with all that belongs to it.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct JointEstimate {
-    /// How the search ended.
-    pub ending: Ending,
-    /// Starting points of the search.
-    pub starts: usize,
-    /// The law at the maximum of the likelihood.
-    #[serde(skip)]
-    pub law: DoubleTanh,
-    /// Bv, Bf1, Bf2, w1, w2 with verdicts; a slope with a bound holds the bound.
-    #[serde(skip)]
-    pub values: [EstimatedValue; FRICTION],
-    /// Covariance of the five parameters in SI units.
-    #[serde(skip)]
-    pub covariance: [[f64; FRICTION]; FRICTION],
-    /// What was estimated along, and is no friction.
-    pub nuisance: Vec<Nuisance>,
-    #[serde(flatten)]
-    pub speeds: Speeds,
-    /// The law over the speeds covered: 50 equal steps in each direction.
-    pub curve: Vec<FrictionCurvePoint>,
-    /// Mean torques at constant speed, which took no part in the fit.
-    pub plateaus: Vec<Plateau>,
-    pub nis: Nis,
-    pub noise: FilterNoise,
-    /// Factor by which coloured innovations widened the covariance.
-    pub widening: f64,
-    /// Torque residual along the measured motion [N or Nm].
-    pub rmse: f64,
-    /// The same relative to the torque.
-    pub relative_error: f64,
-    pub samples: usize,
-    /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where they came in
-    /// as the position filter leaves them.
-    #[serde(skip)]
-    pub cutoffs: Vec<f64>,
-}
-
-/// Noise levels that the filter settled on.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct FilterNoise {
-    /// Standard deviation of the torque noise [N or Nm].
-    pub torque_std: f64,
-    /// Factor on the encoder's variance.
-    pub position_variance_factor: f64,
-}
-
 /// Points of the curve in each direction.
 const CURVE_STEPS: usize = 50;
+/// The same beyond the speeds covered, and how far it goes there as a factor on the fastest of them.
+const BEYOND_STEPS: usize = 10;
+pub const BEYOND: f64 = 2.0;
+/// Samples that the search sees of a longer log.
+const SEARCHED: usize = 60_000;
 /// Starts taken from the log.
 const LOG_STARTS: usize = 4;
 
@@ -155,9 +58,11 @@ pub fn estimate(
 ) -> Result<JointEstimate, FrictionError> {
     let problem = &prepared.problem;
     let speeds = speeds(joint, &prepared.velocity, problem.parameters())?;
+    let thinned = thinned(prepared, SEARCHED);
+    let searched = thinned.as_ref().unwrap_or(prepared);
     let mut starts = Vec::new();
     if !options.only_start || options.start.is_none() {
-        starts.extend(from_log(prepared, LOG_STARTS));
+        starts.extend(from_log(searched, LOG_STARTS));
     }
     if let Some(law) = &options.start {
         let mut p = vec![0.0; problem.parameters()];
@@ -180,7 +85,13 @@ pub fn estimate(
     let no_estimate = || FrictionError::NoEstimate {
         joint: joint.to_owned(),
     };
-    let mut maximum = maximise(prepared, &starts, &options.noise).ok_or_else(no_estimate)?;
+    let mut maximum = maximise(searched, &starts, &options.noise).ok_or_else(no_estimate)?;
+    if thinned.is_some() {
+        maximum = settle_on(problem, &maximum, &options.noise).ok_or_else(no_estimate)?;
+    }
+    if let Some(one) = fewer_terms(problem, &maximum, &options.noise) {
+        maximum = one;
+    }
     let Some(inputs) = inputs else {
         return Ok(assemble(names, prepared, maximum, speeds));
     };
@@ -214,7 +125,8 @@ fn assemble(
     let p = &maximum.parameters;
     let law = problem.friction(p);
     let covariance = covariance(problem, &maximum);
-    let curve = curve(&law, &covariance, speeds.covered);
+    let [_, fastest] = speeds.covered;
+    let next = fastest + (BEYOND - 1.0) * fastest / BEYOND_STEPS as f64;
     let (rmse, relative_error) = residual(prepared, p, &law);
     let s = &maximum.score;
     let half = 1.96 * (2.0 / s.windows.max(1) as f64).sqrt();
@@ -224,7 +136,8 @@ fn assemble(
         covariance,
         nuisance: nuisance(names, prepared, &maximum),
         speeds,
-        curve,
+        curve: curve(&law, &covariance, speeds.covered, CURVE_STEPS),
+        curve_beyond: curve(&law, &covariance, [next, BEYOND * fastest], BEYOND_STEPS),
         plateaus: plateaus(prepared, p),
         nis: Nis {
             mean: s.window_nis,
@@ -240,6 +153,7 @@ fn assemble(
         starts: maximum.starts,
         ending: maximum.ending,
         widening: maximum.widening,
+        coulomb_terms: if maximum.one_term() { 1 } else { 2 },
         noise: FilterNoise {
             torque_std: maximum.noise.torque,
             position_variance_factor: maximum.noise.position_factor,
@@ -250,7 +164,9 @@ fn assemble(
 
 /// The same maximum with slope_1 the steeper one: a swap of the two tanh terms is the same law.
 fn steeper_first(mut maximum: Maximum) -> Maximum {
-    if maximum.parameters[3] < maximum.parameters[4] {
+    if maximum.one_term() {
+        maximum.parameters[4] = maximum.parameters[3];
+    } else if maximum.parameters[3] < maximum.parameters[4] {
         let mut order: Vec<usize> = (0..maximum.parameters.len()).collect();
         order.swap(1, 2);
         order.swap(3, 4);
@@ -287,6 +203,13 @@ fn value(
         std: std(i),
         verdict,
     };
+    if maximum.fixed.contains(&i) {
+        return EstimatedValue {
+            std: f64::NAN,
+            verdict: Verdict::NotIdentifiable,
+            ..plain
+        };
+    }
     if i < 3 {
         return plain;
     }
@@ -315,17 +238,18 @@ fn value(
     }
 }
 
+/// The law with its band at speeds from `from` to `to` in equal steps, in both directions.
 fn curve(
     law: &DoubleTanh,
     covariance: &[[f64; FRICTION]; FRICTION],
-    covered: [f64; 2],
+    [from, to]: [f64; 2],
+    steps: usize,
 ) -> Vec<FrictionCurvePoint> {
-    let [lo, hi] = covered;
-    let step = |i: usize| lo + (hi - lo) * i as f64 / (CURVE_STEPS - 1) as f64;
-    (0..CURVE_STEPS)
+    let step = |i: usize| from + (to - from) * i as f64 / (steps - 1) as f64;
+    (0..steps)
         .rev()
         .map(|i| -step(i))
-        .chain((0..CURVE_STEPS).map(step))
+        .chain((0..steps).map(step))
         .map(|v| FrictionCurvePoint {
             v,
             torque: law.torque(v),

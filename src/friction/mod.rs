@@ -4,12 +4,13 @@
 //! `prepare` turns the motion of all joints into the one-joint problem, `inputs` smooths it anew,
 //! `start` guesses from the log, `filter` is the filter, `score` the same filter at fixed parameters, `passes` the search,
 //! `slope` the bounds of slopes that a log cannot determine, `propagate` the integrals that filter
-//! and score share.
+//! and score share, `thinned` the share of a long log that the search sees.
 
 pub mod estimate;
 pub mod excitation;
 pub mod filter;
 pub mod inputs;
+pub mod joint_estimate;
 pub mod motions;
 pub mod passes;
 pub mod plateau;
@@ -19,5 +20,6 @@ mod propagate;
 pub mod score;
 mod slope;
 mod start;
+mod thinned;
 #[cfg(test)]
 mod trial;

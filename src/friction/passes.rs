@@ -47,6 +47,14 @@ const LIKELIER: f64 = 1.0;
 const MOST_STEPS: usize = 40;
 /// A step that gains less log-likelihood than this is the last.
 const SETTLED: f64 = 1e-4;
+/// Log-likelihood that a second Coulomb term has to gain: that of its two parameters (Akaike 1974).
+const SECOND_TERM: f64 = 2.0;
+/// What stands still where there is one Coulomb term: Bf2 and w2.
+pub(super) const ONE_TERM: [usize; 2] = [2, 4];
+/// Slopes within this factor of one another are hardly apart.
+const HARDLY_APART: f64 = 2.0;
+/// Most steps to the maximum with one term.
+const ONE_TERM_STEPS: usize = 15;
 /// Damping of the steps.
 const DAMPING: StepControl = StepControl {
     rejected_from: 1e-4,
@@ -75,7 +83,16 @@ pub(super) struct Maximum {
     pub widening: f64,
     /// A slope stands at an end of its range.
     pub at_limit: [bool; 2],
+    /// Parameters that are no unknowns: those of a Coulomb term that the log does as well without.
+    pub fixed: &'static [usize],
     pub starts: usize,
+}
+
+impl Maximum {
+    /// Whether one Coulomb term does.
+    pub fn one_term(&self) -> bool {
+        !self.fixed.is_empty()
+    }
 }
 
 /// Prior standard deviations of all parameters.
@@ -151,7 +168,25 @@ pub(super) fn maximise(
             best = Some(refined);
         }
     }
-    settle(problem, best?, noise, given, &spread, starts.len())
+    settle(problem, best?, noise, given, &[], starts.len())
+}
+
+/// The maximum of `problem` from that of a share of its rows.
+pub(super) fn settle_on(
+    problem: &FrictionProblem,
+    maximum: &Maximum,
+    given: &GivenNoise,
+) -> Option<Maximum> {
+    let (p, noise) = (maximum.parameters.clone(), maximum.noise);
+    let refined = refine(problem, p, noise, &spread(problem), FIRST_STEPS);
+    settle(
+        problem,
+        refined,
+        noise,
+        given,
+        maximum.fixed,
+        maximum.starts,
+    )
 }
 
 /// Noise levels and parameters in turn: each is little moved by the other.
@@ -160,14 +195,73 @@ fn settle(
     mut refined: RefinedParameters,
     mut noise: NoiseLevels,
     given: &GivenNoise,
-    spread: &[f64],
+    fixed: &'static [usize],
     starts: usize,
 ) -> Option<Maximum> {
+    let spread = spread(problem);
     for _ in 0..2 {
         noise = tune(problem, &refined.parameters, noise, given);
-        refined = refine(problem, refined.parameters, noise, spread, MOST_STEPS);
+        refined = refine_others(
+            problem,
+            refined.parameters,
+            noise,
+            &spread,
+            MOST_STEPS,
+            fixed,
+        );
     }
-    finish(problem, refined, noise, spread, starts)
+    finish(problem, refined, noise, &spread, fixed, starts)
+}
+
+/// The maximum with one Coulomb term, where the log is as likely without a second. Two terms whose
+/// slopes are hardly apart cancel, and what they leave is a number only in their sum.
+pub(super) fn fewer_terms(
+    problem: &FrictionProblem,
+    maximum: &Maximum,
+    given: &GivenNoise,
+) -> Option<Maximum> {
+    if maximum.one_term() || second_is_known(maximum) {
+        return None;
+    }
+    let spread = spread(problem);
+    let p = &maximum.parameters;
+    let sum = p[1] + p[2];
+    let starts = [(sum, p[3]), (sum, p[4]), (sum, 0.5 * (p[3] + p[4]))];
+    let refined = starts.map(|(height, slope)| {
+        let mut start = p.clone();
+        (start[1], start[2]) = (height, 0.0);
+        (start[3], start[4]) = (slope, slope);
+        refine_others(
+            problem,
+            start,
+            maximum.noise,
+            &spread,
+            ONE_TERM_STEPS,
+            &ONE_TERM,
+        )
+    });
+    let likelihood = |r: &RefinedParameters| r.score.log_likelihood;
+    let best = refined
+        .into_iter()
+        .filter(|r| likelihood(r).is_finite())
+        .max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))?;
+    // coloured innovations count for less, as in the covariance
+    let gain = (maximum.score.log_likelihood - likelihood(&best)) / maximum.widening;
+    if gain >= SECOND_TERM {
+        return None;
+    }
+    let (noise, starts) = (maximum.noise, maximum.starts);
+    settle(problem, best, noise, given, &ONE_TERM, starts)
+}
+
+/// Whether height and slope of both terms are known to a tenth, and the slopes are well apart: then
+/// nobody need ask whether one term does.
+fn second_is_known(maximum: &Maximum) -> bool {
+    let (p, c) = (&maximum.parameters, &maximum.covariance);
+    let height = |i: usize| c[(i, i)] < (0.1 * p[i]).powi(2);
+    // slopes are logarithms
+    let slope = |i: usize| c[(i, i)] < 0.1 * 0.1;
+    height(1) && height(2) && slope(3) && slope(4) && (p[3] - p[4]).abs() > HARDLY_APART.ln()
 }
 
 /// Narrows the accelerations of the other joints one after the other as long as the innovations
@@ -180,6 +274,7 @@ pub(super) fn bands(
     given: &GivenNoise,
 ) -> Option<(Vec<f64>, FrictionProblem, Maximum)> {
     let spread = spread(&prepared.problem);
+    let fixed = maximum.fixed;
     let mut cutoffs = vec![f64::INFINITY; inputs.robot.joints()];
     let mut best: Option<(FrictionProblem, RefinedParameters)> = None;
     let mut top = maximum.score.log_likelihood;
@@ -191,7 +286,8 @@ pub(super) fn bands(
                 .map_or(&maximum.parameters, |b| &b.1.parameters);
             let found = inputs.problem(prepared, &cutoffs).map(|problem| {
                 let p = start.clone();
-                let refined = refine(&problem, p, maximum.noise, &spread, CHOICE_STEPS);
+                let noise = maximum.noise;
+                let refined = refine_others(&problem, p, noise, &spread, CHOICE_STEPS, fixed);
                 (problem, refined)
             });
             match found {
@@ -208,7 +304,7 @@ pub(super) fn bands(
     }
     let (problem, refined) = best?;
     let (noise, starts) = (maximum.noise, maximum.starts);
-    let settled = settle(&problem, refined, noise, given, &spread, starts)?;
+    let settled = settle(&problem, refined, noise, given, fixed, starts)?;
     Some((cutoffs, problem, settled))
 }
 
@@ -236,16 +332,23 @@ fn damped(
 ) -> Option<DVector<f64>> {
     let mut h = score.information.clone();
     let mut gradient = score.gradient.clone();
+    hold(&mut h, fixed);
     for &j in fixed {
-        h.row_mut(j).fill(0.0);
-        h.column_mut(j).fill(0.0);
-        h[(j, j)] = 1.0;
         gradient[j] = 0.0;
     }
     for (j, s) in spread.iter().enumerate() {
         h[(j, j)] = h[(j, j)] * (1.0 + damping) + 1e-6 / (s * s);
     }
     Some(h.cholesky()?.solve(&gradient))
+}
+
+/// Parts some parameters from all others in an information matrix.
+fn hold(information: &mut DMatrix<f64>, fixed: &[usize]) {
+    for &j in fixed {
+        information.row_mut(j).fill(0.0);
+        information.column_mut(j).fill(0.0);
+        information[(j, j)] = 1.0;
+    }
 }
 
 /// Gauss-Newton with step control on the innovation likelihood.
@@ -314,7 +417,8 @@ pub(super) fn add_choices(
         ..maximum.noise
     };
     for (problem, noise) in [(again, maximum.noise), (problem, coarser)] {
-        let moved = refine(problem, p.clone(), noise, &spread, CHOICE_STEPS);
+        let from = p.clone();
+        let moved = refine_others(problem, from, noise, &spread, CHOICE_STEPS, maximum.fixed);
         if moved.ending != Ending::Diverged {
             let change = DVector::from_fn(p.len(), |i, _| moved.parameters[i] - p[i]);
             maximum.covariance.ger(1.0, &change, &change, 1.0);
@@ -372,6 +476,7 @@ fn finish(
     refined: RefinedParameters,
     noise: NoiseLevels,
     spread: &[f64],
+    fixed: &'static [usize],
     starts: usize,
 ) -> Option<Maximum> {
     let np = problem.parameters();
@@ -379,14 +484,19 @@ fn finish(
     for (j, s) in spread.iter().enumerate() {
         h[(j, j)] += 1.0 / (s * s);
     }
-    let covariance = h.cholesky()?.inverse();
+    hold(&mut h, fixed);
+    let mut covariance = h.cholesky()?.inverse();
+    for &j in fixed {
+        covariance[(j, j)] = 0.0;
+    }
     // white innovations give outer = information; the mean ratio over the friction directions says
     // by how much colour widens
     let spread_of_score = &covariance * &refined.score.outer * &covariance;
-    let ratio: f64 = (0..FRICTION)
+    let free = || (0..FRICTION).filter(|j| !fixed.contains(j));
+    let ratio: f64 = free()
         .map(|j| spread_of_score[(j, j)] / covariance[(j, j)])
         .sum::<f64>()
-        / FRICTION as f64;
+        / free().count() as f64;
     let widening = if refined.score.blocks > 2 * np {
         ratio.max(1.0)
     } else {
@@ -405,6 +515,7 @@ fn finish(
         ending: refined.ending,
         widening,
         at_limit,
+        fixed,
         starts,
     })
 }

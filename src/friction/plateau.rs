@@ -27,6 +27,52 @@ pub struct Plateau {
 const SHORTEST: f64 = 0.15;
 const DEPARTURE: f64 = 0.02;
 
+/// A curve follows its plateaus to this share of their torque.
+const FOLLOWS: f64 = 0.03;
+/// Speeds within this share of one another are one speed.
+const ONE_SPEED: f64 = 0.05;
+/// Standard errors that a mean must be off by before it counts.
+const SURE: f64 = 3.0;
+
+/// The curve at a speed whose plateaus it misses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// Mean velocity of the plateaus [m/s or rad/s].
+    pub v: f64,
+    /// Their mean torque, and that of the curve [N or Nm].
+    pub torque: f64,
+    pub curve: f64,
+}
+
+/// Speeds at which the mean over all plateaus is off the `curve` by more than 3 % and by more than
+/// its own standard error explains, the farthest first.
+pub fn missed(plateaus: &[Plateau], curve: &dyn Fn(f64) -> f64) -> Vec<Missed> {
+    let mut sorted: Vec<&Plateau> = plateaus.iter().collect();
+    sorted.sort_by(|a, b| a.v.total_cmp(&b.v));
+    let alike = |a: &&Plateau, b: &&Plateau| (b.v - a.v).abs() <= ONE_SPEED * a.v.abs();
+    let mut out: Vec<Missed> = sorted
+        .chunk_by(alike)
+        .filter_map(|group| {
+            let n = group.len() as f64;
+            let mean = |of: &dyn Fn(&Plateau) -> f64| group.iter().map(|p| of(p)).sum::<f64>() / n;
+            let off = |p: &Plateau| p.torque - curve(p.v);
+            let (v, torque, difference) = (mean(&|p| p.v), mean(&|p| p.torque), mean(&off));
+            // what each says of itself, and what they say of one another
+            let within = mean(&|p| p.std * p.std) / n;
+            let between = mean(&|p| (off(p) - difference).powi(2)) / n;
+            let sure = difference.abs() > SURE * within.max(between).sqrt();
+            (sure && difference.abs() > FOLLOWS * torque.abs()).then_some(Missed {
+                v,
+                torque,
+                curve: torque - difference,
+            })
+        })
+        .collect();
+    let share = |m: &Missed| (m.curve / m.torque - 1.0).abs();
+    out.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    out
+}
+
 /// Plateaus of all records at the estimate `p`.
 pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
     let problem = &prepared.problem;

@@ -6,6 +6,8 @@
 //! quite still. Its coefficients are unknown. Columns are scaled to the torque, and only the
 //! directions that this motion excites are kept.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::problem::{FrictionProblem, Record};
@@ -31,6 +33,10 @@ pub struct SmoothedMotion {
 /// Directions whose singular value is below this share of the largest are not carried: what they
 /// could add to the torque is below this share of it.
 const DIRECTION_TOLERANCE: f64 = 2e-3;
+
+/// Samples of the longest record. A longer stretch is cut: a cut costs the knowledge of one state,
+/// and the filter runs over records in parallel.
+const LONGEST_RECORD: usize = 40_000;
 
 /// The problem of one joint with the map from its nuisance states back to the robot's parameters.
 #[derive(Debug, Clone)]
@@ -198,10 +204,12 @@ fn build(
     let long = motions.iter().filter(|m| m.t.len() >= 3);
     let of_joint =
         |x: &Vec<f64>| -> Vec<f64> { x.iter().skip(joint).step_by(n).copied().collect() };
+    let pieces = long
+        .clone()
+        .flat_map(|m| pieces(m.t.len()).map(move |piece| (m, piece)));
     let built = BuiltRecords {
-        records: long
-            .clone()
-            .map(|m| record(robot, joint, m, sensors, back))
+        records: pieces
+            .map(|(m, piece)| record(robot, joint, m, piece, sensors, back))
             .collect(),
         velocity: long.clone().flat_map(|m| of_joint(&m.v)).collect(),
         acceleration: long.flat_map(|m| of_joint(&m.a)).collect(),
@@ -209,30 +217,37 @@ fn build(
     (!built.records.is_empty()).then_some(built)
 }
 
-/// The record of one motion.
+/// Samples of a stretch cut into records of about equal length.
+fn pieces(samples: usize) -> impl Iterator<Item = Range<usize>> {
+    let count = samples.div_ceil(LONGEST_RECORD);
+    (0..count).map(move |i| i * samples / count..(i + 1) * samples / count)
+}
+
+/// The record of a piece of one motion.
 fn record(
     robot: &Robot,
     joint: usize,
     motion: &SmoothedMotion,
+    piece: Range<usize>,
     sensors: &SensorModel,
     back: &DMatrix<f64>,
 ) -> Record {
     let (n, e) = (robot.joints(), back.ncols());
-    let samples = motion.t.len();
+    let first = piece.start;
     let mut record = Record {
-        t: motion.t.clone(),
-        v0: motion.v[joint],
+        t: motion.t[piece.clone()].to_vec(),
+        v0: motion.v[first * n + joint],
         ..Record::default()
     };
-    for k in 0..samples {
+    for k in piece.clone() {
         let pose = &motion.measured[k * n..(k + 1) * n];
         record.y.push(pose[joint]);
         record.r.push((sensors.variance)(pose));
     }
-    let (m, h) = coefficients(robot, joint, motion, back);
+    let (m, h) = coefficients(robot, joint, motion, piece.clone(), back);
     let mut torque = vec![0.0; n];
     // intervals: mean of their ends; the torque as it is timed
-    for k in 0..samples - 1 {
+    for k in piece.start..piece.end - 1 {
         let row = |x: &'_ [f64], k: usize| -> Vec<f64> { x[k * n..(k + 1) * n].to_vec() };
         record.tau.push(if sensors.zero_order_hold {
             // the motor's force is constant; as a joint torque it is that of the middle pose
@@ -245,9 +260,10 @@ fn record(
         } else {
             0.5 * (motion.tau[k * n + joint] + motion.tau[(k + 1) * n + joint])
         });
-        for j in 0..e {
-            record.m.push(0.5 * (m[k * e + j] + m[(k + 1) * e + j]));
-            record.h.push(0.5 * (h[k * e + j] + h[(k + 1) * e + j]));
+        let row = (k - first) * e;
+        for j in row..row + e {
+            record.m.push(0.5 * (m[j] + m[j + e]));
+            record.h.push(0.5 * (h[j] + h[j + e]));
         }
     }
     record
@@ -259,16 +275,17 @@ fn coefficients(
     robot: &Robot,
     joint: usize,
     motion: &SmoothedMotion,
+    piece: Range<usize>,
     back: &DMatrix<f64>,
 ) -> (Vec<f64>, Vec<f64>) {
     let (n, p, e) = (robot.joints(), robot.parameters().len(), back.ncols());
-    let samples = motion.t.len();
+    let (samples, first) = (piece.len(), piece.start);
     let (mut y, mut moved) = (vec![0.0; n * p], vec![0.0; n * p]);
     let mut a = vec![0.0; n];
     let (mut raw_m, mut raw_h) = (vec![0.0; p + 1], vec![0.0; p + 1]);
     let (mut m, mut h) = (vec![0.0; samples * e], vec![0.0; samples * e]);
     for k in 0..samples {
-        let at = k * n..(k + 1) * n;
+        let at = (first + k) * n..(first + k + 1) * n;
         let (q, v) = (&motion.q[at.clone()], &motion.v[at.clone()]);
         a.copy_from_slice(&motion.a[at]);
         a[joint] = 0.0;

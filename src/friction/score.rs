@@ -9,6 +9,7 @@
 //! coloured residual adds to it.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::problem::{FRICTION, FrictionProblem, NoiseLevels, Record};
 use super::propagate::{SampleInterval, ScaledLaw, Transition, state, with_sensitivities};
@@ -112,7 +113,7 @@ struct InnovationWindows {
 }
 
 impl InnovationWindows {
-    /// The record ends.
+    /// The next window begins.
     fn cut(&mut self) {
         (self.sum, self.length, self.slow) = (0.0, 0, false);
     }
@@ -131,6 +132,12 @@ impl InnovationWindows {
             }
             self.cut();
         }
+    }
+
+    /// Adds the windows that another record closed.
+    fn add_counted(&mut self, other: &Self) {
+        self.fast = (self.fast.0 + other.fast.0, self.fast.1 + other.fast.1);
+        self.all = (self.all.0 + other.all.0, self.all.1 + other.all.1);
     }
 
     fn mean(&self) -> (f64, usize) {
@@ -170,83 +177,131 @@ impl Sensitivities {
 }
 
 /// Likelihood, score and information of `parameters`. `block` is the number of samples over which
-/// the score is summed before its outer product is taken.
+/// the score is summed before its outer product is taken. Records know nothing of one another: they
+/// run in parallel, and are added in their order, so that threads change nothing.
 pub fn score(
     problem: &FrictionProblem,
     parameters: &[f64],
     noise: NoiseLevels,
     block: usize,
 ) -> LikelihoodScore {
-    let np = problem.parameters();
     let law = ScaledLaw::new(problem, parameters);
+    let parts: Vec<RecordScore> = problem
+        .records
+        .par_iter()
+        .map(|record| of_record(problem, record, &law, parameters, noise, block))
+        .collect();
+    let mut sum = RecordScore::none(problem.parameters());
+    for part in &parts {
+        sum.add(part);
+    }
+    sum.whole()
+}
+
+/// Sums over one record or several.
+struct RecordScore {
+    sums: LikelihoodScore,
+    windows: InnovationWindows,
+    /// Lower triangle of the information, row-major.
+    information: Vec<f64>,
+    nis: f64,
+    inside: usize,
+}
+
+impl RecordScore {
+    fn none(parameters: usize) -> Self {
+        RecordScore {
+            sums: LikelihoodScore::none(parameters),
+            windows: InnovationWindows::default(),
+            information: vec![0.0; parameters * parameters],
+            nis: 0.0,
+            inside: 0,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        let (sum, part) = (&mut self.sums, &other.sums);
+        sum.log_likelihood += part.log_likelihood;
+        sum.gradient += &part.gradient;
+        sum.outer += &part.outer;
+        sum.blocks += part.blocks;
+        sum.innovations += part.innovations;
+        for (a, b) in self.information.iter_mut().zip(&other.information) {
+            *a += b;
+        }
+        self.windows.add_counted(&other.windows);
+        self.nis += other.nis;
+        self.inside += other.inside;
+    }
+
+    fn whole(self) -> LikelihoodScore {
+        let mut out = self.sums;
+        let np = out.gradient.len();
+        let at = |i: usize, j: usize| self.information[i.max(j) * np + i.min(j)];
+        out.information = DMatrix::from_fn(np, np, at);
+        let n = out.innovations.max(1) as f64;
+        out.mean_nis = self.nis / n;
+        (out.window_nis, out.windows) = self.windows.mean();
+        out.share_inside = self.inside as f64 / n;
+        out
+    }
+}
+
+fn of_record(
+    problem: &FrictionProblem,
+    record: &Record,
+    law: &ScaledLaw,
+    parameters: &[f64],
+    noise: NoiseLevels,
+    block: usize,
+) -> RecordScore {
+    let np = problem.parameters();
+    let mut out = RecordScore::none(np);
     let mut t = Transition::new(np);
-    let mut out = LikelihoodScore::none(np);
-    let mut windows = InnovationWindows::default();
     let s2 = noise.torque * noise.torque;
-    let mut info = vec![0.0; np * np];
-    let (mut nis, mut inside) = (0.0, 0usize);
     let mut w = Sensitivities {
         q: vec![0.0; np],
         v: vec![0.0; np],
     };
-    for record in &problem.records {
-        let mut part = DVector::zeros(np);
-        let (mut q, mut v) = (record.y[0], record.v0);
-        let mut p = first_covariance(problem, record, noise);
-        w.q.fill(0.0);
-        w.v.fill(0.0);
-        windows.cut();
-        for k in 0..record.tau.len() {
-            let interval = SampleInterval::of(record, k, problem.nuisance);
-            let next = with_sensitivities(
-                &law,
-                parameters,
-                &interval,
-                problem.least_inertia,
-                q,
-                v,
-                &mut t,
-            );
-            (q, v) = next;
-            p = predict(p, &t, s2);
-            w.propagate(&t);
-            let s = p[0] + record.r[k + 1] * noise.position_factor;
-            let innovation = record.y[k + 1] - q;
-            let (kq, kv) = update(&mut p, s);
-            q += kq * innovation;
-            v += kv * innovation;
-            let z = innovation * innovation / s;
-            out.log_likelihood -= 0.5 * (z + s.ln());
-            nis += z;
-            windows.add(
-                innovation / s.sqrt(),
-                v.abs() * interval.dt,
-                record.r[k + 1],
-            );
-            inside += usize::from(z < CHI2_95);
-            out.innovations += 1;
-            // d(innovation)/dp = -w; score = w nu / s, information = w w' / s
-            let g = innovation / s;
-            for i in 0..np {
-                part[i] += w.q[i] * g;
-                let wi = w.q[i] / s;
-                for (a, w) in info[i * np..i * np + i + 1].iter_mut().zip(&w.q[..=i]) {
-                    *a += wi * w;
-                }
-            }
-            w.update(kq, kv);
-            if (k + 1) % block.max(1) == 0 {
-                out.close_block(&mut part);
+    let mut part = DVector::zeros(np);
+    let (mut q, mut v) = (record.y[0], record.v0);
+    let mut p = first_covariance(problem, record, noise);
+    for k in 0..record.tau.len() {
+        let interval = SampleInterval::of(record, k, problem.nuisance);
+        let least = problem.least_inertia;
+        (q, v) = with_sensitivities(law, parameters, &interval, least, q, v, &mut t);
+        p = predict(p, &t, s2);
+        w.propagate(&t);
+        let s = p[0] + record.r[k + 1] * noise.position_factor;
+        let innovation = record.y[k + 1] - q;
+        let (kq, kv) = update(&mut p, s);
+        q += kq * innovation;
+        v += kv * innovation;
+        let z = innovation * innovation / s;
+        out.sums.log_likelihood -= 0.5 * (z + s.ln());
+        out.nis += z;
+        let travel = v.abs() * interval.dt;
+        out.windows
+            .add(innovation / s.sqrt(), travel, record.r[k + 1]);
+        out.inside += usize::from(z < CHI2_95);
+        out.sums.innovations += 1;
+        // d(innovation)/dp = -w; score = w nu / s, information = w w' / s
+        let g = innovation / s;
+        for i in 0..np {
+            part[i] += w.q[i] * g;
+            let wi = w.q[i] / s;
+            let row = &mut out.information[i * np..i * np + i + 1];
+            for (a, w) in row.iter_mut().zip(&w.q[..=i]) {
+                *a += wi * w;
             }
         }
-        // the last, shorter block
-        out.close_block(&mut part);
+        w.update(kq, kv);
+        if (k + 1) % block.max(1) == 0 {
+            out.sums.close_block(&mut part);
+        }
     }
-    out.information = DMatrix::from_fn(np, np, |i, j| info[i.max(j) * np + i.min(j)]);
-    let n = out.innovations.max(1) as f64;
-    out.mean_nis = nis / n;
-    (out.window_nis, out.windows) = windows.mean();
-    out.share_inside = inside as f64 / n;
+    // the last, shorter block
+    out.sums.close_block(&mut part);
     out
 }
 
@@ -260,32 +315,45 @@ pub(super) fn log_likelihood(
     noise: NoiseLevels,
 ) -> f64 {
     let law = ScaledLaw::new(problem, parameters);
+    let parts: Vec<f64> = problem
+        .records
+        .par_iter()
+        .map(|record| likelihood_of_record(problem, record, &law, parameters, noise))
+        .collect();
+    parts.iter().sum()
+}
+
+fn likelihood_of_record(
+    problem: &FrictionProblem,
+    record: &Record,
+    law: &ScaledLaw,
+    parameters: &[f64],
+    noise: NoiseLevels,
+) -> f64 {
     let eta = &parameters[FRICTION..];
     let s2 = noise.torque * noise.torque;
     let mut sum = 0.0;
-    for record in &problem.records {
-        let (mut q, mut v) = (record.y[0], record.v0);
-        let mut p = first_covariance(problem, record, noise);
-        for k in 0..record.tau.len() {
-            let interval = SampleInterval::of(record, k, problem.nuisance);
-            let (start_v, dt) = (v, interval.dt);
-            let minv = inverse_inertia(&interval, eta, problem.least_inertia);
-            (q, v) = state(&law, eta, &interval, problem.least_inertia, q, v);
-            // one mean decay over the interval serves the covariance
-            let decay = 0.5 * (law.slope_at(start_v) + law.slope_at(v)) * minv * dt;
-            let t = decayed(decay, dt, minv);
-            p = [
-                p[0] + 2.0 * t[0] * p[1] + t[0] * t[0] * p[2] + s2 * t[2] * t[2],
-                t[1] * (p[1] + t[0] * p[2]) + s2 * t[2] * t[3],
-                t[1] * t[1] * p[2] + s2 * t[3] * t[3],
-            ];
-            let s = p[0] + record.r[k + 1] * noise.position_factor;
-            let innovation = record.y[k + 1] - q;
-            let (kq, kv) = update(&mut p, s);
-            q += kq * innovation;
-            v += kv * innovation;
-            sum -= 0.5 * (innovation * innovation / s + s.ln());
-        }
+    let (mut q, mut v) = (record.y[0], record.v0);
+    let mut p = first_covariance(problem, record, noise);
+    for k in 0..record.tau.len() {
+        let interval = SampleInterval::of(record, k, problem.nuisance);
+        let (start_v, dt) = (v, interval.dt);
+        let minv = inverse_inertia(&interval, eta, problem.least_inertia);
+        (q, v) = state(law, eta, &interval, problem.least_inertia, q, v);
+        // one mean decay over the interval serves the covariance
+        let decay = 0.5 * (law.slope_at(start_v) + law.slope_at(v)) * minv * dt;
+        let t = decayed(decay, dt, minv);
+        p = [
+            p[0] + 2.0 * t[0] * p[1] + t[0] * t[0] * p[2] + s2 * t[2] * t[2],
+            t[1] * (p[1] + t[0] * p[2]) + s2 * t[2] * t[3],
+            t[1] * t[1] * p[2] + s2 * t[3] * t[3],
+        ];
+        let s = p[0] + record.r[k + 1] * noise.position_factor;
+        let innovation = record.y[k + 1] - q;
+        let (kq, kv) = update(&mut p, s);
+        q += kq * innovation;
+        v += kv * innovation;
+        sum -= 0.5 * (innovation * innovation / s + s.ln());
     }
     sum
 }

@@ -23,7 +23,8 @@ pub(crate) fn open_above(problem: &FrictionProblem, maximum: &Maximum, i: usize)
     let mut p = maximum.parameters.clone();
     p[i] = (problem.slope_range.1 * problem.velocity_scale).ln();
     let spread = spread(problem);
-    let refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &[i]);
+    let fixed = [&[i], maximum.fixed].concat();
+    let refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &fixed);
     drop(maximum, refined.score.log_likelihood) < BOUND_DROP
 }
 
@@ -35,11 +36,12 @@ pub(crate) fn profile_slope(problem: &FrictionProblem, maximum: &Maximum, i: usi
     let lowest = (problem.slope_range.0 * problem.velocity_scale).ln();
     let mut p = maximum.parameters.clone();
     let mut before = (p[i], 0.0);
+    let fixed = [&[i], maximum.fixed].concat();
     while p[i] > lowest {
         p[i] = (p[i] - STRIDE).max(lowest);
         let from = p.clone();
-        let mut refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &[i]);
-        if i == 3 && refined.parameters[4] > refined.parameters[3] {
+        let mut refined = refine_others(problem, p, maximum.noise, &spread, STEPS, &fixed);
+        if i == 3 && !maximum.one_term() && refined.parameters[4] > refined.parameters[3] {
             let mut both = from;
             both[4] = both[4].min(both[3]);
             let fixed = [3, 4];

@@ -325,6 +325,21 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
             e.widening.sqrt()
         ));
     }
+    if e.coulomb_terms == 1 {
+        out.push(format!(
+            "{joint}: one Coulomb term does; coulomb_2 and slope_2 are not determined, for a second term makes \
+             these data no likelier"
+        ));
+    } else if e.cancels() {
+        out.push(format!(
+            "{joint}: coulomb_1 {} and coulomb_2 {} cancel, for their slopes are hardly apart: use the friction \
+             curve, which is known to {}, and none of the two by itself",
+            number::significant(e.law.coulomb_1, 3),
+            number::significant(e.law.coulomb_2, 3),
+            number::percent(e.curve_uncertainty()),
+        ));
+    }
+    out.extend(missed_plateaus(found));
     for (k, value) in e.values.iter().enumerate() {
         match value.verdict {
             Verdict::LowerBound => out.push(format!(
@@ -332,14 +347,43 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
                 DoubleTanh::NAMES[k],
                 number::significant(value.value, 3)
             )),
-            Verdict::NotIdentifiable => out.push(format!(
+            Verdict::NotIdentifiable if !e.one_term_lacks(k) => out.push(format!(
                 "{joint}: these data cannot determine {}; log slower reversals and more speeds",
                 DoubleTanh::NAMES[k]
             )),
-            Verdict::Identified | Verdict::Weak => {}
+            Verdict::NotIdentifiable | Verdict::Identified | Verdict::Weak => {}
         }
     }
     out
+}
+
+/// The speeds at which the curve is not to be used, for the mean torque at constant speed, which took
+/// no part in the fit, says otherwise.
+fn missed_plateaus(found: &FrictionOfJoint) -> Option<String> {
+    const NAMED: usize = 4;
+    let missed = found.estimate.missed_plateaus();
+    let worst = missed.iter().take(NAMED).map(|m| {
+        format!(
+            "{} at {} (curve {})",
+            number::significant(m.torque, 3),
+            number::significant(m.v, 2),
+            number::significant(m.curve, 3)
+        )
+    });
+    let worst: Vec<String> = worst.collect();
+    let more = match missed.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        n => format!(" and {n} more speeds"),
+    };
+    (!missed.is_empty()).then(|| {
+        format!(
+            "{}: the friction curve misses the mean torque at constant speed: {}{more}; do not use it at these \
+             speeds: the law cannot follow this joint there, its friction depends on more than speed, or it \
+             changed between the logs",
+            found.joint,
+            worst.join(", ")
+        )
+    })
 }
 
 /// The parameters of one joint as a model file holds them. A slope with a bound keeps the value of

@@ -1,7 +1,7 @@
 //! The report of `friction`.
 
 use crate::config::ModelFile;
-use crate::friction::estimate::{FrictionCurvePoint, curve_std};
+use crate::friction::estimate::{BEYOND, FrictionCurvePoint, curve_std};
 use crate::identify::{FrictionOfJoint, IdentifiedFriction, LoggedRobot};
 use crate::log::{Provenance, escape};
 use crate::number;
@@ -96,6 +96,13 @@ fn words(of: &Friction) -> (String, bool) {
             good = false;
             text += &format!(" The search for {} ended without converging.", found.joint);
         }
+        if !found.estimate.missed_plateaus().is_empty() {
+            good = false;
+            text += &format!(
+                " The curve of {} misses the mean torque at constant speed (see the notes).",
+                found.joint
+            );
+        }
         let nis = &found.estimate.nis;
         if nis.mean > nis.upper_95 {
             good = false;
@@ -177,8 +184,8 @@ fn speeds_to_draw([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     let slowest = (0.1 * low).max(1e-4 * high);
     let share = |k: usize| k as f64 / (POINTS - 1) as f64;
     let ratios = (0..POINTS).map(|k| slowest * (high / slowest).powf(share(k)));
-    let steps = (0..POINTS).map(|k| low + (high - low) * share(k));
-    let mut speeds: Vec<f64> = ratios.chain(steps).collect();
+    let steps = (0..POINTS).map(|k| low + (BEYOND * high - low) * share(k));
+    let mut speeds: Vec<f64> = ratios.chain(steps).chain([low, high]).collect();
     speeds.sort_by(f64::total_cmp);
     let down: Vec<f64> = speeds.iter().rev().map(|v| -v).collect();
     down.into_iter().chain([0.0]).chain(speeds)

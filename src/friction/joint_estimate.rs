@@ -1,0 +1,146 @@
+//! What the filter says of one joint: parameters with verdicts, curve, plateaus, consistency.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::excitation::Speeds;
+use super::passes::ONE_TERM;
+use super::plateau::{Missed, Plateau, missed};
+use super::problem::FRICTION;
+use crate::math::descent::Ending;
+use crate::robot::friction::DoubleTanh;
+use crate::verdict::Verdict;
+
+/// One friction parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EstimatedValue {
+    pub value: f64,
+    pub std: f64,
+    pub verdict: Verdict,
+}
+
+/// One point of the friction curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct FrictionCurvePoint {
+    /// Velocity [m/s or rad/s].
+    pub v: f64,
+    /// Friction torque [N or Nm].
+    pub torque: f64,
+    /// Its standard deviation [N or Nm].
+    pub std: f64,
+}
+
+/// A nuisance quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Nuisance {
+    pub name: String,
+    pub value: f64,
+    pub std: f64,
+    pub unit: String,
+}
+
+/// Normalised innovations squared with their 95 % bounds.
+///
+/// The noise levels are estimated, so that single innovations have about their own variance under
+/// any model. What tells a wrong one is that its innovations are alike: so the mean is over windows
+/// of 50 samples, each the square of the window's summed normalised innovations over their number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Nis {
+    /// Mean over windows; 1 where the filter's covariance is true and the innovations are white.
+    pub mean: f64,
+    /// 95 % bounds of that mean.
+    pub lower_95: f64,
+    pub upper_95: f64,
+    /// Number of windows.
+    pub windows: usize,
+    /// Mean over single innovations.
+    pub per_sample: f64,
+    /// Share of single innovations inside their own 95 % bound.
+    pub share_inside: f64,
+}
+
+impl Nis {
+    /// Whether the mean is inside its bounds.
+    pub fn consistent(&self) -> bool {
+        (self.lower_95..=self.upper_95).contains(&self.mean)
+    }
+}
+
+/// Friction of one joint with all that belongs to it.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct JointEstimate {
+    /// How the search ended.
+    pub ending: Ending,
+    /// Starting points of the search.
+    pub starts: usize,
+    /// The law at the maximum of the likelihood.
+    #[serde(skip)]
+    pub law: DoubleTanh,
+    /// Bv, Bf1, Bf2, w1, w2 with verdicts; a slope with a bound holds the bound.
+    #[serde(skip)]
+    pub values: [EstimatedValue; FRICTION],
+    /// Covariance of the five parameters in SI units.
+    #[serde(skip)]
+    pub covariance: [[f64; FRICTION]; FRICTION],
+    /// What was estimated along, and is no friction.
+    pub nuisance: Vec<Nuisance>,
+    #[serde(flatten)]
+    pub speeds: Speeds,
+    /// The law over the speeds covered: 50 equal steps in each direction.
+    pub curve: Vec<FrictionCurvePoint>,
+    /// The law at speeds that the log does not cover, up to twice the largest of those: a forecast.
+    pub curve_beyond: Vec<FrictionCurvePoint>,
+    /// Mean torques at constant speed, which took no part in the fit.
+    pub plateaus: Vec<Plateau>,
+    pub nis: Nis,
+    pub noise: FilterNoise,
+    /// Factor by which coloured innovations widened the covariance.
+    pub widening: f64,
+    /// Coulomb terms that the law was given: one where a second makes the log no likelier.
+    pub coulomb_terms: usize,
+    /// Torque residual along the measured motion [N or Nm].
+    pub rmse: f64,
+    /// The same relative to the torque.
+    pub relative_error: f64,
+    pub samples: usize,
+    /// Cut-offs of the other joints' accelerations [Hz], one per joint; infinite where they came in
+    /// as the position filter leaves them.
+    #[serde(skip)]
+    pub cutoffs: Vec<f64>,
+}
+
+/// Sizes of the two Coulomb terms over that of their sum from which they cancel.
+const CANCEL: f64 = 4.0;
+
+impl JointEstimate {
+    /// Whether the two Coulomb terms are each several times what they leave together.
+    pub fn cancels(&self) -> bool {
+        let (one, two) = (self.law.coulomb_1, self.law.coulomb_2);
+        one.abs() + two.abs() > CANCEL * (one + two).abs()
+    }
+
+    /// Half the 95 % band of the curve over its torque, the largest over the speeds covered.
+    pub fn curve_uncertainty(&self) -> f64 {
+        let share = |p: &FrictionCurvePoint| 1.96 * p.std / p.torque.abs();
+        self.curve.iter().map(share).fold(0.0, f64::max)
+    }
+
+    /// Whether parameter `k` belongs to a second Coulomb term that the law was not given.
+    pub fn one_term_lacks(&self, k: usize) -> bool {
+        self.coulomb_terms == 1 && ONE_TERM.contains(&k)
+    }
+
+    /// Speeds at which the curve misses the plateaus' mean torque.
+    pub fn missed_plateaus(&self) -> Vec<Missed> {
+        missed(&self.plateaus, &|v| self.law.torque(v))
+    }
+}
+
+/// Noise levels that the filter settled on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct FilterNoise {
+    /// Standard deviation of the torque noise [N or Nm].
+    pub torque_std: f64,
+    /// Factor on the encoder's variance.
+    pub position_variance_factor: f64,
+}

@@ -1,0 +1,82 @@
+//! A share of a long log for the search: what finds the maximum need not see every row. The
+//! maximum itself is then settled on all of them.
+
+use std::ops::Range;
+
+use super::prepare::Prepared;
+use super::problem::{FrictionProblem, Record};
+
+/// Samples of one piece.
+const PIECE: usize = 1000;
+
+/// At most about `most` samples of the log in pieces, half of them from pieces in which the joint
+/// turns round, which the slopes are seen in, half from the others, both spread evenly over the log.
+/// `None` where the log has no more than that.
+pub(super) fn thinned(prepared: &Prepared, most: usize) -> Option<Prepared> {
+    let records = &prepared.problem.records;
+    if prepared.problem.samples() <= most {
+        return None;
+    }
+    let (mut turning, mut others) = (Vec::new(), Vec::new());
+    let mut first = 0;
+    for (r, record) in records.iter().enumerate() {
+        let samples = record.t.len();
+        let count = samples.div_ceil(PIECE);
+        for i in 0..count {
+            let rows = i * samples / count..(i + 1) * samples / count;
+            let v = &prepared.velocity[first + rows.start..first + rows.end];
+            let turns = v.iter().any(|x| *x > 0.0) && v.iter().any(|x| *x < 0.0);
+            let of_kind = if turns { &mut turning } else { &mut others };
+            of_kind.push((r, first, rows));
+        }
+        first += samples;
+    }
+    let budget = (most / PIECE).max(2);
+    let of_turning = (budget / 2).max(budget.saturating_sub(others.len()));
+    let mut kept = evenly(&turning, of_turning);
+    kept.extend(evenly(&others, budget - kept.len()));
+    kept.sort_by_key(|(record, _, rows)| (*record, rows.start));
+    let (mut velocity, mut acceleration) = (Vec::new(), Vec::new());
+    let mut parts = Vec::new();
+    for (record, first, rows) in kept.into_iter().filter(|(_, _, rows)| rows.len() >= 3) {
+        let all = first + rows.start..first + rows.end;
+        velocity.extend(&prepared.velocity[all.clone()]);
+        acceleration.extend(&prepared.acceleration[all.clone()]);
+        let v0 = prepared.velocity[all.start];
+        parts.push(part(&records[record], rows, v0, prepared.problem.nuisance));
+    }
+    Some(Prepared {
+        problem: FrictionProblem {
+            records: parts,
+            ..prepared.problem
+        },
+        back: prepared.back.clone(),
+        velocity,
+        acceleration,
+    })
+}
+
+/// At most `most` of the pieces, spread evenly.
+fn evenly(pieces: &[Piece], most: usize) -> Vec<Piece> {
+    let count = pieces.len().min(most);
+    let at = |i: usize| pieces[i * pieces.len() / count].clone();
+    (0..count).map(at).collect()
+}
+
+/// Record, first sample of it among all, and samples of the piece.
+type Piece = (usize, usize, Range<usize>);
+
+/// Some samples of a record as a record.
+fn part(record: &Record, rows: Range<usize>, v0: f64, nuisance: usize) -> Record {
+    let intervals = rows.start..rows.end - 1;
+    let columns = intervals.start * nuisance..intervals.end * nuisance;
+    Record {
+        t: record.t[rows.clone()].to_vec(),
+        y: record.y[rows.clone()].to_vec(),
+        r: record.r[rows].to_vec(),
+        tau: record.tau[intervals].to_vec(),
+        m: record.m[columns.clone()].to_vec(),
+        h: record.h[columns].to_vec(),
+        v0,
+    }
+}
