@@ -359,6 +359,7 @@ mod tests {
     use super::super::prepare::{SensorModel, prepare};
     use super::super::trial::Trial;
     use super::*;
+    use crate::math::descent::Ending;
     use crate::robot::{JointKind, Robot};
 
     fn run(trial: &Trial, seed: u64, options: &Options) -> Result<JointEstimate, FrictionError> {

@@ -133,3 +133,39 @@ pub fn plateaus(prepared: &Prepared, p: &[f64]) -> Vec<Plateau> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plateau(v: f64, torque: f64) -> Plateau {
+        Plateau {
+            v,
+            torque,
+            std: 0.01,
+            seconds: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_speed_whose_plateaus_the_curve_misses_is_named_and_no_other() {
+        let curve = |v: f64| 2.0 * v.signum();
+        // right; off by 5 %; off by 5 % but as unsure as that; off by 1 %
+        let unsure = Plateau {
+            std: 0.06,
+            ..plateau(-0.4, -2.1)
+        };
+        let all = [
+            plateau(0.1, 2.0),
+            plateau(0.4, 2.1),
+            plateau(0.405, 2.11),
+            unsure,
+            plateau(1.0, 2.02),
+        ];
+        let found = missed(&all, &curve);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!((found[0].v - 0.4025).abs() < 1e-9);
+        assert!((found[0].torque - 2.105).abs() < 1e-9);
+        assert!((found[0].curve - 2.0).abs() < 1e-9);
+    }
+}

@@ -80,3 +80,33 @@ fn part(record: &Record, rows: Range<usize>, v0: f64, nuisance: usize) -> Record
         v0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trial::Trial;
+    use super::*;
+
+    #[test]
+    fn a_share_of_a_log_keeps_turning_points_and_what_lies_between_in_their_order() {
+        let prepared = Trial::usual().prepared(1);
+        let all = prepared.problem.samples();
+        assert!(thinned(&prepared, all).is_none());
+        let share = thinned(&prepared, 6000).expect("the log is longer");
+        let samples = share.problem.samples();
+        assert!((5000..=6000).contains(&samples), "{samples}");
+        assert_eq!(share.velocity.len(), samples);
+        assert_eq!(share.acceleration.len(), samples);
+        let (mut first, mut turns, mut before) = (0, 0, f64::NEG_INFINITY);
+        for record in &share.problem.records {
+            assert!(record.t[0] > before);
+            before = record.t[record.t.len() - 1];
+            assert_eq!(record.tau.len() + 1, record.t.len());
+            assert_eq!(record.m.len(), record.tau.len() * prepared.problem.nuisance);
+            let v = &share.velocity[first..first + record.t.len()];
+            assert_eq!(record.v0, v[0]);
+            turns += usize::from(v.iter().any(|x| *x > 0.0) && v.iter().any(|x| *x < 0.0));
+            first += record.t.len();
+        }
+        assert!(turns >= 1 && turns < share.problem.records.len());
+    }
+}

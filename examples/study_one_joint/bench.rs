@@ -1,14 +1,7 @@
-//! Friction curves from one-joint logs as laboratories have them: logs of one speed each, the slow
-//! speeds of harmonic drives, short logs, two slopes that are hardly apart, one slope.
-//!
-//! `cargo run --release --example study_one_joint -- [SEEDS] [FOLDER]` writes one line per seed to
-//! target/study_one_joint.jsonl as it goes and, at the end, FOLDER/study_one_joint.json, from which
-//! docs/studies.md has its table. The motion is integrated by the simulator; encoder and torque
-//! noise are those of a wrist's drive; the filter is given nothing but the log.
-
-mod study;
+//! One-joint logs as laboratories have them, simulated, and the filter's estimate from them.
 
 use cft_ident::friction::estimate::{JointEstimate, Options, estimate};
+use cft_ident::friction::excitation::FrictionError;
 use cft_ident::friction::inputs::Inputs;
 use cft_ident::friction::motions::motions;
 use cft_ident::friction::prepare::{SensorModel, SmoothedMotion, prepare};
@@ -22,10 +15,7 @@ use cft_ident::simulate::{
     Drive, Effects, Noise, Reference, Settings, SimulatedRun, SingleJointTruth, SmoothFriction,
     Start,
 };
-use cft_ident::verdict::Verdict;
 use rand::{RngExt, SeedableRng};
-use serde_json::{Value, json};
-use study::{percent, quantile, study, write_summary};
 
 /// Travel of the joint \[rad\] and largest acceleration \[rad/s^2\].
 const RANGE: (f64, f64) = (-2.4, 2.4);
@@ -33,16 +23,18 @@ const ACCELERATION: f64 = 12.0;
 /// One encoder count \[rad\], torque per volt \[Nm/V\].
 const COUNT: f64 = 2e-5;
 const GAIN: f64 = 4.0;
-/// A tenth of the curve must hold to this.
-const ASKED: f64 = 0.03;
+/// A curve must hold to this wherever there are plateaus.
+pub const ASKED: f64 = 0.03;
 
 /// A kind of experiment.
-struct Case {
-    name: &'static str,
+pub struct Case {
+    pub name: &'static str,
     /// Bv, Bf1, Bf2, w1, w2 before they are varied.
     law: [f64; 5],
     /// Plateau speeds \[rad/s\].
-    speeds: &'static [f64],
+    pub speeds: &'static [f64],
+    /// Whether the plant has one Coulomb term.
+    pub one_slope: bool,
     /// Length of a log \[s\].
     seconds: f64,
     /// Whether each direction of each speed is a log of its own, without turning points.
@@ -50,11 +42,12 @@ struct Case {
 }
 
 const TEN: [f64; 10] = [0.04, 0.06, 0.09, 0.13, 0.2, 0.3, 0.45, 0.67, 1.0, 1.5];
-const CASES: [Case; 5] = [
+pub const CASES: [Case; 5] = [
     Case {
         name: "one speed a log, each direction by itself",
         law: [0.8, 2.0, -0.45, 120.0, 9.0],
         speeds: &TEN,
+        one_slope: false,
         seconds: 8.0,
         constant: true,
     },
@@ -62,6 +55,7 @@ const CASES: [Case; 5] = [
         name: "harmonic drive, from 0.01 rad/s",
         law: [6.0, 9.0, -2.5, 300.0, 40.0],
         speeds: &[0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2],
+        one_slope: false,
         seconds: 60.0,
         constant: false,
     },
@@ -69,6 +63,7 @@ const CASES: [Case; 5] = [
         name: "10 s",
         law: [0.8, 2.0, -0.45, 120.0, 9.0],
         speeds: &[0.3, 0.6, 1.2, 2.4],
+        one_slope: false,
         seconds: 10.0,
         constant: false,
     },
@@ -76,6 +71,7 @@ const CASES: [Case; 5] = [
         name: "two slopes within a factor 1.5",
         law: [0.8, 1.2, 0.9, 60.0, 42.0],
         speeds: &TEN,
+        one_slope: false,
         seconds: 40.0,
         constant: false,
     },
@@ -83,29 +79,11 @@ const CASES: [Case; 5] = [
         name: "one slope",
         law: [0.8, 1.8, 0.0, 60.0, 60.0],
         speeds: &TEN,
+        one_slope: true,
         seconds: 40.0,
         constant: false,
     },
 ];
-
-fn main() {
-    let (rows, folder) = study("study_one_joint", 20, campaign);
-    let rows: Vec<Value> = CASES.iter().map(|case| summary(case.name, &rows)).collect();
-    let seeds = rows.first().and_then(|r| r["seeds"].as_u64()).unwrap_or(0);
-    write_summary(
-        &folder,
-        "study_one_joint",
-        "friction curves from one-joint logs as laboratories have them",
-        "study_one_joint",
-        seeds as usize,
-        rows,
-    );
-}
-
-fn campaign(seed: u64) -> Value {
-    let cases: Vec<Value> = CASES.iter().map(|case| one(case, seed)).collect();
-    json!({ "seed": seed, "cases": cases })
-}
 
 fn truth(case: &Case, seed: u64) -> (SingleJointTruth, DoubleTanh) {
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
@@ -237,7 +215,8 @@ fn logs(case: &Case, truth: &SingleJointTruth, seed: u64) -> [Vec<SmoothedMotion
     both
 }
 
-fn one(case: &Case, seed: u64) -> Value {
+/// What the filter makes of a case, and the true law.
+pub fn estimated(case: &Case, seed: u64) -> (Result<JointEstimate, FrictionError>, DoubleTanh) {
     let (truth, law) = truth(case, seed);
     let [wide, narrower] = logs(case, &truth, seed);
     let robot = Robot::single_joint("wrist", JointKind::Revolute);
@@ -256,66 +235,17 @@ fn one(case: &Case, seed: u64) -> Value {
     };
     let names = ["inertia".to_owned()];
     let options = Options::default();
-    let began = std::time::Instant::now();
     let found = estimate("wrist", &names, &prepared, Some(&inputs), &options);
-    let seconds = began.elapsed().as_secs_f64();
-    let mut row = match found {
-        Ok(e) => judged(case, &e, &law),
-        Err(refusal) => json!({ "refused": refusal.to_string() }),
-    };
-    row["case"] = json!(case.name);
-    row["rows"] = json!(prepared.velocity.len());
-    row["seconds"] = json!(seconds);
-    row
+    (found, law)
 }
 
-/// Errors of the curve at the plateaus' speeds and over all speeds covered, and what is covered.
-fn judged(case: &Case, e: &JointEstimate, law: &DoubleTanh) -> Value {
-    let off = |v: f64| (e.law.torque(v) - law.torque(v)).abs() / law.torque(v).abs();
-    let at_plateaus = case.speeds.iter().flat_map(|v| [off(*v), off(-v)]);
-    let inside = e
-        .curve
-        .iter()
-        .map(|p| (p.torque - law.torque(p.v)).abs() <= 1.96 * p.std);
-    let whole = e.curve.iter().map(|p| off(p.v)).fold(0.0, f64::max);
-    json!({
-        "plateaus": at_plateaus.fold(0.0, f64::max),
-        "curve": whole,
-        "inside": inside.filter(|x| *x).count() as f64 / e.curve.len() as f64,
-        "values": e.values.iter().map(|v| v.value).collect::<Vec<_>>(),
-        "truth": law.parameters(),
-        "not_identifiable": e.values.iter().filter(|v| v.verdict == Verdict::NotIdentifiable).count(),
-        "cancelling": e.law.coulomb_1.abs() > 3.0 * (e.law.coulomb_1 + e.law.coulomb_2).abs(),
-        "covered": e.speeds.covered,
-        "nis": e.nis.mean,
-    })
+/// Largest relative error of the curve at the speeds of the plateaus, in both directions.
+pub fn error_at_plateaus(case: &Case, e: &JointEstimate, law: &DoubleTanh) -> f64 {
+    let speeds = case.speeds.iter().flat_map(|v| [*v, -v]);
+    speeds.map(|v| off(e, law, v)).fold(0.0, f64::max)
 }
 
-fn summary(name: &str, rows: &[Value]) -> Value {
-    let of = |row: &Value| -> Vec<Value> { row["cases"].as_array().cloned().unwrap_or_default() };
-    let cases: Vec<Value> = rows
-        .iter()
-        .flat_map(of)
-        .filter(|c| c["case"] == name)
-        .collect();
-    let numbers =
-        |key: &str| -> Vec<f64> { cases.iter().filter_map(|c| c[key].as_f64()).collect() };
-    let (plateaus, curve, inside) = (numbers("plateaus"), numbers("curve"), numbers("inside"));
-    let refused = cases.len() - plateaus.len();
-    let most = |x: &[f64]| match x.is_empty() {
-        true => "-".to_owned(),
-        false => percent(quantile(x.to_vec(), 1.0)),
-    };
-    let right = plateaus.iter().filter(|x| **x <= ASKED).count();
-    json!({
-        "seeds": cases.len(),
-        "case": name,
-        "rows": quantile(numbers("rows"), 0.5),
-        "curves within 3 % at every plateau": format!("{right} of {}", plateaus.len()),
-        "refused": refused,
-        "largest error at a plateau": most(&plateaus),
-        "largest error of a curve": most(&curve),
-        "coverage": format!("{:.3}", inside.iter().sum::<f64>() / inside.len().max(1) as f64),
-        "median seconds": format!("{:.1}", quantile(numbers("seconds"), 0.5)),
-    })
+/// Relative error of the curve at a speed.
+pub fn off(e: &JointEstimate, law: &DoubleTanh, v: f64) -> f64 {
+    (e.law.torque(v) / law.torque(v) - 1.0).abs()
 }
