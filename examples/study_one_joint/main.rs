@@ -7,6 +7,7 @@
 //! noise are those of a wrist's drive; the filter is given nothing but the log.
 
 mod bench;
+#[allow(dead_code)] // it uses its share
 #[path = "../study/mod.rs"]
 mod study;
 
