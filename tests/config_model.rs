@@ -240,7 +240,7 @@ fn a_model_edited_wrongly_is_refused_with_the_line() {
         &["no joint of this robot", "q1, q2, q4, q5"],
     );
     refused(
-        change("  \"viscous:q4\"", "  \"viscous:q9\""),
+        change("\n  \"viscous:q4\"", "\n  \"viscous:q9\""),
         &["viscous:q9", "no parameter"],
     );
     refused(

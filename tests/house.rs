@@ -13,8 +13,8 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("verdict", &[]),
     ("number", &[]),
     ("robot", &["math"]),
-    ("log", &["math", "robot"]),
-    ("config", &["robot", "log", "verdict"]),
+    ("log", &["math", "number", "robot"]),
+    ("config", &["number", "robot", "log", "verdict"]),
     ("output", &["log"]),
     ("export", &["number", "robot", "config"]),
     ("motion", &["math", "robot", "log"]),
@@ -26,7 +26,10 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("inspect", &["math", "number", "log"]),
     ("setup", &["math", "robot", "motion", "inertia"]),
     ("mapping", &["robot", "log", "inspect"]),
-    ("simulate", &["math", "robot", "log", "config", "effect"]),
+    (
+        "simulate",
+        &["math", "number", "robot", "log", "config", "effect"],
+    ),
     (
         "excite",
         &[

@@ -37,7 +37,8 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
     let names = log.names();
     let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
         CliError::input(format!(
-            "no column is a time; the header has {}",
+            "{}: no column is a time; the header has {}",
+            log.log_name(),
             log::list(names.iter().map(String::as_str))
         ))
         .hint("name the time column, `time = ..`, or say the rate, `rate_hz = ..`, in [log] of a robot file and give it with -r")

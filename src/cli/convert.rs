@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, arguments, columns};
-use crate::identify::LoggedRobot;
+use super::{CliError, Context, Outcome, arguments, columns, logs_of, names_of};
+use crate::identify::{LoggedRobot, repeated_rows};
 use crate::log::{
     Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
 };
@@ -248,6 +248,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let bar = context.progress("converting", Some(args.logs.len() as u64));
     let notes = machine.as_ref().map(|machine| machine.file.notes.0.clone());
     let (mut warnings, mut provenance) = (notes.unwrap_or_default(), Vec::new());
+    let layout = machine.as_ref().map(|machine| machine.file.layout());
+    warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
     for spec in &args.logs {
         provenance.push(match &machine {
             None => as_it_stands(spec, args, &mut target, &mut warnings, context)?,
@@ -257,12 +259,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     drop(bar);
     if target.rows == 0 {
-        return Err(CliError::input("the logs hold no row with a time")
+        let logs = names_of(&args.logs).join(", ");
+        return Err(CliError::input(format!("{logs}: no row has a time"))
             .hint("check the time column, and the span"));
     }
     if target.without_time > 0 && !args.drop_rows {
         return Err(CliError::input(format!(
-            "{} of {} rows have no time and would be lost",
+            "{}: {} of {} rows have no time and would be lost",
+            names_of(&args.logs).join(", "),
             target.without_time,
             target.without_time + target.rows
         ))

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
 use crate::config::ModelFile;
-use crate::identify::{IdentifyError, LoggedRobot};
+use crate::identify::{IdentifyError, LoggedRobot, repeated_rows};
 use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look, look_again};
 use crate::log::{LogSection, LogSpec, Provenance, RawReader, escape};
 use crate::motion;
@@ -231,6 +231,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .as_ref()
         .map(|known| known.machine.file.notes.0.clone());
     let mut warnings = notes.unwrap_or_default();
+    let layout = known.as_ref().map(|known| known.machine.file.layout());
+    warnings.extend(repeated_rows(&logs_of(&args.logs), layout.as_ref()));
     for spec in &args.logs {
         // What several machines recorded is no one log: each is looked at on its own.
         let machines = match &known {

@@ -47,14 +47,20 @@ impl<'a> Document<'a> {
                     true => number.abs().sqrt(),
                     false => number,
                 };
-                if number::is_usable(size) {
+                let path: Vec<&str> = path.iter().map(String::as_str).collect();
+                // a row that `new` leaves to be filled in is refused by what it lacks
+                let open = number.is_nan()
+                    && matches!(
+                        path[..],
+                        ["robot", "link", _, "a" | "alpha" | "d" | "theta"]
+                    );
+                if number::is_usable(size) || open {
                     return Ok(());
                 }
                 let written = match number.is_finite() {
                     true => float.as_str().to_owned(),
                     false => number.to_string(),
                 };
-                let path: Vec<&str> = path.iter().map(String::as_str).collect();
                 return Err(ConfigError::Value {
                     file: self.file.to_owned(),
                     line: self.line(value.span().start),

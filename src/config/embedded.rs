@@ -1,12 +1,12 @@
 //! Reading of configuration files; those that come with the tool are found anywhere.
 
-use std::io::Read;
 use std::path::Path;
 
 use super::campaign::Campaign;
 use super::document::Document;
 use super::model_file::ModelFile;
 use super::robot_file::RobotFile;
+use super::text_file::text_of;
 use super::trajectory::Trajectory;
 use super::{ConfigError, check, serial_chain, urdf};
 use crate::log::{did_you_mean, list, named_beside, remedy, shown};
@@ -57,23 +57,6 @@ pub fn embedded(path: &Path) -> Option<&'static str> {
     let path = path.strip_prefix(".").unwrap_or(path);
     let found = EMBEDDED.iter().find(|(name, _)| Path::new(name) == path);
     found.map(|(_, text)| *text)
-}
-
-/// Largest file of text that is read whole: a model of 200 links with its covariance has less, and a URDF
-/// names its meshes and does not hold them.
-const MOST_BYTES: u64 = 16 << 20;
-
-/// The text of a file that is not too large, whatever stands under its name.
-pub(super) fn text_of(path: &Path) -> std::io::Result<String> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)?
-        .take(MOST_BYTES + 1)
-        .read_to_end(&mut bytes)?;
-    let unusable = |what| std::io::Error::new(std::io::ErrorKind::InvalidData, what);
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(unusable("it has more than 16 MB"));
-    }
-    String::from_utf8(bytes).map_err(|_| unusable("it is no UTF-8 text"))
 }
 
 /// Text of a configuration file: the one on the disk, else the one that comes with the tool.

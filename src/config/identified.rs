@@ -116,10 +116,16 @@ impl ModelFile {
         self.covariance_of(&keys)
     }
 
-    /// Puts a joint's friction parameters in place of those that the file has of it.
+    /// Puts a joint's friction parameters in place of those that the file has of it, of which the covariance
+    /// then says nothing any more.
     pub fn replace_joint(&mut self, joint: &str, parameters: Vec<Parameter>) {
-        self.parameters
-            .retain(|p| p.joint.as_deref() != Some(joint) || p.name == "offset");
+        let kept = |p: &Parameter| p.joint.as_deref() != Some(joint) || p.name == "offset";
+        let dropped: Vec<String> = (self.parameters.iter())
+            .filter(|p| !kept(p))
+            .map(Parameter::key)
+            .collect();
+        self.forget_covariance(&dropped);
+        self.parameters.retain(kept);
         self.parameters.extend(parameters);
     }
 

@@ -20,6 +20,7 @@ pub mod robot_file;
 pub mod schema;
 mod serial_chain;
 pub mod serial_section;
+mod text_file;
 pub mod trajectory;
 mod trajectory_text;
 mod urdf;

@@ -10,6 +10,7 @@ use super::ConfigError;
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{Provenance, escape};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
+use crate::verdict::IDENTIFIED;
 pub use crate::verdict::Verdict;
 
 /// One parameter of a model.
@@ -45,6 +46,20 @@ impl Parameter {
         match &self.joint {
             Some(joint) => format!("{}:{joint}", self.name),
             None => self.name.clone(),
+        }
+    }
+
+    /// Whether its torque is not worth mentioning: rated identified though its value is uncertain.
+    pub fn is_negligible(&self) -> bool {
+        let uncertain = |std| std > IDENTIFIED * self.value.abs();
+        self.verdict == Some(Verdict::Identified) && self.std.is_some_and(uncertain)
+    }
+
+    /// What is told of it: its verdict, or that it is negligible; nothing where it was not estimated.
+    pub fn verdict_word(&self) -> &'static str {
+        match self.verdict {
+            Some(_) if self.is_negligible() => "negligible",
+            verdict => verdict.map_or("", Verdict::word),
         }
     }
 }

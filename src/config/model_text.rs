@@ -109,6 +109,7 @@ impl ModelFile {
             drive_inertia: raw.drive_inertia,
             provenance: raw.provenance.unwrap_or_default(),
         };
+        model.check_parameters(&document)?;
         match &raw.contents {
             Some(contents) => contents.check(&model, &document)?,
             None => {
@@ -116,7 +117,6 @@ impl ModelFile {
                 model.robot.notes.0.push(contents::without_list(file));
             }
         }
-        model.check_parameters(&document)?;
         model.check_covariance(&document)?;
         model.check_rest(&document)?;
         Ok(model)

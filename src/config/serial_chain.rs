@@ -6,15 +6,13 @@ use super::ConfigError;
 use super::angles::Changes;
 use super::document::Document;
 use super::robot_file::RobotSection;
-use super::serial_section::{BASE, CouplingSection, FollowsSection, LinkSection, SineSection};
-use super::urdf::MOST_MOVING;
+use super::serial_section::{
+    BASE, CouplingSection, FollowsSection, LinkSection, MOST_LINKS, SineSection,
+};
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector};
 use crate::robot::tree::{Coordinate, Coupling, Dependence, Link, Sine, Tree, TreeError};
 use crate::robot::{JointKind, Robot};
-
-/// Most links of a robot file: as many as a URDF may have that move.
-const MOST_LINKS: usize = MOST_MOVING;
 
 /// Free fall, where the file says nothing: along -z of the base \[m/s^2\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];

@@ -11,6 +11,10 @@ use crate::robot::standard::Body;
 /// Name of the frame that does not move.
 pub(super) const BASE: &str = "base";
 
+/// Most links that are gathered, of a URDF those that move; what a robot may have is fewer, and told by the
+/// chain.
+pub(super) const MOST_LINKS: usize = 200;
+
 /// A sine in a dependent coordinate: amplitude sin(phase + sum of `of`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

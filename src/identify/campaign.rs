@@ -9,6 +9,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::lsq::{IdentifiedDynamics, LsqSettings, lsq};
 use super::model::{new_model, refined};
+use super::repeated::{each_row_once, without_rows_of};
 use super::validate::{Validated, validate};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
@@ -80,6 +81,14 @@ pub fn identify<E: From<IdentifyError>>(
     control: &Control,
     ended: &mut dyn FnMut(StageEnd) -> Result<(), E>,
 ) -> Result<Campaigned, E> {
+    // a one-joint log may serve both fits, but no log of a fit the validation
+    let validation = ("validation", logs.validation.as_slice());
+    for (role, fitted) in [
+        ("friction", &logs.friction),
+        ("identification", &logs.identification),
+    ] {
+        each_row_once(machine, &[(role, fitted), validation])?;
+    }
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
     let mut keep = |from: &[Provenance], told: &[String]| {
         inputs.extend_from_slice(from);
@@ -116,7 +125,8 @@ pub fn identify<E: From<IdentifyError>>(
         keep(&found.inputs, &found.warnings);
         validated = Some(found);
     }
-    let train = [logs.identification.as_slice(), &logs.friction].concat();
+    let one_joint = without_rows_of(machine, &logs.friction, &logs.identification);
+    let train = [logs.identification.as_slice(), &one_joint].concat();
     let roles = DiagnoseLogs {
         train: &train,
         veto: &[],

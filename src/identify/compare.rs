@@ -10,6 +10,7 @@ use super::in_memory::{InMemory, read_whole};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{refined, refined_or_friction};
+use super::repeated::repeated_rows;
 use crate::compare::{self, Difference, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
@@ -245,6 +246,7 @@ pub fn compare(
     let first = &sides[0].given;
     let machine = LoggedRobot::new(&first.name, first.file.robot.clone());
     let mut warnings = cautions(sides.each_ref(), !logs.is_empty());
+    warnings.extend(repeated_rows(logs, Some(&machine.file.layout())));
     let tried = match logs {
         [] => None,
         logs => Some(on_logs(&machine, &sides, logs, control)?),

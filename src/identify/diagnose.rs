@@ -11,6 +11,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
 use super::prior::{information, moved_alone, open};
+use super::repeated::each_row_once;
 use crate::config::ModelFile;
 use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
@@ -22,7 +23,7 @@ use crate::motion::ParallelFilters;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::setup::{Finding, FindingKind};
-use crate::verdict::{IDENTIFIED, Verdict, verdict_of};
+use crate::verdict::{Verdict, verdict_of};
 
 /// Logs by what they are for.
 #[derive(Debug, Clone, Copy, Default)]
@@ -91,6 +92,14 @@ pub fn diagnose(
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
+    each_row_once(
+        machine,
+        &[
+            ("fit", logs.train),
+            ("veto", logs.veto),
+            ("holdout", logs.holdout),
+        ],
+    )?;
     let groups = [
         (logs.train, LogRole::Train),
         (logs.veto, LogRole::Veto),
@@ -344,8 +353,7 @@ fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
     // what smoothing and the encoders' steps did to the given model, they do to this one
     let std = found.max(p.std.unwrap_or(0.0));
     // a parameter without a torque worth mentioning is known well enough as it is
-    let negligible = p.verdict == Some(Verdict::Identified)
-        && p.std.is_some_and(|s| s > IDENTIFIED * p.value.abs());
+    let negligible = p.is_negligible();
     p.value = value;
     p.std = Some(std);
     if !negligible {

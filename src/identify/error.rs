@@ -24,6 +24,16 @@ pub enum IdentifyError {
     Interrupted,
     #[error("no log is given")]
     NoLog,
+    /// Rows that would count twice, or be fitted and held out.
+    #[error(
+        "{second} ({second_role}) holds rows that {first} ({first_role}) holds: deviations come out too small, or what was fitted is no holdout; give each row once, spans as in LOG@0..70% and LOG@70..100%"
+    )]
+    SameRows {
+        first: String,
+        first_role: &'static str,
+        second: String,
+        second_role: &'static str,
+    },
     /// A fault of the data for which a fit refuses a log; its remedy is told apart.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
     Refused { log: String, fault: Box<LogFault> },
@@ -108,6 +118,7 @@ impl IdentifyError {
             | Self::Config(_)
             | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
             | Self::Refused { .. }
+            | Self::SameRows { .. }
             | Self::Motion { .. }
             | Self::TooManyRows { .. }
             | Self::TooManySamples { .. }

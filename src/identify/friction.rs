@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::one_joint::{self, OneJointLog};
+use super::repeated::each_row_once;
 use crate::config::ModelFile;
 use crate::config::identified::{friction_meaning, friction_unit};
 use crate::config::model_file::{FrictionPrior, Parameter};
@@ -146,6 +147,7 @@ pub fn friction(
     control: &Control,
 ) -> Result<IdentifiedFriction, IdentifyError> {
     machine.check_gains()?;
+    each_row_once(machine, &[("fit", logs)])?;
     let (groups, inputs, found) = by_joint(machine, logs, settings, control)?;
     let mut warnings = [machine.file.notes.0.clone(), found].concat();
     let work = control.begin("friction filter", Some(groups.len() as u64));

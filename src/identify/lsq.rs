@@ -16,6 +16,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::new_model;
 use super::passes::Passes;
+use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
 use crate::config::ModelFile;
@@ -125,6 +126,7 @@ pub fn lsq(
         ..
     } = *settings;
     machine.check_gains()?;
+    each_row_once(machine, &[("fit", logs)])?;
     if settings.gains.is_some() && friction.is_some() {
         return Err(GainError::FrictionGiven.into());
     }

@@ -8,6 +8,7 @@ use super::error::IdentifyError;
 use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::repeated::repeated_rows;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
 use crate::validate::{Reconstructed, Reconstruction, Validation};
@@ -37,7 +38,8 @@ pub fn validate(
 ) -> Result<Validated, IdentifyError> {
     let work = control.begin("reconstruction", Some(logs.len() as u64));
     let mut all = Reconstruction::new(&refined.model, &machine.rest_speeds(logs, control)?);
-    let (mut inputs, mut warnings, mut last) = (Vec::new(), Vec::new(), None);
+    let (mut inputs, mut last) = (Vec::new(), None);
+    let mut warnings = repeated_rows(logs, Some(&machine.file.layout()));
     let settings = machine.settings();
     let mut segments = 0;
     for log in logs {

@@ -98,6 +98,7 @@ pub fn look(
     let mut fresh = plan.held.map(|rows| FreshRows::new(rows, plan));
     let mut block = RawBlock::default();
     while log.read(&mut block)? {
+        block.drop_unusable();
         if stop() {
             return Ok(None);
         }

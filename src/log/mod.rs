@@ -21,6 +21,7 @@ mod reader;
 mod recording;
 mod rows;
 mod section;
+mod shared;
 mod source;
 mod spec;
 mod stale;
@@ -43,6 +44,7 @@ pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
     PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
 };
+pub use shared::shares_rows;
 pub use source::{Provenance, sha256};
 pub use spec::{LogSpec, Span};
 pub use time::Instant;

@@ -47,6 +47,15 @@ impl RawBlock {
         self.t.len()
     }
 
+    /// Takes numbers that cannot be worked with for no measurement: what is looked at is not what is copied.
+    pub(crate) fn drop_unusable(&mut self) {
+        for number in self.columns.iter_mut().flatten() {
+            if !is_usable(*number) {
+                *number = f64::NAN;
+            }
+        }
+    }
+
     fn clear(&mut self, width: usize) {
         self.t.clear();
         self.columns.resize_with(width, Vec::new);
@@ -92,6 +101,11 @@ impl RawReader {
         let pass = LogPass::open(spec, layout, Strictness::Record)?;
         let words = vec![0; pass.rows.names().len()];
         Ok(Self { pass, words })
+    }
+
+    /// Name of the log, for messages.
+    pub fn log_name(&self) -> String {
+        super::escape(&self.pass.spec.name())
     }
 
     /// Names of the columns.
@@ -183,11 +197,15 @@ impl RawReader {
                     self.pass.rows.refuse_comma(index)?;
                     self.words[index] += 1;
                 }
-                // what cannot be worked with is no measurement
-                column.push(number.filter(|x| is_usable(*x)).unwrap_or(f64::NAN));
+                column.push(number.unwrap_or(f64::NAN));
             }
         }
         Ok(block.rows() > 0)
+    }
+
+    /// Time from the first to the last row so far [s].
+    pub fn duration_s(&self) -> f64 {
+        self.pass.duration_s()
     }
 
     /// Rows with more or fewer fields than the header, so far; they are passed over.

@@ -1,5 +1,7 @@
 //! A log as its columns: names, roles, units, ranges, and its clock.
 
+use std::collections::BTreeMap;
+
 use super::column::Column;
 use super::content;
 use super::error::MappingError;
@@ -127,8 +129,11 @@ pub fn look(
         held: None,
     };
     let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
+    // by name: a log may have ten thousands of columns
+    let facts = findings.channels.iter().rev().map(|f| (&f.name, f));
+    let facts: BTreeMap<_, _> = facts.collect();
     for column in &mut columns {
-        let fact = findings.channels.iter().find(|f| f.name == column.name);
+        let fact = facts.get(&column.name);
         if let Some((low, high)) = fact.and_then(|f| f.min.zip(f.max)) {
             column.range = [low, high];
         }
@@ -186,6 +191,7 @@ fn sample(log: &mut RawReader) -> Result<Vec<Vec<f64>>, MappingError> {
     let mut block = RawBlock::default();
     let most = SAMPLE.min((1 << 22) / width.max(1));
     while out.first().is_some_and(|c| c.len() < most) && log.read(&mut block)? {
+        block.drop_unusable();
         for (to, from) in out.iter_mut().zip(&block.columns) {
             to.extend(from);
         }

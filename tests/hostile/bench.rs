@@ -28,6 +28,10 @@ kind = "prismatic"
 law = "viscous-coulomb"
 fitted_with_inertias = true
 offset = true
+
+[limits.slide]
+position = [-0.5, 0.5]
+speed = 2.0
 "#;
 
 /// What a slide of 10 kg logs in 4 s at 500 Hz: position and torque of each row.

@@ -13,10 +13,7 @@ fn a_simulation_that_does_not_fit_into_memory_is_refused_at_once() {
         );
         bench.refuses(&line, 3, &[]);
     }
-    let fast = format!(
-        "{}\n[control]\nrate_hz = 1e12\n[limits.slide]\nposition = [-1.0, 1.0]\n",
-        crate::bench::SLIDE
-    );
+    let fast = format!("{}\n[control]\nrate_hz = 1e12\n", crate::bench::SLIDE);
     bench.file("fast.toml", fast);
     bench.refuses(
         "simulate -r fast.toml -m model.toml --seconds 20 -o out.csv",

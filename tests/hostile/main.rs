@@ -3,8 +3,12 @@
 #![cfg(unix)]
 
 mod bench;
+mod causes;
+mod every_command;
 mod extremes;
 mod lost_parts;
+mod metamorphic;
 mod numbers;
 mod outputs;
+mod repeated;
 mod sizes;

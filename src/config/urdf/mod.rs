@@ -16,15 +16,13 @@ mod parts;
 mod tree;
 mod xml;
 
-pub(super) use tree::MOST_MOVING;
-
 use std::path::Path;
 
 use super::ConfigError;
 use super::document::Document;
-use super::embedded::text_of;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
+use super::text_file::text_of;
 use crate::log::{named_beside, remedy, shown};
 use crate::robot::tree::space::{Rotation, product};
 

@@ -8,16 +8,13 @@ use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::{
-    BASE, FollowsSection, FrameSection, InertialSection, LinkSection,
+    BASE, FollowsSection, FrameSection, InertialSection, LinkSection, MOST_LINKS,
 };
 use crate::log::{escape, list, nearest};
 use crate::robot::JointKind;
 use crate::robot::tree::space::{
     Rotation, UNTURNED, Vector, add, of_roll_pitch_yaw, product, roll_pitch_yaw, turn,
 };
-
-/// Most moving links that are gathered; what a robot may have is fewer, and told by the chain.
-pub(in crate::config) const MOST_MOVING: usize = 200;
 
 /// Where a link of the URDF is: in which moving link, and how it lies there.
 #[derive(Clone, Copy)]
@@ -278,11 +275,11 @@ fn sit<'a>(
         ));
     }
     let at = moving.len();
-    if at >= MOST_MOVING {
+    if at >= MOST_LINKS {
         return Err(place.wrong(
             joint.line,
             &format!("joint {}", escape(&joint.name)),
-            &format!("is one of more than {MOST_MOVING} that move"),
+            &format!("is one of more than {MOST_LINKS} that move"),
             "name the `tip` of the chain that was measured",
         ));
     }

@@ -73,8 +73,16 @@ impl JointStates {
             mut found,
             others: mut other_topics,
             times,
+            cause,
         } = survey(paths)?;
         if found.is_empty() {
+            if let Some(cause) = cause {
+                return Err(LogError::Topic {
+                    file: source::shown_all(paths),
+                    problem: cause.problem,
+                    remedy: cause.remedy.to_owned(),
+                });
+            }
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
                 problem: "no topic holds sensor_msgs/msg/JointState".to_owned(),

@@ -9,7 +9,7 @@ use super::message::{MessageHead, MessageReader, Schema, Wanted};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
 use super::value::Value;
-use crate::log::LogError;
+use crate::log::{LogError, escape};
 
 /// Messages that are looked at for topics and their names.
 const LOOKED_AT: u64 = 20_000;
@@ -54,6 +54,14 @@ pub(super) struct Survey {
     pub found: Vec<FoundTopic>,
     pub others: Vec<String>,
     pub times: Times,
+    /// Why a recording whose topics are of that kind holds no joint state, where none was found.
+    pub cause: Option<Cause>,
+}
+
+/// What keeps the joint states of a recording from being read, and what to do.
+pub(super) struct Cause {
+    pub problem: String,
+    pub remedy: &'static str,
 }
 
 /// Looks at the beginning of a recording.
@@ -62,6 +70,7 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
     let mut found: Vec<FoundTopic> = Vec::new();
     let mut times = None;
     let mut messages = 0;
+    let mut unreadable: Option<(String, String)> = None;
     while messages < LOOKED_AT
         && let Some(message) = recording.next()?
     {
@@ -73,8 +82,12 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         let at = match known {
             Some(at) => at,
             None if schema.name.ends_with("JointState") && found.len() < TOPICS => {
-                let Ok(probe) = reader_of(schema, &probes()) else {
-                    continue;
+                let probe = match reader_of(schema, &probes()) {
+                    Ok(probe) => probe,
+                    Err(reason) => {
+                        unreadable.get_or_insert((topic.clone(), reason));
+                        continue;
+                    }
                 };
                 found.push(FoundTopic {
                     topic: topic.clone(),
@@ -96,8 +109,11 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
                 continue;
             }
         };
-        found[at].look(&message.head, message.data);
+        if let Err(reason) = found[at].look(&message.head, message.data) {
+            unreadable.get_or_insert((found[at].topic.clone(), reason));
+        }
     }
+    let cause = cause(&recording, &found, unreadable);
     found.retain(|one| !one.names.is_empty() && one.arrays.contains(&true));
     let others = recording.seen.iter().map(|topic| topic.name.clone());
     let used = |name: &String| {
@@ -108,6 +124,49 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         found,
         others,
         times,
+        cause,
+    })
+}
+
+/// What is wrong with a recording that breaks off, or with its topics of joint states, where it has some.
+fn cause(
+    recording: &MessageFiles,
+    found: &[FoundTopic],
+    unreadable: Option<(String, String)>,
+) -> Option<Cause> {
+    const AGAIN: &str = "copy it again from where it was recorded, or record again";
+    if let Some((topic, reason)) = unreadable {
+        let (topic, reason) = (escape(&topic), escape(&reason));
+        return Some(Cause {
+            problem: format!("messages of {topic} cannot be read: {reason}"),
+            remedy: AGAIN,
+        });
+    }
+    let mut declared = recording.seen.iter();
+    let declared = declared.find(|topic| topic.schema.name.ends_with("JointState"));
+    let of = declared.map(|topic| format!(" of {}", escape(&topic.name)));
+    if found.is_empty()
+        && let Some((_, broken)) = recording.broken.first()
+    {
+        let (of, reason) = (of.unwrap_or_default(), escape(&broken.reason));
+        return Some(Cause {
+            problem: format!(
+                "holds no joint states{of} before it breaks off {}: {reason}",
+                broken.place
+            ),
+            remedy: AGAIN,
+        });
+    }
+    let of = of?;
+    Some(match found.is_empty() {
+        true => Cause {
+            problem: format!("holds no message{of}"),
+            remedy: "record again while the robot moves",
+        },
+        false => Cause {
+            problem: format!("the messages{of} name no joint, or hold no number of one"),
+            remedy: "record again with names, positions and efforts filled in",
+        },
     })
 }
 
@@ -130,11 +189,11 @@ fn probes() -> Vec<Vec<FieldPath>> {
 }
 
 impl FoundTopic {
-    fn look(&mut self, head: &MessageHead, data: &[u8]) {
+    /// # Errors
+    /// What is wrong with the message.
+    fn look(&mut self, head: &MessageHead, data: &[u8]) -> Result<(), String> {
         let mut values = [Value::Absent; 6];
-        if self.probe.read(data, &mut values).is_err() {
-            return;
-        }
+        self.probe.read(data, &mut values)?;
         let stamp = match (values[3].integer(), values[4].integer()) {
             (Some(s), Some(ns)) if (s, ns) != (0, 0) => Some(s * 1_000_000_000 + ns),
             _ => None,
@@ -142,7 +201,7 @@ impl FoundTopic {
         self.instants
             .insert(stamp.unwrap_or(i128::from(head.log_ns)));
         if self.looked_at >= OF_TOPIC {
-            return;
+            return Ok(());
         }
         self.looked_at += 1;
         for (filled, value) in self.arrays.iter_mut().zip(&values) {
@@ -154,6 +213,7 @@ impl FoundTopic {
                 self.names.push(name);
             }
         }
+        Ok(())
     }
 
     /// Whether its names are those of columns.

@@ -4,15 +4,16 @@ use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::number;
 use crate::report::Writer;
-use crate::verdict::{IDENTIFIED, Verdict};
+use crate::verdict::Verdict;
 
-/// How many parameters have which verdict, in words, and whether all are identified.
+/// How many parameters have which verdict, in words, and whether all are identified or negligible.
 pub fn tally(model: &ModelFile) -> (String, bool) {
-    let rated = || model.parameters.iter().filter_map(|p| p.verdict);
-    let count = |wanted| rated().filter(|v| *v == wanted).count();
+    let rated = || model.parameters.iter().filter(|p| p.verdict.is_some());
+    let negligible = rated().filter(|p| p.is_negligible()).count();
+    let count = |wanted| rated().filter(|p| p.verdict == Some(wanted)).count();
     let mut words = vec![format!(
         "{} of {} parameters are identified",
-        count(Verdict::Identified),
+        count(Verdict::Identified) - negligible,
         rated().count()
     )];
     let others = [
@@ -26,7 +27,11 @@ pub fn tally(model: &ModelFile) -> (String, bool) {
             n => words.push(format!("{n} {word}")),
         }
     }
-    (words.join(", "), words.len() == 1)
+    let good = words.len() == 1;
+    if negligible > 0 {
+        words.insert(1, format!("{negligible} negligible"));
+    }
+    (words.join(", "), good)
 }
 
 /// The section; `truth` gives the true value of a parameter where it is known.
@@ -76,13 +81,8 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) 
                     false => number::ABSENT.to_owned(),
                 });
             }
-            let verdict = match p.verdict {
-                // identified though uncertain: its torque is not worth mentioning
-                Some(Verdict::Identified) if std > IDENTIFIED * p.value.abs() => "negligible",
-                Some(verdict) => verdict.word(),
-                None => "",
-            };
-            row.extend([p.unit.clone(), verdict.to_owned(), p.meaning.clone()]);
+            let verdict = p.verdict_word().to_owned();
+            row.extend([p.unit.clone(), verdict, p.meaning.clone()]);
             row
         })
         .collect();

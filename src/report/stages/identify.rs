@@ -135,7 +135,7 @@ fn beside_truth(of: &Identify) -> Table {
                 value: if unknown { f64::NAN } else { p.value },
                 std: p.std.filter(|_| !unknown).unwrap_or(f64::NAN),
                 unit: &p.unit,
-                verdict: p.verdict.map_or("", Verdict::word),
+                verdict: p.verdict_word(),
                 truth: (of.truth)(p),
             }
         })

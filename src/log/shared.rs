@@ -1,0 +1,104 @@
+//! Whether two logs that are given hold the same rows: a file twice, a copy of it, spans that overlap.
+
+use std::path::PathBuf;
+
+use super::source::sha256_of;
+use super::{Layout, LogError, LogSpec, RawBlock, RawReader, Span};
+
+/// Whether rows of one log are rows of the other, by the bytes of their files and by their spans; `layout` tells
+/// the time column where a robot is known. Files that cannot be read share nothing: their reader says why.
+pub fn shares_rows(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
+    let same = |(a, b): (Vec<PathBuf>, Vec<PathBuf>)| same_bytes(&a, &b);
+    let files = a.files().ok().zip(b.files().ok());
+    files.is_some_and(same) && overlap(a, b, layout)
+}
+
+/// Whether files hold the same bytes. Only those of the same lengths are read for it.
+fn same_bytes(a: &[PathBuf], b: &[PathBuf]) -> bool {
+    let names = |files: &[PathBuf]| files.iter().map(|file| file.canonicalize().ok()).collect();
+    let (of_a, of_b): (Vec<_>, Vec<_>) = (names(a), names(b));
+    if of_a == of_b && of_a.iter().all(Option::is_some) {
+        return true;
+    }
+    let lengths = |files: &[PathBuf]| {
+        let about = files.iter().map(|file| file.metadata().ok());
+        // what is no file, a pipe, can be read but once
+        about
+            .map(|about| {
+                about
+                    .filter(|about| about.is_file())
+                    .map(|about| about.len())
+            })
+            .collect::<Option<Vec<u64>>>()
+    };
+    let lengths = lengths(a).zip(lengths(b));
+    lengths.is_some_and(|(a, b)| a == b)
+        && sha256_of(a)
+            .ok()
+            .zip(sha256_of(b).ok())
+            .is_some_and(|(a, b)| a == b)
+}
+
+/// Whether the spans of one log have rows in common; both are half open.
+fn overlap(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
+    use Span::{Percent, Seconds, Whole};
+    let meet = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a.max(c) < b.min(d);
+    match (a.span, b.span) {
+        (Whole, _) | (_, Whole) => true,
+        (Percent { from: a, to: b }, Percent { from: c, to: d })
+        | (Seconds { from: a, to: b }, Seconds { from: c, to: d }) => meet([a, b], [c, d]),
+        (Percent { from, to }, Seconds { from: c, to: d })
+        | (Seconds { from: c, to: d }, Percent { from, to }) => {
+            let seconds = duration_s(a, layout).map(|all| [from, to].map(|p| all * p / 100.0));
+            seconds.is_ok_and(|span| meet(span, [c, d]))
+        }
+    }
+}
+
+/// Time from the first to the last row of the whole log [s].
+fn duration_s(log: &LogSpec, layout: Option<&Layout>) -> Result<f64, LogError> {
+    let mut reader = RawReader::open(&LogSpec::whole(&log.path), layout)?;
+    let mut block = RawBlock::default();
+    while reader.read(&mut block)? {}
+    Ok(reader.duration_s())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn specs(folder: &std::path::Path, a: &str, b: &str) -> [LogSpec; 2] {
+        [a, b].map(|name| folder.join(name).display().to_string().parse().unwrap())
+    }
+
+    #[test]
+    fn copies_and_overlapping_spans_share_rows_and_halves_do_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: String = (0..1001)
+            .map(|k| format!("{},0\n", f64::from(k) / 100.0))
+            .collect();
+        let text = format!("t,q_a\n{rows}");
+        std::fs::write(folder.path().join("a.csv"), &text).unwrap();
+        std::fs::write(folder.path().join("copy.csv"), &text).unwrap();
+        std::fs::write(
+            folder.path().join("other.csv"),
+            text.replace("10,0", "10,1"),
+        )
+        .unwrap();
+        for (a, b, shared) in [
+            ("a.csv", "a.csv", true),
+            ("a.csv", "copy.csv", true),
+            ("a.csv", "other.csv", false),
+            ("a.csv", "none.csv", false),
+            ("a.csv@0..70%", "a.csv@70..100%", false),
+            ("a.csv@0..70%", "copy.csv@69..100%", true),
+            ("a.csv@0..7s", "a.csv@7..s", false),
+            ("a.csv@0..7s", "a.csv", true),
+            ("a.csv@0..70%", "a.csv@7..s", false),
+            ("a.csv@6.9..s", "copy.csv@0..70%", true),
+        ] {
+            let [first, second] = specs(folder.path(), a, b);
+            assert_eq!(shares_rows(&first, &second, None), shared, "{a} {b}");
+        }
+    }
+}
