@@ -171,7 +171,8 @@ pub struct FilterSection {
     /// Every how many samples a row is kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimation: Option<u32>,
-    /// Cut-off of the position filter, used only to differentiate [Hz].
+    /// Cut-off of the position filter, used only to differentiate [Hz]; left out, that of each joint is found from
+    /// its logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_cutoff_hz: Option<f64>,
     /// Order of the position filter, one pass.

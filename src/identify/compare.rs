@@ -10,6 +10,7 @@ use super::in_memory::{InMemory, read_whole};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{refined, refined_or_friction};
+use super::position_cutoff::known;
 use super::repeated::repeated_rows;
 use crate::compare::{self, Difference, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
@@ -270,6 +271,9 @@ fn on_logs(
     logs: &[Log],
     control: &Control,
 ) -> Result<Tried, IdentifyError> {
+    // one motion for both models: that of the first
+    let laws = known(&sides[0].model.model);
+    let machine = &machine.with_position_cutoffs(logs, &laws, control)?;
     let in_memory = read_whole(machine, logs, control)?;
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);

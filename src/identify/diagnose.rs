@@ -10,6 +10,7 @@ use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{in_file, new_model, refined};
+use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
 use crate::config::ModelFile;
@@ -108,6 +109,7 @@ pub fn diagnose(
     let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
+    let machine = &machine.with_position_cutoffs(&all, &known(&given.model), control)?;
     let mut in_memory = read_whole(machine, &all, control)?;
     let known = logs.train.iter().filter(|_| !settings.keep);
     let known = known.map(|log| machine.open(log, control)?.provenance());

@@ -24,9 +24,10 @@ use crate::validate::Validation;
 
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
-    let plain = (6.0 * settings.cutoff_hz).min(0.4 * rate_hz);
+    let each = settings.joint_q_cutoffs_hz.iter();
     FilterSettings {
-        q_cutoff_hz: Some(NARROWER * settings.q_cutoff_hz.unwrap_or(plain)),
+        q_cutoff_hz: Some(NARROWER * settings.plain_q_cutoff_hz(rate_hz)),
+        joint_q_cutoffs_hz: each.map(|hz| NARROWER * hz).collect(),
         ..settings.clone()
     }
 }
@@ -40,6 +41,8 @@ pub struct LoggedRobot {
     pub robot: Robot,
     /// Channels that are no torques are taken as they are, one gain for all joints.
     pub(super) as_declared: bool,
+    /// Position cut-offs that were found from logs, in joint order \[Hz\]; empty where none were.
+    pub(super) position_cutoffs_hz: Arc<Vec<f64>>,
     /// What the first look at each log found: a log is opened several times.
     looks: Arc<Mutex<BTreeMap<String, Arc<FirstLook>>>>,
 }
@@ -60,6 +63,7 @@ impl LoggedRobot {
             name: name.to_owned(),
             file,
             robot,
+            position_cutoffs_hz: Arc::default(),
             looks: Arc::default(),
             as_declared: false,
         }
@@ -348,6 +352,7 @@ impl LoggedRobot {
             },
             decimation: f.decimation.map(|d| d as usize),
             q_cutoff_hz: f.position_cutoff_hz,
+            joint_q_cutoffs_hz: self.position_cutoffs_hz.to_vec(),
             q_order: f.position_order.map_or(plain.q_order, |o| o as usize),
             differences: match f.differences {
                 Some(DifferencesKind::Central) => Differences::Central,

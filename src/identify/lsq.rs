@@ -16,6 +16,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::new_model;
 use super::passes::Passes;
+use super::position_cutoff::PositionCutoff;
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
@@ -35,6 +36,7 @@ use crate::math::descent::Ending;
 use crate::motion::Summary;
 use crate::number;
 use crate::robot::friction::DoubleTanh;
+use crate::robot::model::JointFriction;
 use crate::setup::Finding;
 use crate::verdict::Verdict;
 
@@ -78,6 +80,8 @@ pub struct IdentifiedDynamics {
     pub effective_samples: f64,
     /// Residual of the fit.
     pub joints: Vec<JointResidual>,
+    /// By which filter positions became velocities; joints that never move are left out.
+    pub position_cutoffs: Vec<PositionCutoff>,
     #[serde(rename = "estimator")]
     pub account: Account,
     #[serde(rename = "processing")]
@@ -136,14 +140,21 @@ pub fn lsq(
             estimator: estimator.name(),
         });
     }
-    let mut passes = Passes::new(machine, logs, control);
     let before = friction.map(|given| {
         let hold = settings.hold_friction || estimator == EstimatorKind::Ols;
         FrictionBefore::of(machine, given, logs, (estimator, hold), control)
     });
     let before = before.transpose()?;
     let mut linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
-    linear.rest_at(machine.rest_speeds(logs, control)?);
+    let speeds = machine.rest_speeds(logs, control)?;
+    let known = linear.known.iter();
+    let laws: Vec<_> = known
+        .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
+        .collect();
+    let costs = machine.cutoff_costs(logs, &laws, &speeds, &|log| machine.open(log, control))?;
+    let machine = &machine.with_cutoffs(&costs);
+    linear.rest_at(speeds);
+    let mut passes = Passes::new(machine, logs, control);
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
     if let Some(gains) = settings.gains {
         share_uncertainty(&mut estimated, gains)?;
@@ -191,6 +202,8 @@ pub fn lsq(
     let unknowns = unknowns(machine, &columns, &fit, &essential);
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
+    let (position_cutoffs, wrong) = costs.told(machine, &columns, &fit);
+    warnings.extend(wrong);
     if unknowns
         .iter()
         .all(|u| u.verdict == Verdict::NotIdentifiable)
@@ -223,6 +236,7 @@ pub fn lsq(
         joints: joints.collect(),
         friction: friction_of_fit,
         friction_prior,
+        position_cutoffs,
         columns,
         fit,
         covariance,

@@ -7,6 +7,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::position_cutoff::known;
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
@@ -57,6 +58,19 @@ pub fn torque(
     let model = &refined.model;
     let n = machine.robot.joints();
     let band = Band::new(machine, file, model);
+    let open = |log: &Log| machine.open_positions(log, control);
+    let machine = &match machine.finds_cutoffs() {
+        true => {
+            let logs = std::slice::from_ref(log);
+            machine.with_cutoffs(&machine.cutoff_costs(
+                logs,
+                &known(model),
+                &vec![0.0; n],
+                &open,
+            )?)
+        }
+        false => machine.clone(),
+    };
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
     let settings = FilterSettings {
         decimation: Some(1),

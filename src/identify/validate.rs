@@ -8,6 +8,7 @@ use super::error::IdentifyError;
 use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::position_cutoff::known;
 use super::repeated::repeated_rows;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
@@ -36,6 +37,7 @@ pub fn validate(
     control: &Control,
     row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, IdentifyError> {
+    let machine = &machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
     let work = control.begin("reconstruction", Some(logs.len() as u64));
     let mut all = Reconstruction::new(&refined.model, &machine.rest_speeds(logs, control)?);
     let (mut inputs, mut last) = (Vec::new(), None);

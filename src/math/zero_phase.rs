@@ -68,6 +68,27 @@ impl ZeroPhase {
         Ok(())
     }
 
+    /// Filters one of the channels of `data` in place.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn run_channel(
+        &self,
+        data: &mut [f64],
+        channels: usize,
+        which: usize,
+    ) -> Result<(), MathError> {
+        let (samples, pad) = (data.len() / channels.max(1), self.sos.pad_samples());
+        if samples <= pad || which >= channels {
+            return Err(MathError::TooShort {
+                samples,
+                needed: pad,
+            });
+        }
+        self.run_lanes::<1>(data, channels, which);
+        Ok(())
+    }
+
     /// Both passes over the channels `first..first + L`; returns L.
     fn run_lanes<const L: usize>(&self, data: &mut [f64], channels: usize, first: usize) -> usize {
         let samples = data.len() / channels;

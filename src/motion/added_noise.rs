@@ -18,9 +18,10 @@ impl Parallel {
             return Ok(None);
         };
         let mut again = stretch.clone();
-        let motion = [&mut again.q, &mut again.v, &mut again.a];
-        for channel in motion.into_iter().flatten() {
-            filter.run(channel, 1)?;
+        for motion in [&mut again.q, &mut again.v, &mut again.a] {
+            for (j, channel) in motion.iter_mut().enumerate() {
+                filter.of(j).run(channel, 1)?;
+            }
         }
         Ok(Some(again))
     }
@@ -40,9 +41,9 @@ impl Parallel {
     ) -> Result<Stretch, MotionError> {
         let mut chance = ChaCha8Rng::seed_from_u64(seed);
         let mut noisy = stretch.clone();
-        let lag = self.rough_lag(stretch.dt);
         for j in 0..stretch.joints() {
-            let [q, v, a] = self.motion_of_noise(stretch, &mut chance)?;
+            let lag = self.rough_lag(j, stretch.dt);
+            let [q, v, a] = self.motion_of_noise(j, stretch, &mut chance)?;
             let level = middle_roughness(&stretch.a[j], lag) / middle_roughness(&a, lag);
             if !level.is_finite() {
                 continue;
@@ -57,18 +58,19 @@ impl Parallel {
         Ok(noisy)
     }
 
-    /// Samples over which a difference shows most of what is as fast as the position filter lets through, and next
+    /// Samples over which a difference of a joint's motion shows most of what is as fast as the position filter lets through, and next
     /// to nothing of motion.
-    fn rough_lag(&self, dt: f64) -> usize {
-        let cutoff = self.position_cutoff_hz;
+    pub(super) fn rough_lag(&self, joint: usize, dt: f64) -> usize {
+        let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
         cutoff
             .map_or(1, |hz| (1.0 / (3.0 * hz * dt)) as usize)
             .max(1)
     }
 
-    /// What white noise of positions, even over an interval of 1, becomes: position, velocity, acceleration.
-    fn motion_of_noise(
+    /// What white noise of a joint's positions, even over an interval of 1, becomes: position, velocity, acceleration.
+    pub(super) fn motion_of_noise(
         &self,
+        joint: usize,
         stretch: &Stretch,
         chance: &mut ChaCha8Rng,
     ) -> Result<[Vec<f64>; 3], MotionError> {
@@ -78,7 +80,7 @@ impl Parallel {
             .map(|_| chance.random::<f64>() - 0.5)
             .collect();
         if let Some(filter) = &self.position {
-            filter.run(&mut q, 1)?;
+            filter.of(joint).run(&mut q, 1)?;
         }
         let (mut v, mut a) = (vec![0.0; q.len()], vec![0.0; q.len()]);
         self.differences.apply(&q, 1, stretch.dt, &mut v, &mut a);
@@ -93,7 +95,7 @@ const SPAN: usize = 4;
 
 /// Median over blocks of the rms of the fourth difference over a lag, to which motion gives next to nothing, and a
 /// jerk at a reversal only a few of the blocks. 0 for less than a block.
-fn middle_roughness(x: &[f64], lag: usize) -> f64 {
+pub(super) fn middle_roughness(x: &[f64], lag: usize) -> f64 {
     let reach = SPAN * lag;
     let rough = |k: usize| {
         x[k] - 4.0 * x[k + lag] + 6.0 * x[k + 2 * lag] - 4.0 * x[k + 3 * lag] + x[k + reach]

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::MotionError;
-use super::settings::{FilterSettings, edge, position_filter};
+use super::position_filter::PositionFilter;
+use super::settings::{FilterSettings, edge};
 use super::time_base::{Event, SampleClock, TimeBase, lagrange};
 use super::window::step_of;
 use crate::log::Block;
@@ -65,7 +66,7 @@ pub fn full_rate(
     let clock = SampleClock::of(t)?;
     let (grid_t, mut grid_q) = even_grid(t, q, joints, settings, clock)?;
     let dt = step_of(&grid_t, clock.dt);
-    let (filter, _) = position_filter(settings, 1.0 / dt)?;
+    let filter = PositionFilter::design(settings, 1.0 / dt)?;
     if let Some(filter) = &filter {
         filter.run(&mut grid_q, joints)?;
     }

@@ -21,6 +21,8 @@
 //! | `settings` | what the user chooses |
 //! | `time_base` | uniform steps, gaps, torque by a zero-order hold |
 //! | `differences` | v and a from q |
+//! | `position_filter` | what positions come through, of all joints or of each |
+//! | [`position_cutoff`] | what a position cut-off costs the friction at reversals |
 //! | `run` | the windows of a streamed log |
 //! | `zero_order_hold` | motor forces between two samples, where a linkage turns them |
 //! | `rest` | rows in which a joint rests |
@@ -32,6 +34,8 @@ mod added_noise;
 mod cutter;
 mod differences;
 mod full_rate;
+pub mod position_cutoff;
+mod position_filter;
 pub mod rest;
 mod run;
 mod settings;

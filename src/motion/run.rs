@@ -53,7 +53,8 @@ pub struct Summary {
     pub cutoff_hz: f64,
     /// Every how many samples a row was kept.
     pub decimation: usize,
-    /// Cut-off of the position filter (Hz); none where raw positions were differentiated.
+    /// Cut-off of the position filter (Hz), the lowest where each joint has its own; none where raw positions were
+    /// differentiated.
     #[serde(rename = "position_cutoff_hz")]
     pub q_cutoff_hz: Option<f64>,
 }
@@ -219,7 +220,7 @@ impl<'a> Intake<'a> {
             interpolated: self.time_base.interpolated(),
             cutoff_hz: self.settings.cutoff_hz,
             decimation: chain.decimation,
-            q_cutoff_hz: chain.q_cutoff_hz,
+            q_cutoff_hz: chain.position.as_ref().map(|f| f.lowest_cutoff_hz()),
             skipped: cutter.skipped,
         })
     }

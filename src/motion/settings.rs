@@ -1,6 +1,7 @@
 //! What the user chooses about filtering, and the filters that follow for one sampling step.
 
 use super::MotionError;
+use super::position_filter::{HIGHEST_SHARE, PositionFilter};
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -11,8 +12,6 @@ const POSITION_OVERLAP: f64 = 45.0;
 const PARALLEL_OVERLAP: f64 = 28.0;
 /// Samples of a window besides its overlaps, at least.
 const WINDOW_CORE: usize = 8192;
-/// A position cut-off that is not asked for stays below this share of the sampling rate.
-const HIGHEST_SHARE: f64 = 0.4;
 
 /// How a log is filtered.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +25,8 @@ pub struct FilterSettings {
     /// Cut-off of the position filter (Hz); left out, six times `cutoff_hz` but at most 0.4 of the
     /// sampling rate.
     pub q_cutoff_hz: Option<f64>,
+    /// Cut-off of each joint's position filter (Hz), in its place; empty where all joints have one.
+    pub joint_q_cutoffs_hz: Vec<f64>,
     /// Order of the (Butterworth) position filter; 0 differentiates raw positions.
     pub q_order: usize,
     /// How positions are differentiated.
@@ -49,6 +50,7 @@ impl Default for FilterSettings {
             filter: ParallelFilter::Butterworth { order: 4 },
             decimation: None,
             q_cutoff_hz: None,
+            joint_q_cutoffs_hz: Vec::new(),
             q_order: 4,
             differences: Differences::HighOrder,
             torque: TorqueTiming::Sampled,
@@ -102,8 +104,7 @@ pub(super) struct FilterChain {
     /// Sampling step (s).
     pub dt: f64,
     pub differences: Differences,
-    pub position: Option<ZeroPhase>,
-    pub q_cutoff_hz: Option<f64>,
+    pub position: Option<PositionFilter>,
     pub parallel: ZeroPhase,
     pub decimation: usize,
     /// Samples dropped at a segment's end before the parallel filter.
@@ -121,6 +122,13 @@ pub(super) struct FilterChain {
 }
 
 impl FilterSettings {
+    /// The position cut-off of all joints at a sampling rate \[Hz\]: the declared one, else six times that of the
+    /// parallel filter.
+    pub fn plain_q_cutoff_hz(&self, rate_hz: f64) -> f64 {
+        let plain = || (6.0 * self.cutoff_hz).min(HIGHEST_SHARE * rate_hz);
+        self.q_cutoff_hz.unwrap_or_else(plain)
+    }
+
     /// Every how many samples of step `dt` [s] a row is kept: the declared decimation, else ten rows
     /// a period of the cut-off.
     pub fn decimation_at(&self, dt: f64) -> usize {
@@ -152,12 +160,12 @@ impl FilterChain {
                 Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)?
             }
         };
-        let (position, q_cutoff_hz) = position_filter(settings, rate)?;
+        let position = PositionFilter::design(settings, rate)?;
         let edge = edge(settings, position.as_ref(), dt)?;
         let trim = samples_of("trim_s", settings.trim_s, dt)?
             .unwrap_or_else(|| parallel.settle_samples(3.0));
         let pad = |sos: &Sos| sos.pad_samples() + 1;
-        let position_pad = position.as_ref().map_or(0, |f| pad(f.sos()));
+        let position_pad = position.as_ref().map_or(0, |f| pad(f.narrowest().sos()));
         // An artificial end must cost at least what a segment's end does, or a middle window
         // would keep samples that the whole segment drops.
         let position_overlap = settled(settings, position.as_ref(), POSITION_OVERLAP)
@@ -171,7 +179,6 @@ impl FilterChain {
             dt,
             differences: settings.differences,
             position,
-            q_cutoff_hz,
             parallel: ZeroPhase::new(parallel),
             decimation,
             edge,
@@ -184,25 +191,10 @@ impl FilterChain {
     }
 }
 
-/// The position filter and its cut-off (Hz).
-pub(super) fn position_filter(
-    settings: &FilterSettings,
-    rate: f64,
-) -> Result<(Option<ZeroPhase>, Option<f64>), MotionError> {
-    if settings.q_order == 0 {
-        return Ok((None, None));
-    }
-    let cutoff = settings
-        .q_cutoff_hz
-        .unwrap_or_else(|| (6.0 * settings.cutoff_hz).min(HIGHEST_SHARE * rate));
-    let sos = Sos::butterworth(settings.q_order, cutoff, rate)?;
-    Ok((Some(ZeroPhase::new(sos)), Some(cutoff)))
-}
-
 /// Samples at a segment's end where the position filter lacks what it would look ahead to.
 pub(super) fn edge(
     settings: &FilterSettings,
-    position: Option<&ZeroPhase>,
+    position: Option<&PositionFilter>,
     dt: f64,
 ) -> Result<usize, MotionError> {
     let asked = samples_of("q_trim_s", settings.q_trim_s, dt)?;
@@ -211,8 +203,9 @@ pub(super) fn edge(
 
 /// Samples after which `factor` time constants of the position filter have passed, and the
 /// differences reach no further back.
-fn settled(settings: &FilterSettings, position: Option<&ZeroPhase>, factor: f64) -> usize {
-    position.map_or(0, |f| f.sos().settle_samples(factor)) + settings.differences.reach()
+fn settled(settings: &FilterSettings, position: Option<&PositionFilter>, factor: f64) -> usize {
+    position.map_or(0, |f| f.narrowest().sos().settle_samples(factor))
+        + settings.differences.reach()
 }
 
 fn samples_of(

@@ -2,6 +2,7 @@
 //! times: whole in memory, 8 bytes x 4 channels x joints a sample.
 
 use super::MotionError;
+use super::position_filter::PositionFilter;
 use super::run::{RunError, Summary, run};
 use super::settings::{Differences, FilterChain, FilterSettings};
 use crate::log::Block;
@@ -140,9 +141,7 @@ pub fn stretches<E>(
 pub struct Parallel {
     filter: ZeroPhase,
     /// The filter that the positions of its stretches came through.
-    pub(super) position: Option<ZeroPhase>,
-    /// Its cut-off \[Hz\].
-    pub(super) position_cutoff_hz: Option<f64>,
+    pub(super) position: Option<PositionFilter>,
     /// How they were differentiated.
     pub(super) differences: Differences,
     /// Every how many samples a row is kept.
@@ -161,11 +160,15 @@ impl Parallel {
         Ok(Parallel {
             filter: chain.parallel,
             position: chain.position,
-            position_cutoff_hz: chain.q_cutoff_hz,
             differences: chain.differences,
             decimation: chain.decimation,
             trim: chain.trim,
         })
+    }
+
+    /// Samples by which the filter extends a stretch at each end.
+    pub(super) fn pad_samples(&self) -> usize {
+        self.filter.sos().pad_samples()
     }
 
     /// Rows that a stretch of `samples` gives.

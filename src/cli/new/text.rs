@@ -262,7 +262,7 @@ impl Draft<'_> {
             ),
         }
         out.push_str(
-            "# position_cutoff_hz = 60.0   # of the positions before they are differentiated\n",
+            "# position_cutoff_hz = 60.0   # of the positions before they are differentiated; found from the logs if left out\n",
         );
     }
 }

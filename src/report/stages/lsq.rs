@@ -226,6 +226,7 @@ pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
     });
     let errors: Vec<String> = errors.collect();
     terminal.paragraph(&format!("residual of the fit: {}", errors.join(", ")));
+    cutoffs(terminal, found);
     account(terminal, &found.account);
     let alone = found.essential.joints.iter();
     let alone = alone.map(|e| {
@@ -241,6 +242,29 @@ pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
         found.unknowns.len(),
         alone.collect::<Vec<_>>().join(", ")
     ));
+}
+
+/// The position cut-offs that were found, and what they leave of friction's errors at reversals.
+fn cutoffs(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let found = found.position_cutoffs.iter().filter(|c| !c.declared);
+    let found: Vec<String> = found
+        .map(|c| {
+            let (hz, off) = (c.cutoff_hz, c.smear.hypot(c.noise));
+            unbroken(&format!(
+                "{} {} Hz ({} {})",
+                c.joint,
+                number::significant(hz, 3),
+                number::significant(off, 2),
+                c.unit
+            ))
+        })
+        .collect();
+    if !found.is_empty() {
+        terminal.paragraph(&format!(
+            "position cut-offs found from the logs, and the error of friction that is left at reversals: {}",
+            found.join(", ")
+        ));
+    }
 }
 
 /// What rank and verdicts say together, where a parameter is called not identifiable: that no torque

@@ -1,0 +1,285 @@
+//! The cut-off of the filter by which positions are differentiated: found from the logs, joint by joint, where the
+//! robot file declares none, and judged where it does.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::open_log::OpenLog;
+use crate::inertia::columns::{Own, RegressorColumns};
+use crate::inertia::solve::Fit;
+use crate::log::Block;
+use crate::motion::position_cutoff::{CutoffCost, CutoffTrial, candidates, least};
+use crate::motion::{FilterSettings, RunError, Stretch, stretches};
+use crate::number;
+use crate::robot::friction::sign;
+use crate::robot::model::{JointFriction, Model};
+
+/// Rows from which a cut-off is found, of all logs together, and of one at least.
+const MOST_ROWS: usize = 120_000;
+const LEAST_ROWS: usize = 20_000;
+/// A declared cut-off is told as wrong where it costs more than this many times the best one ..
+const WRONG: f64 = 1.3;
+/// .. and more than this part of the residual.
+const TOLD: f64 = 0.5;
+
+/// Position cut-off of one joint, and what its friction loses by it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PositionCutoff {
+    pub joint: String,
+    /// Cut-off of the filter that positions come through before they are differentiated \[Hz\].
+    pub cutoff_hz: f64,
+    /// The robot file declares it; found from the logs otherwise.
+    pub declared: bool,
+    /// The cut-off that costs least \[Hz\].
+    pub best_hz: f64,
+    /// Root mean square, over the filtered rows in which the joint moves, of what smoothing changes in its friction
+    /// at reversals \[unit\].
+    pub smear: f64,
+    /// The same of what the noise of the positions changes \[unit\].
+    pub noise: f64,
+    pub unit: String,
+}
+
+/// What cut-offs cost every joint.
+#[derive(Debug, Clone)]
+pub(super) struct CutoffCosts {
+    /// `[joint][cut-off]`; nothing for a joint that never moves.
+    of_joint: Vec<Vec<CutoffCost>>,
+    /// Whether the friction that they are about was known: in torque then, else in parts of the Coulomb level.
+    known: Vec<bool>,
+    /// That of the robot file \[Hz\].
+    declared: Option<f64>,
+    /// That of a joint of which the logs tell nothing \[Hz\].
+    plain: f64,
+}
+
+impl CutoffCosts {
+    /// The cut-off of a joint's filter \[Hz\].
+    fn chosen(&self, joint: usize) -> f64 {
+        let found = || least(&self.of_joint[joint]).map_or(self.plain, |cost| cost.cutoff_hz);
+        self.declared.unwrap_or_else(found)
+    }
+
+    fn cost(&self, joint: usize, cutoff_hz: f64) -> Option<CutoffCost> {
+        let mut costs = self.of_joint[joint].iter();
+        costs.find(|cost| cost.cutoff_hz == cutoff_hz).copied()
+    }
+
+    /// The cut-offs of a fit, whose friction scales those of joints without a known law, and what is wrong with
+    /// them, as warnings.
+    pub(super) fn told(
+        &self,
+        machine: &LoggedRobot,
+        columns: &RegressorColumns,
+        fit: &Fit,
+    ) -> (Vec<PositionCutoff>, Vec<String>) {
+        let (mut list, mut warnings) = (Vec::new(), Vec::new());
+        for (j, joint) in machine.robot.joint_names().iter().enumerate() {
+            let scale = match self.known[j] {
+                true => 1.0,
+                false => coulomb_level(columns, fit, j),
+            };
+            let (Some(best), Some(at)) = (least(&self.of_joint[j]), self.cost(j, self.chosen(j)))
+            else {
+                continue;
+            };
+            let own = PositionCutoff {
+                joint: joint.clone(),
+                cutoff_hz: at.cutoff_hz,
+                declared: self.declared.is_some(),
+                best_hz: best.cutoff_hz,
+                smear: scale * at.smear,
+                noise: scale * at.noise,
+                unit: machine.file.torque_unit(j).to_owned(),
+            };
+            warnings.extend(own.wrong(scale * best.total(), fit.residual_std[j]));
+            list.push(own);
+        }
+        (list, warnings)
+    }
+}
+
+impl PositionCutoff {
+    /// What is wrong with a declared cut-off where the best one costs `best` and the rows have a residual of
+    /// `residual` \[unit\].
+    fn wrong(&self, best: f64, residual: f64) -> Option<String> {
+        let total = self.smear.hypot(self.noise);
+        if !self.declared || total <= TOLD * residual || total <= WRONG * best {
+            return None;
+        }
+        let hz = |x: f64| format!("{} Hz", number::significant(x, 3));
+        let torque = |x: f64| format!("{} {}", number::significant(x, 2), self.unit);
+        let (does, change) = match self.best_hz > self.cutoff_hz {
+            true => ("smears the reversals of", "raise"),
+            false => (
+                "lets the noise of the positions into the friction of",
+                "lower",
+            ),
+        };
+        Some(format!(
+            "position_cutoff_hz = {} {does} {}: {} of the residual's {} rms; {change} it to {}, or leave it out of [filter], and each joint gets what its logs call for",
+            number::significant(self.cutoff_hz, 3),
+            self.joint,
+            torque(total),
+            torque(residual),
+            hz(self.best_hz),
+        ))
+    }
+}
+
+/// Coulomb level of a joint in a fit [N or Nm].
+fn coulomb_level(columns: &RegressorColumns, fit: &Fit, joint: usize) -> f64 {
+    let first = columns.first_own(joint);
+    let own = columns.own[joint].iter().enumerate();
+    let coulomb = own.filter(|(_, own)| match own {
+        Own::Coulomb | Own::Saturating(_) => true,
+        Own::Law(k) => (1..3).contains(k),
+        Own::Viscous | Own::Offset => false,
+    });
+    coulomb
+        .map(|(k, _)| fit.theta[first + k])
+        .sum::<f64>()
+        .abs()
+}
+
+/// The friction of every joint of a model, as known.
+pub(super) fn known(model: &Model) -> Vec<Option<JointFriction>> {
+    model.friction.iter().map(|law| Some(*law)).collect()
+}
+
+/// Opens a log for its positions.
+type Open<'a> = &'a dyn Fn(&Log) -> Result<OpenLog<'a>, IdentifyError>;
+
+impl LoggedRobot {
+    /// The same robot with the position cut-offs that its logs call for. `laws` is the friction of each joint, none
+    /// where it is not known.
+    ///
+    /// # Errors
+    /// A log that cannot be used, and interruption.
+    pub(super) fn with_position_cutoffs(
+        &self,
+        logs: &[Log],
+        laws: &[Option<JointFriction>],
+        control: &Control,
+    ) -> Result<LoggedRobot, IdentifyError> {
+        if !self.finds_cutoffs() {
+            return Ok(self.clone());
+        }
+        let speeds = self.rest_speeds(logs, control)?;
+        let costs = self.cutoff_costs(logs, laws, &speeds, &|log| self.open(log, control))?;
+        Ok(self.with_cutoffs(&costs))
+    }
+
+    /// Whether position cut-offs are found from the logs.
+    pub(super) fn finds_cutoffs(&self) -> bool {
+        let filter = &self.file.filter;
+        filter.position_cutoff_hz.is_none() && filter.position_order != Some(0)
+    }
+
+    /// The same robot with the cut-offs that cost least.
+    pub(super) fn with_cutoffs(&self, costs: &CutoffCosts) -> LoggedRobot {
+        let mut machine = self.clone();
+        if self.finds_cutoffs() {
+            let each = (0..self.robot.joints()).map(|j| costs.chosen(j));
+            machine.position_cutoffs_hz = Arc::new(each.collect());
+        }
+        machine
+    }
+
+    /// What cut-offs cost the friction of every joint on logs.
+    pub(super) fn cutoff_costs(
+        &self,
+        logs: &[Log],
+        laws: &[Option<JointFriction>],
+        rest_speed: &[f64],
+        open: Open,
+    ) -> Result<CutoffCosts, IdentifyError> {
+        let settings = self.settings();
+        let raw = FilterSettings {
+            q_order: 0,
+            ..settings.clone()
+        };
+        let n = self.robot.joints();
+        let most = (MOST_ROWS / logs.len().max(1)).max(LEAST_ROWS);
+        let mut all: Vec<Stretch> = Vec::new();
+        for (index, log) in logs.iter().enumerate() {
+            let mut open = open(log)?;
+            let mut rows = 0;
+            let mut read = |block: &mut Block| {
+                let more = open.read(block)?;
+                rows += block.len();
+                Ok(more && rows < most)
+            };
+            match stretches(index, n, &raw, &mut read) {
+                Ok((found, _)) => all.extend(found),
+                // what reads the log whole says what is wrong with it
+                Err(RunError::Motion(_)) => {}
+                Err(error) => return Err(IdentifyError::of_run(&log.name(), error)),
+            }
+        }
+        let rate = all.iter().map(|s| 1.0 / s.dt).fold(f64::INFINITY, f64::min);
+        let tried = match settings.q_order {
+            0 => Vec::new(),
+            _ => candidates(&settings, rate),
+        };
+        let friction = |j: usize, v: f64| match laws.get(j) {
+            Some(Some(law)) => law.torque(v),
+            _ => sign(v),
+        };
+        let mut trial = CutoffTrial::new(&settings, tried, &friction, rest_speed);
+        for stretch in &all {
+            trial
+                .add(stretch)
+                .map_err(|e| IdentifyError::motion(&logs[stretch.log].name(), e))?;
+        }
+        Ok(CutoffCosts {
+            of_joint: trial.costs(),
+            known: (0..n)
+                .map(|j| matches!(laws.get(j), Some(Some(_))))
+                .collect(),
+            declared: settings.q_cutoff_hz,
+            plain: settings.plain_q_cutoff_hz(rate),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn declared(smear: f64, noise: f64, best_hz: f64) -> PositionCutoff {
+        PositionCutoff {
+            joint: "q4".to_owned(),
+            cutoff_hz: 60.0,
+            declared: true,
+            best_hz,
+            smear,
+            noise,
+            unit: "Nm".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_declared_cut_off_is_judged_by_what_it_costs_beside_the_best_and_the_residual() {
+        let smeared = declared(0.03, 0.001, 160.0).wrong(0.005, 0.04).unwrap();
+        assert!(smeared.starts_with("position_cutoff_hz = 60"), "{smeared}");
+        assert!(smeared.contains("smears the reversals of q4"), "{smeared}");
+        assert!(smeared.contains("raise it to 160"), "{smeared}");
+        let noisy = declared(0.001, 0.03, 40.0).wrong(0.005, 0.04).unwrap();
+        assert!(noisy.contains("lower it to 40"), "{noisy}");
+        // too little of the residual, and next to the best
+        assert_eq!(declared(0.03, 0.0, 160.0).wrong(0.005, 0.4), None);
+        assert_eq!(declared(0.03, 0.0, 160.0).wrong(0.028, 0.04), None);
+        let found = PositionCutoff {
+            declared: false,
+            ..declared(0.03, 0.0, 160.0)
+        };
+        assert_eq!(found.wrong(0.005, 0.04), None);
+    }
+}

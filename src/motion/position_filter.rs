@@ -1,0 +1,83 @@
+//! The filter that positions come through before they are differentiated: one for all joints, or one for each.
+
+use super::MotionError;
+use super::settings::FilterSettings;
+use crate::math::sos::Sos;
+use crate::math::zero_phase::ZeroPhase;
+
+/// A position cut-off that is not asked for stays below this share of the sampling rate.
+pub(super) const HIGHEST_SHARE: f64 = 0.4;
+
+/// The designed filters and their cut-offs.
+#[derive(Debug, Clone)]
+pub(super) struct PositionFilter {
+    /// Of all joints, or of each in turn.
+    filters: Vec<ZeroPhase>,
+    /// \[Hz\]
+    cutoffs: Vec<f64>,
+    /// Which of them is the narrowest.
+    narrowest: usize,
+}
+
+impl PositionFilter {
+    /// The filter of `settings` at a sampling rate \[Hz\]; none where raw positions are differentiated.
+    ///
+    /// # Errors
+    /// [`MotionError`] for a cut-off or an order that the rate does not carry.
+    pub fn design(settings: &FilterSettings, rate: f64) -> Result<Option<Self>, MotionError> {
+        if settings.q_order == 0 {
+            return Ok(None);
+        }
+        let cutoffs = match settings.joint_q_cutoffs_hz.as_slice() {
+            [] => vec![settings.plain_q_cutoff_hz(rate)],
+            each => each.to_vec(),
+        };
+        let design = |cutoff: &f64| Sos::butterworth(settings.q_order, *cutoff, rate);
+        let filters = cutoffs
+            .iter()
+            .map(|cutoff| Ok(ZeroPhase::new(design(cutoff)?)))
+            .collect::<Result<Vec<_>, MotionError>>()?;
+        let order = |a: &usize, b: &usize| cutoffs[*a].total_cmp(&cutoffs[*b]);
+        let narrowest = (0..cutoffs.len()).min_by(order).unwrap_or(0);
+        Ok(Some(PositionFilter {
+            filters,
+            cutoffs,
+            narrowest,
+        }))
+    }
+
+    /// Filters positions, `samples x joints` row-major, in place.
+    ///
+    /// # Errors
+    /// [`MotionError`] for too few samples.
+    pub fn run(&self, q: &mut [f64], joints: usize) -> Result<(), MotionError> {
+        if let [all] = self.filters.as_slice() {
+            return Ok(all.run(q, joints)?);
+        }
+        for joint in 0..joints {
+            self.of(joint).run_channel(q, joints, joint)?;
+        }
+        Ok(())
+    }
+
+    /// The filter of a joint.
+    pub fn of(&self, joint: usize) -> &ZeroPhase {
+        self.filters.get(joint).unwrap_or(self.narrowest())
+    }
+
+    /// Cut-off of a joint's filter \[Hz\].
+    pub fn cutoff_hz(&self, joint: usize) -> f64 {
+        let own = self.cutoffs.get(joint);
+        own.copied().unwrap_or(self.lowest_cutoff_hz())
+    }
+
+    /// The filter that takes longest to settle.
+    pub fn narrowest(&self) -> &ZeroPhase {
+        &self.filters[self.narrowest]
+    }
+
+    /// Cut-off of the narrowest filter \[Hz\].
+    pub fn lowest_cutoff_hz(&self) -> f64 {
+        self.cutoffs[self.narrowest]
+    }
+}
