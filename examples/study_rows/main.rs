@@ -324,7 +324,7 @@ fn summarise(rows: &[Value], folder: &Path) {
         let within = all.filter(|z| number(z).abs() <= 3.0).count() as f64 / (12.0 * n);
         let mut line = json!({
             "motion": cases[0]["motion"],
-            "slope [s/rad]": cases[0]["slope"],
+            "slope [s/rad]": format!("{}", number(&cases[0]["slope"])),
             "cut-offs found [Hz]": (0..4).map(|j| format!("{:.0}", cutoff(j))).collect::<Vec<_>>().join(", "),
             "same kind of motion": each("alike"),
             "unseen motion": each("unseen"),
