@@ -248,6 +248,7 @@ fn plant(seed: u64) -> Value {
                     Some(KnownFriction {
                         law,
                         covariance: [[0.0; 5]; 5],
+                        held: [true; 5],
                     })
                 })
                 .to_vec(),
