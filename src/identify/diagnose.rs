@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::in_memory::{InMemory, read_whole};
+use super::in_memory::{InMemory, read_each};
 use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -109,8 +109,16 @@ pub fn diagnose(
     let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
+    let declared = machine;
     let machine = &machine.with_position_cutoffs(&all, &known(&given.model), control)?;
-    let mut in_memory = read_whole(machine, &all, control)?;
+    // each log by the cut-offs that it calls for itself: a slow log must not narrow those of a quick one
+    let laws = known(&given.model);
+    let each = all.iter().map(|log| {
+        let log = std::slice::from_ref(log);
+        declared.with_position_cutoffs(log, &laws, control)
+    });
+    let each = each.collect::<Result<Vec<_>, _>>()?;
+    let mut in_memory = read_each(machine, &each, &all, control)?;
     let known = logs.train.iter().filter(|_| !settings.keep);
     let known = known.map(|log| machine.open(log, control)?.provenance());
     let known = known.collect::<Result<Vec<_>, _>>()?;

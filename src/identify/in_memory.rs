@@ -33,15 +33,25 @@ pub fn read_whole(
     logs: &[Log],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
+    read_each(machine, &vec![machine.clone(); logs.len()], logs, control)
+}
+
+/// The same, each log smoothed as `smoothing` has it in its place.
+pub(super) fn read_each(
+    machine: &LoggedRobot,
+    smoothing: &[LoggedRobot],
+    logs: &[Log],
+    control: &Control,
+) -> Result<InMemory, IdentifyError> {
     let n = machine.robot.joints();
-    let settings = machine.settings();
     let work = control.begin("reading", Some(logs.len() as u64));
     let (mut all, mut inputs, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     let mut last: Option<Summary> = None;
     let mut origin = None;
     let mut samples = 0;
     let mut averaged = false;
-    for (index, log) in logs.iter().enumerate() {
+    for (index, (log, smoothing)) in logs.iter().zip(smoothing).enumerate() {
+        let settings = smoothing.settings();
         let name = log.name();
         let mut open = machine.open(log, control)?;
         origin = origin.or_else(|| Some(open.origin()));
