@@ -59,11 +59,13 @@ pub fn checked(
         false => machine,
     };
     machine.check_gains()?;
+    // a set-up that is kept whatever the torques say is not asked about: that reads all logs once more
+    let asked = if args.as_declared { &[] } else { logs };
     let CheckedSetup {
         report,
         corrected,
         edits,
-    } = check(&machine, logs, friction, context)?;
+    } = check(&machine, asked, friction, context)?;
     let mut warnings: Vec<String> = report
         .findings
         .iter()

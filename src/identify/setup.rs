@@ -2,11 +2,12 @@
 //! what the torques of the logs say?
 
 use crate::config::ModelFile;
+use crate::inertia::columns::RegressorColumns;
 use crate::log::{Channels as Logged, Layout};
 use crate::motion;
 use crate::robot::Robot;
 use crate::robot::friction::sign;
-use crate::setup::{Channels, Drive, Problem, Searched, SetupReport, Thinner, search};
+use crate::setup::{Channels, Drive, Problem, Sample, Searched, SetupReport, Thinner, search};
 
 use super::control::Control;
 use super::error::IdentifyError;
@@ -52,6 +53,42 @@ pub fn check_setup(
             ..CheckedSetup::default()
         });
     }
+    let sampled = sampled(machine, logs, friction, control)?;
+    let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
+        let mut file = machine.file.clone();
+        file.robot.gravity = Some(gravity);
+        Some(file.robot())
+    };
+    let problem = Problem {
+        robot: &machine.robot,
+        in_gravity: machine.file.declares_gravity().then_some(&in_gravity),
+        channels: sampled.channels,
+        columns: &sampled.columns,
+        sample: sampled.sample,
+    };
+    let searched = search(&problem, &|| control.stopped());
+    control.check()?;
+    Ok(told(machine, &problem, &searched))
+}
+
+/// What a search of the set-up looks at.
+pub struct SampledLogs {
+    pub channels: Channels,
+    /// Friction terms of each joint, fitted or known.
+    pub columns: RegressorColumns,
+    pub sample: Sample,
+}
+
+/// A bounded number of rows of logs, as the robot file declares them.
+///
+/// # Errors
+/// Logs that cannot be read or are refused, and interruption.
+pub fn sampled(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    control: &Control,
+) -> Result<SampledLogs, IdentifyError> {
     let n = machine.robot.joints();
     let settings = machine.settings();
     let _work = control.begin("checking the set-up", None);
@@ -92,25 +129,12 @@ pub fn check_setup(
     let held = (EstimatorKind::Ols, true);
     let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
     let known = known.transpose()?;
-    let columns = columns(
-        machine,
-        known.as_ref().map(|before| before.known.as_slice()),
-    );
-    let in_gravity = |gravity: [f64; 3]| -> Option<Robot> {
-        let mut file = machine.file.clone();
-        file.robot.gravity = Some(gravity);
-        Some(file.robot())
-    };
-    let problem = Problem {
-        robot: &machine.robot,
-        in_gravity: machine.file.declares_gravity().then_some(&in_gravity),
+    let known = known.as_ref().map(|before| before.known.as_slice());
+    Ok(SampledLogs {
         channels: channels.ok_or(IdentifyError::NoLog)?,
-        columns: &columns,
+        columns: columns(machine, known),
         sample: thinner.finish(),
-    };
-    let searched = search(&problem, &|| control.stopped());
-    control.check()?;
-    Ok(told(machine, &problem, &searched))
+    })
 }
 
 fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {

@@ -1,5 +1,7 @@
 //! Gains on blocks of the logs that did not choose the hypothesis, by how many rows are independent.
 
+use std::ops::Range;
+
 use super::channels::Carried;
 use super::correction::Correction;
 use super::fit::Fit;
@@ -9,34 +11,51 @@ use crate::robot::Robot;
 /// Correlation below which rows count as independent.
 const UNCORRELATED: f64 = 0.05;
 
-/// Log-likelihood that `after` gains over `before` on held-out blocks. `independent` is the share of the rows of
-/// each joint that are worth an independent one.
+/// What one hypothesis gains over another on held-out blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gain {
+    /// Log-likelihood over all blocks, by independent rows.
+    pub all: f64,
+    /// The smaller one of its first and its second half.
+    pub half: f64,
+    /// How many of its own deviations the mean over the blocks is above zero: what is wrong everywhere is told
+    /// everywhere.
+    pub deviations: f64,
+}
+
+/// Gain of `after` over `before` on held-out blocks. `independent` is the share of the rows of each joint that are
+/// worth an independent one.
 pub(super) fn gain(
     (before, of_before, power_before): (&Fit, &Normal, &[f64]),
     (after, of_after, power_after): (&Fit, &Normal, &[f64]),
     independent: &[f64],
-) -> Option<f64> {
-    let sums = |fit: &Fit, normal: &Normal| -> Option<Vec<f64>> {
-        let blocks = fit.held_out(normal)?;
-        let joints = 0..normal.joints;
-        Some(
-            joints
-                .map(|j| blocks.iter().map(|block| block[j]).sum())
-                .collect(),
-        )
-    };
-    let (b, a) = (sums(before, of_before)?, sums(after, of_after)?);
+) -> Option<Gain> {
+    let (b, a) = (before.held_out(of_before)?, after.held_out(of_after)?);
     let rows = of_after.rows as f64;
-    let of = |j: usize| {
-        if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
-            return 0.0;
-        }
-        // beyond the torque itself a prediction is worth no more than none
-        let left = |x: f64, power: f64| (x / power).clamp(1e-8, 1.0);
-        let ratio = left(b[j], power_before[j]) / left(a[j], power_after[j]);
-        0.5 * rows * independent[j] * ratio.ln()
+    let of = |blocks: Range<usize>| -> f64 {
+        let share = blocks.len() as f64 / b.len() as f64;
+        let sum = |of: &[Vec<f64>], j: usize| of[blocks.clone()].iter().map(|x| x[j]).sum::<f64>();
+        let of_joint = |j: usize| {
+            if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
+                return 0.0;
+            }
+            // beyond the torque itself a prediction is worth no more than none
+            let left = |x: f64, power: f64| (x / (share * power)).clamp(1e-8, 1.0);
+            let ratio = left(sum(&b, j), power_before[j]) / left(sum(&a, j), power_after[j]);
+            0.5 * rows * share * independent[j] * ratio.ln()
+        };
+        (0..of_after.joints).map(of_joint).sum()
     };
-    Some((0..b.len()).map(of).sum())
+    let count = b.len();
+    let each: Vec<f64> = (0..count).map(|k| of(k..k + 1)).collect();
+    let mean = each.iter().sum::<f64>() / count as f64;
+    let square: f64 = each.iter().map(|g| (g - mean).powi(2)).sum();
+    let std = (square / (count * (count - 1).max(1)) as f64).sqrt();
+    Some(Gain {
+        all: of(0..count),
+        half: of(0..count / 2).min(of(count / 2..count)),
+        deviations: mean / std.max(f64::MIN_POSITIVE),
+    })
 }
 
 /// Of each joint, the share of the rows that are worth an independent one: one over the sum of the

@@ -18,14 +18,33 @@ const TIED: f64 = 3.0;
 const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
-/// Ratio by which its relative error may be larger by chance.
+/// Ratio by which its relative error over the joints may be larger by chance, where physics decides ..
 const NO_WORSE: f64 = 1.005;
+/// .. and below which it must be where the residual does.
+const BETTER: f64 = 0.99;
 /// A relative error that is more than what real machines leave of a right set-up.
 const THIRD: f64 = 0.33;
+/// Deviations by which the mean gain of the blocks is above zero ..
+const DEVIATIONS: f64 = 2.5;
+/// .. and where there are few rows.
+const MORE_DEVIATIONS: f64 = 4.0;
+/// Independent rows for each unknown that are few.
+const FEW: f64 = 3.0;
+/// Strokes of all joints, and of these for each unknown, that show a wrong set-up in all its motions: what fewer
+/// say must be said by each half of them.
+const STROKES: [f64; 2] = [20.0, 0.4];
+/// Strokes for each unknown with which a residual tells nothing.
+const HARDLY: f64 = 0.2;
+/// Share of a gain that one half of the logs may lose.
+const LOST: f64 = 0.1;
 /// Log-likelihood by which what is right may predict worse by chance.
 const WORSE: f64 = 1.0;
 /// Logarithm of a factor by which scales differ that cannot both be right.
-const FLAT: f64 = 0.7;
+const FLAT: f64 = 2.5;
+/// Logarithm of a factor below which a torque constant is badly known, and no unit mistaken.
+const CALIBRATION: f64 = 0.25;
+/// Share of what a fitted factor gains that a round one beside it must gain.
+const MOST: f64 = 0.7;
 /// A deviation that says nothing.
 const UNKNOWN: f64 = 1e5;
 /// A quantity is told as negative beyond so many deviations.
@@ -125,11 +144,16 @@ pub(super) fn decide(
         .fold(f64::NEG_INFINITY, f64::max);
     // the simplest of those that are worth as much
     let simplest = list.iter().position(|j| j.worth >= most - 0.5)?;
-    // a round number before a fitted one that is hardly better
-    let round = list.iter().position(|j| {
-        let alike = same_place(&j.change, &list[simplest].change);
-        alike && j.std.is_none() && j.worth >= most - TIED
+    // a round number before a fitted one that is hardly better, or that differs as calibrations do
+    let rounds = list.iter().enumerate().filter(|(_, j)| {
+        let alike = same_place(&j.change, &list[simplest].change) && j.std.is_none();
+        let near = calibrated(&j.change, &list[simplest].change)
+            && j.worth - worth(declared) > MOST * (most - worth(declared));
+        alike && (j.worth >= most - TIED || near)
     });
+    let round = rounds
+        .max_by(|a, b| a.1.worth.total_cmp(&b.1.worth).then(b.0.cmp(&a.0)))
+        .map(|(i, _)| i);
     let best = round.unwrap_or(simplest);
     if list[best].worth <= worth(declared) {
         return None;
@@ -144,14 +168,33 @@ pub(super) fn decide(
     )?;
     let physics = credit(&chosen.positives) - credit(&declared.positives);
     let needed = ODDS + (tried.max(1) as f64).ln();
-    let gain = held_out + physics;
-    // what is right predicts no worse, and wins in both halves of the logs
+    let gain = held_out.all + physics;
     let fitted = share * (a.score - b.score);
+    // few independent rows for each unknown: what the model lacks repeats itself in them
+    let rows = independent.iter().sum::<f64>() * chosen.trial.normal.rows as f64;
+    let unknowns = chosen.trial.normal.unknowns as f64;
+    let deviations = match rows < FEW * unknowns {
+        true => MORE_DEVIATIONS,
+        false => DEVIATIONS,
+    };
+    let strokes = problem.sample.strokes();
+    // what physics says alone needs no residual
+    let deviations = if physics > needed { 0.0 } else { deviations };
+    // what is right predicts no worse, and wins in both halves of the logs and in most blocks
     if gain < needed
-        || held_out < -WORSE
+        || held_out.all < -WORSE
         || fitted < -0.5 * WORSE
-        || a.error() > NO_WORSE * b.error()
-        || !wins_in_halves(problem, declared, chosen, share, 0.5 * needed)
+        || a.error()
+            > if physics > 0.5 * needed {
+                NO_WORSE
+            } else {
+                BETTER
+            } * b.error()
+        || held_out.half + 0.5 * physics < -LOST * held_out.all
+        || held_out.deviations < deviations
+        || (strokes < HARDLY * unknowns && physics < needed)
+        || (strokes < STROKES[0].max(STROKES[1] * unknowns)
+            && !wins_in_halves(problem, declared, chosen, share, 0.5 * needed))
     {
         return None;
     }
@@ -197,6 +240,17 @@ pub(super) fn decide(
         if !tied.iter().any(there) && !chosen.change.as_ref().is_some_and(there) {
             tied.push(change);
         }
+    }
+    // another factor of the same channel, a round one first
+    let beside = list
+        .iter()
+        .filter(|j| j.worth >= chosen.worth - TIED && other_factor(chosen, j))
+        .max_by(|a, b| fitted(b).cmp(&fitted(a)).then(a.worth.total_cmp(&b.worth)));
+    if let Some(change) = beside
+        .and_then(|j| j.change.clone())
+        .filter(|_| tied.is_empty())
+    {
+        tied.push(change);
     }
     tied.truncate(3);
     Some(Found {
@@ -251,20 +305,30 @@ fn wins_in_halves(
         })
 }
 
-/// Leaves out a scale of a joint where another one, far from it, is worth as much: such a scale only takes the
-/// joint's torque out of the fit of the others, which leaves no trace of its size.
+/// Whether two factors of the same channel differ by no more than badly known torque constants do.
+fn calibrated(a: &Option<Change>, b: &Option<Change>) -> bool {
+    match (a, b) {
+        (Some(Change::Scale(_, _, f)), Some(Change::Scale(_, _, g))) => {
+            (f / g).ln().abs() < CALIBRATION
+        }
+        _ => false,
+    }
+}
+
+/// Leaves out a scale of a joint where another one, ten times as large, is worth as much: such a scale only takes
+/// the joint's torque out of the fit of the others, which leaves no trace of its size.
 fn drop_flat(list: &mut Vec<Judged>) {
     let scale = |j: &Judged| match &j.change {
-        Some(Change::Scale(channel, joints, f)) => {
+        Some(Change::Scale(channel, joints, f)) if joints.len() == 1 => {
             Some((*channel, joints.clone(), f.ln(), j.worth))
         }
         _ => None,
     };
     let scales: Vec<_> = list.iter().filter_map(scale).collect();
     let flat = |of: &(ChannelKind, Vec<usize>, f64, f64)| {
-        let best = scales.iter().filter(|s| s.0 == of.0 && s.1 == of.1);
-        let most = best.clone().map(|s| s.3).fold(f64::NEG_INFINITY, f64::max);
-        let near: Vec<f64> = best.filter(|s| s.3 >= most - TIED).map(|s| s.2).collect();
+        let same = scales.iter().filter(|s| s.0 == of.0 && s.1 == of.1);
+        let most = same.clone().map(|s| s.3).fold(f64::NEG_INFINITY, f64::max);
+        let near: Vec<f64> = same.filter(|s| s.3 >= most - TIED).map(|s| s.2).collect();
         let (low, high) = near
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
@@ -273,6 +337,17 @@ fn drop_flat(list: &mut Vec<Judged>) {
         high - low > FLAT
     };
     list.retain(|j| scale(j).is_none_or(|of| !flat(&of)));
+}
+
+/// Whether two readings have different factors of the same channel: by more than a deviation where one is fitted.
+fn other_factor(a: &Judged, b: &Judged) -> bool {
+    match (&a.change, &b.change) {
+        (Some(Change::Scale(_, _, f)), Some(Change::Scale(_, _, g))) => {
+            let std = a.std.or(b.std).unwrap_or(0.0);
+            same_place(&a.change, &b.change) && (f - g).abs() > std && f != g
+        }
+        _ => false,
+    }
 }
 
 /// Joints with a quantity below so many deviations.

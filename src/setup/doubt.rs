@@ -3,16 +3,18 @@
 //! Signs, order and scales of torques are quadratic forms of one set of normal equations; zeros are looked
 //! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried.
 
+use std::cell::OnceCell;
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::channels::{Carried, Drive};
 use super::confirm;
 use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{Both, Position};
+use super::fit::Fit;
 use super::hypotheses;
-use super::normal::{Problem, own_column};
+use super::normal::{Normal, Problem, own_column};
 use super::physics::{Positive, credit, positives};
 use super::trial::Trial;
 use crate::robot::JointKind;
@@ -34,7 +36,13 @@ const FAR: f64 = 0.5;
 /// An error that a zero moves by less than this ratio is not told in the end.
 const SHIFTED: f64 = 1.1;
 /// Rows that positions are tried on.
-const FEWER: usize = 80;
+const FEWER: usize = 100;
+/// .. and rows on which those that do well there are tried again.
+const MORE: usize = 500;
+/// Blocks of time of these.
+const BLOCKS: usize = 12;
+/// Log-likelihood that a right change may lose by few rows.
+const PROMISING: f64 = -5.0;
 /// A joint that is slower by this stands still on purpose.
 const SLOW: f64 = 3e-3;
 /// Step of differences \[rad\].
@@ -56,7 +64,7 @@ pub(super) fn doubtful(
         || contradicts(declared)
         || torques(problem, declared, credit(positives), rows, moving)
         || zeros(problem, declared, rows)
-        || positions(problem, &declared.by, credit(positives), moving)
+        || positions(problem, &declared.by, moving)
 }
 
 /// Whether a joint moves farther, or less, than a log that excites it can.
@@ -113,76 +121,31 @@ fn torques(
         let trial = Trial::new(problem, by, rows, 1, Some(declared));
         trial.is_some_and(|trial| gained(problem, &trial, declared, credit))
     };
-    let changes = hypotheses::of_torques(problem, moving);
+    // sets of signs are tried by their members, and all together
+    let simple = |change: &Change| match change {
+        Change::Sign(_, joints) => joints.len() == 1 || joints.len() == moving.len(),
+        _ => true,
+    };
+    let mut changes = hypotheses::of_torques(problem, moving);
+    changes.retain(simple);
     let known = problem.columns.known.iter().any(Option::is_some);
     if problem.channels.drive != Drive::Joints || known {
-        let simple = |change: &&Change| change.joints().len() < 2;
-        return changes.iter().filter(simple).any(gains);
+        return changes.iter().filter(|c| c.joints().len() < 2).any(gains);
     }
-    let Some(forms) = Forms::new(declared) else {
-        return true;
+    // friction is each joint's own whatever the weights are: without its columns a fit is small
+    let Some(shared) = declared.normal.shared(problem.robot.parameters().len()) else {
+        return changes.iter().any(gains);
     };
-    let before = forms.score(problem, &declared.by);
+    let score = |by: &Correction| {
+        let mix = problem.channels.mix(by);
+        let targets = mix.iter().map(|mix| Normal::target(mix, 1.0)).collect();
+        let power = super::trial::power(problem, by, &declared.normal, &mix, rows);
+        Fit::new(&shared, targets, &power).map_or(f64::NEG_INFINITY, |fit| fit.score)
+    };
+    let before = score(&declared.by);
     changes
         .iter()
-        .any(|change| forms.score(problem, &declared.by.with(change)) > before && gains(change))
-}
-
-/// The solution for every torque in every joint's place, with the weights of the set-up as it is.
-struct Forms<'a> {
-    declared: &'a Trial,
-    /// Unknowns of torque k in place of joint j's, in column j n + k.
-    solved: DMatrix<f64>,
-}
-
-impl<'a> Forms<'a> {
-    fn new(declared: &'a Trial) -> Option<Self> {
-        let (normal, fit) = (&declared.normal, &declared.fit);
-        let (n, u) = (normal.joints, normal.unknowns);
-        let mut right = DMatrix::zeros(u, n * n);
-        for (j, gram) in normal.total.iter().enumerate() {
-            let c = normal.places[j].len();
-            for k in 0..if c == 0 { 0 } else { n } {
-                for (i, at) in normal.places[j].iter().enumerate() {
-                    right[(*at, j * n + k)] = fit.weights[j] * gram[(i, c + k)];
-                }
-            }
-        }
-        let solved = fit.solve(&right);
-        Some(Self { declared, solved })
-    }
-
-    /// Log-likelihood under a correction of the torques alone.
-    fn score(&self, problem: &Problem, by: &Correction) -> f64 {
-        let normal = &self.declared.normal;
-        let n = normal.joints;
-        let mix = problem.channels.mix(by);
-        let mut theta = DVector::zeros(normal.unknowns);
-        for (j, mix) in mix.iter().enumerate() {
-            for (k, a) in mix.iter().enumerate().filter(|(_, a)| **a != 0.0) {
-                theta.axpy(*a, &self.solved.column(j * n + k), 1.0);
-            }
-        }
-        let mut sum = 0.0;
-        for (j, gram) in normal.total.iter().enumerate() {
-            let places = &normal.places[j];
-            let c = places.len();
-            if c == 0 {
-                continue;
-            }
-            let k = gram.view((c, c), (n, n)) * &mix[j];
-            let power = mix[j].dot(&k);
-            let whole = DVector::from_fn(c + n, |i, _| match i < c {
-                true => -theta[places[i]],
-                false => mix[j][i - c],
-            });
-            let rss = whole.dot(&(gram.view((0, 0), (c + n, c + n)) * &whole));
-            if power > 0.0 {
-                sum += (rss / power).max(1e-8).ln();
-            }
-        }
-        -0.5 * normal.rows as f64 * sum
-    }
+        .any(|change| score(&declared.by.with(change)) > before + GAIN && gains(change))
 }
 
 /// Whether a joint's zero elsewhere gains, by the derivative of the torques with it.
@@ -266,14 +229,10 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
 }
 
 /// Whether turned positions, joints in each other's place, or zeros a quarter turn away gain.
-fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) -> bool {
+fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
     if moving.len() < 2 {
         return false;
     }
-    let rows = problem.sample.spread(FEWER);
-    let Some(declared) = Trial::new(problem, by.clone(), &rows, 1, None) else {
-        return true;
-    };
     let mut changes: Vec<Change> = moving
         .iter()
         .map(|j| Change::Sign(Position, vec![*j]))
@@ -291,17 +250,70 @@ fn positions(problem: &Problem, by: &Correction, credit: f64, moving: &[usize]) 
         _ => false,
     };
     changes.extend(hypotheses::of_zeros(problem).into_iter().filter(quarter));
-    changes.iter().any(|change| {
-        let trial = Trial::new(problem, by.with(change), &rows, 1, Some(&declared));
-        trial.is_some_and(|trial| gained(problem, &trial, &declared, credit))
-    })
+    Race::new(problem, by).is_some_and(|race| changes.iter().any(|change| race.won(change)))
+}
+
+/// Rows of the second look at what a first one on few rows does not refuse.
+struct Race<'a> {
+    problem: &'a Problem<'a>,
+    by: &'a Correction,
+    few: (Vec<usize>, Trial),
+    more: OnceCell<Option<(Vec<usize>, Trial, f64, f64)>>,
+}
+
+impl<'a> Race<'a> {
+    fn new(problem: &'a Problem<'a>, by: &'a Correction) -> Option<Self> {
+        let few = problem.sample.spread(FEWER);
+        let declared = Trial::new(problem, by.clone(), &few, 1, None)?;
+        Some(Self {
+            problem,
+            by,
+            few: (few, declared),
+            more: OnceCell::new(),
+        })
+    }
+
+    fn more(&self) -> Option<&(Vec<usize>, Trial, f64, f64)> {
+        let begin = || {
+            let rows = self.problem.sample.spread(MORE);
+            let trial = Trial::new(self.problem, self.by.clone(), &rows, BLOCKS, None)?;
+            let before = credit(&of(self.problem, &trial));
+            // as many of them as the few are nearly independent
+            let share = (FEWER as f64 / rows.len() as f64).min(1.0);
+            Some((rows, trial, before, share))
+        };
+        self.more.get_or_init(begin).as_ref()
+    }
+
+    /// Whether a change gains on few rows, then on more, where physics has its say.
+    fn won(&self, change: &Change) -> bool {
+        let by = self.by.with(change);
+        let (rows, declared) = &self.few;
+        let Some(trial) = Trial::new(self.problem, by.clone(), rows, 1, Some(declared)) else {
+            return false;
+        };
+        let first = trial.fit.score - declared.fit.score;
+        if first < PROMISING {
+            return false;
+        }
+        let Some((rows, declared, before, share)) = self.more() else {
+            return true;
+        };
+        let Some(trial) = Trial::new(self.problem, by, rows, BLOCKS, Some(declared)) else {
+            return false;
+        };
+        let gain = share * (trial.fit.score - declared.fit.score);
+        let after = credit(&of(self.problem, &trial));
+        gain.min(gain + after - before) > GAIN
+    }
+}
+
+fn of(problem: &Problem, trial: &Trial) -> Vec<Positive> {
+    positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit)
 }
 
 /// Whether a trial is likelier than the set-up as it is, whose physics has this credit.
 fn gained(problem: &Problem, trial: &Trial, declared: &Trial, before: f64) -> bool {
     let gain = trial.fit.score - declared.fit.score;
-    gain > GAIN && {
-        let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
-        gain + credit(&positives) - before > GAIN
-    }
+    gain > GAIN && gain + credit(&of(problem, trial)) - before > GAIN
 }

@@ -24,6 +24,8 @@ const MANY_TURNS: f64 = 14.0;
 const HARDLY: f64 = 0.05;
 /// Logarithm of the ratio of factors that are tried one after the other.
 const RATIO: f64 = 0.025;
+/// Logarithm of the ratio by which a factor beside a round one is looked for first.
+const UNROUNDED: f64 = 0.3;
 /// Halvings of a step behind the top of a climb.
 const HALVES: usize = 4;
 /// Steps of a search for the direction of gravity \[rad\].
@@ -95,6 +97,7 @@ impl Fitted<'_> {
                 out.push((Change::Gravity(g), score));
             }
         }
+        out.extend(self.unrounded(better()));
         if moving.len() > 1 && !motors {
             for &j in moving {
                 out.extend(self.scaled(ChannelKind::Torque, j, declared));
@@ -102,6 +105,31 @@ impl Fitted<'_> {
             }
         }
         out
+    }
+
+    /// Of each scale that does better by a round factor, the factor nearby that does best.
+    fn unrounded<'b>(&self, better: impl Iterator<Item = (&'b Change, f64)>) -> Vec<(Change, f64)> {
+        let mut best: Vec<(&Change, f64)> = Vec::new();
+        for (change, score) in better {
+            let Change::Scale(channel, joints, _) = change else {
+                continue;
+            };
+            let same = |known: &&mut (&Change, f64)| matches!(known.0, Change::Scale(c, j, _) if c == channel && j == joints);
+            match best.iter_mut().find(same) {
+                Some(known) if known.1 < score => *known = (change, score),
+                Some(_) => {}
+                None => best.push((change, score)),
+            }
+        }
+        let climb = |(change, score): (&Change, f64)| match change {
+            Change::Scale(channel, joints, f) => {
+                let of = |x: f64| Change::Scale(*channel, joints.clone(), x.exp());
+                let (x, score) = climbed((f.ln(), score), UNROUNDED, 1.2, &|x| self.score(&of(x)));
+                (x != f.ln()).then(|| (of(x), score))
+            }
+            _ => None,
+        };
+        best.into_iter().filter_map(climb).collect()
     }
 
     /// The vertex of the parabola through the likelihood at x and a step to both sides, and its curvature; x

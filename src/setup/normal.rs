@@ -193,6 +193,44 @@ impl Problem<'_> {
 }
 
 impl Normal {
+    /// The sums over all blocks without the joints' own terms, which take what they can of all other columns:
+    /// of the unknowns the first `shared` are left.
+    pub(super) fn shared(&self, shared: usize) -> Option<Self> {
+        let mut places = Vec::with_capacity(self.joints);
+        let mut total = Vec::with_capacity(self.joints);
+        for (gram, at) in self.total.iter().zip(&self.places) {
+            let first = at.iter().take_while(|c| **c < shared).count();
+            let own = at.len() - first;
+            places.push(at[..first].to_vec());
+            let left: Vec<usize> = (0..first).chain(at.len()..gram.nrows()).collect();
+            let part = |rows: &[usize], columns: &[usize]| {
+                DMatrix::from_fn(rows.len(), columns.len(), |i, k| {
+                    gram[(rows[i], columns[k])]
+                })
+            };
+            let of_own: Vec<usize> = (first..at.len()).collect();
+            let mut kept = part(&left, &left);
+            if own > 0 {
+                let cross = part(&of_own, &left);
+                let mut h = part(&of_own, &of_own);
+                let scale = h.diagonal().max();
+                for i in 0..own {
+                    h[(i, i)] += f64::EPSILON.sqrt() * scale.max(f64::MIN_POSITIVE);
+                }
+                kept -= cross.transpose() * h.cholesky()?.solve(&cross);
+            }
+            total.push(kept);
+        }
+        Some(Self {
+            blocks: Vec::new(),
+            total,
+            places,
+            unknowns: shared,
+            joints: self.joints,
+            rows: self.rows,
+        })
+    }
+
     /// Weights of the columns behind the unknowns of a joint: torques, then known friction.
     pub(super) fn target(mix: &DVector<f64>, friction: f64) -> DVector<f64> {
         mix.push(-friction)

@@ -3,6 +3,12 @@
 /// Most rows that are kept.
 pub const MOST_ROWS: usize = 2000;
 
+/// A joint rests below this share of its rms speed.
+const RESTING: f64 = 0.01;
+
+/// A speed below this share of the rms speed tells no direction.
+const SLOW: f64 = 0.1;
+
 /// Rows of smoothed motion and torque; each list holds n numbers a row.
 #[derive(Debug, Clone, Default)]
 pub struct Sample {
@@ -66,6 +72,59 @@ impl Sample {
         }
         let rows = self.len().max(1) as f64;
         sums.iter().map(|sum| (sum / rows).sqrt()).collect()
+    }
+
+    /// How often joints go the other way, all joints together: motions that differ.
+    pub fn strokes(&self) -> f64 {
+        let n = self.joints.max(1);
+        let mut count = 0;
+        for (j, rms) in self.rms(&self.v).into_iter().enumerate() {
+            let fast = self
+                .v
+                .iter()
+                .skip(j)
+                .step_by(n)
+                .filter(|v| v.abs() > SLOW * rms);
+            let mut last = 0.0;
+            for v in fast {
+                count += usize::from(last * v < 0.0);
+                last = *v;
+            }
+        }
+        count as f64
+    }
+
+    /// Leaves out the rows in which nothing moves: static friction takes any torque there.
+    fn without_rests(&mut self) {
+        let n = self.joints;
+        let speeds = self.rms(&self.v);
+        let moves = |v: &[f64]| {
+            v.iter()
+                .zip(&speeds)
+                .any(|(v, rms)| v.abs() > RESTING * rms)
+        };
+        let kept: Vec<usize> = (0..self.len())
+            .filter(|k| moves(&self.v[k * n..(k + 1) * n]))
+            .collect();
+        if kept.len() < self.len() / 4 {
+            return;
+        }
+        for list in [
+            &mut self.q,
+            &mut self.v,
+            &mut self.a,
+            &mut self.sign,
+            &mut self.tau,
+        ] {
+            for (to, from) in kept.iter().enumerate() {
+                list.copy_within(from * n..(from + 1) * n, to * n);
+            }
+            list.truncate(kept.len() * n);
+        }
+        for (to, from) in kept.iter().enumerate() {
+            self.log[to] = self.log[*from];
+        }
+        self.log.truncate(kept.len());
     }
 
     /// About `most` rows of these, evenly spread.
@@ -141,6 +200,7 @@ impl Thinner {
     /// The rows that were kept.
     pub fn finish(mut self) -> Sample {
         self.sample.spacing_s = self.seconds / self.sample.len().max(1) as f64;
+        self.sample.without_rests();
         self.sample
     }
 }
@@ -154,7 +214,7 @@ mod tests {
         let mut thinner = Thinner::new(1, 10.0);
         for k in 0..30_000 {
             let x = f64::from(k);
-            thinner.add(k as usize / 10_000, 0.01, &[x, x, x, x, x]);
+            thinner.add(k as usize / 10_000, 0.01, &[x, 1.0, x, x, x]);
         }
         let sample = thinner.finish();
         assert!((MOST_ROWS / 2..=MOST_ROWS).contains(&sample.len()));
@@ -163,5 +223,19 @@ mod tests {
         assert_eq!(sample.log[sample.len() - 1], 2);
         let all = sample.spacing_s * sample.len() as f64;
         assert!((all - 300.0).abs() < 1e-6, "{all}");
+    }
+
+    #[test]
+    fn rows_in_which_nothing_moves_are_left_out() {
+        let mut thinner = Thinner::new(2, 10.0);
+        for k in 0..100 {
+            let (v, w) = if k % 4 == 0 { (0.0, 0.0) } else { (0.0, 1.0) };
+            let q = f64::from(k);
+            thinner.add(0, 0.01, &[q, q, v, w, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        }
+        let sample = thinner.finish();
+        assert_eq!(sample.len(), 75);
+        let kept = sample.q.iter().step_by(2);
+        assert!(kept.clone().all(|q| q % 4.0 != 0.0) && sample.tau.len() == 150);
     }
 }

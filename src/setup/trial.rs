@@ -67,7 +67,7 @@ impl Trial {
 }
 
 /// Squares of each joint's torque, by which residuals are measured.
-fn power(
+pub(super) fn power(
     problem: &Problem,
     by: &Correction,
     normal: &Normal,

@@ -220,12 +220,32 @@ fn inspected(words: &[String], folder: &Path) -> Value {
     run(folder, &inspect).document
 }
 
+/// What `inspect` says of a fault of the set-up; nothing where this machine cannot have it.
+pub fn heard(machine: &Machine, fault: &Fault, folder: &Path) -> Option<Heard> {
+    let given = fault.make(machine, &|_| None)?;
+    let found = inspected(&write(machine, &given, folder), folder);
+    let silent = Done {
+        status: 0,
+        document: Value::Null,
+        message: String::new(),
+    };
+    let entries = rows(&found["setup"]);
+    Some(Heard::of(fault, machine, entries, &[], &silent))
+}
+
+/// What `inspect` says of the set-up of a machine in which nothing is wrong.
+pub fn heard_of_right(machine: &Machine, folder: &Path) -> Vec<Value> {
+    let found = inspected(&write(machine, &Given::right(machine), folder), folder);
+    rows(&found["setup"]).to_vec()
+}
+
 /// What was heard of the truth.
-struct Heard {
-    named: bool,
-    first: bool,
-    tied: bool,
-    right_joint: bool,
+#[derive(Debug)]
+pub struct Heard {
+    pub named: bool,
+    pub first: bool,
+    pub tied: bool,
+    pub right_joint: bool,
 }
 
 impl Heard {
