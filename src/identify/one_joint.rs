@@ -14,10 +14,10 @@ use crate::motion::{Differences, FilterSettings};
 /// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
 const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
 
-/// Most rows of a one-joint log: more than an hour at 1 kHz. A row takes 80 bytes per joint for its
+/// Most rows of a one-joint log: half an hour at 1 kHz. A row takes 80 bytes per joint for its
 /// motion, smoothed twice, and 16 bytes per nuisance direction for each of at most three problems
 /// at a time: about 1 kB for a robot of four joints.
-const MOST_ROWS: usize = 4_000_000;
+const MOST_ROWS: usize = 2_000_000;
 
 /// A one-joint log, read and smoothed.
 pub struct OneJointLog {
