@@ -301,7 +301,7 @@ fn log_mappings_that_cannot_be_are_refused() {
 fn filters_limits_and_simulator_settings_that_cannot_be_are_refused() {
     for (rest, words) in [
         ("[filter]\ncutoff_hz = 0\n", ["is 0", "above 0"]),
-        ("[filter]\ncutoff_hz = nan\n", ["NaN", "above 0"]),
+        ("[filter]\ncutoff_hz = nan\n", ["NaN", "finite"]),
         ("[filter]\ndecimation = 0\n", ["is 0", "every row"]),
         ("[filter]\norder = 40\n", ["is 40", "1 to 12"]),
         (

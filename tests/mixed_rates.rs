@@ -50,7 +50,7 @@ fn robot() -> LoggedRobot {
     let text = r#"
         robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
         friction = { law = "viscous-coulomb", fitted_with_inertias = true }
-        filter = { cutoff_hz = 20.0 }
+        filter = { cutoff_hz = 20.0, position_cutoff_hz = 80.0 }
     "#;
     LoggedRobot::new("slide.toml", RobotFile::parse("slide.toml", text).unwrap())
 }

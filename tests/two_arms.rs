@@ -57,6 +57,8 @@ fn truth(robot: &str) -> String {
             ("viscous", 1.5 * size),
             // small: the simulator's joints come to rest within 1/2000 s, a fit's law has a jump there
             ("coulomb", 0.1 * size),
+            // the robot file has one, and a model file that lacks it has lost it
+            ("offset", 0.0),
         ] {
             let _ = write!(
                 out,

@@ -141,7 +141,7 @@ impl Driven {
     ) -> Vec<f64> {
         let n = self.log.t.len();
         let mut tau = [0.0; 4];
-        let mut channels = vec![Vec::with_capacity(n); 8];
+        let mut channels = vec![Vec::new(); 8];
         for k in EDGE..n - EDGE {
             let at = 4 * k..4 * k + 4;
             let [q, v, a] = qva.map(|x| &x[at.clone()]);

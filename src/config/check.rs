@@ -179,14 +179,10 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
     document.known_names(&["limits"], &file.limits, &file.coordinate_names())?;
     for (name, limits) in &file.limits {
         let at = |key| ["limits", name.as_str(), key];
-        if let Some([low, high]) = limits.position {
-            if low >= high {
-                return Err(document.value(
-                    &at("position"),
-                    "is empty",
-                    "write the lower end first",
-                ));
-            }
+        if let Some([low, high]) = limits.position
+            && low >= high
+        {
+            return Err(document.value(&at("position"), "is empty", "write the lower end first"));
         }
         for (key, value) in [
             ("speed", limits.speed),

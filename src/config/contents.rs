@@ -63,11 +63,17 @@ impl Contents {
         }
     }
 
-    /// Refuses a model that lacks something of the list; it may hold more.
-    pub(super) fn check(&self, model: &ModelFile, document: &Document) -> Result<(), ConfigError> {
+    /// Refuses a model that lacks something of the list; it may hold more. `written` are the keys of its
+    /// parameters as they stand in the file: a URDF beside it may have taken some in.
+    pub(super) fn check(
+        &self,
+        model: &ModelFile,
+        written: Vec<String>,
+        document: &Document,
+    ) -> Result<(), ConfigError> {
         let found = Self::of(model);
         let names = [
-            ("parameters", &self.parameters, found.parameters),
+            ("parameters", &self.parameters, written),
             ("effects", &self.effects, found.effects),
             ("residual_std", &self.residual_std, found.residual_std),
             ("drive_inertia", &self.drive_inertia, found.drive_inertia),
@@ -77,7 +83,16 @@ impl Contents {
             for name in wanted {
                 // each stands for one: two effects may have one name
                 let Some(at) = found.iter().position(|known| known == name) else {
-                    let problem = format!("names `{}`, which the file lacks", escape(name));
+                    let mut problem = format!("names `{}`, which the file lacks", escape(name));
+                    // a name that was misspelt, not lost
+                    if let Some(other) = found.iter().find(|known| !wanted.contains(known)) {
+                        let kind = name.split(':').next().unwrap_or(name);
+                        problem += &format!(
+                            "; it holds `{}`, which the list does not name: did you mean `{}`?",
+                            escape(other),
+                            escape(kind)
+                        );
+                    }
                     return Err(lost(document, list, &problem));
                 };
                 found.swap_remove(at);

@@ -87,6 +87,7 @@ impl ModelFile {
             notes: Notes::default(),
         };
         let beside = robot.robot.urdf.is_some();
+        let written: Vec<String> = raw.parameter.iter().map(Parameter::key).collect();
         urdf::resolve(&mut robot, &document, folder)?;
         check::check(&robot, &document)?;
         if beside {
@@ -111,7 +112,7 @@ impl ModelFile {
         };
         model.check_parameters(&document)?;
         match &raw.contents {
-            Some(contents) => contents.check(&model, &document)?,
+            Some(contents) => contents.check(&model, written, &document)?,
             None => {
                 contents::check_by_robot(&model, file)?;
                 model.robot.notes.0.push(contents::without_list(file));

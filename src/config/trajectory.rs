@@ -249,10 +249,10 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
     for &speed in &raw.speeds {
         document.positive(&["speeds"], speed)?;
     }
-    if let Some([low, high]) = raw.range {
-        if low >= high {
-            return Err(document.value(&["range"], "is empty", "write the lower end first"));
-        }
+    if let Some([low, high]) = raw.range
+        && low >= high
+    {
+        return Err(document.value(&["range"], "is empty", "write the lower end first"));
     }
     if let Some(acceleration) = raw.acceleration {
         document.positive(&["acceleration"], acceleration)?;

@@ -66,7 +66,8 @@ pub fn full_rate(
     let clock = SampleClock::of(t)?;
     let (grid_t, mut grid_q) = even_grid(t, q, joints, settings, clock)?;
     let dt = step_of(&grid_t, clock.dt);
-    let filter = PositionFilter::design(settings, 1.0 / dt)?;
+    let cutoffs = settings.position_cutoffs_hz(1.0 / dt);
+    let filter = PositionFilter::design(settings.q_order, cutoffs, 1.0 / dt)?;
     if let Some(filter) = &filter {
         filter.run(&mut grid_q, joints)?;
     }

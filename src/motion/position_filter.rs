@@ -1,7 +1,6 @@
 //! The filter that positions come through before they are differentiated: one for all joints, or one for each.
 
 use super::MotionError;
-use super::settings::FilterSettings;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -20,25 +19,22 @@ pub(super) struct PositionFilter {
 }
 
 impl PositionFilter {
-    /// The filter of `settings` at a sampling rate \[Hz\]; none where raw positions are differentiated.
+    /// Butterworth filters of that order, with the cut-off \[Hz\] of all joints or those of each, at a sampling
+    /// rate \[Hz\]; none of order 0, where raw positions are differentiated.
     ///
     /// # Errors
     /// [`MotionError`] for a cut-off or an order that the rate does not carry.
-    pub fn design(settings: &FilterSettings, rate: f64) -> Result<Option<Self>, MotionError> {
-        if settings.q_order == 0 {
+    pub fn design(order: usize, cutoffs: Vec<f64>, rate: f64) -> Result<Option<Self>, MotionError> {
+        if order == 0 {
             return Ok(None);
         }
-        let cutoffs = match settings.joint_q_cutoffs_hz.as_slice() {
-            [] => vec![settings.plain_q_cutoff_hz(rate)],
-            each => each.to_vec(),
-        };
-        let design = |cutoff: &f64| Sos::butterworth(settings.q_order, *cutoff, rate);
+        let design = |cutoff: &f64| Sos::butterworth(order, *cutoff, rate);
         let filters = cutoffs
             .iter()
             .map(|cutoff| Ok(ZeroPhase::new(design(cutoff)?)))
             .collect::<Result<Vec<_>, MotionError>>()?;
-        let order = |a: &usize, b: &usize| cutoffs[*a].total_cmp(&cutoffs[*b]);
-        let narrowest = (0..cutoffs.len()).min_by(order).unwrap_or(0);
+        let lower = |a: &usize, b: &usize| cutoffs[*a].total_cmp(&cutoffs[*b]);
+        let narrowest = (0..cutoffs.len()).min_by(lower).unwrap_or(0);
         Ok(Some(PositionFilter {
             filters,
             cutoffs,

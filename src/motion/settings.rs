@@ -122,6 +122,14 @@ pub(super) struct FilterChain {
 }
 
 impl FilterSettings {
+    /// Cut-offs of the position filter at a sampling rate \[Hz\]: one for all joints, or one for each.
+    pub(super) fn position_cutoffs_hz(&self, rate_hz: f64) -> Vec<f64> {
+        match self.joint_q_cutoffs_hz.as_slice() {
+            [] => vec![self.plain_q_cutoff_hz(rate_hz)],
+            each => each.to_vec(),
+        }
+    }
+
     /// The position cut-off of all joints at a sampling rate \[Hz\]: the declared one, else six times that of the
     /// parallel filter.
     pub fn plain_q_cutoff_hz(&self, rate_hz: f64) -> f64 {
@@ -160,7 +168,8 @@ impl FilterChain {
                 Sos::chebyshev(order, ripple_db, settings.cutoff_hz, rate)?
             }
         };
-        let position = PositionFilter::design(settings, rate)?;
+        let cutoffs = settings.position_cutoffs_hz(rate);
+        let position = PositionFilter::design(settings.q_order, cutoffs, rate)?;
         let edge = edge(settings, position.as_ref(), dt)?;
         let trim = samples_of("trim_s", settings.trim_s, dt)?
             .unwrap_or_else(|| parallel.settle_samples(3.0));

@@ -258,8 +258,11 @@ struct Race<'a> {
     problem: &'a Problem<'a>,
     by: &'a Correction,
     few: (Vec<usize>, Trial),
-    more: OnceCell<Option<(Vec<usize>, Trial, f64, f64)>>,
+    more: OnceCell<Option<SecondLook>>,
 }
+
+/// Rows, the declared set-up's trial on them, its credit by physics, and the share of the rows that counts.
+type SecondLook = (Vec<usize>, Trial, f64, f64);
 
 impl<'a> Race<'a> {
     fn new(problem: &'a Problem<'a>, by: &'a Correction) -> Option<Self> {
@@ -273,7 +276,7 @@ impl<'a> Race<'a> {
         })
     }
 
-    fn more(&self) -> Option<&(Vec<usize>, Trial, f64, f64)> {
+    fn more(&self) -> Option<&SecondLook> {
         let begin = || {
             let rows = self.problem.sample.spread(MORE);
             let trial = Trial::new(self.problem, self.by.clone(), &rows, BLOCKS, None)?;

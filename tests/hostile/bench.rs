@@ -70,8 +70,8 @@ impl Bench {
     pub fn new() -> Self {
         let bench = Bench(tempfile::tempdir().unwrap());
         bench.file("slide.toml", SLIDE);
-        bench.file("good.csv", &slide_log(2000, |_, _, _| {}));
-        bench.file("other.csv", &slide_log(1500, |_, _, _| {}));
+        bench.file("good.csv", slide_log(2000, |_, _, _| {}));
+        bench.file("other.csv", slide_log(1500, |_, _, _| {}));
         let fitted = bench.run("lsq good.csv -r slide.toml -o model.toml -q");
         assert_eq!(fitted.status, Some(0), "{}", fitted.stderr);
         bench

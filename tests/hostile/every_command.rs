@@ -166,7 +166,7 @@ fn spoiled(good: &[u8], seed: u64) -> Vec<Vec<u8>> {
     }
     // a word for another
     let ends = |byte: &u8| b" ,=\n[]\"<>".contains(byte);
-    for k in 0..16 {
+    for word in &WORDS {
         let from = chance.below(good.len());
         let from = good[from..]
             .iter()
@@ -176,7 +176,7 @@ fn spoiled(good: &[u8], seed: u64) -> Vec<Vec<u8>> {
             .iter()
             .position(ends)
             .map_or(good.len(), |at| from + at);
-        out.push([&good[..from], WORDS[k].as_bytes(), &good[to..]].concat());
+        out.push([&good[..from], word.as_bytes(), &good[to..]].concat());
     }
     // lines lost, twice, exchanged
     let lines: Vec<&[u8]> = good.split_inclusive(|byte| *byte == b'\n').collect();
