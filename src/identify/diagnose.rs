@@ -109,20 +109,22 @@ pub fn diagnose(
     let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
-    let declared = machine;
-    let machine = &machine.with_position_cutoffs(&all, &known(&given.model), control)?;
-    // each log by the cut-offs that it calls for itself: a slow log must not narrow those of a quick one
     let laws = known(&given.model);
+    // each log by the cut-offs that it calls for itself: a slow log must not narrow those of a quick one
     let each = all.iter().map(|log| {
         let log = std::slice::from_ref(log);
-        declared.with_position_cutoffs(log, &laws, control)
+        Ok(machine
+            .with_position_cutoffs(log, &laws, control)?
+            .settings())
     });
-    let each = each.collect::<Result<Vec<_>, _>>()?;
+    let each = each.collect::<Result<Vec<_>, IdentifyError>>()?;
+    let machine = &machine.with_position_cutoffs(&all, &laws, control)?;
     let mut in_memory = read_each(machine, &each, &all, control)?;
-    let known = logs.train.iter().filter(|_| !settings.keep);
-    let known = known.map(|log| machine.open(log, control)?.provenance());
-    let known = known.collect::<Result<Vec<_>, _>>()?;
-    let (before, friction_prior) = before_these((name, file), &known)?;
+    let fitted = match settings.keep {
+        true => &[],
+        false => &in_memory.inputs[..logs.train.len()],
+    };
+    let (before, friction_prior) = before_these((name, file), fitted)?;
     let case = case(
         machine,
         (name, file, &before),

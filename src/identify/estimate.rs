@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::error::IdentifyError;
-use super::known_friction::{of_refinement, with_friction};
+use super::known_friction::{of_joint, of_refinement, with_friction};
 use super::logged_robot::LoggedRobot;
 use super::passes::{Passes, PositionFilter, Simulated};
 use crate::config::campaign::EstimatorKind;
@@ -162,7 +162,7 @@ pub fn estimate(
         if estimator == EstimatorKind::Wls {
             return Ok(Estimated { account, ..found });
         }
-        // rows weighted otherwise tell of the inertias; the friction is what it was refined to
+        // rows weighted otherwise inform the inertias alone; the friction stays as it was refined
         columns = found.columns;
     }
     let (mut fit, sums, solver) = match estimator {
@@ -212,11 +212,9 @@ fn with_known_friction(
     fit.covariance = covariance.view((0, 0), (u, u)).into_owned();
     let known = columns.known.iter_mut().flatten();
     for (place, (known, law)) in known.zip(laws.into_iter().flatten()).enumerate() {
-        let at = u + GRADIENT * place;
-        let of = |a: usize, b: usize| covariance[(at + a, at + b)];
         *known = KnownFriction {
             law: law.law,
-            covariance: std::array::from_fn(|a| std::array::from_fn(|b| of(a, b))),
+            covariance: of_joint(&covariance, u + GRADIENT * place),
             held: [true; GRADIENT],
         };
     }

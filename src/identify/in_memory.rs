@@ -5,7 +5,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use crate::log::{Instant, Provenance};
-use crate::motion::{Stretch, Summary, stretches};
+use crate::motion::{FilterSettings, Stretch, Summary, stretches};
 
 /// Most samples that are taken into memory, over all logs: 2 GB for a robot of seven joints.
 const MOST_SAMPLES: usize = 9_000_000;
@@ -33,13 +33,18 @@ pub fn read_whole(
     logs: &[Log],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
-    read_each(machine, &vec![machine.clone(); logs.len()], logs, control)
+    read_each(
+        machine,
+        &vec![machine.settings(); logs.len()],
+        logs,
+        control,
+    )
 }
 
-/// The same, each log smoothed as `smoothing` has it in its place.
+/// The same, each log with the settings in its place.
 pub(super) fn read_each(
     machine: &LoggedRobot,
-    smoothing: &[LoggedRobot],
+    settings: &[FilterSettings],
     logs: &[Log],
     control: &Control,
 ) -> Result<InMemory, IdentifyError> {
@@ -50,13 +55,12 @@ pub(super) fn read_each(
     let mut origin = None;
     let mut samples = 0;
     let mut averaged = false;
-    for (index, (log, smoothing)) in logs.iter().zip(smoothing).enumerate() {
-        let settings = smoothing.settings();
+    for (index, (log, settings)) in logs.iter().zip(settings).enumerate() {
         let name = log.name();
         let mut open = machine.open(log, control)?;
         origin = origin.or_else(|| Some(open.origin()));
         averaged |= open.is_centred();
-        let (mut found, summary) = stretches(index, n, &settings, &mut |block| open.read(block))
+        let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&name, e))?;
         for stretch in &mut found {
             stretch.zero = open.origin().seconds();

@@ -14,6 +14,7 @@ use crate::config::campaign::EstimatorKind;
 use crate::config::identified::friction_unit;
 use crate::config::model_file::FrictionPrior;
 use crate::config::robot_file::FrictionLawKind;
+use crate::friction::estimate::curve_std;
 use crate::inertia::columns::{GRADIENT, KnownFriction, RegressorColumns};
 use crate::inertia::solve::Fit;
 use crate::log::Provenance;
@@ -200,13 +201,8 @@ impl FrictionBefore {
             let law = columns.known[j]
                 .as_ref()
                 .map_or(self.known[j].law, |k| k.law);
-            let g = law.gradient(speed);
-            let at = first + GRADIENT * j;
-            let variance: f64 = (0..GRADIENT * GRADIENT)
-                .map(|i| (i / GRADIENT, i % GRADIENT))
-                .map(|(a, b)| g[a] * g[b] * all[(at + a, at + b)])
-                .sum();
-            let (torque, std) = (law.torque(speed), variance.max(0.0).sqrt());
+            let covariance = of_joint(all, first + GRADIENT * j);
+            let (torque, std) = (law.torque(speed), curve_std(&law, &covariance, speed));
             let unit = machine.file.torque_unit(j);
             let position = machine.robot.joint_kind(j).position_unit();
             let shown = |x: f64| number::significant(x, 3);
@@ -226,6 +222,11 @@ impl FrictionBefore {
         }
         out
     }
+}
+
+/// Covariance of one joint's friction, which begins at row `at` of that of all.
+pub(super) fn of_joint(all: &DMatrix<f64>, at: usize) -> [[f64; GRADIENT]; GRADIENT] {
+    std::array::from_fn(|a| std::array::from_fn(|b| all[(at + a, at + b)]))
 }
 
 /// What is known of a joint's friction without the logs `given`: the values of the model `file`, called `name`, or where

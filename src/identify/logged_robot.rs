@@ -143,14 +143,7 @@ impl LoggedRobot {
         logs: &[Log],
         control: &Control,
     ) -> Result<Vec<f64>, IdentifyError> {
-        let mut speeds = vec![0.0; self.robot.joints()];
-        for log in logs {
-            let look = self.first_look(log, &self.file.layout(), control)?;
-            for (speed, of_log) in speeds.iter_mut().zip(&look.rest_speed) {
-                *speed = of_log.max(*speed);
-            }
-        }
-        Ok(speeds)
+        self.greatest(logs, |look| &look.rest_speed, control)
     }
 
     /// Greatest speed of every joint in these logs [m/s or rad/s].
@@ -162,14 +155,24 @@ impl LoggedRobot {
         logs: &[Log],
         control: &Control,
     ) -> Result<Vec<f64>, IdentifyError> {
-        let mut speeds = vec![0.0_f64; self.robot.joints()];
+        self.greatest(logs, |look| &look.fastest, control)
+    }
+
+    /// What the first looks at logs found of each joint, the greatest of all logs.
+    fn greatest(
+        &self,
+        logs: &[Log],
+        of: impl Fn(&FirstLook) -> &[f64],
+        control: &Control,
+    ) -> Result<Vec<f64>, IdentifyError> {
+        let mut greatest = vec![0.0_f64; self.robot.joints()];
         for log in logs {
             let look = self.first_look(log, &self.file.layout(), control)?;
-            for (speed, of_log) in speeds.iter_mut().zip(&look.fastest) {
-                *speed = of_log.max(*speed);
+            for (greatest, of_log) in greatest.iter_mut().zip(of(&look)) {
+                *greatest = of_log.max(*greatest);
             }
         }
-        Ok(speeds)
+        Ok(greatest)
     }
 
     /// Whether the robot moves as without its motors where torques are exactly 0.

@@ -80,7 +80,7 @@ pub use position_cutoff::PositionCutoff;
 pub use repeated::repeated_rows;
 pub use residual::{JointResidual, RelativeError};
 pub use separate::separating_command;
-pub use setup::{CheckedSetup, SampledLogs, check_setup, sampled};
+pub use setup::{CheckedSetup, check_setup};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};

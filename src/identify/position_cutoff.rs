@@ -55,7 +55,7 @@ pub(super) struct CutoffCosts {
     known: Vec<bool>,
     /// That of the robot file \[Hz\].
     declared: Option<f64>,
-    /// That of a joint of which the logs tell nothing \[Hz\].
+    /// That of a joint for which the logs determine none \[Hz\].
     plain: f64,
 }
 
@@ -168,16 +168,30 @@ impl LoggedRobot {
         laws: &[Option<JointFriction>],
         control: &Control,
     ) -> Result<LoggedRobot, IdentifyError> {
+        let speeds = self.rest_speeds(logs, control)?;
+        self.with_cutoffs_along(logs, laws, &speeds, &|log| self.open(log, control))
+    }
+
+    /// The same for logs that `open` opens, in which each joint rests up to its `rest_speed`; nothing is read where
+    /// cut-offs are declared.
+    ///
+    /// # Errors
+    /// A log that cannot be used, and interruption.
+    pub(super) fn with_cutoffs_along(
+        &self,
+        logs: &[Log],
+        laws: &[Option<JointFriction>],
+        rest_speed: &[f64],
+        open: Open,
+    ) -> Result<LoggedRobot, IdentifyError> {
         if !self.finds_cutoffs() {
             return Ok(self.clone());
         }
-        let speeds = self.rest_speeds(logs, control)?;
-        let costs = self.cutoff_costs(logs, laws, &speeds, &|log| self.open(log, control))?;
-        Ok(self.with_cutoffs(&costs))
+        Ok(self.with_cutoffs(&self.cutoff_costs(logs, laws, rest_speed, open)?))
     }
 
     /// Whether position cut-offs are found from the logs.
-    pub(super) fn finds_cutoffs(&self) -> bool {
+    fn finds_cutoffs(&self) -> bool {
         let filter = &self.file.filter;
         filter.position_cutoff_hz.is_none() && filter.position_order != Some(0)
     }

@@ -72,18 +72,18 @@ pub fn check_setup(
 }
 
 /// What a search of the set-up looks at.
-pub struct SampledLogs {
-    pub channels: Channels,
+struct SampledLogs {
+    channels: Channels,
     /// Friction terms of each joint, fitted or known.
-    pub columns: RegressorColumns,
-    pub sample: Sample,
+    columns: RegressorColumns,
+    sample: Sample,
 }
 
 /// A bounded number of rows of logs, as the robot file declares them.
 ///
 /// # Errors
 /// Logs that cannot be read or are refused, and interruption.
-pub fn sampled(
+fn sampled(
     machine: &LoggedRobot,
     logs: &[Log],
     friction: Option<(&str, &ModelFile)>,

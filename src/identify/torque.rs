@@ -59,18 +59,8 @@ pub fn torque(
     let n = machine.robot.joints();
     let band = Band::new(machine, file, model);
     let open = |log: &Log| machine.open_positions(log, control);
-    let machine = &match machine.finds_cutoffs() {
-        true => {
-            let logs = std::slice::from_ref(log);
-            machine.with_cutoffs(&machine.cutoff_costs(
-                logs,
-                &known(model),
-                &vec![0.0; n],
-                &open,
-            )?)
-        }
-        false => machine.clone(),
-    };
+    let logs = std::slice::from_ref(log);
+    let machine = &machine.with_cutoffs_along(logs, &known(model), &vec![0.0; n], &open)?;
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
     let settings = FilterSettings {
         decimation: Some(1),

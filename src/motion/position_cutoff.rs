@@ -146,7 +146,7 @@ impl<'a> CutoffTrial<'a> {
             })
     }
 
-    /// The cut-off that costs each joint least \[Hz\]; `plain` where nothing tells.
+    /// The cut-off that costs each joint least \[Hz\]; `plain` where the logs determine none.
     pub fn chosen(&self, plain: f64) -> Vec<f64> {
         let hz = |costs: &Vec<CutoffCost>| least(costs).map_or(plain, |cost| cost.cutoff_hz);
         self.costs().iter().map(hz).collect()
@@ -167,7 +167,7 @@ impl<'a> CutoffTrial<'a> {
     }
 }
 
-/// The cut-off that costs a joint least; none where nothing tells.
+/// The cut-off that costs a joint least; none where the logs determine none.
 pub fn least(costs: &[CutoffCost]) -> Option<CutoffCost> {
     let order = |a: &&CutoffCost, b: &&CutoffCost| a.total().total_cmp(&b.total());
     let found = costs.iter().min_by(order).copied();

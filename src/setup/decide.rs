@@ -33,7 +33,7 @@ const FEW: f64 = 3.0;
 /// Strokes of all joints, and of these for each unknown, that show a wrong set-up in all its motions: what fewer
 /// say must be said by each half of them.
 const STROKES: [f64; 2] = [20.0, 0.4];
-/// Strokes for each unknown with which a residual tells nothing.
+/// Strokes for each unknown below which a residual is no evidence.
 const HARDLY: f64 = 0.2;
 /// Share of a gain that one half of the logs may lose.
 const LOST: f64 = 0.1;
