@@ -10,16 +10,7 @@ use assert_cmd::Command;
 /// A folder with a robot file, a good log and a model fitted to it.
 struct Bench(tempfile::TempDir);
 
-const SLIDE: &str = r#"[robot]
-model = "single-joint"
-joint = "slide"
-kind = "prismatic"
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-offset = true
-"#;
+const SLIDE: &str = include_str!("../fixtures/robots/slide.toml");
 
 /// What a slide of 10 kg logs in 2 s at 1 kHz, `edit` applied to the lines.
 fn log(edit: impl FnOnce(&mut Vec<String>)) -> String {

@@ -7,16 +7,7 @@ use std::fs;
 use assert_cmd::Command;
 use serde_json::Value;
 
-const SLIDE: &str = r#"[robot]
-model = "single-joint"
-joint = "slide"
-kind = "prismatic"
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-offset = true
-"#;
+const SLIDE: &str = include_str!("../fixtures/robots/slide.toml");
 
 /// Inertia, viscous and Coulomb friction, offset of the slide.
 const TRUTH: [f64; 4] = [10.0, 5.0, 3.0, 0.7];

@@ -7,16 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-const SLIDE: &str = r#"[robot]
-model = "single-joint"
-joint = "slide"
-kind = "prismatic"
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-offset = true
-"#;
+const SLIDE: &str = include_str!("../fixtures/robots/slide.toml");
 
 /// A log of `rows` milliseconds.
 fn write_log(path: &Path, rows: u32) {

@@ -1,9 +1,12 @@
 //! URDF files as robots: placements, lumping, mimic joints and limits, against Pinocchio.
 
+mod measured_support;
+
 use cft_ident::config::RobotFile;
 use cft_ident::robot::JointKind;
 use cft_ident::robot::standard::STANDARD;
 use cft_ident::robot::tree::space;
+use measured_support::shared;
 use serde_json::Value;
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
@@ -16,18 +19,6 @@ fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fixtures")
         .join(name)
-}
-
-/// A file of the measured logs; says so where they are not there.
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there", path.display());
-    None
 }
 
 /// A robot file that names this URDF.

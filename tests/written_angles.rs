@@ -1,21 +1,13 @@
 //! Angles of robot files and URDFs as people write them, with a few decimals: the same robot as with
 //! exact ones. A calibrated arm stays as it is.
 
+mod measured_support;
+
 use cft_ident::config::{RobotFile, UrdfChain};
+use measured_support::shared;
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
-use std::path::{Path, PathBuf};
-
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there", path.display());
-    None
-}
+use std::path::Path;
 
 /// The Panda with drive inertias, pi/2 written so.
 fn panda(half_turn: &str) -> String {

@@ -19,20 +19,10 @@ pub struct Ended {
 
 pub struct Bench(tempfile::TempDir);
 
-pub const SLIDE: &str = r#"[robot]
-model = "single-joint"
-joint = "slide"
-kind = "prismatic"
-
-[friction]
-law = "viscous-coulomb"
-fitted_with_inertias = true
-offset = true
-
-[limits.slide]
-position = [-0.5, 0.5]
-speed = 2.0
-"#;
+pub const SLIDE: &str = concat!(
+    include_str!("../../fixtures/robots/slide.toml"),
+    "\n[limits.slide]\nposition = [-0.5, 0.5]\nspeed = 2.0\n"
+);
 
 /// What a slide of 10 kg logs in 4 s at 500 Hz: position and torque of each row.
 pub fn slide_row(k: u32) -> (f64, f64, f64) {

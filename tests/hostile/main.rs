@@ -7,6 +7,8 @@ mod causes;
 mod every_command;
 mod extremes;
 mod lost_parts;
+#[path = "../measured_support/mod.rs"]
+mod measured_support;
 mod metamorphic;
 mod numbers;
 mod outputs;

@@ -8,11 +8,12 @@
 //! | two halves as two logs | one standard deviation: rows at the cut are left to the filters |
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
 use crate::bench::Bench;
+use crate::measured_support::shared;
 
 /// Measured sets: the log, its robot file, and what another zero of the clock may change [standard deviations].
 const SETS: [(&str, &str, f64); 2] = [
@@ -64,21 +65,6 @@ impl Table {
     }
 }
 
-/// A measured log; `None` with a word about it where it is not there.
-fn measured(log: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
-        .join(log);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!(
-        "SKIPPED: {} is not there (docs/data.md says where it is from)",
-        path.display()
-    );
-    None
-}
-
 /// Key, value and standard deviation of every parameter that a fit finds.
 fn fitted(bench: &Bench, logs: &str, robot: &str, further: &str) -> Vec<(String, f64, f64)> {
     let line = format!("lsq {logs} -r {robot} -o out.toml --as-declared --json - -q {further}");
@@ -120,7 +106,7 @@ fn same(what: &str, of: &[(String, f64, f64)], as_before: &[(String, f64, f64)],
 #[test]
 fn a_log_that_is_written_otherwise_gives_the_same_parameters() {
     for (log, robot, of_clock) in SETS {
-        let Some(path) = measured(log) else { continue };
+        let Some(path) = shared(log) else { continue };
         let bench = Bench::new();
         bench.file(
             "robot.toml",
@@ -182,7 +168,7 @@ fn a_log_that_is_written_otherwise_gives_the_same_parameters() {
 
 #[test]
 fn another_unit_a_mirrored_axis_and_another_container_give_the_same_parameters() {
-    let Some(path) = measured("emps/emps_id.csv") else {
+    let Some(path) = shared("emps/emps_id.csv") else {
         return;
     };
     let bench = Bench::new();

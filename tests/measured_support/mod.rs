@@ -21,6 +21,7 @@ pub fn shared(log: &str) -> Option<PathBuf> {
 }
 
 /// Runs a command in `folder` that must succeed, and gives its JSON document.
+#[allow(dead_code)] // a test that only wants a log runs nothing
 #[track_caller]
 pub fn run<S: AsRef<OsStr> + std::fmt::Debug>(folder: &Path, words: &[S]) -> Value {
     let output = Command::cargo_bin("cft-ident")
