@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 
 use cft_ident::diagnose::{
-    Candidate, Case, Diagnosis, FreeParameters, LogRole, ParameterPrior, SelectionLimits, diagnose,
+    Candidate, Case, Diagnosis, FreeParameters, LogRole, ParameterPrior, SelectionLimits,
+    WIDE_TIMES, WideMotion, diagnose,
 };
 use cft_ident::effect::{self, Added, AugmentedModel};
 use cft_ident::inertia::accumulate;
@@ -180,7 +181,7 @@ fn on_arm(setting: &Setting, seed: u64) -> (Lab, Vec<Truth>, Campaign) {
         .collect();
     let specs: Vec<EffectSpec> = put.iter().map(|t| t.spec.clone()).collect();
     let keep = setting.put.iter().any(|p| p.kind.kept());
-    let campaign = Campaign::made(&lab, &truth, &specs, seed, keep);
+    let campaign = Campaign::made(&lab, &truth, &specs, &motion, (seed, keep));
     (lab, put, campaign)
 }
 
@@ -464,17 +465,34 @@ fn arm(index: usize, log: &Block) -> Vec<Stretch> {
     held(index, 4, &processing(), log)
 }
 
+/// The same through a position filter so much wider as the diagnosis asks for.
+pub fn wider(joints: usize, settings: &Processing, logs: &[Block]) -> Vec<Stretch> {
+    let held = |(i, log): (usize, &Block)| {
+        let wide = settings.widened(WIDE_TIMES, 1.0 / (log.t[1] - log.t[0]));
+        held(i, joints, &wide, log)
+    };
+    logs.iter().enumerate().flat_map(held).collect()
+}
+
 /// The logs of a campaign and the declared model, as a lab has them.
 pub struct Campaign {
     pub declared: AugmentedModel,
     pub prior: ParameterPrior,
     pub stretches: Vec<Stretch>,
+    /// The same through a wider position filter.
+    pub wide: Vec<Stretch>,
     pub roles: Vec<LogRole>,
     pub keep: bool,
 }
 
 impl Campaign {
-    fn made(lab: &Lab, truth: &CftTruth, specs: &[EffectSpec], seed: u64, keep: bool) -> Self {
+    pub fn made(
+        lab: &Lab,
+        truth: &CftTruth,
+        specs: &[EffectSpec],
+        motion: &dyn Fn(u64) -> Reference<4>,
+        (seed, keep): (u64, bool),
+    ) -> Self {
         // with --keep the model comes from logs without the effect
         let before: &[EffectSpec] = if keep { &[] } else { specs };
         let robot = &lab.robot;
@@ -491,7 +509,7 @@ impl Campaign {
             let settings = noisy(SECONDS, 10 * seed + j as u64);
             follow(truth, specs, reference, &settings).expect("a run")
         };
-        let mut all = Vec::new();
+        let mut logs = Vec::new();
         let mut known = Vec::new();
         for j in 0..JOINTS.len() {
             let recording = ladder(j, before);
@@ -503,7 +521,7 @@ impl Campaign {
                 held: [true; 5],
             }));
             if !keep {
-                all.extend(arm(all.len(), &lab.log(&recording)));
+                logs.push(lab.log(&recording));
             }
         }
         let columns = RegressorColumns {
@@ -530,13 +548,11 @@ impl Campaign {
             true => lab.run(truth, specs, motion(seed + 1), 10 * seed + 7),
             false => training,
         };
-        all.extend(arm(all.len(), &training));
-        let mut roles = vec![LogRole::Train; all.len()];
-        all.extend(arm(
-            all.len(),
-            &lab.run(truth, specs, along(series(UNSEEN)), 10 * seed + 6),
-        ));
+        logs.push(training);
+        let mut roles = vec![LogRole::Train; logs.len()];
+        logs.push(lab.run(truth, specs, along(series(UNSEEN)), 10 * seed + 6));
         roles.push(LogRole::Holdout);
+        let stretches = logs.iter().enumerate().flat_map(|(i, log)| arm(i, log));
         let mut information = DMatrix::zeros(36, 36);
         if keep {
             let mut put = |at: usize, covariance: DMatrix<f64>| {
@@ -561,13 +577,14 @@ impl Campaign {
         Campaign {
             declared,
             prior,
-            stretches: all,
+            stretches: stretches.collect(),
+            wide: wider(4, &processing(), &logs),
             roles,
             keep,
         }
     }
 
-    fn case(
+    pub fn case(
         &self,
         lab: &Lab,
         given: AugmentedModel,
@@ -583,6 +600,13 @@ impl Campaign {
                 friction: vec![vec![true; 5]; joints],
             },
             stretches: self.stretches.clone(),
+            wide: WideMotion::beside(
+                &self.stretches,
+                self.wide.clone(),
+                &lab.processing
+                    .widened(WIDE_TIMES, 1.0 / self.stretches[0].dt),
+            )
+            .ok(),
             roles: self.roles.clone(),
             filters: ParallelFilters::design(&lab.processing, &self.stretches).expect("a filter"),
             cutoff_hz: lab.processing.cutoff_hz,

@@ -145,6 +145,7 @@ pub fn campaign(truth: &SingleJointTruth, specs: &[EffectSpec], seed: u64) -> Ca
         },
         declared,
         stretches,
+        wide: crate::campaign::wider(1, &settings(), &[training, unseen]),
         roles: vec![LogRole::Train, LogRole::Holdout],
         keep: false,
     }

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! logs -> stretches -> data split (fit, folds, veto, holdout)
-//!      fit -> orders -> search (candidates) -> accept, choose, add -> fit ..  -> removal -> errors
+//!      fit -> orders -> search (candidates) -> accept, placebo, choose, add -> removal -> fit ..
+//!          -> reconsider -> search ..  -> errors
 //! ```
 //!
 //! Every candidate is tested beside everything that is declared, with its columns projected off it:
@@ -15,6 +16,7 @@
 //! | `problem` | which rows do what, the unknowns, and their joint fit |
 //! | `faults` | torque channels and disturbances, before any physics |
 //! | `candidates` | every effect at every place, its shape and its significance |
+//! | `placebo` | what chance makes of a model that lacks nothing |
 //! | `selection` | which one is added, and which one goes again |
 //! | `unexplained` | errors, the noise floor, and what is above it |
 //! | `uncertainty` | covariance, bias, and the profile of shapes |
@@ -23,6 +25,7 @@
 mod candidates;
 mod faults;
 mod outcome;
+mod placebo;
 mod problem;
 mod run;
 mod selection;
@@ -33,12 +36,14 @@ pub use candidates::candidate::Candidate;
 pub use candidates::score::CandidateScore;
 pub use faults::channels::Suspicion;
 pub use faults::disturbance::CutDisturbance;
-pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors};
+pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors, Turn};
 pub use problem::case::{Case, SelectionLimits};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown};
+pub use problem::wide_motion::{TIMES as WIDE_TIMES, WideMotion};
 pub use run::{DiagnoseError, diagnose};
+pub use unexplained::dependence::{Dependence, Signal};
 pub use unexplained::errors::{Errors, JointErrors, OverallErrors};
 pub use unexplained::evidence::{JointEvidence, evidence};
 pub use unexplained::{STRUCTURED, Unexplained};

@@ -6,8 +6,9 @@ use super::candidates::candidate::Candidate;
 use super::faults::disturbance::CutDisturbance;
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
+use super::unexplained::Unexplained;
+use super::unexplained::dependence::Dependence;
 use super::unexplained::errors::Errors;
-use super::unexplained::{NEGLIGIBLE, STRUCTURED, Unexplained};
 use crate::effect::{Added, AugmentedModel};
 
 /// Part of a joint's structure that may be left where effects are named for the rest of it.
@@ -25,6 +26,20 @@ pub struct AcceptedEffect {
     pub holdout: Option<[f64; 2]>,
 }
 
+/// One turn of the search.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Turn {
+    /// An effect was added.
+    Added(String),
+    /// An effect went, for the others make it superfluous.
+    Dropped(String),
+    /// Effects went for others that say the same with fewer numbers, or more.
+    Replaced {
+        gone: Vec<String>,
+        come: Vec<String>,
+    },
+}
+
 /// Errors before or after.
 #[derive(Debug, Clone)]
 pub struct SplitErrors {
@@ -40,6 +55,8 @@ pub struct Diagnosis {
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
     pub steps: Vec<AcceptedEffect>,
+    /// How the search came to them.
+    pub path: Vec<Turn>,
     /// Candidates of the last round, in which none was accepted.
     pub candidates: Vec<Candidate>,
     pub before: SplitErrors,
@@ -47,6 +64,8 @@ pub struct Diagnosis {
     pub refitted: Errors,
     pub after: SplitErrors,
     pub unexplained: Vec<Unexplained>,
+    /// What the residuals of joints with structure depend on, the strongest of each joint first.
+    pub dependence: Vec<Dependence>,
     /// Part of the structure of each joint's residual that is unexplained on the fitted logs.
     pub part_unexplained: Vec<f64>,
     pub set_aside: Vec<SetAside>,
@@ -68,9 +87,7 @@ impl Diagnosis {
     pub fn structured_joints(&self) -> impl Iterator<Item = usize> {
         let joints = self.unexplained.iter().enumerate();
         joints
-            .filter(|(_, l)| {
-                l.over_floor.is_none_or(|over| over > STRUCTURED) && l.share > NEGLIGIBLE
-            })
+            .filter(|(_, left)| left.is_structure())
             .map(|(j, _)| j)
     }
 

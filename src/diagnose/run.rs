@@ -1,5 +1,5 @@
-//! The loop: fit, search, add the best, refit, until nothing is accepted; then every accepted effect
-//! is tested for removal, and only then is the holdout looked at.
+//! The loop: fit, search, add the best, refit, test every accepted effect for removal; where nothing is accepted any
+//! more, look for other effects that say the same, and search again. Only then is the holdout looked at.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -10,20 +10,22 @@ use super::candidates::orders;
 use super::candidates::search::search;
 use super::faults::channels::{Suspicion, suspicion};
 use super::faults::disturbance::{self, CutDisturbance};
-use super::outcome::{AcceptedEffect, Diagnosis, SplitErrors};
+use super::outcome::{AcceptedEffect, Diagnosis, SplitErrors, Turn};
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, RowRole};
 use super::problem::fit::{FittedModel, fit};
 use super::problem::fit_problem::{FitProblem, inertial_of};
 use super::problem::rests::rest_weight;
 use super::problem::unknowns::Unknowns;
-use super::selection::accept::accept;
+use super::selection::accept::{accept, beyond_chance};
 use super::selection::choose::{alternatives, choose};
+use super::selection::reconsider::replacement;
 use super::selection::removal::superfluous;
 use super::uncertainty::covariance::covariance;
+use super::unexplained::dependence::dependences;
 use super::unexplained::errors::{Counted, Errors, errors};
 use super::unexplained::{noise, part_unexplained, unexplained};
-use crate::effect::{AugmentedModel, Cover, Torques, stationary_joints};
+use crate::effect::{Added, AugmentedModel, Cover, Law, Place, Search, Torques, stationary_joints};
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
@@ -70,11 +72,12 @@ pub fn diagnose(
         }
         let found = work.search()?;
         work.unless_stopped()?;
-        if !work.add_best(found)? {
+        if work.add_best(found)? {
+            work.drop_superfluous()?;
+        } else if !work.drop_superfluous()? && !work.replace()? {
             break;
         }
     }
-    work.drop_superfluous()?;
     work.evaluate()
 }
 
@@ -94,6 +97,9 @@ struct Diagnosing<'a> {
     /// The declared model refitted, then the model of each step.
     models: Vec<AugmentedModel>,
     steps: Vec<AcceptedEffect>,
+    path: Vec<Turn>,
+    /// Sets of effects that the model has had, so that the search does not go in circles.
+    known: Vec<Vec<String>>,
     disturbances: Vec<CutDisturbance>,
     /// Candidates that came to nothing.
     candidates: Vec<Candidate>,
@@ -145,6 +151,8 @@ impl<'a> Diagnosing<'a> {
             models: vec![at.model.clone()],
             at,
             steps: Vec::new(),
+            path: Vec::new(),
+            known: Vec::new(),
             disturbances: Vec::new(),
             candidates: Vec::new(),
         })
@@ -198,15 +206,17 @@ impl<'a> Diagnosing<'a> {
             noise: &noise,
         };
         let (at, problem) = (&self.at, &self.problem);
-        let (mut found, shapes) = search(at, problem, case, &baseline, &torques, self.stop)?;
+        let all = |_: &Law, _: Place| true;
+        let mut found = search(at, problem, case, &baseline, &torques, (&all, self.stop))?;
         accept(
-            &mut found,
-            shapes,
+            &mut found.candidates,
             &case.limits,
             (at, &problem.split),
             &baseline,
         );
-        Ok(found)
+        let wide = case.wide.as_ref();
+        beyond_chance(&mut found, &case.limits, (at, problem), &torques, wide)?;
+        Ok(found.candidates)
     }
 
     /// Adds the best of the accepted candidates that a joint refit confirms; whether there is one. The others
@@ -235,6 +245,10 @@ impl<'a> Diagnosing<'a> {
         });
         self.models.push(fitted.model.clone());
         self.at = fitted;
+        self.path
+            .push(Turn::Added(found[chosen].effect.title(robot)));
+        self.known
+            .push(titles(&self.at.model, &self.at.model.effects));
         Ok(true)
     }
 
@@ -252,6 +266,11 @@ impl<'a> Diagnosing<'a> {
         while let Some((chosen, others)) = choose(found, &vetoed) {
             let mut model = at.model.clone();
             model.effects.push(found[chosen].effect.clone());
+            if self.known.contains(&titles(&model, &model.effects)) {
+                found[chosen].reject("it was in the model, and others took its place");
+                vetoed.push(chosen);
+                continue;
+            }
             let fitted = fit(&model, &self.problem)?;
             let vetoing = |of: &FittedModel| of.veto_squares(&fitted.weights, split);
             let kept = !self.case.limits.vetoes(&vetoing(at), &vetoing(&fitted));
@@ -265,25 +284,103 @@ impl<'a> Diagnosing<'a> {
         Ok(None)
     }
 
-    /// What a later effect made superfluous goes.
-    fn drop_superfluous(&mut self) -> Result<(), DiagnoseError> {
+    /// What later effects made superfluous goes; whether there was any.
+    fn drop_superfluous(&mut self) -> Result<bool, DiagnoseError> {
+        let before = self.at.model.effects.len();
         while let Some(effect) = superfluous(&self.at, &self.problem, &self.case.limits)? {
             let mut model = self.at.model.clone();
             let title = model.effects[effect].title(&model.model.robot);
             (self.progress)(&format!("{title} is not needed any more"));
             model.effects.remove(effect);
             self.at = fit(&model, &self.problem)?;
-            if let Some(k) = self.steps.iter().position(|s| s.effect == effect) {
-                let mut gone = self.steps.remove(k).candidate;
-                self.models.remove(k + 1);
-                gone.reject("a later effect made it superfluous");
-                self.candidates.push(gone);
-            }
-            for step in self.steps.iter_mut().filter(|s| s.effect > effect) {
-                step.effect -= 1;
-            }
+            self.forget(effect);
+            self.known
+                .push(titles(&self.at.model, &self.at.model.effects));
+            self.path.push(Turn::Dropped(title));
         }
-        Ok(())
+        Ok(self.at.model.effects.len() < before)
+    }
+
+    /// The step that an effect of the model came with, and the places of the others beside it.
+    fn forget(&mut self, effect: usize) -> Option<AcceptedEffect> {
+        let step = self.steps.iter().position(|s| s.effect == effect);
+        let gone = step.map(|k| {
+            self.models.remove(k + 1);
+            self.steps.remove(k)
+        });
+        for step in self.steps.iter_mut().filter(|s| s.effect > effect) {
+            step.effect -= 1;
+        }
+        gone
+    }
+
+    /// Puts other effects in the place of some, where they say the same with fewer numbers or more; whether it did.
+    fn replace(&mut self) -> Result<bool, DiagnoseError> {
+        if self.at.model.effects.is_empty() || self.case.limits.steps == 0 {
+            return Ok(false);
+        }
+        let torques = self.problem.torques(&self.at.model);
+        let of_fitted = self.case.fitted_torques(&torques);
+        let residuals = residuals(&self.at.model, &self.stretches, of_fitted);
+        let noise = noise(&residuals, self.case, &self.stretches)?;
+        let declared = self.declared.clone().unwrap_or_default();
+        let baseline = Baseline {
+            declared: &declared,
+            noise: &noise,
+        };
+        let model = &self.at.model;
+        let known = |effects: &[Added]| self.known.contains(&titles(model, effects));
+        let (at, problem) = (&self.at, &self.problem);
+        let found = replacement(at, problem, self.case, &baseline, (&known, self.stop))?;
+        self.unless_stopped()?;
+        let Some(found) = found else {
+            return Ok(false);
+        };
+        let named = |effects: &[Added]| -> Vec<String> {
+            let robot = &self.case.given.model.robot;
+            effects.iter().map(|e| e.title(robot)).collect()
+        };
+        let before: Vec<Added> = found
+            .gone
+            .iter()
+            .map(|i| self.at.model.effects[*i].clone())
+            .collect();
+        let come: Vec<Added> = found.come.iter().map(|c| c.effect.clone()).collect();
+        let (gone, come) = (named(&before), named(&come));
+        (self.progress)(&format!(
+            "{} in place of {}",
+            come.join(", "),
+            gone.join(", ")
+        ));
+        let mut chance: Option<f64> = None;
+        for effect in found.gone.iter().rev() {
+            let of_step = self
+                .forget(*effect)
+                .and_then(|s| s.candidate.placebo_p_value);
+            chance = match (chance, of_step) {
+                (Some(a), Some(b)) => Some(f64::max(a, b)),
+                (a, b) => a.or(b),
+            };
+        }
+        let first = found.fitted.model.effects.len() - found.come.len();
+        for (i, mut candidate) in found.come.into_iter().enumerate() {
+            candidate.accepted = true;
+            candidate.significant = true;
+            candidate.reason.clear();
+            candidate.placebo_p_value = chance;
+            self.steps.push(AcceptedEffect {
+                effect: first + i,
+                candidate,
+                alternatives: Vec::new(),
+                holdout: None,
+            });
+            self.models.push(found.fitted.model.clone());
+        }
+        self.at = found.fitted;
+        self.known
+            .push(titles(&self.at.model, &self.at.model.effects));
+        self.path.push(Turn::Replaced { gone, come });
+        Ok(true)
     }
 
     /// Everything is decided: the holdout may be looked at.
@@ -319,13 +416,21 @@ impl<'a> Diagnosing<'a> {
         self.unless_stopped()?;
         let (base, split) = (&self.at.base, &self.problem.split);
         let unknowns = base.unknowns.len();
+        let unseen = found.holdout.as_ref().zip(floor_unseen);
+        let left = unexplained(&found.train, &floor, unseen);
+        let structured = left.iter().enumerate().filter(|(_, l)| l.is_structure());
+        let structured: Vec<usize> = structured.map(|(j, _)| j).collect();
+        let dependence = match case.limits.deviations {
+            true => {
+                let torques = self.problem.torques(&self.at.model);
+                dependences(&self.at, &self.problem, &torques, &structured)
+            }
+            false => Vec::new(),
+        };
         Ok(Diagnosis {
             part_unexplained: part_unexplained(&floor, &given.train, &found.train),
-            unexplained: unexplained(
-                &found.train,
-                &floor,
-                found.holdout.as_ref().zip(floor_unseen),
-            ),
+            unexplained: left,
+            dependence,
             covariance: match case.limits.deviations {
                 true => covariance(&self.at, &self.problem, case.cutoff_hz)?,
                 false => DMatrix::from_element(unknowns, unknowns, f64::NAN),
@@ -335,6 +440,7 @@ impl<'a> Diagnosing<'a> {
             set_aside: split.set_aside.clone(),
             model: self.at.model,
             steps: self.steps,
+            path: self.path,
             candidates: self.candidates,
             before,
             refitted,
@@ -384,6 +490,23 @@ impl<'a> Diagnosing<'a> {
         let residuals = residuals(model, stretches, torques.iter());
         noise(&residuals, self.case, stretches)
     }
+}
+
+/// Effects of a model by their titles, in one order; waves with their orders, to two digits.
+fn titles(model: &AugmentedModel, effects: &[Added]) -> Vec<String> {
+    let title = |e: &Added| {
+        let order = match e.law.entry.search {
+            Search::Orders => e
+                .shape
+                .first()
+                .map_or(String::new(), |o| format!(" {o:.1e}")),
+            _ => String::new(),
+        };
+        e.title(&model.model.robot) + &order
+    };
+    let mut titles: Vec<String> = effects.iter().map(title).collect();
+    titles.sort();
+    titles
 }
 
 fn is_holdout(role: RowRole) -> bool {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::in_memory::{InMemory, read_each};
+use super::in_memory::{InMemory, read_each, read_wider};
 use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
@@ -17,10 +17,10 @@ use crate::config::ModelFile;
 use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
     self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion,
-    Unknown,
+    Unknown, WIDE_TIMES, WideMotion,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
-use crate::motion::ParallelFilters;
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::setup::{Finding, FindingKind};
@@ -125,13 +125,17 @@ pub fn diagnose(
         false => &in_memory.inputs[..logs.train.len()],
     };
     let (before, friction_prior) = before_these((name, file), fitted)?;
-    let case = case(
+    let wider = (each.as_slice(), WIDE_TIMES);
+    let wide = read_wider(machine, wider, &all, &in_memory.stretches, control)?;
+    let mut case = case(
         machine,
         (name, file, &before),
         given,
         &mut in_memory,
         (roles, settings),
     )?;
+    case.wide = wide_motion(machine, &case.stretches, wide)
+        .map_err(|error| IdentifyError::motion(name, error))?;
     let work = control.begin("search", None);
     let found = diagnose::diagnose(
         &case,
@@ -167,6 +171,19 @@ pub fn diagnose(
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     })))
+}
+
+/// The logs through a wider position filter, beside the stretches of a case; none where no log gives one.
+fn wide_motion(
+    machine: &LoggedRobot,
+    stretches: &[Stretch],
+    wide: Vec<Stretch>,
+) -> Result<Option<WideMotion>, MotionError> {
+    let Some(dt) = wide.first().map(|s| s.dt) else {
+        return Ok(None);
+    };
+    let settings = machine.settings().widened(WIDE_TIMES, 1.0 / dt);
+    WideMotion::beside(stretches, wide, &settings).map(Some)
 }
 
 /// Channels that are no torques, as a fault: gains that differ look like friction and loads.
@@ -226,6 +243,7 @@ fn case(
         open,
         stretches: std::mem::take(&mut in_memory.stretches),
         roles,
+        wide: None,
         filters,
         cutoff_hz: processing.cutoff_hz,
         rest_speed: in_memory.rest_speed.clone(),

@@ -8,7 +8,9 @@ use serde::{Serialize, Serializer};
 use super::diagnose::{DataFault, Diagnosed};
 use super::logged_robot::LoggedRobot;
 use super::separate::separating_command;
-use crate::diagnose::{AcceptedEffect, Candidate, Errors, LogRole, SplitErrors};
+use crate::diagnose::{
+    AcceptedEffect, Candidate, Dependence, Errors, LogRole, Signal, SplitErrors, Turn,
+};
 use crate::effect::disturbance;
 use crate::motion::Summary;
 use crate::setup::Finding;
@@ -19,11 +21,15 @@ pub struct DiagnosisResult {
     pub verdict: DiagnosisVerdict,
     /// Effects in the order in which they were added.
     pub steps: Vec<DiagnosisStep>,
+    /// How the search came to them, turn by turn: what was added, dropped, or put in the place of others.
+    pub path: Vec<SearchTurn>,
     /// Errors of the model as it was given.
     pub before: Option<ErrorsBySide>,
     /// Errors of the refined model.
     pub after: Option<ErrorsBySide>,
     pub unexplained: Vec<Unexplained>,
+    /// Signals that the residual of a joint with structure depends on, the strongest of each joint first.
+    pub dependence: Vec<ResidualDependence>,
     /// Candidates that were added, then those of the last round.
     pub candidates: Vec<CandidateResult>,
     /// Blocks of the logs that were not fitted.
@@ -76,11 +82,46 @@ pub struct DiagnosisStep {
     /// Fraction of the cross-validated squared error that it removes.
     pub cv_gain: Option<f64>,
     pub effective_samples: Option<f64>,
+    /// Chance that a model which lacks nothing, measured and processed as these logs were, shows a candidate as good
+    /// as this one or better, among all candidates: by placebos.
+    pub p_value: Option<f64>,
     /// Mean relative error on data that decided nothing, before the step.
     pub holdout_before: Option<f64>,
     /// The same after it.
     pub holdout_after: Option<f64>,
     pub holdout_worsened: bool,
+}
+
+/// One turn of the search.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct SearchTurn {
+    pub action: TurnAction,
+    /// Effects that came, each with its place.
+    pub come: Vec<String>,
+    /// Effects that went.
+    pub gone: Vec<String>,
+}
+
+/// What a turn of the search does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TurnAction {
+    Added,
+    /// The others make it superfluous.
+    Dropped,
+    /// Others say the same with fewer numbers, or say more.
+    Replaced,
+}
+
+impl From<&Turn> for SearchTurn {
+    fn from(turn: &Turn) -> Self {
+        let (action, come, gone) = match turn.clone() {
+            Turn::Added(effect) => (TurnAction::Added, vec![effect], Vec::new()),
+            Turn::Dropped(effect) => (TurnAction::Dropped, Vec::new(), vec![effect]),
+            Turn::Replaced { gone, come } => (TurnAction::Replaced, come, gone),
+        };
+        SearchTurn { action, come, gone }
+    }
 }
 
 /// One number of an effect.
@@ -106,6 +147,18 @@ pub struct Unexplained {
     pub share: f64,
     /// Power of the residual over that of the floor; null where nothing tells of the noise.
     pub over_floor: Option<f64>,
+}
+
+/// A dependence of what is left of a joint's torque.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ResidualDependence {
+    pub joint: String,
+    /// One signal, or two together; of the joint itself where no other is named.
+    pub signals: Vec<String>,
+    /// Fraction of the residual's square that means over them take up, beyond what chance takes up.
+    pub share: f64,
+    /// Chance of as much among all signals where the residual depends on none of them.
+    pub p_value: f64,
 }
 
 /// A candidate with what became of it.
@@ -176,9 +229,11 @@ impl DataFault {
         DiagnosisResult {
             verdict: DiagnosisVerdict::DataFault,
             steps: Vec::new(),
+            path: Vec::new(),
             before: None,
             after: None,
             unexplained: Vec::new(),
+            dependence: Vec::new(),
             candidates: Vec::new(),
             set_aside: None,
             episodes: None,
@@ -239,9 +294,11 @@ impl Diagnosed {
         DiagnosisResult {
             verdict: self.verdict(),
             steps: d.steps.iter().map(|s| self.step(machine, s)).collect(),
+            path: d.path.iter().map(SearchTurn::from).collect(),
             before: Some((&d.before).into()),
             after: Some((&d.after).into()),
             unexplained: left.collect(),
+            dependence: d.dependence.iter().map(|d| dependence(names, d)).collect(),
             candidates: candidates.map(|c| candidate(machine, c)).collect(),
             set_aside: Some(aside.collect()),
             episodes: Some(episodes.collect()),
@@ -279,10 +336,40 @@ impl Diagnosed {
             delta_bic: score.map(|s| s.delta_bic),
             cv_gain: score.map(|s| s.cv_gain),
             effective_samples: score.map(|s| s.effective_rows),
+            p_value: step.candidate.placebo_p_value,
             holdout_before: step.holdout.map(|h| h[0]),
             holdout_after: step.holdout.map(|h| h[1]),
             holdout_worsened: step.holdout.is_some_and(|h| h[1] > h[0]),
         }
+    }
+}
+
+fn dependence(names: &[String], found: &Dependence) -> ResidualDependence {
+    let signals = found.signals.iter();
+    ResidualDependence {
+        joint: names[found.joint].clone(),
+        signals: signals
+            .map(|s| signal_words(names, found.joint, *s))
+            .collect(),
+        share: found.share,
+        p_value: found.p_value,
+    }
+}
+
+/// A signal in words; of another joint than `own` with its name.
+pub fn signal_words(names: &[String], own: usize, signal: Signal) -> String {
+    let of = |what: &str, j: usize| match j == own {
+        true => what.to_owned(),
+        false => format!("{what} of {}", names[j]),
+    };
+    match signal {
+        Signal::Position(j) => of("position", j),
+        Signal::Speed(j) => of("speed", j),
+        Signal::Acceleration => "acceleration".to_owned(),
+        Signal::Load => "load".to_owned(),
+        Signal::Direction => "direction".to_owned(),
+        Signal::SinceReversal => "time since reversal".to_owned(),
+        Signal::Time => "time".to_owned(),
     }
 }
 

@@ -59,7 +59,7 @@ pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
 pub use control::{Control, Progress};
 pub use curve::friction_curve;
 pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
-pub use diagnosis::{DiagnosisResult, DiagnosisVerdict};
+pub use diagnosis::{DiagnosisResult, DiagnosisVerdict, signal_words};
 pub use error::{IdentifyError, ReadError};
 pub use error_kind::ErrorKind;
 pub use estimate::{Account, JointAccount};

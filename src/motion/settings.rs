@@ -137,6 +137,17 @@ impl FilterSettings {
         self.q_cutoff_hz.unwrap_or_else(plain)
     }
 
+    /// The same with position cut-offs so many times as high, as far as a sampling rate \[Hz\] carries them.
+    pub fn widened(&self, times: f64, rate_hz: f64) -> Self {
+        let highest = HIGHEST_SHARE * rate_hz;
+        let wider = |cutoff: f64| (times * cutoff).min(highest.max(cutoff));
+        FilterSettings {
+            q_cutoff_hz: Some(wider(self.plain_q_cutoff_hz(rate_hz))),
+            joint_q_cutoffs_hz: self.joint_q_cutoffs_hz.iter().map(|c| wider(*c)).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Every how many samples of step `dt` [s] a row is kept: the declared decimation, else ten rows
     /// a period of the cut-off.
     pub fn decimation_at(&self, dt: f64) -> usize {

@@ -48,6 +48,29 @@ impl Stretch {
         self.zero + self.t.first().copied().unwrap_or(0.0) + self.dt * sample as f64
     }
 
+    /// The part of this stretch that lies beside another of the same log, sample by sample; none where it does not
+    /// reach as far.
+    pub fn beside(&self, other: &Stretch) -> Option<Stretch> {
+        let (first, own) = (other.t.first()?, self.t.first()?);
+        let from = ((first - own) / self.dt).round();
+        let to = from + other.len() as f64;
+        if !alike(self.dt, other.dt) || from < 0.0 || to > self.len() as f64 {
+            return None;
+        }
+        let range = from as usize..to as usize;
+        let part =
+            |channels: &[Vec<f64>]| channels.iter().map(|x| x[range.clone()].to_vec()).collect();
+        Some(Stretch {
+            t: self.t[range.clone()].to_vec(),
+            q: part(&self.q),
+            v: part(&self.v),
+            a: part(&self.a),
+            tau: part(&self.tau),
+            began: other.began,
+            ..*self
+        })
+    }
+
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.q.len()

@@ -12,6 +12,9 @@ pub struct Candidate {
     pub accepted: bool,
     /// Whether the data tell it from chance; it is accepted where it also matters.
     pub significant: bool,
+    /// Chance of one as good among all candidates where nothing is missing, by placebos; none where other tests
+    /// had refused it.
+    pub placebo_p_value: Option<f64>,
     /// Why not; empty where accepted.
     pub reason: String,
 }
@@ -24,6 +27,7 @@ impl Candidate {
             score,
             accepted: false,
             significant: false,
+            placebo_p_value: None,
             reason: reason.to_owned(),
         }
     }

@@ -8,46 +8,16 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::columns::CandidateColumns;
+use super::cross_products::CrossProducts;
+use crate::diagnose::placebo::blocks::Blocks;
+use crate::diagnose::placebo::processing::Artefact;
+use crate::diagnose::placebo::scores::BlockScores;
 use crate::diagnose::problem::data_split::{Piece, RowRole};
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::normal_equations::{NormalEquations, dot};
 use crate::math::long_run::long_run;
 use crate::math::rank_revealing::RankRevealingInverse;
-
-/// Sums of a candidate over one piece.
-struct CrossProducts {
-    /// X'WC over all unknowns.
-    with_base: DMatrix<f64>,
-    /// C'WC.
-    own: DMatrix<f64>,
-    /// C'We.
-    score: DVector<f64>,
-}
-
-impl CrossProducts {
-    fn none(u: usize, k: usize) -> Self {
-        CrossProducts {
-            with_base: DMatrix::zeros(u, k),
-            own: DMatrix::zeros(k, k),
-            score: DVector::zeros(k),
-        }
-    }
-
-    fn add(&mut self, other: &CrossProducts) {
-        self.with_base += &other.with_base;
-        self.own += &other.own;
-        self.score += &other.score;
-    }
-
-    fn without(&self, other: &CrossProducts) -> CrossProducts {
-        CrossProducts {
-            with_base: &self.with_base - &other.with_base,
-            own: &self.own - &other.own,
-            score: &self.score - &other.score,
-        }
-    }
-}
 
 /// What the data say of a candidate.
 #[derive(Debug, Clone)]
@@ -82,8 +52,10 @@ pub struct CandidateTest<'a> {
     of_vetoes: Vec<NormalEquations>,
     /// Squared error of each fold left out, without a candidate.
     pub base_folds: Vec<f64>,
-    /// Squared error of each piece that may veto.
-    base_vetoes: Vec<f64>,
+    /// Squared error of each piece that may veto, without a candidate.
+    pub base_vetoes: Vec<f64>,
+    /// What candidates are tried on where nothing is missing.
+    pub blocks: Blocks,
 }
 
 /// One fold left out.
@@ -130,6 +102,7 @@ impl<'a> CandidateTest<'a> {
             of_vetoes,
             base_folds,
             base_vetoes,
+            blocks: Blocks::of(at, &problem.split, problem.prior.rows_per_independent),
         }
     }
 
@@ -189,6 +162,41 @@ impl<'a> CandidateTest<'a> {
         solution.map_or(0.0, |s| s.removed / self.at.square.max(f64::MIN_POSITIVE))
     }
 
+    /// The same, with what it is pulled by block by block; none where no column has a part of its own.
+    pub fn gain_by_blocks(
+        &self,
+        columns: &CandidateColumns,
+        k: usize,
+    ) -> (f64, Option<BlockScores>) {
+        let cross = self.cross(columns, k);
+        let mut sums: Vec<CrossProducts> = self
+            .blocks
+            .sums
+            .iter()
+            .map(|_| CrossProducts::none(self.at.base.unknowns.len(), k))
+            .collect();
+        let mut total = CrossProducts::none(self.at.base.unknowns.len(), k);
+        for (block, c) in self.blocks.signs.of_piece.iter().zip(&cross) {
+            if let Some(block) = *block {
+                sums[block].add(c);
+                total.add(c);
+            }
+        }
+        let (solution, _) = partial(&total, &self.inverse, &self.at.pull, SHARE);
+        let Some(s) = solution else {
+            return (0.0, None);
+        };
+        let gain = s.removed / self.at.square.max(f64::MIN_POSITIVE);
+        let scores = BlockScores::of(
+            &self.blocks,
+            &sums,
+            &s.projection,
+            (&s.own, &s.right),
+            &s.kept,
+        );
+        (gain, Some(scores))
+    }
+
     /// Everything; none where no column has a part of its own.
     pub fn score(
         &self,
@@ -232,6 +240,30 @@ impl<'a> CandidateTest<'a> {
             folds,
             vetoes,
         })
+    }
+
+    /// Chance of what a candidate shows beyond that which processing alone makes of it; 1 where no column has a part
+    /// of its own.
+    pub fn p_value_beyond(&self, columns: &CandidateColumns, k: usize, artefact: &Artefact) -> f64 {
+        let total = self.over(&self.cross(columns, k), k, &RowRole::fitted);
+        let (solution, _) = partial(&total, &self.inverse, &self.at.pull, SHARE);
+        let (Some(s), (_, Some(scores))) = (solution, self.gain_by_blocks(columns, k)) else {
+            return 1.0;
+        };
+        let mut pull = -s.projection.tr_mul(&artefact.pull);
+        for piece in self.problem.split.pieces.iter().filter(|p| p.role.fitted()) {
+            for (j, own) in columns[piece.stretch].iter().enumerate() {
+                let rows = &artefact.rows[piece.stretch][j];
+                if own.is_empty() || rows.is_empty() {
+                    continue;
+                }
+                let weight = self.at.weights[j].powi(2);
+                for (x, column) in pull.iter_mut().zip(own) {
+                    *x += weight * dot(&column[piece.rows.clone()], &rows[piece.rows.clone()]);
+                }
+            }
+        }
+        scores.p_value_beyond(&pull)
     }
 
     /// Squared error on each piece that may veto, with a candidate.
@@ -357,6 +389,8 @@ struct CandidateSolution {
     projection: DMatrix<f64>,
     /// S.
     own: DMatrix<f64>,
+    /// C'We - T'X'We.
+    right: DVector<f64>,
     /// Weighted squares removed.
     removed: f64,
     /// Columns with a part of their own; the others are redundant.
@@ -394,6 +428,7 @@ fn partial(
         delta,
         projection,
         own,
+        right,
         removed,
         kept,
     };

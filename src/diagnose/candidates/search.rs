@@ -7,6 +7,7 @@ use super::candidate::Candidate;
 use super::columns::{CandidateColumns, columns, kept_by_filter};
 use super::orders::SCANNED;
 use super::score::CandidateTest;
+use crate::diagnose::placebo::draws::Tried;
 use crate::diagnose::problem::case::Case;
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
@@ -21,18 +22,30 @@ const HOPELESS: f64 = 0.2;
 /// Least part of a periodic column's power that the parallel filter must keep.
 const LEAST_KEPT: f64 = 0.2;
 
-/// Tries everything once; the candidates, not yet decided on, and how many shapes were tried.
+/// What a round of candidates comes to.
+pub struct Found<'a> {
+    /// Not yet decided on.
+    pub candidates: Vec<Candidate>,
+    /// What each was tried with.
+    pub tried: Vec<Tried>,
+    pub test: CandidateTest<'a>,
+}
+
+/// Tries once everything that is `wanted`.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn search(
-    at: &FittedModel,
-    problem: &FitProblem,
+pub fn search<'a>(
+    at: &'a FittedModel,
+    problem: &'a FitProblem<'a>,
     case: &Case,
     baseline: &Baseline,
-    torques: &[Torques],
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<(Vec<Candidate>, usize), MotionError> {
+    torques: &'a [Torques],
+    (wanted, stop): (
+        &(dyn Fn(&Law, Place) -> bool + Sync),
+        &(dyn Fn() -> bool + Sync),
+    ),
+) -> Result<Found<'a>, MotionError> {
     let round = SearchRound {
         at,
         problem,
@@ -46,20 +59,28 @@ pub fn search(
         .iter()
         .filter(|law| !case.without.iter().any(|name| name == law.entry.name))
         .flat_map(|law| law.places(robot, laws).into_iter().map(|p| (*law, p)))
+        .filter(|(law, place)| wanted(law, *place))
         .collect();
-    let tried: Vec<(Candidate, usize)> = places
+    let found: Vec<(Candidate, Tried)> = places
         .par_iter()
         .map(|&(law, place)| {
             if stop() {
-                return Ok((Candidate::refused(law, place, "interrupted"), 0));
+                return Ok((
+                    Candidate::refused(law, place, "interrupted"),
+                    Tried::default(),
+                ));
             }
             let noise = baseline.noise_square(at, &problem.split, place);
             let least = noise * case.limits.over_noise / at.square;
             round.tried(law, place, HOPELESS * least)
         })
         .collect::<Result<_, MotionError>>()?;
-    let shapes = tried.iter().map(|(_, shapes)| shapes).sum();
-    Ok((tried.into_iter().map(|(c, _)| c).collect(), shapes))
+    let (candidates, tried) = found.into_iter().unzip();
+    Ok(Found {
+        candidates,
+        tried,
+        test: round.test,
+    })
 }
 
 /// What every candidate of a round is tried against.
@@ -73,34 +94,35 @@ struct SearchRound<'a> {
 }
 
 impl SearchRound<'_> {
-    /// One effect at one place: the best of its shapes, refined where it removes more than `least`; and how many
-    /// shapes were tried.
+    /// One effect at one place: the best of its shapes, refined where it removes more than `least`; and the shapes
+    /// that it began from.
     fn tried(
         &self,
         law: &'static Law,
         place: Place,
         least: f64,
-    ) -> Result<(Candidate, usize), MotionError> {
-        let refused = |reason: &str, tried| Ok((Candidate::refused(law, place, reason), tried));
+    ) -> Result<(Candidate, Tried), MotionError> {
+        let mut tried = Tried::default();
+        let refused =
+            |reason: &str, tried: Tried| Ok((Candidate::refused(law, place, reason), tried));
         if let Some(reason) = self.refusal(law, place) {
-            return refused(reason, 0);
+            return refused(reason, tried);
         }
         let starts = match (law.starts)(&self.problem.cover, place) {
             Ok(starts) => starts,
-            Err(lacking) => return refused(&lacking, 0),
+            Err(lacking) => return refused(&lacking, tried),
         };
-        // a peak was picked out of all orders that were looked at
-        let tried = match law.entry.search {
-            Search::Orders => SCANNED,
-            _ => starts.len(),
-        };
+        if law.entry.search == Search::Orders {
+            // a peak was picked out of all orders that were looked at
+            tried.picked_from = SCANNED;
+        }
         let mut effect = Added {
             law,
             place,
             shape: Vec::new(),
             linear: vec![0.0; law.linear.len()],
         };
-        let Some(gain) = self.best_start(&mut effect, starts)? else {
+        let Some(gain) = self.best_start(&mut effect, starts, &mut tried)? else {
             let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
                           [filter] to look for them";
             return refused(reason, tried);
@@ -174,6 +196,7 @@ impl SearchRound<'_> {
         &self,
         effect: &mut Added,
         starts: Vec<Vec<f64>>,
+        tried: &mut Tried,
     ) -> Result<Option<f64>, MotionError> {
         let mut best = (f64::NEG_INFINITY, Vec::new());
         for shape in starts {
@@ -184,10 +207,13 @@ impl SearchRound<'_> {
                     continue;
                 }
             }
-            let gain = self.gain(effect)?;
+            let columns = self.columns(effect)?;
+            let (gain, scores) = self.test.gain_by_blocks(&columns, effect.linear.len());
             if gain > best.0 {
                 best = (gain, effect.shape.clone());
+                tried.best = tried.starts.len();
             }
+            tried.starts.extend(scores);
         }
         effect.shape = best.1;
         Ok((best.0 > f64::NEG_INFINITY).then_some(best.0))

@@ -3,6 +3,7 @@
 use super::data_split::LogRole;
 use super::prior::ParameterPrior;
 use super::unknowns::FreeParameters;
+use super::wide_motion::WideMotion;
 use crate::effect::{AugmentedModel, Torques};
 use crate::motion::{ParallelFilters, Stretch};
 
@@ -13,6 +14,9 @@ pub struct Case {
     pub prior: ParameterPrior,
     pub open: FreeParameters,
     pub stretches: Vec<Stretch>,
+    /// Their motion through a wider filter, from which it is told what processing makes; none where that is not
+    /// asked for.
+    pub wide: Option<WideMotion>,
     /// Role of each log.
     pub roles: Vec<LogRole>,
     pub filters: ParallelFilters,
@@ -33,7 +37,7 @@ pub struct Case {
 /// Limits that a candidate must keep. All tests must agree.
 #[derive(Debug, Clone, Copy)]
 pub struct SelectionLimits {
-    /// Chance of one false effect or more among all candidates of a round.
+    /// Chance of one false effect or more among all candidates, where nothing is missing.
     pub false_alarm: f64,
     /// Least share of the effect's torque that nothing declared can stand in for.
     pub unique_share: f64,
@@ -51,14 +55,15 @@ pub struct SelectionLimits {
     pub over_noise: f64,
     /// Most effects that are added; with none the given model is fitted and nothing is looked for.
     pub steps: usize,
-    /// Whether standard deviations are worked out, which takes several fits; without them they are not a number.
+    /// Whether standard deviations are worked out, which takes several fits, and what the residual depends on; without
+    /// them the deviations are not a number.
     pub deviations: bool,
 }
 
 impl Default for SelectionLimits {
     fn default() -> Self {
         SelectionLimits {
-            false_alarm: 0.005,
+            false_alarm: 0.01,
             unique_share: 0.001,
             cv_gain: 0.003,
             cv_certainty: 1.0,

@@ -9,3 +9,4 @@ pub mod prior;
 pub mod rests;
 pub mod rows;
 pub mod unknowns;
+pub mod wide_motion;

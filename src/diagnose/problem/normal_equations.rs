@@ -152,7 +152,7 @@ impl Base {
     }
 
     /// Adds one piece.
-    fn add(&self, sums: &[PieceSums], weights: &[f64], total: &mut NormalEquations) {
+    pub(crate) fn add(&self, sums: &[PieceSums], weights: &[f64], total: &mut NormalEquations) {
         for (j, s) in sums.iter().enumerate() {
             let w = weights[j] * weights[j];
             let columns = &self.unknowns.columns[j];
@@ -176,7 +176,7 @@ pub struct NormalEquations {
 }
 
 impl NormalEquations {
-    fn none(u: usize) -> Self {
+    pub(crate) fn none(u: usize) -> Self {
         NormalEquations {
             normal: DMatrix::zeros(u, u),
             score: DVector::zeros(u),

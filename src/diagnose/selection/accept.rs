@@ -2,10 +2,18 @@
 
 use crate::diagnose::candidates::baseline::Baseline;
 use crate::diagnose::candidates::candidate::Candidate;
+use crate::diagnose::candidates::columns::columns;
 use crate::diagnose::candidates::score::spread;
+use crate::diagnose::candidates::search::Found;
+use crate::diagnose::placebo::draws::Placebos;
+use crate::diagnose::placebo::processing::Artefact;
 use crate::diagnose::problem::case::SelectionLimits;
 use crate::diagnose::problem::data_split::DataSplit;
 use crate::diagnose::problem::fit::FittedModel;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::problem::wide_motion::WideMotion;
+use crate::effect::Torques;
+use crate::motion::MotionError;
 
 /// Standard errors by which the error on the veto pieces may grow by chance.
 const VETO_CHANCE: f64 = 1.0;
@@ -30,10 +38,9 @@ struct Worth {
     of_noise: f64,
 }
 
-/// Decides on all candidates of a round, in which so many shapes were tried.
+/// Decides on all candidates of a round but for chance.
 pub(crate) fn accept(
     found: &mut [Candidate],
-    shapes: usize,
     limits: &SelectionLimits,
     (at, split): (&FittedModel, &DataSplit),
     baseline: &Baseline,
@@ -45,14 +52,60 @@ pub(crate) fn accept(
             of_declared: removed / baseline.declared_square(at, place),
             of_noise: removed / baseline.noise_square(at, split, place),
         };
-        decide(candidate, shapes.max(1), limits, worth);
+        decide(candidate, limits, worth);
     }
 }
 
-/// Puts a candidate to every test.
-fn decide(candidate: &mut Candidate, tried: usize, limits: &SelectionLimits, worth: Worth) {
+/// Puts those that are left to the last test: placebos of a model that lacks nothing are seldom as good.
+///
+/// # Errors
+/// [`MotionError`] of the filters.
+pub(crate) fn beyond_chance(
+    found: &mut Found,
+    limits: &SelectionLimits,
+    (at, problem): (&FittedModel, &FitProblem),
+    torques: &[Torques],
+    wide: Option<&WideMotion>,
+) -> Result<(), MotionError> {
+    let left = |c: &Candidate| c.accepted || c.significant;
+    if !found.candidates.iter().any(left) {
+        return Ok(());
+    }
+    let placebos = Placebos::of(&found.test.blocks, &found.tried);
+    let artefact = wide
+        .map(|wide| Artefact::of(at, problem, wide))
+        .transpose()?;
+    let pairs = found.candidates.iter_mut().zip(&found.tried).enumerate();
+    for (i, (candidate, tried)) in pairs.filter(|(_, (c, _))| left(c)) {
+        let p = placebos.p_value(i, tried);
+        candidate.placebo_p_value = Some(p);
+        if p > limits.false_alarm {
+            candidate.reject(&format!(
+                "chance gives as much: p = {p:.3} among all candidates, by placebos"
+            ));
+            continue;
+        }
+        let Some(artefact) = &artefact else { continue };
+        let effect = &candidate.effect;
+        let columns = columns(&at.model, problem, torques, effect)?;
+        let alone = found
+            .test
+            .p_value_beyond(&columns, effect.linear.len(), artefact);
+        let beyond = placebos.p_value_of(i, tried, alone);
+        candidate.placebo_p_value = Some(p.max(beyond));
+        if beyond > limits.false_alarm {
+            candidate.reject(&format!(
+                "processing makes as much: the filter of the positions and their noise leave such a residual in a \
+                 model that lacks nothing; beyond it p = {beyond:.3}"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Puts a candidate to every other test.
+fn decide(candidate: &mut Candidate, limits: &SelectionLimits, worth: Worth) {
     let Some(s) = &candidate.score else { return };
-    let corrected = s.p_value * tried as f64;
     let refusal = if !s.beta.iter().all(|b| b.is_finite()) {
         Some("its coefficients are not finite".to_owned())
     } else if s.unique_share < limits.unique_share {
@@ -62,15 +115,6 @@ fn decide(candidate: &mut Candidate, tried: usize, limits: &SelectionLimits, wor
         ))
     } else if !candidate.effect.is_possible() {
         Some("its coefficient has a sign that the effect cannot have".to_owned())
-    } else if corrected > limits.false_alarm {
-        Some(format!(
-            "chance gives as much: p = {} among all candidates",
-            match corrected {
-                // by Bonferroni's bound, which may pass 1
-                p if p >= 1.0 => "1".to_owned(),
-                p => format!("{p:.2e}"),
-            }
-        ))
     } else {
         None
     };
@@ -145,9 +189,10 @@ mod tests {
             score: Some(score),
             accepted: false,
             significant: false,
+            placebo_p_value: None,
             reason: String::new(),
         };
-        decide(&mut candidate, 100, &SelectionLimits::default(), worth);
+        decide(&mut candidate, &SelectionLimits::default(), worth);
         candidate
     }
 
@@ -168,9 +213,8 @@ mod tests {
         assert!(found.reason.starts_with("too small"), "{}", found.reason);
         // what fails another test too is no remainder, whichever reason is told
         type ScoreChange = fn(&mut CandidateScore);
-        let failures: [(ScoreChange, &str); 6] = [
+        let failures: [(ScoreChange, &str); 5] = [
             (|s| s.unique_share = 1e-4, "only 0.01 %"),
-            (|s| s.p_value = 1e-3, "chance"),
             (|s| s.delta_bic = -1.0, "not worth"),
             (|s| s.cv_gain = 0.001, "cross-validation:"),
             (|s| s.cv_std = 0.3, "cross-validation is not"),

@@ -2,4 +2,5 @@
 
 pub mod accept;
 pub mod choose;
+pub mod reconsider;
 pub mod removal;

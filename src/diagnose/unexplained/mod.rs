@@ -1,5 +1,6 @@
 //! What of the torque's residual is above its noise, before and after.
 
+pub mod dependence;
 pub mod errors;
 pub mod evidence;
 mod noise_floor;
@@ -19,6 +20,13 @@ pub struct Unexplained {
     /// Power of the residual over that of the floor; none where the torque was filtered before it was logged,
     /// so that nothing beyond the band tells of its noise.
     pub over_floor: Option<f64>,
+}
+
+impl Unexplained {
+    /// Whether it is more than noise makes, and worth a name.
+    pub fn is_structure(&self) -> bool {
+        self.over_floor.is_none_or(|over| over > STRUCTURED) && self.share > NEGLIGIBLE
+    }
 }
 
 /// Residual power over the floor's from which on a residual is called structured.

@@ -1,8 +1,10 @@
 //! The report of `diagnose`.
 
 use crate::config::ModelFile;
-use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors};
-use crate::identify::{DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command};
+use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, Turn};
+use crate::identify::{
+    DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command, signal_words,
+};
 use crate::log::{Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
@@ -115,6 +117,9 @@ pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed, nam
     for (i, step) in d.steps.iter().enumerate() {
         step_told(terminal, machine, found, (i + 1, step));
     }
+    if let Some(path) = path(found) {
+        terminal.note("  ", &path, 4);
+    }
     terminal.list(doubts(machine, found));
     for e in &d.disturbances {
         let told = format!(
@@ -148,10 +153,11 @@ fn step_told(
     terminal.note(&format!("{number:>3}. "), &what, 7);
     if let Some(s) = &step.candidate.score {
         let told = format!(
-            "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows",
+            "removes {} of the cross-validated squared error; BIC {:+.0} with {:.0} effective rows{}",
             number::percent(s.cv_gain),
             s.delta_bic,
-            s.effective_rows
+            s.effective_rows,
+            (step.candidate.placebo_p_value).map_or(String::new(), |p| format!("; p = {p:.3}"))
         );
         terminal.note(MARGIN, &told, 7);
     }
@@ -249,6 +255,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
             open.join(", ")
         ));
     }
+    out.extend(dependences(machine, found));
     let mut remainder: Vec<&Candidate> = d.remainder().collect();
     let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
     remainder.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
@@ -271,6 +278,46 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
         ));
     }
     out
+}
+
+/// What the residual that is left depends on, a sentence for each joint.
+fn dependences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+    let names = machine.robot.joint_names();
+    let all = &found.diagnosis.dependence;
+    let of_joint = |(j, name): (usize, &String)| {
+        let told = all.iter().filter(|d| d.joint == j).map(|d| {
+            let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
+            let signals: Vec<String> = signals.collect();
+            format!(
+                "{} ({} of its square, p = {:.3})",
+                signals.join(" with "),
+                number::percent(d.share),
+                d.p_value
+            )
+        });
+        let told: Vec<String> = told.collect();
+        (!told.is_empty()).then(|| format!("what is left on {name} depends on {}", told.join(", ")))
+    };
+    names.iter().enumerate().filter_map(of_joint).collect()
+}
+
+/// How the search came to what it found, where it changed its mind.
+fn path(found: &Diagnosed) -> Option<String> {
+    let path = &found.diagnosis.path;
+    if path.iter().all(|turn| matches!(turn, Turn::Added(_))) {
+        return None;
+    }
+    let turns = path.iter().map(|turn| match turn {
+        Turn::Added(effect) => format!("{effect} added"),
+        Turn::Dropped(effect) => format!("{effect} dropped, for the others make it superfluous"),
+        Turn::Replaced { gone, come } => {
+            format!("{} in place of {}", come.join(" and "), gone.join(" and "))
+        }
+    });
+    Some(format!(
+        "how the search went: {}",
+        turns.collect::<Vec<_>>().join("; ")
+    ))
 }
 
 /// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
@@ -350,6 +397,9 @@ pub fn sections(
     if !d.steps.is_empty() {
         page.heading("What was added");
         steps(page, machine, found);
+    }
+    if let Some(path) = path(found) {
+        page.paragraph(&path);
     }
     page.list(doubts(machine, found));
     // logs that decided nothing, where there are any

@@ -1,0 +1,355 @@
+//! On which signals a residual depends that no effect explains: how much of its square the means over bins of a
+//! signal, or over cells of two, take up, beside what they take up of the same residual with random signs from block
+//! to block.
+
+use rayon::prelude::*;
+
+use crate::diagnose::placebo::blocks::Signs;
+use crate::diagnose::problem::fit::FittedModel;
+use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::effect::Torques;
+use crate::motion::Stretch;
+
+/// What a residual may depend on; positions and speeds of any joint, all else of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    Position(usize),
+    Speed(usize),
+    Acceleration,
+    Load,
+    Direction,
+    SinceReversal,
+    Time,
+}
+
+/// A dependence of one joint's residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dependence {
+    pub joint: usize,
+    /// One signal, or two together.
+    pub signals: Vec<Signal>,
+    /// Share of the residual's square that it takes up, beyond what it takes up of placebos.
+    pub share: f64,
+    /// Chance of as much among all signals where the residual depends on none.
+    pub p_value: f64,
+    /// Mean residual over the first signal's bins, `[signal, mean]` [N or Nm]: of all rows, or of those in the lower and
+    /// upper half of the second.
+    pub curves: Vec<Vec<[f64; 2]>>,
+}
+
+/// Bins of one signal, and of each of two.
+const BINS: [usize; 2] = [16, 6];
+/// Signals that are tried in pairs, the strongest.
+const PAIRED: usize = 6;
+/// Share of a residual's square below which a dependence is not worth telling.
+const LEAST_SHARE: f64 = 0.02;
+/// Chance above which a dependence is not told.
+const SURE: f64 = 0.01;
+/// Dependences told of one joint.
+const TOLD: usize = 4;
+/// Part by which two signals must take up more than the better of them alone.
+const TOGETHER: f64 = 1.2;
+
+/// Rows of one joint with their blocks.
+struct Rows {
+    residual: Vec<f64>,
+    block: Vec<usize>,
+    /// Stretch and sample of each.
+    at: Vec<(usize, usize)>,
+}
+
+/// Dependences of the residuals of `joints`, the strongest of each joint first.
+pub fn dependences(
+    at: &FittedModel,
+    problem: &FitProblem,
+    torques: &[Torques],
+    joints: &[usize],
+) -> Vec<Dependence> {
+    let signs = Signs::of(&problem.split.pieces);
+    let of_joint = |j: &usize| of_joint(at, problem, torques, &signs, *j);
+    let found: Vec<Vec<Dependence>> = joints.par_iter().map(of_joint).collect();
+    found.into_iter().flatten().collect()
+}
+
+fn of_joint(
+    at: &FittedModel,
+    problem: &FitProblem,
+    torques: &[Torques],
+    signs: &Signs,
+    j: usize,
+) -> Vec<Dependence> {
+    let rows = rows(at, problem, signs, j);
+    let square: f64 = rows.residual.iter().map(|e| e * e).sum();
+    if rows.residual.is_empty() || square <= 0.0 {
+        return Vec::new();
+    }
+    let joints = at.weights.len();
+    let moving = |i: &usize| !problem.cover.joints[*i].stationary;
+    let mut signals = vec![
+        Signal::Acceleration,
+        Signal::Load,
+        Signal::Direction,
+        Signal::SinceReversal,
+        Signal::Time,
+    ];
+    for i in (0..joints).filter(moving) {
+        signals.extend([Signal::Position(i), Signal::Speed(i)]);
+    }
+    let values: Vec<Vec<f64>> = signals
+        .iter()
+        .map(|s| values(*s, j, &rows, problem.stretches, torques))
+        .collect();
+    let mut tried: Vec<(Vec<usize>, Taken)> = Vec::new();
+    for (i, x) in values.iter().enumerate() {
+        let (cells, count) = (bins(x, BINS[0]), BINS[0]);
+        tried.push((vec![i], Taken::of(&rows, signs, &cells, count)));
+    }
+    let mut strongest: Vec<usize> = (0..tried.len()).collect();
+    strongest.sort_by(|a, b| tried[*b].1.surely().total_cmp(&tried[*a].1.surely()));
+    strongest.truncate(PAIRED);
+    strongest.sort_unstable();
+    let coarse: Vec<Vec<usize>> = values.iter().map(|x| bins(x, BINS[1])).collect();
+    for (k, a) in strongest.iter().enumerate() {
+        for b in &strongest[k + 1..] {
+            let pairs = coarse[*a].iter().zip(&coarse[*b]);
+            let cells: Vec<usize> = pairs.map(|(a, b)| a * BINS[1] + b).collect();
+            let count = BINS[1] * BINS[1];
+            tried.push((vec![*a, *b], Taken::of(&rows, signs, &cells, count)));
+        }
+    }
+    // the best of each draw over all signals
+    let draws = signs.of_draws.len();
+    let best = |d: usize| {
+        tried
+            .iter()
+            .map(|(_, t)| t.place(t.draws[d]))
+            .fold(f64::MIN, f64::max)
+    };
+    let best: Vec<f64> = (0..draws).map(best).collect();
+    let mut found: Vec<(f64, Dependence)> = Vec::new();
+    for (of, taken) in &tried {
+        let own = taken.surely();
+        let as_good = best.iter().filter(|b| **b >= own).count();
+        let p_value = (1 + as_good) as f64 / (1 + draws) as f64;
+        let share = (taken.real - taken.mean) / square;
+        if p_value > SURE || share < LEAST_SHARE {
+            continue;
+        }
+        let mut of = of.clone();
+        // the one that takes up more by itself comes first
+        let alone = |i: &usize| tried[*i].1.real - tried[*i].1.mean;
+        of.sort_by(|a, b| alone(b).total_cmp(&alone(a)));
+        let better = alone(&of[0]) / square;
+        if of.len() == 2 && share < TOGETHER * better {
+            continue;
+        }
+        let second = of.get(1).map(|i| values[*i].as_slice());
+        let dependence = Dependence {
+            joint: j,
+            signals: of.iter().map(|i| signals[*i]).collect(),
+            share,
+            p_value,
+            curves: curves(&values[of[0]], second, &rows.residual),
+        };
+        found.push((share, dependence));
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.truncate(TOLD);
+    found.into_iter().map(|(_, d)| d).collect()
+}
+
+fn rows(at: &FittedModel, problem: &FitProblem, signs: &Signs, j: usize) -> Rows {
+    let mut rows = Rows {
+        residual: Vec::new(),
+        block: Vec::new(),
+        at: Vec::new(),
+    };
+    for (piece, block) in problem.split.pieces.iter().zip(&signs.of_piece) {
+        let Some(block) = block else { continue };
+        if problem.split.ignores(piece.stretch, j) {
+            continue;
+        }
+        let parallel = problem.filters.of(&problem.stretches[piece.stretch]);
+        for row in piece.rows.clone() {
+            rows.residual
+                .push(at.base.stretches[piece.stretch].residual[j][row]);
+            rows.block.push(*block);
+            rows.at.push((piece.stretch, parallel.sample_of(row)));
+        }
+    }
+    rows
+}
+
+/// A signal at the rows of joint `j`.
+fn values(
+    signal: Signal,
+    j: usize,
+    rows: &Rows,
+    stretches: &[Stretch],
+    torques: &[Torques],
+) -> Vec<f64> {
+    let since: Vec<Vec<f64>> = match signal {
+        Signal::SinceReversal => stretches.iter().map(|s| since_reversal(s, j)).collect(),
+        _ => Vec::new(),
+    };
+    let value = |(i, k): &(usize, usize)| {
+        let s = &stretches[*i];
+        match signal {
+            Signal::Position(of) => s.q[of][*k],
+            Signal::Speed(of) => s.v[of][*k],
+            Signal::Acceleration => s.a[j][*k],
+            Signal::Load => torques[*i].load.get(j).map_or(0.0, |load| load[*k]),
+            Signal::Direction => s.v[j][*k].signum(),
+            Signal::SinceReversal => since[*i][*k],
+            Signal::Time => s.began + s.dt * *k as f64,
+        }
+    };
+    rows.at.iter().map(value).collect()
+}
+
+/// Time since a joint last turned [s].
+fn since_reversal(stretch: &Stretch, j: usize) -> Vec<f64> {
+    let mut since = 0.0;
+    let mut before = 0.0;
+    let step = |v: &f64| {
+        since = if v * before < 0.0 {
+            0.0
+        } else {
+            since + stretch.dt
+        };
+        if *v != 0.0 {
+            before = *v;
+        }
+        since
+    };
+    stretch.v[j].iter().map(step).collect()
+}
+
+/// Bin of each value, equally many in each; equal values in one.
+fn bins(x: &[f64], count: usize) -> Vec<usize> {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let edges: Vec<f64> = (1..count)
+        .map(|k| sorted[k * sorted.len() / count])
+        .collect();
+    x.iter()
+        .map(|x| edges.partition_point(|e| e <= x))
+        .collect()
+}
+
+/// Mean residual over bins of a signal: of all rows, or of the lower and upper half of another.
+fn curves(x: &[f64], other: Option<&[f64]>, residual: &[f64]) -> Vec<Vec<[f64; 2]>> {
+    let cells = bins(x, BINS[0]);
+    let halves = other.map_or(vec![0; x.len()], |other| bins(other, 2));
+    let count = 1 + halves.iter().copied().max().unwrap_or(0);
+    let curve = |half: usize| {
+        let mut sums = vec![[0.0; 3]; BINS[0]];
+        for i in (0..x.len()).filter(|i| halves[*i] == half) {
+            let [n, at, mean] = &mut sums[cells[i]];
+            *n += 1.0;
+            *at += x[i];
+            *mean += residual[i];
+        }
+        let filled = sums.iter().filter(|s| s[0] > 0.0);
+        filled.map(|[n, x, e]| [x / n, e / n]).collect()
+    };
+    (0..count).map(curve).collect()
+}
+
+/// What the means over cells take up of the residual's square, and of the draws.
+struct Taken {
+    real: f64,
+    draws: Vec<f64>,
+    mean: f64,
+    deviation: f64,
+}
+
+impl Taken {
+    fn of(rows: &Rows, signs: &Signs, cells: &[usize], count: usize) -> Self {
+        let blocks = signs.blocks;
+        let mut sums = vec![0.0; blocks * count];
+        let mut numbers = vec![0.0f64; count];
+        for ((e, block), cell) in rows.residual.iter().zip(&rows.block).zip(cells) {
+            sums[block * count + cell] += e;
+            numbers[*cell] += 1.0;
+        }
+        let taken = |sign: &dyn Fn(usize) -> f64| {
+            let mut totals = vec![0.0; count];
+            for (block, of_block) in sums.chunks_exact(count).enumerate() {
+                let sign = sign(block);
+                for (total, sum) in totals.iter_mut().zip(of_block) {
+                    *total += sign * sum;
+                }
+            }
+            let squares = totals.iter().zip(&numbers);
+            squares.map(|(t, n)| t * t / n.max(1.0)).sum::<f64>()
+        };
+        let draws: Vec<f64> = signs.of_draws.iter().map(|s| taken(&|b| s[b])).collect();
+        let number = draws.len() as f64;
+        let mean = draws.iter().sum::<f64>() / number;
+        let variance = draws.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / number;
+        Taken {
+            real: taken(&|_| 1.0),
+            draws,
+            mean,
+            deviation: variance.sqrt().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    fn place(&self, taken: f64) -> f64 {
+        (taken - self.mean) / self.deviation
+    }
+
+    fn surely(&self) -> f64 {
+        self.place(self.real)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::problem::data_split::{Piece, RowRole};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn what_a_residual_depends_on_takes_up_its_share_and_what_it_does_not_takes_up_nothing() {
+        let n = 6000;
+        let pieces: Vec<Piece> = (0..60)
+            .map(|k| Piece {
+                stretch: 0,
+                rows: 100 * k..100 * (k + 1),
+                role: RowRole::Fold(k % 10),
+            })
+            .collect();
+        let signs = Signs::of(&pieces);
+        let mut chance = ChaCha8Rng::seed_from_u64(3);
+        let mut noise = || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0;
+        let signal: Vec<f64> = (0..n).map(|k| (0.0137 * k as f64).sin()).collect();
+        let other: Vec<f64> = (0..n).map(|k| (0.0091 * k as f64 + 1.0).sin()).collect();
+        let residual: Vec<f64> = signal
+            .iter()
+            .map(|x| noise() + 2.0 * (x * x - 0.5))
+            .collect();
+        let block = pieces.iter().zip(&signs.of_piece);
+        let rows = Rows {
+            residual,
+            block: block
+                .flat_map(|(p, b)| p.rows.clone().map(|_| b.unwrap()))
+                .collect(),
+            at: Vec::new(),
+        };
+        let square: f64 = rows.residual.iter().map(|e| e * e).sum();
+        let of = |x: &[f64]| Taken::of(&rows, &signs, &bins(x, BINS[0]), BINS[0]);
+        let (real, none) = (of(&signal), of(&other));
+        // 2 (x^2 - 1/2) has a variance of 1/2 beside the noise's 1
+        let share = (real.real - real.mean) / square;
+        assert!((share - 1.0 / 3.0).abs() < 0.05, "{share}");
+        assert!(real.draws.iter().all(|d| *d < real.real));
+        assert!(
+            none.draws.iter().any(|d| *d > none.real),
+            "{}",
+            none.surely()
+        );
+    }
+}
