@@ -44,6 +44,14 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// A time \[s\] to the millisecond; `1.235e12` where its digits would fill a line.
+pub fn clock(seconds: f64) -> String {
+    match seconds.abs() < 1e12 {
+        true => format!("{seconds:.3}"),
+        false => significant(seconds, 4),
+    }
+}
+
 /// Value and standard deviation as two texts: the deviation with two significant digits, the value
 /// down to the same place. Without a usable deviation the value has five digits.
 pub fn value_and_std(value: f64, std: f64) -> (String, String) {
@@ -86,8 +94,13 @@ pub fn percent(fraction: f64) -> String {
 }
 
 /// The same where the header of a column says `%`: `0.0523` is `5.23`.
+/// Below a ten-thousandth it is `<0.0001`.
 pub fn hundredths(fraction: f64) -> String {
-    significant(100.0 * fraction, 3)
+    let percent = 100.0 * fraction;
+    match percent.abs() < 1e-4 && percent != 0.0 {
+        true => "<0.0001".to_owned(),
+        false => significant(percent, 3),
+    }
 }
 
 /// Power of ten of the leading digit, once `value` is rounded to `digits` digits.
@@ -105,6 +118,13 @@ fn exponent_after_rounding(value: f64, digits: i32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_has_milliseconds_and_never_a_line_of_digits() {
+        assert_eq!(clock(12.3456), "12.346");
+        assert_eq!(clock(1.7e9), "1700000000.000");
+        assert_eq!(clock(1e29), "1.000e29");
+    }
 
     #[test]
     fn significant_digits_survive_rounding_up_a_decade() {
@@ -137,6 +157,8 @@ mod tests {
     fn fractions_are_shown_as_percent() {
         assert_eq!(percent(0.00523), "0.523 %");
         assert_eq!(percent(1.0), "100 %");
+        assert_eq!(percent(2.83e-7), "<0.0001 %");
+        assert_eq!(percent(0.0), "0 %");
         assert_eq!(percent(f64::INFINITY), "-");
         assert_eq!(plus_minus(13.5, 0.25), "13.50 ± 0.25");
     }

@@ -25,7 +25,9 @@ fn campaign() -> (&'static Path, &'static str) {
     static RUN: OnceLock<(tempfile::TempDir, String)> = OnceLock::new();
     let (folder, said) = RUN.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        let done = tool(folder.path(), "identify -q -o run").assert().code(0);
+        let done = tool(folder.path(), "identify --verbose -o run")
+            .assert()
+            .code(0);
         let said = String::from_utf8(done.get_output().stdout.clone()).unwrap();
         (folder, said)
     });
@@ -77,8 +79,10 @@ fn what_the_commands_print_fits_80_columns_and_parts_no_number_from_its_unit() {
         "excite --check configs/cft-excitation.toml",
         "export -m model.toml --c model.h --rust model.rs",
         "new mine --log q1.csv",
+        "example",
+        "example bldc",
     ] {
-        let done = tool(folder.path(), line).arg("-q").assert().code(0);
+        let done = tool(folder.path(), line).arg("--verbose").assert().code(0);
         let said = String::from_utf8(done.get_output().stdout.clone()).unwrap();
         assert_fits(line, &said);
     }
@@ -90,7 +94,7 @@ fn the_diagnosis_says_per_cent_once_and_lines_its_numbers_up_at_the_right() {
     let from = said.find("relative torque error [%]").unwrap();
     let table: Vec<&str> = said[from..].lines().skip(1).take(6).collect();
     assert!(!table[2..].concat().contains('%'), "{table:#?}");
-    let end = table[0].find("its 95 %").unwrap() + "its 95 %".len();
+    let end = table[0].find("95 % CI").unwrap() + "95 % CI".len();
     for row in &table[2..] {
         let interval = row[..end].rsplit(' ').next().unwrap();
         let (low, high) = interval.split_once("..").unwrap();
@@ -130,17 +134,76 @@ fn colour_is_for_terminals_and_says_nothing_that_the_words_do_not() {
 }
 
 #[test]
-fn results_and_warnings_have_no_colour_even_where_it_is_forced() {
+fn verdicts_have_colour_where_it_is_taken_and_the_words_are_the_same_without() {
     let folder = copy();
-    let run = tool(
-        folder.path(),
-        "validate unseen.csv -m model.toml --max-relative-error 0.001",
-    )
-    .env("CLICOLOR_FORCE", "1")
-    .assert()
-    .code(1);
-    let run = run.get_output();
-    assert!(![&run.stdout[..], &run.stderr].concat().contains(&0x1b));
+    let line = "validate unseen.csv -m model.toml --max-relative-error 0.001";
+    let said = |set: &[(&str, &str)]| {
+        let mut tool = tool(folder.path(), line);
+        let run = tool.envs(set.iter().copied()).assert().code(1);
+        String::from_utf8(run.get_output().stdout.clone()).unwrap()
+    };
+    let piped = said(&[]);
+    assert!(!piped.contains('\u{1b}'), "{piped:?}");
+    let forced = said(&[("CLICOLOR_FORCE", "1")]);
+    assert!(forced.starts_with("\u{1b}[1m"), "{forced:?}");
+    assert_eq!(plain(&forced), piped);
+    assert_eq!(said(&[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]), piped);
+}
+
+#[test]
+fn the_verdict_comes_first_quiet_says_it_alone_and_verbose_says_more() {
+    let folder = copy();
+    let lines = [
+        "lsq identification.csv -r configs/cft.toml -m friction.toml -o m.toml",
+        "validate unseen.csv -m model.toml",
+        "friction q1.csv q2.csv q4.csv -r configs/cft.toml -o f.toml",
+        "compare model.toml refined.toml unseen.csv",
+    ];
+    for line in lines {
+        let said = |detail: &str| {
+            let run = tool(folder.path(), &format!("{line} {detail}"))
+                .assert()
+                .code(0);
+            String::from_utf8(run.get_output().stdout.clone()).unwrap()
+        };
+        let (quiet, usual, verbose) = (said("-q"), said(""), said("--verbose"));
+        assert!(usual.starts_with(quiet.trim_end()), "{line}:\n{usual}");
+        assert!(quiet.lines().count() < usual.lines().count(), "{line}");
+        assert!(
+            usual.lines().count() <= 24,
+            "{line}: more than a screen:\n{usual}"
+        );
+        // the line that says there is more is not in it
+        let left = usual.replace("--verbose shows more\n", "");
+        assert!(verbose.lines().count() >= left.lines().count(), "{line}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn open_shows_the_report_in_the_browser_that_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = copy();
+    let browser = folder.path().join("browser");
+    std::fs::write(&browser, "#!/bin/sh\necho \"$1\" > opened\n").unwrap();
+    std::fs::set_permissions(&browser, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let line = "validate unseen.csv -m model.toml --report page.html --open -q";
+    tool(folder.path(), line)
+        .env("BROWSER", &browser)
+        .assert()
+        .code(0);
+    let opened = folder.path().join("opened");
+    let came = || std::fs::read_to_string(&opened).unwrap_or_default();
+    // the browser is not waited for
+    for _ in 0..200 {
+        if !came().is_empty() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(25));
+    }
+    assert_eq!(came().trim(), "page.html");
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(!page.contains("--open"));
 }
 
 /// Files that a reader has and the built-in campaign has not.

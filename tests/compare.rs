@@ -227,7 +227,7 @@ fn the_tables_fit_80_columns_and_the_pictures_are_written() {
     let page = fs::read_to_string(at.join("c.html")).unwrap();
     for part in [
         "Comparison of a.toml and b.toml",
-        "its 95 %",
+        "95 % CI",
         "<svg",
         "Where it came from",
     ] {

@@ -105,6 +105,7 @@ fn model(values: &[f64]) -> ModelFile {
             seed: Some(7),
             inputs: vec![
                 Provenance {
+                    role: None,
                     name: "a.csv".to_owned(),
                     span: Some("0..70%".to_owned()),
                     sha256: "00".repeat(32),
@@ -112,6 +113,7 @@ fn model(values: &[f64]) -> ModelFile {
                     duration_s: 19.999,
                 },
                 Provenance {
+                    role: None,
                     name: "b.csv".to_owned(),
                     span: None,
                     sha256: "ff".repeat(32),

@@ -83,6 +83,59 @@ fn every_link_inside_the_repository_leads_somewhere() {
     }
 }
 
+/// The anchor of a heading, as GitHub and mdbook make it.
+fn anchor(heading: &str) -> String {
+    let plain = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = plain.chars().filter_map(|c| match c {
+        ' ' => Some('-'),
+        c if c.is_alphanumeric() || c == '-' || c == '_' => Some(c),
+        _ => None,
+    });
+    kept.collect()
+}
+
+#[test]
+fn every_link_to_a_section_finds_its_heading() {
+    let mut seen = 0;
+    for path in blocks::documents(root()) {
+        let text = fs::read_to_string(&path).unwrap();
+        for link in links(&text) {
+            let Some((target, section)) = link.split_once('#') else {
+                continue;
+            };
+            if target.contains("://") {
+                continue;
+            }
+            let page = match target {
+                "" => text.clone(),
+                file => fs::read_to_string(path.parent().unwrap().join(file)).unwrap(),
+            };
+            let mut headings = page.lines().filter(|line| line.starts_with('#'));
+            let found = headings.any(|line| anchor(line) == section);
+            assert!(found, "{}: {link}", path.display());
+            seen += 1;
+        }
+    }
+    assert!(seen >= 3, "{seen}");
+}
+
+#[test]
+fn every_page_of_the_manual_stands_in_its_summary() {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let listed = links(&summary);
+    for path in blocks::documents(root()) {
+        let Ok(page) = path.strip_prefix(root().join("docs")) else {
+            continue;
+        };
+        let page = page.to_string_lossy();
+        let itself = page == "SUMMARY.md";
+        assert!(
+            itself || listed.contains(&&*page),
+            "{page} is not in docs/SUMMARY.md"
+        );
+    }
+}
+
 #[test]
 fn every_figure_stands_in_a_document_and_is_the_tools_own() {
     let texts: Vec<String> = blocks::documents(root())
@@ -146,7 +199,7 @@ fn the_readme_shows_what_identify_prints() {
     let run = assert_cmd::Command::cargo_bin("cft-ident")
         .unwrap()
         .current_dir(folder.path())
-        .args(["identify", "-q"])
+        .args(["identify", "--verbose"])
         .assert()
         .code(0);
     let fresh = String::from_utf8(run.get_output().stdout.clone()).unwrap();

@@ -111,7 +111,7 @@ fn lsq(folder: &Path, robot: &str, words: &[&str]) -> (Value, String) {
         .current_dir(folder)
         .args(["lsq", "log.csv", "-r", robot, "-o", "model.toml"])
         .args(words)
-        .args(["--json", "fit.json", "-q"])
+        .args(["--json", "fit.json", "--verbose"])
         .output()
         .unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -224,7 +224,7 @@ fn every_estimator_says_how_it_ended_and_names_parameters_by_grouping_and_key() 
         let first = parameter(&json, "Izz1");
         assert_eq!(first["name"], "Izz1 + 0.16 m2");
         assert!(first["essential"].is_boolean());
-        assert!(text.contains("Izz1 + 0.16 m2") && text.contains("are essential"));
+        assert!(text.contains("Izz1 + 0.16 m2") && text.contains("are significant"));
         let groupings = text.split("stand for combinations\n").nth(1).unwrap();
         let groupings = groupings.lines().take_while(|line| !line.is_empty());
         assert!(groupings.into_iter().all(|line| line.chars().count() <= 80));

@@ -117,6 +117,7 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
         name: "slide.toml".to_owned(),
         file: file.clone(),
         provenance: Provenance {
+            role: None,
             name: "slide.toml".to_owned(),
             span: None,
             sha256: "0".repeat(64),

@@ -230,6 +230,13 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     is_sound(&page);
     // friction was declared without its saturating terms
     assert!(page.contains("The model lacks: "));
+    // the first screen: errors per joint as bars, and what to do next
+    let first = &page[..page.find("<h2").unwrap()];
+    assert!(first.contains("Relative torque error on held-out data"));
+    assert!(first.contains("95 % confidence interval") && first.contains("Next: "));
+    // a card per effect
+    assert!(page.contains("residual without the effect"));
+    assert!(page.contains("rms without it and"));
     let headings = headings(&page);
     for heading in [
         "What was added",
@@ -238,7 +245,10 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     ] {
         assert!(headings.contains(&heading), "{headings:?}");
     }
-    assert_eq!(page.matches("<figure>").count(), 3);
+    // bars, torques, residuals, friction, and a card for each effect
+    let cards = page.matches("residual without the effect").count();
+    assert!(cards > 0);
+    assert_eq!(page.matches("<figure>").count(), 4 + cards);
 }
 
 #[cfg(unix)]

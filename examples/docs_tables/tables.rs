@@ -107,7 +107,7 @@ fn parameters(fit: &Value, published: Option<&Value>) -> Rendered {
     }
     let _ = writeln!(
         out,
-        "; {} rows after decimation, worth {} independent ones.",
+        "; {} rows after decimation, effective sample size {}.",
         fit["samples"],
         significant(number(&fit["effective_samples"]).round(), 3)
     );

@@ -5,14 +5,14 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::simulate::{simulate_to, warnings};
+use super::simulate::{simulate_to, truth_beside, warnings};
 use super::{CliError, Context};
 use crate::config::campaign::{CampaignLogs, CampaignSettings};
-use crate::config::{self, Campaign, RobotFile, Trajectory};
+use crate::config::{self, Campaign, RobotFile, Trajectory, Wanted};
 use crate::simulate::{EffectSpec, Experiment, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
-const ROBOT: &str = "configs/cft.toml";
+pub(super) const ROBOT: &str = "configs/cft.toml";
 /// Designed by `excite` for all parameters; it ends by itself, after about 40 s.
 const EXCITATION: &str = "configs/cft-excitation.toml";
 const UNSEEN: &str = "configs/cft-validation.toml";
@@ -23,8 +23,8 @@ const EFFECT: &str = "ripple:q1:order=14,sin=1.2,cos=0.6";
 const ONE_JOINT_S: f64 = 20.0;
 const UNSEEN_S: f64 = 20.0;
 
-/// Simulates the campaign into `folder` and writes its campaign file; returns the warnings of the
-/// simulations.
+/// Simulates the campaign into `folder` and writes its campaign file; returns the names of the files
+/// and the warnings of the simulations.
 ///
 /// # Errors
 /// Where the folder cannot be written to, or the user interrupts.
@@ -32,7 +32,7 @@ pub(super) fn simulate(
     folder: &Path,
     seed: u64,
     context: &Context,
-) -> Result<Vec<String>, CliError> {
+) -> Result<(Vec<String>, Vec<String>), CliError> {
     let robot = RobotFile::load(Path::new(ROBOT))?;
     let excitation = Trajectory::load(Path::new(EXCITATION))?;
     let unseen = Trajectory::load(Path::new(UNSEEN))?;
@@ -74,6 +74,11 @@ pub(super) fn simulate(
             Ok(named.into_iter().map(|w| format!("{log}: {w}")).collect())
         })
         .collect();
+    let mut files = vec!["campaign.toml".to_owned(), "robot.toml".to_owned()];
+    for (log, ..) in &orders {
+        let truth = truth_beside(Path::new(log));
+        files.extend([log.clone(), truth.display().to_string()]);
+    }
     let said = said.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
     let campaign = Campaign {
         robot: "robot.toml".into(),
@@ -91,11 +96,11 @@ pub(super) fn simulate(
     };
     let text = toml::to_string(&campaign)
         .map_err(|e| CliError::output(format!("the campaign cannot be expressed in TOML: {e}")))?;
-    let robot_text = config::text(Path::new(ROBOT))?;
+    let robot_text = config::text_of_kind(Path::new(ROBOT), Wanted::Robot)?;
     let head = "# The built-in campaign: repeat it with `cft-ident identify campaign.toml`.\n\n";
     context.write_text(&folder.join("robot.toml"), &robot_text)?;
     context.write_text(&folder.join("campaign.toml"), &format!("{head}{text}"))?;
     // what is identified next reads them
     context.files().commit()?;
-    Ok(said)
+    Ok((files, said))
 }

@@ -25,6 +25,7 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFaul
         channels,
         keep: Vec::new(),
         held: None,
+        band_hz: None,
     };
     Ok((plan, None))
 }
@@ -78,6 +79,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
         channels,
         keep: machine.file.log.keep.clone(),
         held: None,
+        band_hz: Some(machine.settings().cutoff_hz),
     };
     (plan, log.refused().map(|error| refusal(error.to_string())))
 }

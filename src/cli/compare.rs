@@ -90,7 +90,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_picture(path, &stages::compare::figure(&of).svg())?;
     }
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(context.detail()),
         document,
         missed: Vec::new(),
     })

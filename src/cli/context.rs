@@ -5,15 +5,16 @@ use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
 use crate::identify::{self, Control};
 use crate::output::Together;
-use crate::report::figure;
+use crate::report::{Detail, figure};
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]
@@ -23,8 +24,11 @@ pub struct Context {
     bars: bool,
     interrupted: Arc<AtomicBool>,
     command: String,
+    detail: Detail,
     control: Control,
     files: Arc<Together>,
+    /// The last page that was written.
+    page: Arc<Mutex<Option<PathBuf>>>,
     /// Warnings that stand before those of the command's own result.
     told: Arc<Mutex<Vec<String>>>,
 }
@@ -51,8 +55,10 @@ impl Context {
             bars,
             interrupted,
             command: String::new(),
+            detail: Detail::Usual,
             control,
             files: Arc::default(),
+            page: Arc::default(),
             told: Arc::default(),
         }
     }
@@ -61,6 +67,17 @@ impl Context {
     pub fn called(mut self, arguments: &[OsString]) -> Self {
         self.command = typed::line(arguments);
         self
+    }
+
+    /// The same, with so much of a result shown.
+    pub fn showing(mut self, detail: Detail) -> Self {
+        self.detail = detail;
+        self
+    }
+
+    /// How much of a result is shown.
+    pub fn detail(&self) -> Detail {
+        self.detail
     }
 
     /// The command as it was typed, without folders from the root on and without what does not
@@ -116,7 +133,17 @@ impl Context {
 
     /// Writes a text that gets its name with the other outputs.
     pub(crate) fn write_text(&self, path: &Path, text: &str) -> Result<(), CliError> {
+        if path.extension().is_some_and(|end| end == "html") {
+            let mut page = self.page.lock().unwrap_or_else(PoisonError::into_inner);
+            *page = Some(path.to_owned());
+        }
         Ok(self.files.write(path, text.as_bytes())?)
+    }
+
+    /// The page that was written, if one was.
+    pub(super) fn page(&self) -> Option<PathBuf> {
+        let page = self.page.lock().unwrap_or_else(PoisonError::into_inner);
+        page.clone()
     }
 
     /// Writes a figure, as SVG or as PNG by the path's ending.
@@ -160,10 +187,19 @@ impl Context {
     }
 }
 
+/// The bars that are drawn now; what else is written to the terminal stands above them.
+static BARS: LazyLock<MultiProgress> =
+    LazyLock::new(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10)));
+
+/// A line on standard error, above the bars.
+pub(super) fn above_bars(text: &str) {
+    BARS.suspend(|| tell(&mut std::io::stderr(), text));
+}
+
 /// A line on standard error, unless that is to be quiet.
 fn note(text: &str, quiet: bool) {
     if !quiet {
-        tell(&mut std::io::stderr(), &indented(text));
+        above_bars(&indented(text));
     }
 }
 
@@ -186,6 +222,9 @@ fn show(progress: identify::Progress, running: &mut Vec<Progress>, bars: bool, q
     }
 }
 
+/// Time between two looks at the clock of a bar.
+const TICK: Duration = Duration::from_millis(250);
+
 /// A running bar; its methods may be called from any thread.
 #[derive(Debug)]
 pub struct Progress {
@@ -194,12 +233,17 @@ pub struct Progress {
 
 impl Progress {
     fn new(label: &str, total: Option<u64>, drawn: bool) -> Self {
-        let target = if drawn {
-            ProgressDrawTarget::stderr_with_hz(10)
-        } else {
-            ProgressDrawTarget::hidden()
+        let bar = match total {
+            Some(total) => ProgressBar::new(total),
+            None => ProgressBar::new_spinner(),
         };
-        let bar = ProgressBar::with_draw_target(total, target);
+        let bar = match drawn {
+            true => BARS.add(bar),
+            false => {
+                bar.set_draw_target(ProgressDrawTarget::hidden());
+                bar
+            }
+        };
         let template = match total {
             Some(_) => "{msg:<24} [{bar:32}] {percent:>3} %  {eta} left",
             None => "{msg:<24} {spinner} {elapsed}",
@@ -208,6 +252,10 @@ impl Progress {
             bar.set_style(style.progress_chars("=> "));
         }
         bar.set_message(label.to_owned());
+        if drawn {
+            // a step may take long: the clock runs on meanwhile
+            bar.enable_steady_tick(TICK);
+        }
         Progress { bar }
     }
 

@@ -18,7 +18,7 @@ Example:
 
 /// Trace the torque residual to effects that the model lacks, add them, and refit.
 ///
-/// Errors are reported before and after on data that decided nothing: the --holdout logs, or blocks
+/// Errors are reported before and after on held-out data: the --holdout logs, or blocks
 /// that are set aside.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
@@ -97,7 +97,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 context.write_text(path, &report.html())?;
             }
             return Ok(Outcome {
-                text: report.text(),
+                text: report.text_for(context.detail()),
                 document: Document::new(
                     "diagnose",
                     &[],
@@ -145,7 +145,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         report.terminal().line(&written);
     }
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(context.detail()),
         document,
         missed: Vec::new(),
     })

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Context;
 use super::error::CliError;
-use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory};
+use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
 use crate::log::{Provenance, escape};
 
 /// A configuration file that was read.
@@ -20,10 +20,11 @@ pub struct Given<T> {
 
 fn read<T>(
     path: &Path,
+    wanted: Wanted,
     parse: impl Fn(&str, &str) -> Result<T, ConfigError>,
 ) -> Result<Given<T>, CliError> {
     let name = escape(&path.to_string_lossy());
-    let text = config::text(path)?;
+    let text = config::text_of_kind(path, wanted)?;
     let file = path.file_name().unwrap_or(path.as_os_str());
     Ok(Given {
         value: parse(&name, &text)?,
@@ -34,14 +35,14 @@ fn read<T>(
 
 /// A robot file, or one that comes with the tool.
 pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
-    read(path, |name, text| {
+    read(path, Wanted::Robot, |name, text| {
         RobotFile::parse_in(name, text, path.parent())
     })
 }
 
 /// A model file; what is told of it becomes a warning of the command.
 pub fn model(path: &Path, context: &Context) -> Result<Given<ModelFile>, CliError> {
-    let model = read(path, |name, text| {
+    let model = read(path, Wanted::Own, |name, text| {
         ModelFile::parse_in(name, text, path.parent())
     })?;
     model
@@ -67,5 +68,5 @@ pub(crate) fn model_of(
 
 /// A trajectory file, or one that comes with the tool.
 pub fn trajectory(path: &Path) -> Result<Given<Trajectory>, CliError> {
-    read(path, Trajectory::parse)
+    read(path, Wanted::Trajectory, Trajectory::parse)
 }

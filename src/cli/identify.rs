@@ -35,7 +35,7 @@ pub struct Args {
     /// Campaign file: robot, logs by role, settings
     #[arg(value_name = "CAMPAIGN.toml")]
     pub campaign: Option<PathBuf>,
-    /// Folder to write into [default: runs/ and the campaign's name]
+    /// Folder to write into [default: cft-ident-run, or the campaign's name with .run]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Seed of the simulation and of the starting points [default: the campaign's]
@@ -74,7 +74,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let file = match &args.campaign {
         Some(file) => file.clone(),
         None => {
-            warnings = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
+            (_, warnings) = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
             folder.join("campaign.toml")
         }
     };
@@ -225,7 +225,7 @@ fn execute(
         .as_ref()
         .map(|found| validate::missed(&found.validation, campaign.settings.max_relative_error));
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(context.detail()),
         document,
         missed: missed.unwrap_or_default(),
     })

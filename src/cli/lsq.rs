@@ -160,7 +160,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .terminal()
         .line(&format!("written: {}", args.output.display()));
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(context.detail()),
         document,
         missed: Vec::new(),
     })

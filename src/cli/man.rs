@@ -37,7 +37,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     // options of every command are written into each
     all.build();
     let mut pages = vec![("cft-ident".to_owned(), all.clone())];
-    for command in all.get_subcommands().filter(|c| !c.is_hide_set()) {
+    for command in all.get_subcommands() {
         let name = format!("cft-ident-{}", command.get_name());
         if command.get_name() != "help" {
             pages.push((name, command.clone()));

@@ -8,6 +8,8 @@ pub mod compare;
 pub mod completions;
 pub mod convert;
 pub mod diagnose;
+pub mod diff;
+pub mod example;
 pub mod excite;
 pub mod export;
 pub mod friction;
@@ -22,6 +24,8 @@ pub mod torque;
 pub mod validate;
 
 mod arguments;
+mod browser;
+mod colour;
 mod columns;
 mod context;
 mod error;
@@ -46,6 +50,7 @@ use clap::{Parser, Subcommand};
 use crate::identify::Log;
 use crate::log::LogSpec;
 use crate::output;
+use crate::report::Detail;
 use crate::report::table::{WIDTH, folded};
 
 pub use arguments::Destination;
@@ -65,6 +70,9 @@ fn logs_of(specs: &[LogSpec]) -> Vec<Log> {
 }
 
 const EXAMPLES: &str = "\
+Begin with a real arm:    cft-ident example ur10
+Shell and manual pages:   cft-ident completions bash, cft-ident man DIR
+
 The help of each command ends with examples. Their files are those that
 `cft-ident identify` leaves in cft-ident-run/.";
 
@@ -86,9 +94,15 @@ struct Common {
     /// there)
     #[arg(long, value_name = "FILE", global = true)]
     json: Option<Destination>,
-    /// No progress and no notes; warnings and errors stay
+    /// No progress, no notes, and of the result its verdict alone; warnings and errors stay
     #[arg(short, long, global = true)]
     quiet: bool,
+    /// All tables, where a screen shows the verdict, the errors and what to do next
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
+    /// Open the report in a browser when it is written
+    #[arg(long, global = true)]
+    open: bool,
     /// Number of threads; the result does not depend on it [default: all]
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -96,11 +110,11 @@ struct Common {
 
 /// Makes the enum of the commands: of each its name and the module with its `Args` and its `run`.
 macro_rules! commands {
-    ($($(#[$how:meta])* $name:ident: $module:ident,)+) => {
+    ($($name:ident: $module:ident,)+) => {
         /// The commands, in the order of the help.
         #[derive(Debug, Subcommand)]
         enum Command {
-            $($(#[$how])* $name($module::Args),)+
+            $($name($module::Args),)+
         }
 
         impl Command {
@@ -122,14 +136,15 @@ commands! {
     Validate: validate,
     Diagnose: diagnose,
     Compare: compare,
+    Diff: diff,
     Torque: torque,
     Simulate: simulate,
     Excite: excite,
     Export: export,
     New: new,
+    Example: example,
     Schema: schema,
     Completions: completions,
-    #[command(hide = true)]
     Man: man,
 }
 
@@ -141,7 +156,7 @@ pub fn main() -> ExitCode {
         if flag.swap(true, Ordering::Relaxed) {
             stop();
         }
-        let _ = writeln!(std::io::stderr(), "stopping; once more to stop at once");
+        context::above_bars("stopping; once more to stop at once");
         std::thread::spawn(|| {
             std::thread::sleep(match KEEPS.load(Ordering::Relaxed) {
                 true => KEEPING,
@@ -224,18 +239,30 @@ fn execute(
         json.and_then(Destination::file),
         interrupted,
     )
-    .called(arguments);
+    .called(arguments)
+    .showing(match (cli.common.quiet, cli.common.verbose) {
+        (true, _) => Detail::Brief,
+        (_, true) => Detail::Full,
+        _ => Detail::Usual,
+    });
     // Told before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
     let mut outcome = cli.command.run(&context)?;
     outcome.document.warn_first(context.warnings());
-    outcome::show(
+    let exit = outcome::show(
         &outcome,
         json,
-        context.files(),
+        (context.files(), context.detail()),
         &mut std::io::stdout().lock(),
         &mut std::io::stderr().lock(),
-    )
+    )?;
+    if cli.common.open {
+        match context.page() {
+            Some(page) => browser::open(&page)?,
+            None => context.note("no report to open: --report FILE.html writes one"),
+        }
+    }
+    Ok(exit)
 }
 
 #[cfg(test)]

@@ -4,11 +4,12 @@
 
 use std::io::{self, Write};
 
-use super::Destination;
 use super::error::{CliError, indented, tell};
 use super::exit::Exit;
+use super::{Destination, colour};
 use crate::log::is_hidden;
 use crate::output::Together;
+use crate::report::Detail;
 use crate::report::json::Document;
 
 /// What a command hands back.
@@ -22,6 +23,9 @@ pub struct Outcome {
     pub missed: Vec<String>,
 }
 
+/// Warnings that are shown before a result.
+const MOST: usize = 8;
+
 /// Shows `outcome` and returns the status that it stands for.
 ///
 /// The files get their names once everything else is told: a document that nobody could be given leaves none.
@@ -29,12 +33,24 @@ pub struct Outcome {
 pub(super) fn show(
     outcome: &Outcome,
     json: Option<&Destination>,
-    files: &Together,
+    (files, detail): (&Together, Detail),
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
-    for warning in outcome.document.warnings() {
+    let most = match detail {
+        Detail::Full => usize::MAX,
+        _ => MOST,
+    };
+    let all = outcome.document.warnings().count();
+    for warning in outcome.document.warnings().take(most) {
         tell(stderr, &format!("warning: {}", indented(warning)));
+    }
+    if all > most {
+        let more = all - most;
+        tell(
+            stderr,
+            &format!("warning: {more} more; --verbose shows them, --json holds them"),
+        );
     }
     match json {
         Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
@@ -72,6 +88,9 @@ fn write_for_a_person(stdout: &mut dyn Write, text: &str) -> Result<(), CliError
             false => shown.push(c),
         }
     }
+    if colour::wanted() {
+        shown = colour::coloured(&shown);
+    }
     let written = stdout
         .write_all(shown.as_bytes())
         .and_then(|()| stdout.flush());
@@ -107,7 +126,7 @@ mod tests {
         let exit = show(
             &outcome(&[]),
             Some(&Destination::Stdout),
-            &Together::default(),
+            (&Together::default(), Detail::Usual),
             &mut out,
             &mut err,
         );
@@ -126,7 +145,7 @@ mod tests {
         let exit = show(
             &outcome(&["q4 1.4 % > 1 %"]),
             Some(&to_file),
-            &Together::default(),
+            (&Together::default(), Detail::Usual),
             &mut out,
             &mut err,
         );
@@ -139,6 +158,22 @@ mod tests {
                 .unwrap()
                 .ends_with("limit missed: q4 1.4 % > 1 %\n")
         );
+    }
+
+    #[test]
+    fn many_warnings_do_not_push_the_result_off_the_screen() {
+        let warnings: Vec<String> = (0..40).map(|k| format!("gap at {k} s")).collect();
+        let many = Outcome {
+            document: Document::new("validate", &[], &warnings, &json!({})).unwrap(),
+            ..outcome(&[])
+        };
+        let lines = |detail| {
+            let files = Together::default();
+            let (mut out, mut err) = (Vec::new(), Vec::new());
+            show(&many, None, (&files, detail), &mut out, &mut err).unwrap();
+            String::from_utf8(err).unwrap().lines().count()
+        };
+        assert_eq!((lines(Detail::Usual), lines(Detail::Full)), (MOST + 1, 40));
     }
 
     /// A standard output that fails with the given kind.
@@ -159,7 +194,7 @@ mod tests {
         let tables = show(
             &result,
             None,
-            &Together::default(),
+            (&Together::default(), Detail::Usual),
             &mut pipe,
             &mut Vec::new(),
         );
@@ -167,7 +202,7 @@ mod tests {
         let json = show(
             &result,
             Some(&Destination::Stdout),
-            &Together::default(),
+            (&Together::default(), Detail::Usual),
             &mut pipe,
             &mut Vec::new(),
         );
@@ -176,7 +211,7 @@ mod tests {
         let tables = show(
             &result,
             None,
-            &Together::default(),
+            (&Together::default(), Detail::Usual),
             &mut full,
             &mut Vec::new(),
         );

@@ -4,7 +4,8 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
-use crate::cli::{convert, export, identify, inspect, new, simulate};
+use crate::cli::{convert, example, export, identify, inspect, new, simulate};
+use crate::compare::RunDifference;
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
 use crate::identify::{
@@ -41,6 +42,8 @@ pub enum Kind {
     Diagnose,
     /// JSON document of `compare`
     Compare,
+    /// JSON document of `diff`
+    Diff,
     /// JSON document of `identify`
     Identify,
     /// JSON document of `excite`
@@ -57,6 +60,8 @@ pub enum Kind {
     Export,
     /// JSON document of `new`
     New,
+    /// JSON document of `example`
+    Example,
 }
 
 /// Write the JSON schema of a file, or of the JSON document of a command, to standard output.
@@ -84,6 +89,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Validate => json::schema::<Validated>("validate"),
         Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
         Kind::Compare => json::schema::<Comparison>("compare"),
+        Kind::Diff => json::schema::<RunDifference>("diff"),
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
@@ -92,6 +98,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Convert => json::schema::<convert::Converted>("convert"),
         Kind::Export => json::schema::<export::Exported>("export"),
         Kind::New => json::schema::<new::Drafted>("new"),
+        Kind::Example => json::schema::<example::Examples>("example"),
     }
 }
 

@@ -147,7 +147,7 @@ fn new_text(
     corrected: &RobotFile,
     path: &Path,
 ) -> Result<String, CliError> {
-    let text = config::text(robot)?;
+    let text = config::text_of_kind(robot, config::Wanted::Robot)?;
     let name = path.to_string_lossy();
     // a URDF is named beside the file
     let folder = path.parent();

@@ -155,7 +155,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 }
 
 /// The log's stem with `.truth.toml`, beside it.
-fn truth_beside(log: &Path) -> PathBuf {
+pub(super) fn truth_beside(log: &Path) -> PathBuf {
     let packed = log
         .extension()
         .is_some_and(|end| end.eq_ignore_ascii_case("gz") || end.eq_ignore_ascii_case("zst"));

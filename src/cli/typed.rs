@@ -23,7 +23,9 @@ pub(super) fn line(arguments: &[OsString]) -> String {
             rest.next();
             continue;
         }
-        if word.starts_with("--threads=") || word == "-q" || word == "--quiet" {
+        if word.starts_with("--threads=")
+            || ["-q", "--quiet", "-v", "--verbose", "--open"].contains(&&*word)
+        {
             continue;
         }
         if OUTPUTS.contains(&&*word) {

@@ -153,7 +153,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.files().add_log(file)?;
     }
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(context.detail()),
         document,
         missed: missed(&found.validation, args.max_relative_error),
     })

@@ -76,28 +76,32 @@ pub struct SideBySide {
 }
 
 /// A parameter, or a number of an effect.
-struct ParameterEntry {
-    name: String,
-    joint: Option<String>,
-    theta: Option<u32>,
-    unit: String,
+pub(super) struct ParameterEntry {
+    pub(super) name: String,
+    pub(super) joint: Option<String>,
+    pub(super) theta: Option<u32>,
+    pub(super) unit: String,
     /// What the robot's structure means by it; empty where the name says all.
-    meaning: String,
-    estimate: ParameterEstimate,
+    pub(super) meaning: String,
+    pub(super) estimate: ParameterEstimate,
 }
 
 /// Pairs the parameters of two models by name, joint, unit and meaning.
 pub fn side_by_side(a: &ModelFile, b: &ModelFile) -> SideBySide {
-    let (ours, theirs) = (entries(a), entries(b));
+    paired(&entries(a), &entries(b))
+}
+
+/// Pairs entries by name, joint, unit and meaning.
+pub(super) fn paired(ours: &[ParameterEntry], theirs: &[ParameterEntry]) -> SideBySide {
     let mut out = SideBySide::default();
-    for entry in &ours {
-        match partner(entry, &theirs) {
+    for entry in ours {
+        match partner(entry, theirs) {
             Ok(other) => out.parameters.push(pair(entry, other)),
             Err(reason) => out.only_in_a.push(apart(entry, reason)),
         }
     }
-    for entry in &theirs {
-        if let Err(reason) = partner(entry, &ours) {
+    for entry in theirs {
+        if let Err(reason) = partner(entry, ours) {
             out.only_in_b.push(apart(entry, reason));
         }
     }

@@ -59,11 +59,39 @@ pub fn embedded(path: &Path) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// Text of a configuration file: the one on the disk, else the one that comes with the tool.
+/// What a file is to be, which decides what is suggested where it is not there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    Robot,
+    Trajectory,
+    /// A file of the user's: a model, a campaign, a document.
+    Own,
+}
+
+impl Wanted {
+    /// Whether a file that comes with the tool is one.
+    fn is(self, text: &str) -> bool {
+        match self {
+            Wanted::Robot => text.contains("[robot]"),
+            Wanted::Trajectory => text.contains("kind = ") && !text.contains("[robot]"),
+            Wanted::Own => false,
+        }
+    }
+}
+
+/// Text of a file of the user's: the one on the disk, else the one that comes with the tool.
 ///
 /// # Errors
 /// [`ConfigError::Read`] where there is neither.
 pub fn text(path: &Path) -> Result<String, ConfigError> {
+    text_of_kind(path, Wanted::Own)
+}
+
+/// Text of a file of one kind, likewise.
+///
+/// # Errors
+/// [`ConfigError::Read`] where there is neither.
+pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> {
     let error = match text_of(path) {
         Ok(text) => return Ok(text),
         Err(error) => error,
@@ -72,15 +100,18 @@ pub fn text(path: &Path) -> Result<String, ConfigError> {
         if let Some(text) = embedded(path) {
             return Ok(text.to_owned());
         }
-        let known = list(EMBEDDED.iter().map(|(name, _)| *name));
+        let known = EMBEDDED.iter().filter(|(_, text)| wanted.is(text));
+        let known = list(known.map(|(name, _)| *name));
+        let more = match known.is_empty() {
+            true => String::new(),
+            false => format!(
+                "; {}these come with the tool: {known}",
+                did_you_mean(&shown(path), &known)
+            ),
+        };
         return Err(ConfigError::Read {
             file: shown(path),
-            remedy: format!(
-                "{}{}; {}these come with the tool: {known}",
-                remedy(&error),
-                named_beside(path, &["toml"]),
-                did_you_mean(&shown(path), &known),
-            ),
+            remedy: format!("{}{}{more}", remedy(&error), named_beside(path, &["toml"])),
             source: error,
         });
     }
@@ -151,7 +182,11 @@ impl RobotFile {
 
     /// Reads and checks a robot file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse_in(&shown(path), &text(path)?, path.parent())
+        Self::parse_in(
+            &shown(path),
+            &text_of_kind(path, Wanted::Robot)?,
+            path.parent(),
+        )
     }
 }
 
@@ -165,7 +200,7 @@ impl ModelFile {
 impl Trajectory {
     /// Reads and checks a trajectory file, or one that comes with the tool.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text(path)?)
+        Self::parse(&shown(path), &text_of_kind(path, Wanted::Trajectory)?)
     }
 }
 
@@ -173,5 +208,26 @@ impl Campaign {
     /// Reads and checks a campaign file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         Self::parse(&shown(path), &text(path)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_there_is_answered_with_files_of_its_kind() {
+        let said = |wanted| {
+            text_of_kind(Path::new("none.toml"), wanted)
+                .unwrap_err()
+                .to_string()
+        };
+        let robot = said(Wanted::Robot);
+        assert!(robot.contains("configs/ur10.toml"), "{robot}");
+        assert!(!robot.contains("configs/cft-excitation.toml"), "{robot}");
+        let motion = said(Wanted::Trajectory);
+        assert!(motion.contains("configs/cft-excitation.toml"), "{motion}");
+        assert!(!motion.contains("configs/ur10.toml"), "{motion}");
+        assert!(!said(Wanted::Own).contains("come with the tool"));
     }
 }

@@ -27,7 +27,7 @@ mod urdf;
 
 pub(crate) use crate::log::did_you_mean;
 pub use campaign::Campaign;
-pub use embedded::{EMBEDDED, embedded, text};
+pub use embedded::{EMBEDDED, Wanted, embedded, text, text_of_kind};
 pub use error::ConfigError;
 pub use model_file::ModelFile;
 pub use robot_file::RobotFile;

@@ -46,7 +46,7 @@ pub enum DiagnoseError {
     NothingDetermined { unknowns: usize },
     #[error("the torque of joint {joint} is zero throughout; check its channel")]
     NoTorque { joint: String },
-    #[error("a torque channel has another sign or place than the model knows")]
+    #[error("a torque channel looks sign-flipped or swapped")]
     Channels(Suspicion),
     #[error("interrupted")]
     Interrupted,

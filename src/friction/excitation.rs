@@ -15,7 +15,7 @@ pub enum FrictionError {
     NothingMoves { travel: f64 },
     #[error(
         "joints {first} and {second} both move ({first_share:.0} % and {second_share:.0} % of their ranges), so \
-         the joint that this log is about cannot be told; name it with --joint, or log one joint at a time"
+         it is open which joint this log is about; name it with --joint, or log one joint at a time"
     )]
     SeveralMove {
         first: String,
@@ -28,8 +28,8 @@ pub enum FrictionError {
     )]
     StandsStill { joint: String },
     #[error(
-        "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be told \
-         from a constant torque; log it in both directions"
+        "joint {joint} never reverses (speeds from {least:.4} to {most:.4}): Coulomb friction cannot be \
+         separated from a constant torque; log it in both directions"
     )]
     NeverReverses {
         joint: String,

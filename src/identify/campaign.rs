@@ -14,7 +14,7 @@ use super::validate::{Validated, validate};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
 use crate::effect::AugmentedModel;
-use crate::log::Provenance;
+use crate::log::{DataRole, Provenance};
 
 /// Logs by role.
 #[derive(Debug, Clone, Default)]
@@ -23,7 +23,7 @@ pub struct RoleLogs {
     pub friction: Vec<Log>,
     /// Logs that the inertial parameters are fitted to.
     pub identification: Vec<Log>,
-    /// Logs that decide nothing: what the model is tried on.
+    /// Held-out logs: what the model is tried on.
     pub validation: Vec<Log>,
 }
 
@@ -69,7 +69,7 @@ pub struct Campaigned {
 }
 
 /// Runs a campaign. Friction is fitted again beside an effect, so the diagnosis has the one-joint logs
-/// too; the validation logs decide nothing in it. `ended` is told each stage's result as it is there,
+/// too; the validation logs are held out of it. `ended` is told each stage's result as it is there,
 /// so that what was finished can be kept whatever follows.
 ///
 /// # Errors
@@ -90,8 +90,8 @@ pub fn identify<E: From<IdentifyError>>(
         each_row_once(machine, &[(role, fitted), validation])?;
     }
     let (mut inputs, mut warnings) = (Vec::new(), Vec::new());
-    let mut keep = |from: &[Provenance], told: &[String]| {
-        inputs.extend_from_slice(from);
+    let mut keep = |from: &[Provenance], told: &[String], role: DataRole| {
+        inputs.extend(from.iter().cloned().map(|input| input.used_as(role)));
         warnings.extend_from_slice(told);
     };
     let known = match logs.friction.as_slice() {
@@ -101,7 +101,7 @@ pub fn identify<E: From<IdentifyError>>(
             let mut model = new_model(machine, "identify", &found.inputs);
             found.write_into(&mut model);
             ended(StageEnd::Friction(&found, &model))?;
-            keep(&found.inputs, &found.warnings);
+            keep(&found.inputs, &found.warnings, DataRole::Fitted);
             Some((found, model))
         }
     };
@@ -116,13 +116,13 @@ pub fn identify<E: From<IdentifyError>>(
     let dynamics = lsq(machine, &logs.identification, &lsq_settings, control)?;
     let model = dynamics.model(machine, of_friction);
     ended(StageEnd::Dynamics(&dynamics, &model))?;
-    keep(&dynamics.inputs, &dynamics.warnings);
+    keep(&dynamics.inputs, &dynamics.warnings, DataRole::Fitted);
     let numbers = refined(&model, "model.toml")?;
     let mut validated = None;
     if !logs.validation.is_empty() {
         let found = validate(machine, &numbers, &logs.validation, control, &mut |_, _| {})?;
         ended(StageEnd::Validated(&found))?;
-        keep(&found.inputs, &found.warnings);
+        keep(&found.inputs, &found.warnings, DataRole::HeldOut);
         validated = Some(found);
     }
     let one_joint = without_rows_of(machine, &logs.friction, &logs.identification);

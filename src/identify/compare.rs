@@ -208,8 +208,8 @@ fn cautions([a, b]: [&Side; 2], logs: bool) -> Vec<String> {
     let made = |file: &ModelFile| file.provenance.inputs.clone();
     let shared: Vec<String> = made(first)
         .iter()
-        .filter(|i| i.samples > 0)
-        .filter(|i| made(second).iter().any(|o| o.sha256 == i.sha256))
+        .filter(|i| i.made())
+        .filter(|i| made(second).iter().any(|o| o.made() && o.shares_rows(i)))
         .map(|i| escape(&i.name))
         .collect();
     if !shared.is_empty() {

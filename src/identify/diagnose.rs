@@ -20,6 +20,7 @@ use crate::diagnose::{
     Unknown, WIDE_TIMES, WideMotion,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
+use crate::log::DataRole;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
@@ -125,6 +126,14 @@ pub fn diagnose(
         false => &in_memory.inputs[..logs.train.len()],
     };
     let (before, friction_prior) = before_these((name, file), fitted)?;
+    let (fitted, vetoed) = (logs.train.len(), logs.train.len() + logs.veto.len());
+    for (at, input) in in_memory.inputs.iter_mut().enumerate() {
+        input.role = Some(match at {
+            at if at < fitted => DataRole::Fitted,
+            at if at < vetoed => DataRole::Vetoed,
+            _ => DataRole::HeldOut,
+        });
+    }
     let wider = (each.as_slice(), WIDE_TIMES);
     let wide = read_wider(machine, wider, &all, &in_memory.stretches, control)?;
     let mut case = case(
@@ -136,7 +145,7 @@ pub fn diagnose(
     )?;
     case.wide = wide_motion(machine, &case.stretches, wide)
         .map_err(|error| IdentifyError::motion(name, error))?;
-    let work = control.begin("search", None);
+    let work = control.begin("search for effects", None);
     let found = diagnose::diagnose(
         &case,
         &mut |step| control.note(&format!("added {step}")),

@@ -85,7 +85,7 @@ pub struct DiagnosisStep {
     /// Chance that a model which lacks nothing, measured and processed as these logs were, shows a candidate as good
     /// as this one or better, among all candidates: by placebos.
     pub p_value: Option<f64>,
-    /// Mean relative error on data that decided nothing, before the step.
+    /// Mean relative error on held-out data, before the step.
     pub holdout_before: Option<f64>,
     /// The same after it.
     pub holdout_after: Option<f64>,
@@ -132,7 +132,7 @@ pub struct EffectValueFound {
     pub unit: String,
 }
 
-/// Errors on the logs that were fitted and on those that decided nothing.
+/// Errors on the logs that were fitted and on held-out data.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ErrorsBySide {
     pub train: Errors,

@@ -22,11 +22,11 @@ pub enum GainError {
     )]
     MassHidden,
     #[error(
-        "{log}: no joint shows a load: the mass that the torques tell of is zero within two deviations ({joints}); give the log with the payload, or a heavier one, in motions that lift it"
+        "{log}: no joint shows a load: the payload mass that the torques show is zero within two standard deviations ({joints}); give the log with the payload, or a heavier one, in motions that lift it"
     )]
     NoLoad { log: String, joints: String },
     #[error(
-        "{log}: the payload shows with a negative mass on every joint; the log with the payload belongs behind --fit-gains, those without before it; or all torques are turned: give `torque_sign = -1` in every [log.joint.NAME]"
+        "{log}: the payload shows with a negative mass on every joint; the log with the payload belongs behind --fit-gains, those without before it; or all torques are sign-flipped: give `torque_sign = -1` in every [log.joint.NAME]"
     )]
     Exchanged { log: String },
     #[error(
@@ -38,7 +38,7 @@ pub enum GainError {
     )]
     Undetermined { joints: String, found: String },
     #[error(
-        "without a payload only ratios of gains can be told, and the logs do not fix that of {joints} to {reference}{found}; give a log with a known payload, `--fit-gains LOG:mass=KG`; or give `torque_scale` in [log.joint.NAME]"
+        "without a payload only ratios of gains can be identified, and the logs do not fix that of {joints} to {reference}{found}; give a log with a known payload, `--fit-gains LOG:mass=KG`; or give `torque_scale` in [log.joint.NAME]"
     )]
     RatioUndetermined {
         joints: String,

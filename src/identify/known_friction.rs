@@ -58,23 +58,9 @@ pub(super) struct FrictionBefore {
     left_out: Vec<bool>,
 }
 
-/// Whether two readings of logs have rows in common.
-fn share_rows(a: &Provenance, b: &Provenance) -> bool {
-    let ends = |p: &Provenance| {
-        let (from, to) = p.span.as_deref()?.split_once("..")?;
-        let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
-        let to = to.strip_suffix(unit)?.parse::<f64>().ok()?;
-        Some((from.parse::<f64>().ok()?, to, unit.to_owned()))
-    };
-    a.sha256 == b.sha256
-        && match (ends(a), ends(b)) {
-            (Some((a0, a1, unit)), Some((b0, b1, other))) if unit == other => a0 < b1 && b0 < a1,
-            _ => true,
-        }
-}
-
 fn any_shared(a: &[Provenance], b: &[Provenance]) -> bool {
-    a.iter().any(|a| b.iter().any(|b| share_rows(a, b)))
+    let mut made = b.iter().filter(|b| b.made());
+    made.any(|b| a.iter().any(|a| a.shares_rows(b)))
 }
 
 impl FrictionBefore {

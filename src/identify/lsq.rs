@@ -341,7 +341,7 @@ fn negative(unknowns: &[Unknown]) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "negative by more than two deviations, though no friction and no inertia is: {}; something else is in these numbers: a torque that the model lacks (`diagnose`), or a motion that does not tell them from others; one term of a friction may be negative where all its terms together take power",
+            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not tell these parameters from others",
             names.join(", ")
         )
     })

@@ -7,7 +7,7 @@ use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
 use crate::config::model_file::{Effect, EffectParameter, ModelProvenance};
 use crate::effect::{self, Added, AugmentedModel, EffectNumber};
-use crate::log::Provenance;
+use crate::log::{DataRole, Provenance};
 use crate::robot::model::Model;
 
 /// The model of a file with its effects; `name` names the file in errors.
@@ -78,7 +78,14 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command: command.to_owned(),
             seed: None,
-            inputs: inputs.to_vec(),
+            inputs: inputs
+                .iter()
+                .cloned()
+                .map(|input| match input.role {
+                    None => input.used_as(DataRole::Fitted),
+                    Some(_) => input,
+                })
+                .collect(),
         },
     }
 }

@@ -8,6 +8,7 @@ use super::first_look::FirstLook;
 use crate::inspect::Cutter;
 use crate::log::{Block, Instant, Layout, Provenance, Reader};
 use crate::motion::{Summary, ZeroOrderHold};
+use crate::number::clock;
 use crate::robot::Robot;
 
 /// A log that is being read.
@@ -128,7 +129,7 @@ fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<Strin
             .spans_s
             .iter()
             .take(3)
-            .map(|[a, b]| format!("{:.3}..{:.3} s", zero + a, zero + b))
+            .map(|[a, b]| format!("{}..{} s", clock(zero + a), clock(zero + b)))
             .collect();
         out.push(format!(
             "{name}: {} stretch(es) between gaps are too short to filter and are left out ({} samples; {})",
@@ -145,8 +146,8 @@ fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<Strin
     }
     if summary.interpolated > 0 {
         out.push(format!(
-            "{name}: the clock is uneven, {} of {} samples were interpolated onto an even one",
-            summary.interpolated, summary.samples
+            "{name}: the clock is uneven; its {} samples were put on an even one, with {} points interpolated",
+            summary.samples, summary.interpolated
         ));
     }
     out

@@ -3,6 +3,7 @@
 use super::fault::{Episodes, FaultKind, LogFault, Severity};
 use super::judge::Track;
 use crate::log::RowFault;
+use crate::number::clock;
 
 /// Faults under construction, and what is to be cut out.
 pub(super) struct FaultList {
@@ -144,7 +145,7 @@ pub(super) fn rows_text(rows: u64, stretches: usize) -> String {
 /// A time for a person: `1.000 ms`.
 pub(super) fn seconds(s: f64) -> String {
     match s.abs() {
-        x if x >= 1.0 => format!("{s:.3} s"),
+        x if x >= 1.0 => format!("{} s", clock(s)),
         x if x >= 1e-3 => format!("{:.3} ms", s * 1e3),
         _ => format!("{:.3} us", s * 1e6),
     }

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::log::RowFault;
+use crate::number::clock;
 
 /// How much a fault matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -192,8 +193,8 @@ impl LogFault {
     /// Where it is by the log's own clock, for a person: `5.000..5.399`, or `5.000` for a single row.
     pub fn span(&self) -> String {
         match self.log_to_s > self.log_from_s {
-            true => format!("{:.3}..{:.3}", self.log_from_s, self.log_to_s),
-            false => format!("{:.3}", self.log_from_s),
+            true => format!("{}..{}", clock(self.log_from_s), clock(self.log_to_s)),
+            false => clock(self.log_from_s),
         }
     }
 }

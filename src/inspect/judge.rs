@@ -17,6 +17,8 @@ use crate::log::RowFault;
 /// A joint moves where it travels further than this share of what the farthest joint does.
 const TRAVELS: f64 = 0.02;
 
+/// Band in which noise is counted where none is declared \[Hz\].
+const BAND_HZ: f64 = 20.0;
 /// Channels whose shape is looked at; of more only the numbers are.
 const SHAPED: usize = 512;
 /// Channels that are compared with each other.
@@ -183,6 +185,8 @@ pub struct LogJudge {
     pub(super) windows: Windows,
     /// Kinds of findings that are not acted upon.
     pub(super) keep: Vec<RowFault>,
+    /// Band in which noise is counted \[Hz\].
+    pub(super) band_hz: f64,
     steps: Vec<RowStep>,
     /// Which rows repeat the positions of the row before.
     fresh: Vec<Freshness>,
@@ -248,6 +252,7 @@ impl LogJudge {
             fresh: Vec::new(),
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
+            band_hz: BAND_HZ,
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
             compared,
@@ -263,6 +268,12 @@ impl LogJudge {
     /// The same, with kinds of findings that are told but not acted upon.
     pub fn keeping(mut self, keep: &[RowFault]) -> Self {
         self.keep = keep.to_vec();
+        self
+    }
+
+    /// The same, with the band that a fit keeps \[Hz\], where it is known.
+    pub fn within(mut self, band_hz: Option<f64>) -> Self {
+        self.band_hz = band_hz.unwrap_or(BAND_HZ);
         self
     }
 

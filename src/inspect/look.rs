@@ -33,6 +33,8 @@ pub struct ColumnPlan {
     pub keep: Vec<RowFault>,
     /// Rows for which each sample was held: only fresh rows are looked at.
     pub held: Option<usize>,
+    /// Band that a fit keeps \[Hz\]; none where nobody has declared it.
+    pub band_hz: Option<f64>,
 }
 
 /// Looks at a log once more where the first look found what hides the rest: positions that begin
@@ -91,7 +93,9 @@ pub fn look(
         log.set_time(column, seconds);
     }
     let channels = plan.channels.iter().map(|planned| planned.channel.clone());
-    let mut judge = LogJudge::new(channels.collect(), Depth::Whole).keeping(&plan.keep);
+    let mut judge = LogJudge::new(channels.collect(), Depth::Whole)
+        .keeping(&plan.keep)
+        .within(plan.band_hz);
     let mut turning: Vec<Option<Unwrap>> = (plan.channels.iter())
         .map(|planned| planned.wrap.map(Unwrap::new))
         .collect();

@@ -29,8 +29,6 @@ const FINE: f64 = 4096.0;
 const COARSE: f64 = 0.1;
 /// Grain of a torque over its deviation that spoils a fit.
 const COARSE_TORQUE: f64 = 0.1;
-/// Band in which the acceleration noise is counted [Hz].
-const BAND_HZ: f64 = 20.0;
 
 /// The faults of one channel.
 pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: &mut FaultList) {
@@ -421,12 +419,13 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
     match (track.channel.role, &track.excitation) {
         (ChannelRole::Position, Some(excitation)) => {
             // White noise of step^2/12, differentiated twice, up to the cut-off.
-            let w = std::f64::consts::TAU * BAND_HZ;
-            let noise = step * (clock.dt * BAND_HZ / 30.0).sqrt() * w * w;
+            let band = judge.band_hz;
+            let w = std::f64::consts::TAU * band;
+            let noise = step * (clock.dt * band / 30.0).sqrt() * w * w;
             let share = noise / excitation.acceleration_rms();
             if share > COARSE {
                 let effect = format!(
-                    "steps of {step:.3e}: below {BAND_HZ} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
+                    "steps of {step:.3e}: below {band} Hz they make {:.0} % noise on the acceleration, which biases inertias towards 0",
                     100.0 * share
                 );
                 draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);
@@ -435,7 +434,7 @@ fn coarse(judge: &LogJudge, track: &Track, clock: &ClockFacts, draft: &mut Fault
         }
         (ChannelRole::Torque, _) if step > COARSE_TORQUE * track.deviation() => {
             let effect = format!(
-                "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters drown in it",
+                "steps of {step:.3e}, {:.0} % of the channel's deviation: small parameters cannot be identified from it",
                 100.0 * step / track.deviation()
             );
             draft.whole(Warning, FaultKind::Quantisation, track, effect, remedy);

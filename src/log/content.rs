@@ -114,6 +114,14 @@ impl Unpacker {
     }
 }
 
+/// All of what zstd compressed in memory.
+///
+/// # Errors
+/// Bytes that are damaged.
+pub(crate) fn unpacked(packed: &[u8]) -> io::Result<Vec<u8>> {
+    zstd::stream::decode_all(packed)
+}
+
 /// The end of a file that cannot be read any further.
 struct CutOff(io::ErrorKind, String);
 

@@ -45,11 +45,12 @@ pub use section::{
     PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
 };
 pub use shared::shares_rows;
-pub use source::{Provenance, sha256};
+pub use source::{DataRole, Provenance, sha256};
 pub use spec::{LogSpec, Span};
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;
+pub(crate) use content::unpacked;
 pub(crate) use layout::channel;
 pub(crate) use names::{did_you_mean, is_hidden, list};
 pub(crate) use source::{named_beside, remedy, shown};

@@ -209,6 +209,7 @@ impl LogPass {
             },
             samples: self.samples,
             duration_s: self.duration_s(),
+            role: None,
         })
     }
 }

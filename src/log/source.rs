@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::LogError;
 use super::names::{escape, escape_whole, list, nearest};
+use super::{LogError, Span};
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,9 +29,52 @@ pub struct Provenance {
     /// Time from the first to the last row used [s].
     #[serde(default)]
     pub duration_s: f64,
+    /// What its rows were used for; absent where nothing was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub role: Option<DataRole>,
+}
+
+/// What the rows of a log were used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DataRole {
+    /// Parameters were fitted to them.
+    Fitted,
+    /// They could veto an effect.
+    Vetoed,
+    /// They were evaluated once, after everything was decided.
+    HeldOut,
+}
+
+impl DataRole {
+    /// The word in tables and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            DataRole::Fitted => "fitted",
+            DataRole::Vetoed => "vetoed",
+            DataRole::HeldOut => "held-out",
+        }
+    }
 }
 
 impl Provenance {
+    /// The same, with what it was used for; a file that is no log has no role.
+    pub fn used_as(mut self, role: DataRole) -> Self {
+        self.role = (self.samples > 0).then_some(role);
+        self
+    }
+
+    /// Whether something was made from these rows: from those of a log that was not held out.
+    pub fn made(&self) -> bool {
+        self.samples > 0 && self.role != Some(DataRole::HeldOut)
+    }
+
+    /// Whether both are rows of one log and have some in common, by checksum and span.
+    pub fn shares_rows(&self, other: &Self) -> bool {
+        let span = |of: &Self| of.span.as_deref().map_or(Span::Whole, Span::read);
+        self.sha256 == other.sha256 && span(self).meets(span(other))
+    }
+
     /// An input that is no log: a model, robot, campaign or trajectory file.
     pub fn of_file(path: &Path) -> Result<Self, LogError> {
         Ok(Self {
@@ -40,6 +83,7 @@ impl Provenance {
             sha256: sha256(path)?,
             samples: 0,
             duration_s: 0.0,
+            role: None,
         })
     }
 
@@ -53,6 +97,7 @@ impl Provenance {
             sha256: checksum.hexadecimal(),
             samples: 0,
             duration_s: 0.0,
+            role: None,
         }
     }
 }

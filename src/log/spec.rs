@@ -54,6 +54,22 @@ impl Span {
         }
     }
 
+    /// The span that a label tells; the whole log where it tells none.
+    pub(super) fn read(label: &str) -> Self {
+        Self::parse(label).unwrap_or_default()
+    }
+
+    /// Whether two spans of one log can have rows in common; those in other units can.
+    pub(super) fn meets(self, other: Self) -> bool {
+        match (self, other) {
+            (Span::Percent { from: a, to: b }, Span::Percent { from: c, to: d })
+            | (Span::Seconds { from: a, to: b }, Span::Seconds { from: c, to: d }) => {
+                a.max(c) < b.min(d)
+            }
+            _ => true,
+        }
+    }
+
     /// Reads `0..70%` or `15.2..23s`; either number may be left out.
     fn parse(text: &str) -> Result<Self, &'static str> {
         let (body, percent) = if let Some(body) = text.strip_suffix('%') {

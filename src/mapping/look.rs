@@ -127,6 +127,7 @@ pub fn look(
         channels: channels.collect(),
         keep: Vec::new(),
         held: None,
+        band_hz: None,
     };
     let findings = inspect::look(&mut log, &plan, stop)?.ok_or(MappingError::Interrupted)?;
     // by name: a log may have ten thousands of columns

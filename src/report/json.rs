@@ -163,6 +163,7 @@ mod tests {
 
     fn input() -> Provenance {
         Provenance {
+            role: None,
             name: "q4.csv".into(),
             span: Some("0..70%".into()),
             sha256: "00ff".into(),

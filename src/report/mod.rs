@@ -17,4 +17,4 @@ mod traces;
 mod value;
 
 pub use traces::{Trace, TraceLine, TracePanel, TraceStyle, Traces};
-pub use value::{Part, Report, Shown, Writer};
+pub use value::{Detail, Part, Report, Shown, Writer};

@@ -1,12 +1,32 @@
 //! A report as a terminal shows it: tables and paragraphs of 80 columns, without colour.
 
 use super::table::{WIDTH, hanging};
-use super::value::{Part, Report, Shown};
+use super::value::{Detail, Part, Report, Shown};
 
 impl Report {
-    /// The report for a terminal, ending in a line end.
+    /// All that a terminal can show of the report, ending in a line end.
     pub fn text(&self) -> String {
-        self.parts(Shown::Terminal).map(shown).collect()
+        self.text_for(Detail::Full)
+    }
+
+    /// The report for a terminal, ending in a line end.
+    pub fn text_for(&self, detail: Detail) -> String {
+        if detail == Detail::Full {
+            let parts = self.parts(&[Shown::Terminal, Shown::Detail]);
+            return parts.map(shown).collect();
+        }
+        let parts = self.parts(&[Shown::Terminal]);
+        let verdicts = parts.clone();
+        let verdicts = verdicts.filter(|part| matches!(part, Part::Verdict { .. }));
+        let brief: String = verdicts.map(shown).collect();
+        if detail == Detail::Brief && !brief.is_empty() {
+            return brief;
+        }
+        let mut text: String = parts.map(shown).collect();
+        if self.parts(&[Shown::Detail]).count() > self.parts(&[]).count() {
+            text += "--verbose shows more\n";
+        }
+        text
     }
 }
 
@@ -90,5 +110,25 @@ mod tests {
             report.text(),
             "all is well\nwritten: a.toml\n  one\n  two\n"
         );
+    }
+
+    #[test]
+    fn a_quiet_terminal_shows_the_verdict_and_a_verbose_one_everything() {
+        let mut report = Report::new("title");
+        report.everywhere().verdict("it holds", true);
+        report.detail().line("all 58 parameters");
+        report.terminal().line("written: a.toml");
+        assert_eq!(report.text_for(Detail::Brief), "it holds\n");
+        assert_eq!(
+            report.text_for(Detail::Usual),
+            "it holds\nwritten: a.toml\n--verbose shows more\n"
+        );
+        assert_eq!(
+            report.text_for(Detail::Full),
+            "it holds\nall 58 parameters\nwritten: a.toml\n"
+        );
+        let mut plain = Report::new("title");
+        plain.terminal().line("no verdict");
+        assert_eq!(plain.text_for(Detail::Brief), "no verdict\n");
     }
 }

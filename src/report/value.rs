@@ -10,7 +10,21 @@ use super::traces::Traces;
 pub enum Shown {
     Everywhere,
     Terminal,
+    /// On a terminal that is to show everything.
+    Detail,
     Page,
+}
+
+/// How much of a report a terminal shows.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// The verdict; of a report without one what is usual.
+    Brief,
+    /// About a screen.
+    #[default]
+    Usual,
+    /// Everything.
+    Full,
 }
 
 /// One part of a report.
@@ -71,9 +85,9 @@ impl Report {
         &self.title
     }
 
-    /// The parts that are shown in one place, in their order.
-    pub fn parts(&self, place: Shown) -> impl Iterator<Item = &Part> {
-        let there = move |shown: Shown| shown == Shown::Everywhere || shown == place;
+    /// The parts that are shown in one of these places or everywhere, in their order.
+    pub fn parts<'a>(&'a self, places: &'a [Shown]) -> impl Iterator<Item = &'a Part> + Clone {
+        let there = |shown: Shown| shown == Shown::Everywhere || places.contains(&shown);
         let parts = self.parts.iter().filter(move |(shown, _)| there(*shown));
         parts.map(|(_, part)| part)
     }
@@ -86,6 +100,11 @@ impl Report {
     /// Adds parts that only a terminal shows.
     pub fn terminal(&mut self) -> Writer<'_> {
         self.shown(Shown::Terminal)
+    }
+
+    /// Adds parts that a terminal shows where everything is asked for.
+    pub fn detail(&mut self) -> Writer<'_> {
+        self.shown(Shown::Detail)
     }
 
     /// Adds parts that only a page has room for.

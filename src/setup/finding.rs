@@ -177,9 +177,16 @@ impl Finding {
 impl FrictionPower {
     /// As it is told.
     pub fn sentence(&self) -> String {
+        let watts = |x: f64| match x.abs() < 0.01 {
+            true => format!("{x:.2e}"),
+            false => format!("{x:.3}"),
+        };
         format!(
-            "friction of {} drives it: all its terms together take {:.3e} +- {:.1e} W over the speeds of these logs, and friction takes power; {}",
-            self.joint, self.power, self.std, self.cause
+            "the friction of {} would drive it: its terms together take {} +- {} W over the speeds of these logs, where friction takes power above zero; {}",
+            self.joint,
+            watts(self.power),
+            watts(self.std),
+            self.cause
         )
     }
 }

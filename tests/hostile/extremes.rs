@@ -25,7 +25,9 @@ fn a_simulation_that_does_not_fit_into_memory_is_refused_at_once() {
 #[test]
 fn a_trajectory_of_extreme_frequency_or_duration_is_told_and_not_computed() {
     let bench = Bench::new();
-    let table3 = cft_ident::config::text("configs/table3.toml".as_ref()).unwrap();
+    let table3 = cft_ident::config::embedded("configs/table3.toml".as_ref())
+        .unwrap()
+        .to_owned();
     let at = table3.find("\nfundamental_hz").unwrap() + 1;
     let end = at + table3[at..].find('\n').unwrap();
     for (hz, words) in [

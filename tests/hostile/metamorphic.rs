@@ -110,7 +110,9 @@ fn a_log_that_is_written_otherwise_gives_the_same_parameters() {
         let bench = Bench::new();
         bench.file(
             "robot.toml",
-            cft_ident::config::text(robot.as_ref()).unwrap(),
+            cft_ident::config::embedded(robot.as_ref())
+                .unwrap()
+                .to_owned(),
         );
         let table = Table::read(&path);
         bench.file("log.csv", table.text());
@@ -172,7 +174,9 @@ fn another_unit_a_mirrored_axis_and_another_container_give_the_same_parameters()
         return;
     };
     let bench = Bench::new();
-    let robot = cft_ident::config::text("configs/emps.toml".as_ref()).unwrap();
+    let robot = cft_ident::config::embedded("configs/emps.toml".as_ref())
+        .unwrap()
+        .to_owned();
     bench.file("robot.toml", &robot);
     let table = Table::read(&path);
     bench.file("log.csv", table.text());

@@ -312,7 +312,7 @@ fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliEr
     let judged = judged(bench, &motion, &channels, None, friction)?;
     let report = written(bench, &motion, &judged, names, &given.name)?;
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(bench.context.detail()),
         document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
         missed: judged.broken(),
     })
@@ -354,7 +354,7 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
         .write_text(&file, &trajectory.to_toml(&head(&judged)))?;
     report.terminal().line(&format!("written: {shown}"));
     Ok(Outcome {
-        text: report.text(),
+        text: report.text_for(bench.context.detail()),
         document: Document::new("excite", &bench.inputs, &judged.warnings, &judged)?,
         missed: Vec::new(),
     })
@@ -394,7 +394,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         let context = bench.context;
         context.write_text(&file, &Trajectory::Fourier(fourier).to_toml(&head(&judged)))?;
         report.terminal().line(&format!("written: {shown}"));
-        text += &report.text();
+        text += &report.text_for(context.detail());
         warnings.extend(judged.warnings.iter().cloned());
         all.push(judged);
         if found.stopped {

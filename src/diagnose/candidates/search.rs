@@ -148,7 +148,7 @@ impl SearchRound<'_> {
         let columns = self.columns(&effect)?;
         let score = (self.test).score(&columns, effect.linear.len(), effect.shape.len());
         let reason = match &score {
-            None => "nothing of it is its own: what is declared stands in for it",
+            None => "the declared parameters explain all of it",
             Some(s) => {
                 effect.linear.clone_from(&s.beta);
                 ""

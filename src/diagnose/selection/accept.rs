@@ -110,7 +110,7 @@ fn decide(candidate: &mut Candidate, limits: &SelectionLimits, worth: Worth) {
         Some("its coefficients are not finite".to_owned())
     } else if s.unique_share < limits.unique_share {
         Some(format!(
-            "only {:.2} % of it is its own: what is declared stands in for the rest",
+            "the declared parameters explain all but {:.2} % of it",
             100.0 * s.unique_share
         ))
     } else if !candidate.effect.is_possible() {

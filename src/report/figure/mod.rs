@@ -6,6 +6,8 @@
 
 mod axis;
 mod decimate;
+mod effect;
+mod errors;
 mod friction;
 mod joint_grid;
 mod legend;
@@ -17,6 +19,8 @@ mod residual;
 mod svg;
 mod torque;
 
+pub use effect::EffectFigure;
+pub use errors::{ErrorBar, ErrorFigure, JointBars};
 pub use friction::{FrictionFigure, FrictionPanel};
 pub use motion::{MotionFigure, MotionPanel};
 pub use overlay::{OverlayFigure, OverlayPanel};

@@ -20,7 +20,7 @@ impl Report {
     pub fn html(&self) -> String {
         let (mut opening, mut sections) = (String::new(), Vec::<(String, String)>::new());
         let mut scripted = false;
-        for part in self.parts(Shown::Page) {
+        for part in self.parts(&[Shown::Page]) {
             if let Part::Heading(text) = part {
                 sections.push((escaped(text), String::new()));
                 continue;
@@ -98,6 +98,22 @@ fn shown(part: &Part) -> String {
 
 /// A table; the first column holds names. A column of words is set to the left.
 fn table_of(table: &Table) -> String {
+    let (caption, _, rows) = table.parts();
+    match rows.len() > MANY {
+        true => format!(
+            "<details class=\"table\"><summary>{} ({} rows)</summary>{}</details>\n",
+            escaped(if caption.is_empty() { "table" } else { caption }),
+            rows.len(),
+            open_table(table)
+        ),
+        false => open_table(table),
+    }
+}
+
+/// Rows from which on a table is folded.
+const MANY: usize = 24;
+
+fn open_table(table: &Table) -> String {
     let (caption, head, rows) = table.parts();
     let columns: Vec<Column> = (0..head.len())
         .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
@@ -259,6 +275,17 @@ mod tests {
                 || STYLE.contains(&format!("--sky:{colour}"));
             assert!(known, "{colour}");
         }
+    }
+
+    #[test]
+    fn a_long_table_is_folded_with_its_number_of_rows() {
+        let rows = |n: usize| vec![vec!["cell".to_owned()]; n];
+        let short = table_of(&Table::of_words("short", &["a"], rows(MANY)));
+        assert!(!short.contains("<details"), "{short}");
+        let long = table_of(&Table::of_words("long", &["a"], rows(58)));
+        assert!(long.starts_with("<details"), "{long}");
+        assert!(long.contains("<summary>long (58 rows)</summary>"), "{long}");
+        assert_eq!(long.matches("<td").count(), 58);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What several reports say alike, section by section.
 
+pub mod effects;
 pub mod fit;
 pub mod friction;
 mod look;

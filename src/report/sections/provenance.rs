@@ -1,7 +1,7 @@
 //! Where a page came from, so that the run can be repeated.
 
 use crate::config::RobotFile;
-use crate::log::{Provenance, escape};
+use crate::log::{DataRole, Provenance, escape};
 use crate::motion::Summary;
 use crate::number;
 use crate::report::Writer;
@@ -18,12 +18,20 @@ fn files(page: &mut Writer, caption: &str, inputs: &[Provenance]) {
                 only(i.span.clone().unwrap_or_else(|| "whole".to_owned())),
                 only(i.samples.to_string()),
                 only(number::significant(i.duration_s, 5)),
+                only(i.role.map_or("", DataRole::word).to_owned()),
                 i.sha256.clone(),
             ]
         })
         .collect();
     if !rows.is_empty() {
-        let head = ["file", "span", "samples", "duration [s]", "SHA-256"];
+        let head = [
+            "file",
+            "span",
+            "samples",
+            "duration [s]",
+            "used as",
+            "SHA-256",
+        ];
         page.rows(caption, &head, rows);
     }
 }

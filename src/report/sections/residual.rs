@@ -91,7 +91,7 @@ pub fn section(page: &mut Writer, figure: &str) {
     page.heading("The residual and its spectra");
     page.paragraph(
         "Means over bins of the filtered residual, forward and backward apart; amplitudes of its \
-         waves over position (order) and over time (frequency). What depends on nothing is noise.",
+         waves over position (order) and over time (frequency). A residual without pattern is noise.",
     );
     page.figure(figure);
 }

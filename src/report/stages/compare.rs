@@ -1,6 +1,6 @@
 //! The report of `compare`.
 
-use crate::compare::{Apart, Difference, ParameterEstimate, Reason};
+use crate::compare::{Apart, Difference, ParameterEstimate, ParameterPair, Reason, SideBySide};
 use crate::identify::{Compared, DIFFERENT, Tried};
 use crate::log::{Provenance, escape};
 use crate::motion::MotionError;
@@ -13,19 +13,39 @@ use crate::report::sections::{Look, provenance};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 
+/// Parameters that a screen has room for.
+const FEW: usize = 8;
+
 /// The comparison; `logs` names the logs that both were tried on.
 pub fn compare(of: &Compared, logs: &str) -> Report {
     let title = format!("{} and {}", of.name(0), of.name(1));
     let mut report = Report::new(&format!("Comparison of {title}"));
-    let apart = || [0, 1].into_iter().filter_map(|side| apart_table(of, side));
-    let parameters = (!of.table.parameters.is_empty()).then(|| parameter_table(of));
+    let names = [of.name(0), of.name(1)];
+    let apart = || apart_tables(&of.table, &names);
+    let parameters = &of.table.parameters;
+    let parameters = (!parameters.is_empty()).then(|| parameter_table(parameters.iter(), &names));
     report
         .everywhere()
         .verdict(&words(of), of.warnings.is_empty());
-    for table in parameters.clone().into_iter().chain(apart()) {
-        let mut terminal = report.terminal();
-        terminal.line("");
-        terminal.table(table);
+    if let Some(table) = parameters
+        .clone()
+        .filter(|_| of.table.parameters.len() > FEW)
+    {
+        report.detail().line("");
+        report.detail().table(table);
+        let differ = of.different();
+        if !differ.is_empty() {
+            let table = parameter_table(differ.into_iter().take(FEW), &names);
+            report.terminal().line("");
+            report.terminal().table(table);
+        }
+    } else if let Some(table) = parameters.clone() {
+        report.terminal().line("");
+        report.terminal().table(table);
+    }
+    for table in apart() {
+        report.detail().line("");
+        report.detail().table(table);
     }
     if let Some(tried) = &of.tried {
         let errors = error_table(tried, logs);
@@ -145,16 +165,19 @@ fn words(of: &Compared) -> String {
 
 const LETTERS: [&str; 2] = ["A", "B"];
 
-fn key(name: &str, joint: Option<&str>) -> String {
+pub(super) fn key(name: &str, joint: Option<&str>) -> String {
     match joint {
         Some(joint) => format!("{} of {}", escape(name), escape(joint)),
         None => escape(name),
     }
 }
 
-/// Parameters that both have.
-fn parameter_table(of: &Compared) -> Table {
-    let joints = of.table.parameters.iter().any(|p| p.joint.is_some());
+/// Parameters that both have; `names` are those of A and B.
+pub(super) fn parameter_table<'a>(
+    parameters: impl Iterator<Item = &'a ParameterPair> + Clone,
+    names: &[String; 2],
+) -> Table {
+    let joints = parameters.clone().any(|p| p.joint.is_some());
     let mut columns = vec![("parameter", Align::Left)];
     if joints {
         columns.insert(0, ("joint", Align::Left));
@@ -169,10 +192,9 @@ fn parameter_table(of: &Compared) -> Table {
     ]);
     let mut table = Table::new(&columns).caption(&format!(
         "parameters: A is {}, B is {}; B - A in standard deviations of the difference",
-        of.name(0),
-        of.name(1)
+        names[0], names[1]
     ));
-    for p in &of.table.parameters {
+    for p in parameters {
         let cells = |e: &ParameterEstimate| {
             let (value, std) = number::value_and_std(e.value, e.std.unwrap_or(f64::NAN));
             [value, std]
@@ -194,13 +216,19 @@ fn parameter_table(of: &Compared) -> Table {
     table
 }
 
-/// Parameters of one model alone; none where there are none.
-fn apart_table(of: &Compared, side: usize) -> Option<Table> {
-    let only: &[Apart] = [&of.table.only_in_a, &of.table.only_in_b][side];
+/// Parameters that one side has alone, a table of each side that has some.
+pub(super) fn apart_tables(of: &SideBySide, names: &[String; 2]) -> impl Iterator<Item = Table> {
+    let only = [&of.only_in_a, &of.only_in_b];
+    let sides = LETTERS.iter().zip(names).zip(only);
+    let tables = sides.filter_map(|((letter, name), only)| apart_table(only, letter, name));
+    tables.collect::<Vec<_>>().into_iter()
+}
+
+fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
     if only.is_empty() {
         return None;
     }
-    let caption = format!("only in {}, {}", LETTERS[side], of.name(side));
+    let caption = format!("only in {letter}, {name}");
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("parameter", Align::Left),
@@ -230,7 +258,7 @@ fn error_table(tried: &Tried, logs: &str) -> Table {
         ("A", Align::Decimal),
         ("B", Align::Decimal),
         ("B - A", Align::Decimal),
-        ("its 95 %", Align::Right),
+        ("95 % CI", Align::Right),
         ("rms A", Align::Decimal),
         ("rms B", Align::Decimal),
         ("unit", Align::Left),
@@ -298,8 +326,8 @@ fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
     for (letter, side) in ["A", "B"].iter().zip(&of.sides) {
         let made_from = &side.given.file.provenance.inputs;
         let known = |i: &&Provenance| {
-            let mut made = made_from.iter().filter(|m| m.samples > 0);
-            made.any(|m| m.sha256 == i.sha256)
+            let mut made = made_from.iter().filter(|m| m.made());
+            made.any(|m| m.shares_rows(i))
         };
         let names: Vec<String> = inputs
             .iter()
@@ -309,7 +337,7 @@ fn used_before(page: &mut Writer, of: &Compared, inputs: &[Provenance]) {
         if !names.is_empty() {
             page.verdict(
                 &format!(
-                    "{} was used to make {letter}, unless the spans are apart: it favours {letter}.",
+                    "{} was used to make {letter}: it favours {letter}.",
                     names.join(", ")
                 ),
                 false,

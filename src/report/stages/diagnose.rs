@@ -1,5 +1,6 @@
 //! The report of `diagnose`.
 
+use super::first_screen;
 use crate::config::ModelFile;
 use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, Turn};
 use crate::identify::{
@@ -11,7 +12,9 @@ use crate::number;
 use crate::report::figure::ResidualFigure;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::sections::{
+    Look, effects, fit, friction, parameters, provenance, residual, torque,
+};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 
@@ -32,15 +35,11 @@ pub struct Diagnose<'a> {
 /// The effects, their numbers, what is left, and the errors before and after.
 pub fn diagnose(of: &Diagnose) -> Report {
     let mut report = Report::new(&format!("Diagnosis of {}", escape(&of.given.name)));
-    told(
-        &mut report.terminal(),
-        of.machine,
-        of.found,
-        &of.machine.name,
-    );
     let (text, good) = words(of.machine, of.found);
+    report.everywhere().verdict(&text, good);
+    told(&mut report.terminal(), of.machine, of.found);
     let mut page = report.page();
-    page.verdict(&text, good);
+    first_screen::show(&mut page, of.machine, of.found);
     errors(&mut page, of.machine, of.found);
     report
 }
@@ -94,25 +93,14 @@ pub(crate) fn at_fault(fault: &DataFault) -> String {
     format!("The data are at fault ({}): {}.", fault.kind, fault.effect)
 }
 
-/// The diagnosis for a terminal; `name` names the model.
-pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed, name: &str) {
+/// The errors and the effects for a terminal.
+pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     let d = &found.diagnosis;
     let robot = &machine.robot;
-    match found.verdict() {
-        DiagnosisVerdict::EffectsFound => terminal.line(&format!("{name} lacks:")),
-        DiagnosisVerdict::NothingMissing => {
-            terminal.line(&nothing_missing(d, &format!(" in {name}")));
-        }
-        _ if d.steps.is_empty() => terminal.line(&format!(
-            "{name} leaves a residual above the noise that no known effect explains."
-        )),
-        _ => terminal.verdict(
-            &format!(
-                "{name} leaves a residual above the noise that no known effect explains. What \
-                 comes near to it was added, and lowers the error:"
-            ),
-            false,
-        ),
+    terminal.line("");
+    terminal.table(before_and_after(machine, d));
+    if !d.steps.is_empty() {
+        terminal.line("");
     }
     for (i, step) in d.steps.iter().enumerate() {
         step_told(terminal, machine, found, (i + 1, step));
@@ -121,6 +109,7 @@ pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed, nam
         terminal.note("  ", &path, 4);
     }
     terminal.list(doubts(machine, found));
+    terminal.note("  ", &first_screen::next(machine, found), 4);
     for e in &d.disturbances {
         let told = format!(
             "cut out: {:.2}..{:.2} s of {}, a disturbance on {} ({:.0} times the usual squared \
@@ -133,7 +122,6 @@ pub fn told(terminal: &mut Writer, machine: &LoggedRobot, found: &Diagnosed, nam
         );
         terminal.note("  ", &told, 4);
     }
-    terminal.table(before_and_after(machine, d));
 }
 
 /// One effect that was added, for a terminal.
@@ -196,12 +184,12 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
         ("joint", Align::Left),
         ("fitted", Align::Decimal),
         ("after", Align::Decimal),
-        ("unseen", Align::Decimal),
+        ("held-out", Align::Decimal),
         ("after", Align::Decimal),
-        ("its 95 %", Align::Right),
+        ("95 % CI", Align::Right),
         ("above noise", Align::Decimal),
     ])
-    .caption("relative torque error [%] on fitted and on unseen data, before and after");
+    .caption("relative torque error [%] on fitted and on held-out data, before and after");
     let hundred = number::hundredths;
     let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
     for (j, joint) in machine.robot.joint_names().iter().enumerate() {
@@ -224,18 +212,18 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
     table
 }
 
-/// Nothing is missing, or nothing that matters: in the model called so.
-fn nothing_missing(d: &Diagnosis, model: &str) -> String {
+/// Nothing is missing, or nothing that matters.
+fn nothing_missing(d: &Diagnosis) -> String {
     match d.remainder().next() {
-        None => format!("Nothing is missing{model}: what is left of the torque is noise."),
-        Some(_) => format!("Nothing that matters is missing{model}."),
+        None => "Nothing is missing: what is left of the torque is noise.".to_owned(),
+        Some(_) => "Nothing that matters is missing.".to_owned(),
     }
 }
 
 /// Most candidates of a remainder that are named.
 const NAMED: usize = 3;
 
-/// Why what was found may stand in for something else, and what else is no chance; nothing where only noise
+/// Why what was found is an approximation, and what else is significant; nothing where only noise
 /// is left.
 fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let d = &found.diagnosis;
@@ -250,8 +238,8 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let mut out = Vec::new();
     if !open.is_empty() && !d.steps.is_empty() {
         out.push(format!(
-            "structure is left on {}: what was found lowers the error, and may stand in for what no \
-             known effect explains",
+            "the residual of {} is not noise yet: treat the effects above as approximations, for the cause may be \
+             one that no known effect describes",
             open.join(", ")
         ));
     }
@@ -270,10 +258,10 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     if !names.is_empty() {
         let doubt = match d.steps.is_empty() {
             true => "",
-            false => "; what was found may not be quite what is there",
+            false => "; treat the effects above as approximations",
         };
         out.push(format!(
-            "not added, and still no chance: {}{doubt}",
+            "significant, too small to add: {}{doubt}",
             names.join(", ")
         ));
     }
@@ -359,15 +347,19 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             let mut text = format!("The model lacks: {}.", titles.join("; "));
             if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
                 text += &format!(
-                    " With it the error on data that decided nothing goes from {} to {}, as the \
-                     mean over the joints.",
+                    " {} the held-out error goes from {} to {}, as the mean over \
+                     the joints.",
+                    match titles.as_slice() {
+                        [_] => "With it",
+                        _ => "With them",
+                    },
                     number::percent(before.overall.mean_relative_error),
                     number::percent(after.overall.mean_relative_error)
                 );
             }
             (text, true)
         }
-        DiagnosisVerdict::NothingMissing => (nothing_missing(d, ""), true),
+        DiagnosisVerdict::NothingMissing => (nothing_missing(d), true),
         _ => {
             let mut text =
                 "A residual above the noise is left that no known effect explains.".to_owned();
@@ -402,11 +394,26 @@ pub fn sections(
         page.paragraph(&path);
     }
     page.list(doubts(machine, found));
-    // logs that decided nothing, where there are any
+    // held-out logs, where there are any
     let all: Vec<usize> = (0..look.names.len()).collect();
     let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
     let shown = if others.is_empty() { fitted } else { others };
     let names: Vec<&str> = shown.iter().map(|log| look.names[*log].as_str()).collect();
+    let data = match others.is_empty() {
+        true => "the fitted data",
+        false => "held-out data",
+    };
+    let added = d.steps.iter().map(|step| {
+        let would = match step.alternatives.is_empty() {
+            true => String::new(),
+            false => {
+                let effect = &d.model.effects[step.effect];
+                format!("To tell it from others: {}.", effect.law.entry.separate_by)
+            }
+        };
+        (step.effect, would)
+    });
+    effects::cards(page, &look, &d.model, added, (shown, data))?;
     let after = Drawn {
         names: ["after", "residual after"],
         styles: [TraceStyle::Model, TraceStyle::After],
@@ -501,9 +508,9 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             "joint",
             "fitted, before",
             "after",
-            "unseen, before",
+            "held-out, before",
             "after",
-            "95 % of it",
+            "95 % CI",
             "rms after",
             "torque power left above noise",
         ],

@@ -21,18 +21,26 @@ pub struct Friction<'a> {
     pub logs: &'a [String],
 }
 
-/// The laws, and the verdict on them.
+/// Joints whose laws a screen has room for.
+const FEW: usize = 2;
+
+/// The verdict, how the filter went, and the laws.
 pub fn friction(of: &Friction) -> Report {
     let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
     let mut report = Report::new(&format!("Friction from {}", names.join(", ")));
-    for joint in &of.found.joints {
-        report.terminal().table(law(of.machine, joint));
-        report.terminal().line("");
-    }
-    let mut page = report.page();
     let (text, good) = words(of);
-    page.verdict(&text, good);
-    filter(&mut page, of);
+    report.everywhere().verdict(&text, good);
+    report.terminal().line("");
+    filter(&mut report.everywhere(), of);
+    for joint in &of.found.joints {
+        let mut laws = match of.found.joints.len() <= FEW {
+            true => report.terminal(),
+            false => report.detail(),
+        };
+        laws.line("");
+        laws.table(law(of.machine, joint));
+    }
+    report.terminal().line("");
     report
 }
 
@@ -137,19 +145,17 @@ fn filter(page: &mut Writer, of: &Friction) {
                 number::significant(e.nis.lower_95, 3),
                 number::significant(e.nis.upper_95, 3)
             ),
-            e.samples.to_string(),
         ]
     };
     page.rows(
-        "the filter, joint by joint (NIS: normalised innovations squared, 1 where all is modelled)",
+        "relative error of the fit, and normalised innovations squared (NIS, 1 is ideal)",
         &[
             "joint",
-            "relative error",
+            "error",
             "residual rms",
             "speeds covered",
             "NIS",
-            "its 95 % bounds",
-            "samples",
+            "95 % bounds",
         ],
         of.found.joints.iter().map(row).collect(),
     );

@@ -1,6 +1,6 @@
 //! The report of `identify`: the whole campaign.
 
-use super::{diagnose, friction as filter, lsq, validate};
+use super::{diagnose, first_screen, friction as filter, lsq, validate};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::identify::{Campaigned, DataFault, DiagnoseEnd, Diagnosed, LoggedRobot};
@@ -20,7 +20,7 @@ pub struct Identify<'a> {
     /// Name of the campaign.
     pub campaign: &'a str,
     pub found: &'a Campaigned,
-    /// Names of the logs that decided nothing.
+    /// Names of the held-out logs.
     pub unseen: &'a [String],
     /// The true value of a parameter, where it is known.
     pub truth: &'a dyn Fn(&Parameter) -> Option<f64>,
@@ -76,7 +76,7 @@ impl Identify<'_> {
                 page.verdict(&declared, good);
             }
             None => page.verdict(
-                "There is no validation log: the error on unseen data is not known.",
+                "There is no validation log: the held-out error is not known.",
                 false,
             ),
         }
@@ -87,31 +87,37 @@ impl Identify<'_> {
 pub fn identify(of: &Identify) -> Report {
     let (machine, found) = (of.machine, of.found);
     let mut report = Report::new(&format!("Identification: {}", escape(of.campaign)));
-    let mut terminal = report.terminal();
-    terminal.table(beside_truth(of));
-    terminal.line("");
-    lsq::fit_quality(&mut terminal, &found.dynamics);
-    terminal.line("");
-    match &found.validated {
-        None => terminal.line("no validation log: the errors on unseen data are not known"),
-        Some(validated) => {
-            let caption = format!("torque on unseen data ({})", of.unseen.join(", "));
-            validate::told(&mut terminal, &validated.validation, &caption);
-        }
-    }
-    terminal.line("");
-    if let Some(fault) = of.fault() {
-        diagnose::fault_told(&mut terminal, fault);
-    }
+    of.verdicts(&mut report.everywhere());
     if let Some(diagnosed) = of.diagnosed() {
-        diagnose::told(&mut terminal, machine, diagnosed, "model.toml");
+        diagnose::told(&mut report.terminal(), machine, diagnosed);
     }
+    if let Some(validated) = &found.validated {
+        let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
+        let validation = &validated.validation;
+        let mut rest = match of.diagnosed() {
+            // the table of the diagnosis has these errors
+            Some(_) => report.detail(),
+            None => report.terminal(),
+        };
+        rest.line("");
+        validate::told(&mut rest, validation, &caption);
+        validate::overall(&mut report.detail(), validation);
+    }
+    let mut detail = report.detail();
+    detail.line("");
+    detail.table(beside_truth(of));
+    detail.line("");
+    lsq::condition(&mut detail, &found.dynamics);
+    lsq::fit_quality(&mut detail, &found.dynamics);
+    report.terminal().line("");
     let mut page = report.page();
-    of.verdicts(&mut page);
     match (of.diagnosed(), &found.validated) {
-        (Some(diagnosed), _) => diagnose::errors(&mut page, machine, diagnosed),
+        (Some(diagnosed), _) => {
+            first_screen::show(&mut page, machine, diagnosed);
+            diagnose::errors(&mut page, machine, diagnosed);
+        }
         (None, Some(validated)) => {
-            let caption = "errors of the reconstructed torque on unseen data";
+            let caption = "errors of the reconstructed torque on held-out data";
             validate::errors(&mut page, &validated.validation, caption);
         }
         (None, None) => lsq::residuals(&mut page, &found.dynamics),

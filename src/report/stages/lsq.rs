@@ -26,23 +26,33 @@ pub struct Lsq<'a> {
     pub logs: &'a [String],
 }
 
-/// The parameters, the quality of the fit, and the verdict.
+/// Parameters that a screen has room for.
+const FEW: usize = 8;
+
+/// The verdict, the residual of the fit, the parameters and the quality of the fit.
 pub fn lsq(of: &Lsq) -> Report {
     let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
     let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
-    let mut terminal = report.terminal();
-    gains(&mut terminal, &of.found.gains);
-    fitted(&mut terminal, of.found);
-    groupings(&mut terminal, of.found);
-    known_friction(&mut terminal, &of.found.friction);
-    terminal.line("");
-    fit_quality(&mut terminal, of.found);
+    let (text, good) = parameters::tally(of.file);
+    report.everywhere().verdict(&format!("{text}."), good);
+    report.terminal().line("");
+    gains(&mut report.terminal(), &of.found.gains);
+    residuals(&mut report.terminal(), of.found);
+    let mut parameters = match of.found.unknowns.len() <= FEW {
+        true => report.terminal(),
+        false => report.detail(),
+    };
+    parameters.line("");
+    fitted(&mut parameters, of.found);
+    groupings(&mut parameters, of.found);
+    known_friction(&mut report.detail(), &of.found.friction);
+    report.terminal().line("");
+    condition(&mut report.terminal(), of.found);
+    fit_quality(&mut report.detail(), of.found);
     if let Some(links) = &of.found.consistent {
-        consistent(&mut terminal, links);
+        consistent(&mut report.terminal(), links);
     }
     let mut page = report.page();
-    let (text, good) = parameters::tally(of.file);
-    page.verdict(&format!("{text}."), good);
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
     residuals(&mut page, of.found);
@@ -84,22 +94,26 @@ pub fn pictures(
 }
 
 /// The residual of the fit, joint by joint.
-pub fn residuals(page: &mut Writer, found: &IdentifiedDynamics) {
-    let rows = found.joints.iter().zip(&found.fit.torque_rms);
-    let rows = rows.map(|(joint, rms)| {
-        let torque = |v: f64| format!("{} {}", number::significant(v, 3), joint.unit);
-        vec![
-            joint.joint.clone(),
-            number::percent(joint.relative_error),
-            torque(joint.rmse),
-            torque(*rms),
-        ]
-    });
-    page.rows(
-        "residual of the fit, on the logs that were fitted",
-        &["joint", "relative error", "residual rms", "torque rms"],
-        rows.collect(),
-    );
+pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics) {
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("relative error", Align::Decimal),
+        ("residual rms", Align::Decimal),
+        ("torque rms", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption("residual of the fit, on the logs that were fitted");
+    for (joint, rms) in found.joints.iter().zip(&found.fit.torque_rms) {
+        let torque = |v: f64| number::significant(v, 3);
+        table.row([
+            joint.joint.as_str(),
+            &number::percent(joint.relative_error),
+            &torque(joint.rmse),
+            &torque(*rms),
+            joint.unit,
+        ]);
+    }
+    writer.table(table);
 }
 
 /// Gains of the torque channels, where they were fitted.
@@ -203,12 +217,12 @@ fn groupings(terminal: &mut Writer, found: &IdentifiedDynamics) {
     }
 }
 
-/// Condition, rank, effective sample size and residual of the fit, and what is essential.
-pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
+/// Condition, rank and effective sample size of the fit.
+pub(crate) fn condition(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let fit = &found.fit;
     let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
     terminal.paragraph(&format!(
-        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, worth {:.0} independent ones",
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, effective sample size {:.0}",
         condition(fit.condition.raw),
         condition(fit.condition.normalised),
         fit.rank,
@@ -217,15 +231,10 @@ pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
         fit.effective_rows,
     ));
     open_directions(terminal, found);
-    let errors = found.joints.iter().map(|e| {
-        let (error, rmse) = (
-            number::percent(e.relative_error),
-            number::significant(e.rmse, 3),
-        );
-        unbroken(&format!("{} {error} ({rmse} {})", e.joint, e.unit))
-    });
-    let errors: Vec<String> = errors.collect();
-    terminal.paragraph(&format!("residual of the fit: {}", errors.join(", ")));
+}
+
+/// How the fit came about, and which parameters are significant.
+pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
     cutoffs(terminal, found);
     account(terminal, &found.account);
     let alone = found.essential.joints.iter();
@@ -237,7 +246,7 @@ pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
         ))
     });
     terminal.paragraph(&format!(
-        "{} of {} parameters are essential; residual with them alone: {}",
+        "{} of {} parameters are significant (F test, 1 %); residual with them alone: {}",
         found.essential.count,
         found.unknowns.len(),
         alone.collect::<Vec<_>>().join(", ")
@@ -267,8 +276,8 @@ fn cutoffs(terminal: &mut Writer, found: &IdentifiedDynamics) {
     }
 }
 
-/// What rank and verdicts say together, where a parameter is called not identifiable: that no torque
-/// tells of it, or that what tells of it drowns in the noise.
+/// What rank and verdicts say together, where a parameter is called not identifiable: that the
+/// motion does not excite it, or that the noise is larger than its torque.
 fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
     let unknowns = found.unknowns.iter();
     let open = unknowns.filter(|u| u.verdict == Verdict::NotIdentifiable);
@@ -277,17 +286,15 @@ fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
         return;
     }
     let missing = found.unknowns.len().saturating_sub(found.fit.rank);
-    let noise = format!(
-        "a standard deviation above {:.0} % of the value",
-        100.0 * WEAK
-    );
+    let noise = format!("a standard deviation above {:.0} %", 100.0 * WEAK);
     terminal.paragraph(&match missing {
         0 => format!(
-            "the torques tell of every combination; {all} not-identifiable are so for their noise, with {noise}"
+            "all {} base parameters are excited; {all} have {noise}",
+            found.unknowns.len()
         ),
         _ => format!(
-            "the torques tell nothing of {missing} combinations; the {all} not-identifiable are in these, or have \
-             {noise}"
+            "{missing} combinations of parameters are not excited; the {all} not-identifiable are in these, or \
+             have {noise}"
         ),
     });
 }

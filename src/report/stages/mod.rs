@@ -3,7 +3,9 @@
 
 pub mod compare;
 pub mod diagnose;
+pub mod diff;
 pub mod excite;
+mod first_screen;
 pub mod friction;
 pub mod identify;
 pub mod inspect;

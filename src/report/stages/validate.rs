@@ -38,11 +38,13 @@ pub fn validate(of: &Validate) -> Report {
     ));
     let logs = of.logs.join(", ");
     let caption = format!("torque of {logs} by {}", of.machine.name);
-    told(&mut report.terminal(), validation, &caption);
-    let mut page = report.page();
     let (text, good) = words(validation, of.limit, &title);
-    page.verdict(&text, good);
-    used_before(&mut page, of.file, &of.found.inputs);
+    report.everywhere().verdict(&text, good);
+    used_before(&mut report.everywhere(), of.file, &of.found.inputs);
+    report.terminal().line("");
+    told(&mut report.terminal(), validation, &caption);
+    overall(&mut report.detail(), validation);
+    let mut page = report.page();
     errors(&mut page, validation, "errors of the reconstructed torque");
     report
 }
@@ -99,6 +101,15 @@ fn escaped(names: &[String]) -> String {
 pub fn told(terminal: &mut Writer, validation: &Validation, caption: &str) {
     let joints = &validation.joints;
     terminal.table(summary::torque_errors(caption, joints));
+    if let Some(text) = at_rest(validation) {
+        terminal.line("");
+        terminal.paragraph(&text);
+    }
+}
+
+/// Errors over all joints and before the parallel filter, for a terminal that shows everything.
+pub fn overall(terminal: &mut Writer, validation: &Validation) {
+    let joints = &validation.joints;
     terminal.line("");
     let raw = joints.iter().map(|e| {
         let error = number::percent(e.relative_error_raw);
@@ -114,9 +125,6 @@ pub fn told(terminal: &mut Writer, validation: &Validation, caption: &str) {
         pooled.unwrap_or_default(),
         raw.collect::<Vec<_>>().join(", ")
     ));
-    if let Some(text) = at_rest(validation) {
-        terminal.paragraph(&text);
-    }
 }
 
 /// The errors of moving and of resting joints apart, where one rests in a hundredth of its rows.
@@ -230,11 +238,7 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
 /// Logs that the model was made from are no test of it.
 fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
     let made_from = &file.provenance.inputs;
-    let known = |i: &&Provenance| {
-        made_from
-            .iter()
-            .any(|m| m.sha256 == i.sha256 && m.samples > 0)
-    };
+    let known = |i: &&Provenance| made_from.iter().any(|m| m.made() && m.shares_rows(i));
     let names: Vec<String> = inputs
         .iter()
         .filter(known)
@@ -243,8 +247,8 @@ fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
     if !names.is_empty() {
         page.verdict(
             &format!(
-                "{} was used to make this model (the checksum is the same), unless the spans are \
-                 apart: its error is no test of it.",
+                "{} was used to make this model (the checksum is the same): its error is no test \
+                 of the model.",
                 names.join(", ")
             ),
             false,

@@ -13,7 +13,7 @@ const LONGEST: usize = 1 << 20;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum DefinitionError {
     /// The text is no `.msg` definition.
-    #[error("line {line} of the definition of {message} is none: `{text}`")]
+    #[error("invalid field at line {line} of {message}: `{text}`")]
     Line {
         /// Message in which it stands.
         message: String,
@@ -165,7 +165,7 @@ impl Definition {
     /// `text` may be empty where the type is one that is known here.
     ///
     /// # Errors
-    /// [`DefinitionError`]: a line that is none, a type that is not defined, an endless nesting.
+    /// [`DefinitionError`]: a line that is no field, a type that is not defined, an endless nesting.
     pub(super) fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         if text.len() > LONGEST {
             return Err(DefinitionError::Long { bytes: text.len() });

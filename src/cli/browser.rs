@@ -1,0 +1,32 @@
+//! `--open`: the report that was written, shown in a browser.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::CliError;
+
+/// Opens a page with the program that $BROWSER names, else with the system's own; does not wait for it.
+///
+/// # Errors
+/// No such program.
+pub(super) fn open(page: &Path) -> Result<(), CliError> {
+    let mut command = match std::env::var_os("BROWSER").filter(|name| !name.is_empty()) {
+        Some(name) => Command::new(name),
+        None if cfg!(target_os = "macos") => Command::new("open"),
+        None if cfg!(target_os = "windows") => Command::new("explorer"),
+        None => Command::new("xdg-open"),
+    };
+    let begun = command
+        .arg(page)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    begun.map(drop).map_err(|error| {
+        CliError::output(format!(
+            "cannot open {} in a browser: {error}",
+            page.display()
+        ))
+        .hint("open it by hand, or name a browser in the environment variable BROWSER")
+    })
+}

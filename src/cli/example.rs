@@ -1,0 +1,309 @@
+//! `cft-ident example`: a small measured log with its robot file, so that everything can be tried.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CliError, Context, Outcome, campaign};
+use crate::config;
+use crate::log::unpacked;
+use crate::report::json::Document;
+use crate::report::table::{Align, Table};
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident example
+  cft-ident example ur10
+  cft-ident example cft -o campaign";
+
+/// Write a small log of a real machine with its robot file; without NAME, list what there is.
+///
+/// The logs are published ones, cut where they are long; their licence is written beside them. `cft`
+/// is simulated. A file that is there already and says something else stays, and is an error.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Machine
+    #[arg(value_name = "NAME")]
+    pub name: Option<Machine>,
+    /// Folder to write into [default: the name]
+    #[arg(short, long, value_name = "DIR", requires = "name")]
+    pub output: Option<PathBuf>,
+}
+
+/// A machine whose log comes with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Machine {
+    /// UR10, six joints, 125 Hz, as CSV and as a recording of ROS 2
+    Ur10,
+    /// Staubli TX40, six joints, 5 kHz
+    Tx40,
+    /// One motor with cogging, current in A, 1 kHz
+    Bldc,
+    /// The built-in campaign of the CFT robot, simulated
+    Cft,
+}
+
+/// A file that the program carries.
+enum Content {
+    Plain(&'static [u8]),
+    /// Compressed with zstd.
+    Packed(&'static [u8]),
+    /// A robot file that comes with the program.
+    Config(&'static str),
+}
+
+/// What is known of a measured machine.
+struct Measured {
+    what: &'static str,
+    licence: &'static str,
+    origin: &'static str,
+    files: &'static [(&'static str, Content)],
+    /// Commands to go on with; `{}` is the folder.
+    next: &'static str,
+}
+
+macro_rules! carried {
+    ($name:literal) => {
+        include_bytes!(concat!("../../data/", $name))
+    };
+}
+
+static UR10: Measured = Measured {
+    what: "UR10, 6 joints, 27.5 s at 125 Hz; CSV, MCAP, URDF",
+    licence: "BSD-3-Clause",
+    origin: "A measured motion of a UR10: /joint_states at 125 Hz, efforts of the controller [Nm].\n\
+        Source: repository unisa-acg/inverse-dynamics-solver, commit 41e196de, BSD-3-Clause (LICENSE).\n\
+        ur10.mcap holds its messages; ur10.csv the same numbers; ur10.urdf its ur10_robot.urdf.\n\
+        ur10.toml is the robot file.\n",
+    files: &[
+        ("ur10.csv", Content::Packed(carried!("ur10/ur10.csv.zst"))),
+        ("ur10.mcap", Content::Plain(carried!("ur10/ur10.mcap"))),
+        ("ur10.urdf", Content::Plain(carried!("ur10/ur10.urdf"))),
+        ("ur10.toml", Content::Config("configs/ur10.toml")),
+        ("LICENSE", Content::Plain(carried!("ur10/LICENSE"))),
+    ],
+    next: "cft-ident lsq {}/ur10.csv@0..70% -r {}/ur10.toml -o model.toml\n\
+        cft-ident validate {}/ur10.csv@70..100% -m model.toml --report report.html\n",
+};
+
+static TX40: Measured = Measured {
+    what: "Staubli TX40, 6 joints, 6.3 s at 5 kHz; CSV, URDF",
+    licence: "Apache-2.0",
+    origin: "A measured motion of a Staubli TX40, joint side [rad, Nm], at 5 kHz.\n\
+        Source: repository thanhndv212/figaroh-examples, commit c0b5c7f0, examples/staubli_TX40,\n\
+        Apache-2.0 (LICENSE, NOTICE).\n\
+        Changed: positions and torques are converted from the motors' side to the joints; only the first\n\
+        70 % of the record, for joints 5 and 6 hardly move in the rest.\n\
+        tx40.toml is the robot file; the coupling of joints 5 and 6 is not declared in it.\n",
+    files: &[
+        ("tx40.csv", Content::Packed(carried!("tx40/tx40.csv.zst"))),
+        ("tx40.urdf", Content::Plain(carried!("tx40/tx40.urdf"))),
+        ("tx40.toml", Content::Config("configs/tx40.toml")),
+        (
+            "LICENSE",
+            Content::Plain(include_bytes!("../../LICENSE-APACHE")),
+        ),
+        ("NOTICE", Content::Plain(carried!("tx40/NOTICE"))),
+    ],
+    next: "cft-ident lsq {}/tx40.csv -r {}/tx40.toml -o model.toml\n\
+        cft-ident diagnose {}/tx40.csv -m model.toml -o refined.toml --report report.html\n",
+};
+
+static BLDC: Measured = Measured {
+    what: "one motor with cogging, 30 s at 1 kHz; CSV",
+    licence: "BSD-3-Clause",
+    origin: "A measured BLDC motor at constant speeds: position [rad] and current [A] at about 1 kHz. The\n\
+        compensation of its cogging is switched on after half of the log.\n\
+        Source: repository heitor-andrade/laas_anti_cogging, commit eb0391d7, BSD-3-Clause (LICENSE).\n\
+        bldc.toml is the robot file.\n",
+    files: &[
+        ("bldc.csv", Content::Packed(carried!("bldc/bldc.csv.zst"))),
+        ("bldc.toml", Content::Config("configs/bldc.toml")),
+        ("LICENSE", Content::Plain(carried!("bldc/LICENSE"))),
+    ],
+    next: "cft-ident lsq {}/bldc.csv@15.2..23s -r {}/bldc.toml -o model.toml\n\
+        cft-ident diagnose {}/bldc.csv@15.2..23s -m model.toml \\\n  \
+        --holdout {}/bldc.csv@23..29.5s --report report.html\n",
+};
+
+/// What is said of the simulated one.
+const CFT: &str = "CFT robot, 4 joints, simulated; a campaign of 6 logs";
+const CFT_NEXT: &str = "cft-ident identify {}/campaign.toml -o run\n";
+/// Seed of its simulation: that of `identify`.
+const SEED: u64 = 1;
+
+impl Machine {
+    fn measured(self) -> Option<&'static Measured> {
+        match self {
+            Machine::Ur10 => Some(&UR10),
+            Machine::Tx40 => Some(&TX40),
+            Machine::Bldc => Some(&BLDC),
+            Machine::Cft => None,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Machine::Ur10 => "ur10",
+            Machine::Tx40 => "tx40",
+            Machine::Bldc => "bldc",
+            Machine::Cft => "cft",
+        }
+    }
+
+    fn known(self) -> Known {
+        Known {
+            name: self.name(),
+            what: self.measured().map_or(CFT, |machine| machine.what),
+            licence: self.measured().map(|machine| machine.licence),
+        }
+    }
+}
+
+/// An example that can be written.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Known {
+    name: &'static str,
+    /// The machine and its files.
+    what: &'static str,
+    /// Licence of its data; null of a simulation.
+    licence: Option<&'static str>,
+}
+
+/// Examples that there are, and what was written of the one that was asked for.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Examples {
+    examples: Vec<Known>,
+    /// Null where none was asked for.
+    written: Option<Written>,
+}
+
+/// An example in a folder.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Written {
+    name: &'static str,
+    /// Folder as it was named.
+    folder: String,
+    files: Vec<String>,
+    /// Commands to go on with, from the folder that the command ran in.
+    next: Vec<String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder that cannot be made or written to, or holds other files of these names.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let mut text;
+    let mut written = None;
+    match args.name {
+        None => text = list(),
+        Some(machine) => {
+            let folder = match &args.output {
+                Some(folder) => folder.clone(),
+                None => PathBuf::from(machine.name()),
+            };
+            let files = write(machine, &folder, context)?;
+            let shown = folder.display().to_string();
+            let next = machine.measured().map_or(CFT_NEXT, |machine| machine.next);
+            let next = next.replace("{}", shown.trim_end_matches('/'));
+            text = format!("written to {shown}: {}\n\n", files.join(", "));
+            text += &format!("go on with:\n  {}\n", next.trim_end().replace('\n', "\n  "));
+            written = Some(Written {
+                name: machine.name(),
+                folder: shown,
+                files,
+                next: commands(&next),
+            });
+        }
+    }
+    let examples = Machine::value_variants().iter().map(|m| m.known());
+    let result = Examples {
+        examples: examples.collect(),
+        written,
+    };
+    Ok(Outcome {
+        document: Document::new("example", &[], &[], &result)?,
+        text,
+        missed: Vec::new(),
+    })
+}
+
+fn list() -> String {
+    let mut table = Table::new(&[
+        ("name", Align::Left),
+        ("machine", Align::Left),
+        ("licence", Align::Left),
+    ]);
+    for machine in Machine::value_variants() {
+        let known = machine.known();
+        table.row([known.name, known.what, known.licence.unwrap_or("")]);
+    }
+    format!("{table}\ncft-ident example NAME writes it into the folder NAME\n")
+}
+
+/// Commands, continued lines as one.
+fn commands(next: &str) -> Vec<String> {
+    let whole = next.replace("\\\n  ", "");
+    whole.lines().map(str::to_owned).collect()
+}
+
+fn write(machine: Machine, folder: &Path, context: &Context) -> Result<Vec<String>, CliError> {
+    let unusable = |e: &dyn std::fmt::Display| {
+        CliError::output(format!("cannot write into {}: {e}", folder.display()))
+            .hint("name another folder with -o")
+    };
+    let Some(known) = machine.measured() else {
+        let robot = config::embedded(Path::new(campaign::ROBOT)).unwrap_or_default();
+        stays(&folder.join("robot.toml"), robot.as_bytes())?;
+        context
+            .files()
+            .make_folder(folder)
+            .map_err(|e| unusable(&e))?;
+        let (files, warnings) = campaign::simulate(folder, SEED, context)?;
+        warnings.iter().for_each(|warning| context.warn(warning));
+        return Ok(files);
+    };
+    let mut contents: Vec<(&str, Vec<u8>)> = Vec::with_capacity(known.files.len() + 1);
+    for (name, content) in known.files {
+        let bytes = match content {
+            Content::Plain(bytes) => bytes.to_vec(),
+            Content::Packed(bytes) => unpacked(bytes).map_err(|e| unusable(&e))?,
+            Content::Config(path) => config::embedded(Path::new(path))
+                .unwrap_or_default()
+                .as_bytes()
+                .to_vec(),
+        };
+        contents.push((name, bytes));
+    }
+    contents.push(("README.txt", known.origin.as_bytes().to_vec()));
+    for (name, bytes) in &contents {
+        stays(&folder.join(name), bytes)?;
+    }
+    context
+        .files()
+        .make_folder(folder)
+        .map_err(|e| unusable(&e))?;
+    for (name, bytes) in &contents {
+        context.files().write(&folder.join(name), bytes)?;
+    }
+    Ok(contents
+        .into_iter()
+        .map(|(name, _)| name.to_owned())
+        .collect())
+}
+
+/// A file that is there and says something else is the user's.
+fn stays(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    match std::fs::read(path) {
+        Ok(there) if there != bytes => Err(CliError::output(format!(
+            "{} is there already and is not that of the example",
+            path.display()
+        ))
+        .hint("name another folder with -o, or delete the file")),
+        _ => Ok(()),
+    }
+}
