@@ -81,7 +81,7 @@ pub(crate) fn beyond_chance(
         candidate.placebo_p_value = Some(p);
         if p > limits.false_alarm {
             candidate.reject(&format!(
-                "chance gives as much: p = {p:.3} among all candidates, by placebos"
+                "not significant (corrected p = {p:.3}, by placebos)"
             ));
             continue;
         }
