@@ -1,13 +1,14 @@
 //! Simulations as they are ordered: from robot, model and trajectory files to a log that can be read.
 
 use std::io::Write;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use cft_ident::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident::log::{Block, LogSpec, Reader};
 use cft_ident::simulate::{
-    Ending, Experiment, InitialConditions, Order, SimulateError, SimulatedLog, TruthFile, simulate,
-    simulate_from,
+    Ending, Experiment, InitialConditions, Order, Rows, SimulateError, SimulatedLog, TruthFile,
+    simulate, simulate_from, simulate_rows,
 };
 
 fn robot(name: &str) -> RobotFile {
@@ -376,4 +377,55 @@ fn orders_that_name_what_is_not_there_are_refused() {
     let table = Trajectory::load(Path::new("configs/table3.toml")).expect("embedded");
     let refused = simulate(&order(&dspace, Experiment::Trajectory(&table))).expect_err("outside");
     assert!(refused.to_string().contains("x_c4"), "{refused}");
+}
+
+/// Rows as they were handed on, and how many came at once at most.
+#[derive(Default)]
+struct Taken {
+    header: Vec<String>,
+    values: Vec<f64>,
+    most: usize,
+    calls_left: Option<usize>,
+}
+
+impl Rows for Taken {
+    fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
+        self.header = header.to_vec();
+        self.values.extend_from_slice(values);
+        self.most = self.most.max(values.len() / header.len());
+        match &mut self.calls_left {
+            Some(0) => ControlFlow::Break(()),
+            Some(left) => {
+                *left -= 1;
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Continue(()),
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_handed_on_block_by_block_are_those_of_the_log_in_memory() {
+    // noise that is a share of the run's own, jitter and lost rows: what a block alone does not know
+    let mut text = cft_ident::config::text("configs/cft.toml".as_ref()).unwrap();
+    text = text.replace("[sensors]\n", "[sensors]\njitter = 0.01\ndropouts = 0.05\n");
+    let robot = RobotFile::parse("noisy.toml", &text).expect("robot");
+    let order = order(&robot, Experiment::Usual);
+    let whole = simulate(&order).expect("runs");
+    let mut taken = Taken::default();
+    let known = simulate_rows(&order, None, &mut taken).expect("runs");
+    assert_eq!(taken.header, whole.header);
+    assert_eq!(taken.values, whole.values);
+    assert_eq!(known.truth, whole.truth);
+    assert_eq!(known.limits, whole.limits);
+    assert_eq!(known.saturated, whole.saturated);
+    assert!(taken.most <= 4096 && whole.rows().len() > 4 * 4096, "{}", taken.most);
+
+    let mut stopped = Taken {
+        calls_left: Some(1),
+        ..Taken::default()
+    };
+    let error = simulate_rows(&order, None, &mut stopped).expect_err("stops");
+    assert!(matches!(error, SimulateError::Stopped));
+    assert!(stopped.values.len() < whole.values.len() / 2);
 }

@@ -68,7 +68,7 @@ pub(super) fn simulate(
                 // every experiment has noise of its own
                 seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
             };
-            let simulated = simulate_to(&order, None, &folder.join(log), context)?;
+            let (simulated, _) = simulate_to(&order, None, &folder.join(log), context)?;
             bar.advance(1);
             let named = warnings(&simulated);
             Ok(named.into_iter().map(|w| format!("{log}: {w}")).collect())

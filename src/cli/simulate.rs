@@ -1,5 +1,6 @@
 //! `cft-ident simulate`: a log of the simulated robot, and its truth beside it.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -18,7 +19,7 @@ use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::simulate::effects::EffectValue;
 use crate::simulate::{
-    self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order, SimulatedLog,
+    self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order,
 };
 
 const EXAMPLE: &str = "\
@@ -85,9 +86,6 @@ pub struct Args {
     pub output: PathBuf,
 }
 
-/// Rows between two looks at Ctrl-C.
-const BLOCK: usize = 4096;
-
 /// Simulates, and writes the log and its truth.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let truth_path = truth_beside(&args.output);
@@ -140,15 +138,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let bar = context.progress("simulating", None);
     let initial = initial(args);
-    let simulated = simulate_to(&order, initial.as_ref(), &args.output, context)?;
+    let (simulated, log) = simulate_to(&order, initial.as_ref(), &args.output, context)?;
     drop(bar);
 
     let names = (file_name(&args.output), file_name(&truth_path));
-    let duration = duration(&robot, &simulated);
-    let result = Simulated::of(&simulated, args.seed, duration, &names);
+    let result = Simulated::of(&simulated, args.seed, &log, &names);
     let told = [robot.notes.0.clone(), warnings(&simulated)].concat();
     Ok(Outcome {
-        text: render(&robot, &simulated, duration, &names.0),
+        text: render(&robot, &log, &names.0),
         document: Document::new("simulate", &inputs, &told, &result)?,
         missed: Vec::new(),
     })
@@ -188,14 +185,118 @@ pub(super) fn simulate_to(
     initial: Option<&InitialConditions>,
     path: &Path,
     context: &Context,
-) -> Result<SimulatedLog, CliError> {
+) -> Result<(simulate::Simulated, LogFigures), CliError> {
     context.check()?;
-    let simulated = simulate::simulate_from(order, initial)?;
+    let mut rows = ToFile {
+        path,
+        context,
+        time_factor: order.robot.layout().time.factor,
+        writer: None,
+        figures: LogFigures::default(),
+        failed: None,
+    };
+    let simulated = match simulate::simulate_rows(order, initial, &mut rows) {
+        // why is known better here
+        Err(error) => return Err(rows.failed.unwrap_or(error.into())),
+        Ok(simulated) => simulated,
+    };
     // The log gets its name last: where it stands, its truth stands too.
-    let log = write_log(path, &simulated, context)?;
     write_truth(&truth_beside(path), &simulated, context)?;
-    context.files().add_log(log)?;
-    Ok(simulated)
+    if let Some(log) = rows.writer {
+        context.files().add_log(log)?;
+    }
+    Ok((simulated, rows.figures))
+}
+
+/// Writes rows as they come.
+struct ToFile<'a> {
+    path: &'a Path,
+    context: &'a Context,
+    /// Seconds of one unit of the column of times.
+    time_factor: f64,
+    writer: Option<LogWriter>,
+    figures: LogFigures,
+    failed: Option<CliError>,
+}
+
+impl ToFile<'_> {
+    fn write(&mut self, header: &[String], values: &[f64]) -> Result<(), CliError> {
+        self.context.check()?;
+        let writer = match &mut self.writer {
+            Some(writer) => writer,
+            none => none.insert(LogWriter::create(self.path, header)?),
+        };
+        for row in values.chunks_exact(header.len()) {
+            writer.row(row.iter().copied())?;
+            self.figures.add(header, row, self.time_factor);
+        }
+        Ok(())
+    }
+
+    fn ending(&mut self, result: Result<(), CliError>) -> ControlFlow<()> {
+        match result {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                self.failed = Some(error);
+                ControlFlow::Break(())
+            }
+        }
+    }
+}
+
+impl simulate::Rows for ToFile<'_> {
+    fn goes_on(&mut self) -> ControlFlow<()> {
+        let result = self.context.check();
+        self.ending(result)
+    }
+
+    fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
+        let result = self.write(header, values);
+        self.ending(result)
+    }
+}
+
+/// What is told of a log that is on its way to the file.
+#[derive(Debug, Default)]
+pub(super) struct LogFigures {
+    columns: Vec<ColumnFigures>,
+    rows: usize,
+    first_s: f64,
+    last_s: f64,
+}
+
+/// One column of it.
+#[derive(Debug)]
+struct ColumnFigures {
+    name: String,
+    low: f64,
+    high: f64,
+    squares: f64,
+}
+
+impl LogFigures {
+    fn add(&mut self, header: &[String], row: &[f64], time_factor: f64) {
+        if self.columns.is_empty() {
+            self.columns.extend(header.iter().map(|name| ColumnFigures {
+                name: name.clone(),
+                low: f64::INFINITY,
+                high: f64::NEG_INFINITY,
+                squares: 0.0,
+            }));
+            self.first_s = row[0] * time_factor;
+        }
+        for (column, x) in self.columns.iter_mut().zip(row) {
+            column.low = column.low.min(*x);
+            column.high = column.high.max(*x);
+            column.squares += x * x;
+        }
+        self.last_s = row[0] * time_factor;
+        self.rows += 1;
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.last_s - self.first_s
+    }
 }
 
 /// Volts of a log, to be played back.
@@ -224,22 +325,11 @@ impl Volts {
     }
 }
 
-fn write_log(
+fn write_truth(
     path: &Path,
-    simulated: &SimulatedLog,
+    simulated: &simulate::Simulated,
     context: &Context,
-) -> Result<LogWriter, CliError> {
-    let mut writer = LogWriter::create(path, &simulated.header)?;
-    for (k, row) in simulated.rows().enumerate() {
-        if k % BLOCK == 0 {
-            context.check()?;
-        }
-        writer.row(row.iter().copied())?;
-    }
-    Ok(writer)
-}
-
-fn write_truth(path: &Path, simulated: &SimulatedLog, context: &Context) -> Result<(), CliError> {
+) -> Result<(), CliError> {
     let text = simulated.truth.to_toml().map_err(|error| {
         CliError::output(format!("the truth cannot be expressed in TOML: {error}"))
     })?;
@@ -253,13 +343,6 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Time from the first to the last row [s]; the robot file may log it in another unit.
-fn duration(robot: &RobotFile, simulated: &SimulatedLog) -> f64 {
-    match (simulated.rows().next(), simulated.rows().last()) {
-        (Some(first), Some(last)) => (last[0] - first[0]) * robot.layout().time.factor,
-        _ => 0.0,
-    }
-}
-
 /// A simulated log in numbers.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Simulated<'a> {
@@ -296,9 +379,9 @@ struct Files<'a> {
 
 impl<'a> Simulated<'a> {
     fn of(
-        log: &'a SimulatedLog,
+        log: &'a simulate::Simulated,
         seed: u64,
-        duration_s: f64,
+        figures: &LogFigures,
         (name, truth): &'a (String, String),
     ) -> Self {
         let saturated = log.saturated.iter();
@@ -306,8 +389,8 @@ impl<'a> Simulated<'a> {
             effects: &log.truth.effects,
             parameters: &log.truth.parameters,
             seed,
-            samples: log.rows().len(),
-            duration_s,
+            samples: figures.rows,
+            duration_s: figures.duration_s(),
             ending: log.ending,
             limits_reached: &log.limits,
             saturated: saturated
@@ -321,7 +404,7 @@ impl<'a> Simulated<'a> {
     }
 }
 
-pub(super) fn warnings(simulated: &SimulatedLog) -> Vec<String> {
+pub(super) fn warnings(simulated: &simulate::Simulated) -> Vec<String> {
     let ends = match simulated.ending {
         Ending::StoppedAtLimit => ", and the log ends there",
         Ending::Completed => "",
@@ -341,7 +424,7 @@ pub(super) fn warnings(simulated: &SimulatedLog) -> Vec<String> {
 }
 
 /// Range and root mean square of every channel of the log.
-fn render(robot: &RobotFile, simulated: &SimulatedLog, duration: f64, log: &str) -> String {
+fn render(robot: &RobotFile, figures: &LogFigures, log: &str) -> String {
     let mut table = Table::new(&[
         ("column", Align::Left),
         ("from", Align::Decimal),
@@ -351,8 +434,8 @@ fn render(robot: &RobotFile, simulated: &SimulatedLog, duration: f64, log: &str)
     ])
     .caption(&format!(
         "{log}: {} samples, {} s",
-        simulated.rows().len(),
-        number::significant(duration, 5)
+        figures.rows,
+        number::significant(figures.duration_s(), 5)
     ));
     let layout = robot.layout();
     let parts = [Some(&layout), layout.otherwise.as_deref()];
@@ -361,19 +444,15 @@ fn render(robot: &RobotFile, simulated: &SimulatedLog, duration: f64, log: &str)
         .flatten()
         .flat_map(|part| part.positions.iter().chain(&part.torques))
         .collect();
-    for (j, column) in simulated.header.iter().enumerate() {
-        let Some(channel) = channels.iter().find(|channel| channel.column == *column) else {
+    for column in &figures.columns {
+        let Some(channel) = channels.iter().find(|channel| channel.column == column.name) else {
             continue;
         };
-        let values = || simulated.rows().map(|row| row[j]);
-        let low = values().fold(f64::INFINITY, f64::min);
-        let high = values().fold(f64::NEG_INFINITY, f64::max);
-        let squares: f64 = values().map(|x| x * x).sum();
-        let rms = (squares / simulated.rows().len().max(1) as f64).sqrt();
+        let rms = (column.squares / figures.rows.max(1) as f64).sqrt();
         table.row([
-            column.as_str(),
-            &number::significant(low, 4),
-            &number::significant(high, 4),
+            column.name.as_str(),
+            &number::significant(column.low, 4),
+            &number::significant(column.high, 4),
             &number::significant(rms, 3),
             &channel.unit,
         ]);

@@ -8,6 +8,7 @@
 //! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
 //! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
 //! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
+//! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
@@ -16,6 +17,7 @@
 pub(crate) mod bootstrap;
 pub mod descent;
 pub(crate) mod jacobi;
+pub(crate) mod lanes;
 pub(crate) mod long_run;
 pub mod minimise;
 pub mod rank;

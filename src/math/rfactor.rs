@@ -11,6 +11,7 @@
 use nalgebra::DMatrix;
 
 use super::MathError;
+use super::lanes::widest;
 
 /// Rows folded at once: the block of 13 columns stays in a first-level cache of 32 KiB.
 const BLOCK_ROWS: usize = 256;
@@ -151,6 +152,11 @@ impl RFactor {
 
 /// Annihilates `k` rows of the column-major `block` under the row-major upper `triangle`.
 fn reduce(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
+    widest(|| reflect_all(n, triangle, block, k));
+}
+
+#[inline(always)]
+fn reflect_all(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
     for j in 0..n {
         let (left, right) = block.split_at_mut((j + 1) * BLOCK_ROWS);
         let u = &left[j * BLOCK_ROWS..j * BLOCK_ROWS + k];
@@ -200,6 +206,7 @@ fn reduce(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
 }
 
 /// The reflection of four columns at once: `u` is then read from the cache a quarter as often.
+#[inline(always)]
 fn reflect_four(u: &[f64], columns: [&mut [f64]; 4], r: &mut [f64], u0: f64, inverse_h: f64) {
     let [a, b, c, d] = columns;
     let mut sums = [[0.0_f64; 4]; 4];
@@ -235,6 +242,7 @@ fn reflect_four(u: &[f64], columns: [&mut [f64]; 4], r: &mut [f64], u0: f64, inv
 }
 
 /// Inner product with eight partial sums, which the compiler keeps in vector registers.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0_f64; 8];
     let mut a8 = a.chunks_exact(8);

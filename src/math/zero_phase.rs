@@ -6,6 +6,7 @@
 //! state of its first value.
 
 use super::MathError;
+use super::lanes::widest;
 use super::sos::{Section, Sos};
 
 /// Sections of the highest order that [`Sos`] offers.
@@ -59,8 +60,8 @@ impl ZeroPhase {
         let mut first = 0;
         while first < channels {
             first += match channels - first {
-                8.. => self.run_lanes::<8>(data, channels, first),
-                4.. => self.run_lanes::<4>(data, channels, first),
+                8.. => widest(|| self.run_lanes::<8>(data, channels, first)),
+                4.. => widest(|| self.run_lanes::<4>(data, channels, first)),
                 2.. => self.run_lanes::<2>(data, channels, first),
                 _ => self.run_lanes::<1>(data, channels, first),
             };
@@ -90,6 +91,7 @@ impl ZeroPhase {
     }
 
     /// Both passes over the channels `first..first + L`; returns L.
+    #[inline(always)]
     fn run_lanes<const L: usize>(&self, data: &mut [f64], channels: usize, first: usize) -> usize {
         let samples = data.len() / channels;
         let pad = self.sos.pad_samples();
@@ -139,6 +141,7 @@ struct Cascade<'a, const L: usize> {
 
 impl<'a, const L: usize> Cascade<'a, L> {
     /// The state after a long constant input `x`.
+    #[inline(always)]
     fn settled(filter: &'a ZeroPhase, x: [f64; L]) -> Self {
         let mut state = [[[0.0; L]; 2]; MAX_SECTIONS];
         for (state, steady) in state.iter_mut().zip(&filter.steady) {

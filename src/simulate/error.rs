@@ -109,7 +109,7 @@ pub enum SimulateError {
         name: String,
         source: Box<SimulateError>,
     },
-    /// A log that does not fit into memory.
+    /// A log that is too long, for memory where all of it is wanted at once.
     #[error(
         "{seconds:?} s at {rate_hz:?} Hz are more than the {most} rows that are simulated at once; give at most \
          --seconds {most_s:.0}, and several runs with seeds of their own for more"
@@ -120,6 +120,15 @@ pub enum SimulateError {
         most: usize,
         most_s: f64,
     },
+    /// Rows that wait for their noise need a temporary file.
+    #[error(
+        "the rows of a long run cannot wait in the system's temporary folder: {0}; make room there, or name another \
+         folder in TMPDIR"
+    )]
+    Waiting(#[from] std::io::Error),
+    /// Whoever takes the rows wants no more of them.
+    #[error("the simulation was stopped")]
+    Stopped,
     /// More extra states than the integrator is compiled for.
     #[error(
         "the effects need {states} states of their own and at most {most} are possible; use fewer effects"

@@ -30,6 +30,7 @@ pub mod moving;
 pub mod one_joint;
 pub mod order;
 pub mod plant;
+mod recorder;
 pub mod reference;
 pub mod run;
 pub mod sensors;
@@ -48,7 +49,9 @@ pub use experiment::Experiment;
 pub use joint_friction::SmoothFriction;
 pub use mechanism::Mechanism;
 pub use one_joint::{Mover, OneJointMove};
-pub use order::{InitialConditions, Order, SimulatedLog, simulate, simulate_from};
+pub use order::{
+    InitialConditions, Order, Rows, Simulated, SimulatedLog, simulate, simulate_from, simulate_rows,
+};
 pub use plant::Plant;
 pub use reference::{Frame, Path, Reference};
 pub use run::{Drive, Start, run};

@@ -1,19 +1,23 @@
 //! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
 
+use std::ops::ControlFlow;
+
 use super::SimulateError;
 use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::experiment::{Experiment, SECONDS};
 use super::mechanism::Mechanism;
 use super::plant::Plant;
+use super::recorder::{Recorder, Waiting};
 use super::reference::Path;
-use super::run::{Drive, Start, run};
+use super::run::{Drive, Start, run_in_blocks};
+use super::settings::Settings;
 use super::settings_file;
 use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
 use crate::config::ModelFile;
 use crate::config::robot_file::RobotFile;
-use crate::log::{Channel, Channels};
+use crate::log::{Channel, Channels, Layout};
 
 /// What is asked of the simulator.
 #[derive(Debug, Clone)]
@@ -29,7 +33,17 @@ pub struct Order<'a> {
     pub seed: u64,
 }
 
-/// A simulated log, ready to be written.
+/// What is known of a simulated log beside its rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    pub truth: TruthFile,
+    pub limits: Vec<LimitEvent>,
+    pub ending: Ending,
+    /// Share of the rows at which each motor channel is saturated, by coordinate.
+    pub saturated: Vec<(String, f64)>,
+}
+
+/// A simulated log in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedLog {
     /// Column names.
@@ -49,6 +63,21 @@ impl SimulatedLog {
         self.values.chunks_exact(self.header.len())
     }
 }
+
+/// Takes the rows of a simulated log.
+pub trait Rows {
+    /// Called while the robot moves and no row is ready yet: whether to go on.
+    fn goes_on(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to
+    /// go on.
+    fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()>;
+}
+
+/// Rows that are handed on at once.
+const BLOCK: usize = 4096;
 
 /// Initial conditions of the report's block, in motor coordinates (x_c1..x_c4; the joint of a single
 /// joint).
@@ -93,18 +122,63 @@ pub fn simulate_from(
     order: &Order,
     initial: Option<&InitialConditions>,
 ) -> Result<SimulatedLog, SimulateError> {
+    #[derive(Default)]
+    struct InMemory {
+        header: Vec<String>,
+        values: Vec<f64>,
+    }
+    impl Rows for InMemory {
+        fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
+            if self.header.is_empty() {
+                self.header = header.to_vec();
+            }
+            self.values.extend_from_slice(values);
+            ControlFlow::Continue(())
+        }
+    }
+    let mut rows = InMemory::default();
+    let simulated = run_any(order, initial, &mut rows, true)?;
+    Ok(SimulatedLog {
+        header: rows.header,
+        values: rows.values,
+        truth: simulated.truth,
+        limits: simulated.limits,
+        ending: simulated.ending,
+        saturated: simulated.saturated,
+    })
+}
+
+/// Simulates what is ordered and hands the rows on block by block, so that memory does not grow with the log;
+/// only a log with a fault of the data is simulated as a whole first.
+///
+/// # Errors
+/// As [`simulate`], and [`SimulateError::Stopped`] where the rows are wanted no more.
+pub fn simulate_rows(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+    rows: &mut dyn Rows,
+) -> Result<Simulated, SimulateError> {
+    run_any(order, initial, rows, false)
+}
+
+fn run_any(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+    rows: &mut dyn Rows,
+    in_memory: bool,
+) -> Result<Simulated, SimulateError> {
     match order.robot.joint_names().len() {
-        1 => run_order::<1>(order, initial),
-        2 => run_order::<2>(order, initial),
-        3 => run_order::<3>(order, initial),
-        4 => run_order::<4>(order, initial),
-        5 => run_order::<5>(order, initial),
-        6 => run_order::<6>(order, initial),
-        7 => run_order::<7>(order, initial),
-        8 => run_order::<8>(order, initial),
+        1 => run_order::<1>(order, initial, rows, in_memory),
+        2 => run_order::<2>(order, initial, rows, in_memory),
+        3 => run_order::<3>(order, initial, rows, in_memory),
+        4 => run_order::<4>(order, initial, rows, in_memory),
+        5 => run_order::<5>(order, initial, rows, in_memory),
+        6 => run_order::<6>(order, initial, rows, in_memory),
+        7 => run_order::<7>(order, initial, rows, in_memory),
+        8 => run_order::<8>(order, initial, rows, in_memory),
         // many joints share the code of two widths
-        9..=16 => run_order::<16>(order, initial),
-        _ => run_order::<32>(order, initial),
+        9..=16 => run_order::<16>(order, initial, rows, in_memory),
+        _ => run_order::<32>(order, initial, rows, in_memory),
     }
 }
 
@@ -112,36 +186,102 @@ pub fn simulate_from(
 fn run_order<const J: usize>(
     order: &Order,
     initial: Option<&InitialConditions>,
-) -> Result<SimulatedLog, SimulateError> {
+    rows: &mut dyn Rows,
+    in_memory: bool,
+) -> Result<Simulated, SimulateError> {
     let plant = Plant::<J>::of(order.robot, order.model)?;
     let (effects, effect_values) = built_effects(order, &Sites::of(&plant)?)?;
     let mechanism = &plant.mechanism;
     let mut settings = settings_file::settings(order.robot, mechanism)?;
     settings.seconds = order.seconds.unwrap_or(SECONDS);
     settings.seed = order.seed;
+    // A fault of the data may reach back, or ahead, as far as it likes.
+    let in_memory = in_memory || effects.first_fault().is_some();
+    let length = |settings: &Settings<J>| match in_memory {
+        true => settings.samples_in_memory(),
+        false => settings.samples(),
+    };
     // before a ladder of that length is built
-    settings.samples()?;
+    length(&settings)?;
     let (drive, own_seconds) = drive(order, &plant)?;
     let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
     settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
-    let recording = run(&plant, effects, &start, &drive, &settings)?;
-    let (header, values) = lay_out(order.robot, &recording);
-    let truth = truth_of(order, &plant, &recording, effect_values);
-    let rows = recording.rows().max(1) as f64;
-    let share = |(i, name): (usize, &String)| {
-        let saturated = recording.status.iter();
-        let saturated = saturated.filter(|s| s[i] == MotorStatus::Saturated).count();
-        (name.clone(), saturated as f64 / rows)
+    length(&settings)?;
+
+    let mut recorder = Recorder::new(&settings.sensors, settings.seed);
+    let mut waiting = Waiting::new(mechanism.joints());
+    let block = (!in_memory).then_some(BLOCK);
+    let (mut run, effects) = run_in_blocks(
+        &plant,
+        effects,
+        &start,
+        &drive,
+        &settings,
+        block,
+        &mut |block| {
+            recorder.hear(block);
+            waiting.push(block)?;
+            go_on(rows.goes_on())
+        },
+    )?;
+    recorder.hear(&run);
+    let layout = LogLayout::of(order.robot, &run);
+    let mut saturated = Saturated::default();
+    let mut give = |run: &mut SimulatedRun<J>| {
+        recorder.measure(run, mechanism, &effects);
+        saturated.add(run);
+        go_on(rows.take(&layout.header, &layout.values(run)))
     };
-    let saturated = recording.coordinates.iter().enumerate().map(share);
-    Ok(SimulatedLog {
-        header,
-        values,
-        truth,
-        saturated: saturated.collect(),
-        ending: recording.ending,
-        limits: recording.limits,
+    match in_memory {
+        true => give(&mut run)?,
+        false => {
+            waiting.push(&run)?;
+            let mut waited = waiting.rewind()?;
+            while waited.next(BLOCK as u64, &mut run)? {
+                give(&mut run)?;
+            }
+        }
+    }
+    Ok(Simulated {
+        truth: truth_of(order, &plant, &run, effect_values),
+        saturated: saturated.shares(&run.coordinates),
+        ending: run.ending,
+        limits: run.limits,
     })
+}
+
+fn go_on(wish: ControlFlow<()>) -> Result<(), SimulateError> {
+    match wish {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(SimulateError::Stopped),
+    }
+}
+
+/// How often the amplifiers saturate.
+#[derive(Debug, Default)]
+struct Saturated {
+    /// Saturated rows of each motor.
+    counts: Vec<u64>,
+    rows: u64,
+}
+
+impl Saturated {
+    fn add<const J: usize>(&mut self, run: &SimulatedRun<J>) {
+        self.counts.resize(J, 0);
+        for status in &run.status {
+            for (count, status) in self.counts.iter_mut().zip(status) {
+                *count += u64::from(*status == MotorStatus::Saturated);
+            }
+        }
+        self.rows += run.rows() as u64;
+    }
+
+    /// Share of the rows, by coordinate.
+    fn shares(&self, coordinates: &[String]) -> Vec<(String, f64)> {
+        let rows = self.rows.max(1) as f64;
+        let shares = self.counts.iter().map(|count| *count as f64 / rows);
+        coordinates.iter().cloned().zip(shares).collect()
+    }
 }
 
 /// What drives the motors, and how long it lasts where it says so \[s\].
@@ -257,45 +397,56 @@ fn truth_of<const J: usize>(
     }
 }
 
-/// Header and rows under the names, signs, scales and offsets with which the robot file reads logs: joint
-/// channels where it reads those, and for the CFT robot the raw channels and status behind them.
-fn lay_out<const J: usize>(
-    robot: &RobotFile,
-    recording: &SimulatedRun<J>,
-) -> (Vec<String>, Vec<f64>) {
-    let layout = robot.layout();
-    let (joint, actuator) = match (layout.channels, layout.otherwise.as_deref()) {
-        (Channels::Joint, otherwise) => (Some(&layout), otherwise),
-        (Channels::Actuator, _) => (None, Some(&layout)),
-    };
-    let mut header = vec![layout.time.column.clone()];
-    for part in [joint, actuator].into_iter().flatten() {
-        header.extend(
-            part.positions
-                .iter()
-                .chain(&part.torques)
-                .map(|c| c.column.clone()),
-        );
-    }
-    if actuator.is_some() {
-        let motors = 1..=recording.coordinates.len();
-        header.extend(motors.map(|i| format!("status_{i}")));
-    }
-    let mut values = Vec::with_capacity(header.len() * recording.rows());
-    for k in 0..recording.rows() {
-        values.push(logged(&layout.time, recording.t[k]));
-        if let Some(part) = joint {
-            extend(&mut values, &part.positions, &recording.q[k]);
-            extend(&mut values, &part.torques, &recording.torque[k]);
+/// Names, signs, scales and offsets with which the robot file reads logs: joint channels where it reads those,
+/// and for the CFT robot the raw channels and status behind them.
+struct LogLayout {
+    layout: Layout,
+    header: Vec<String>,
+}
+
+impl LogLayout {
+    fn of<const J: usize>(robot: &RobotFile, run: &SimulatedRun<J>) -> Self {
+        let layout = robot.layout();
+        let mut header = vec![layout.time.column.clone()];
+        let (joint, actuator) = parts(&layout);
+        for part in [joint, actuator].into_iter().flatten() {
+            let channels = part.positions.iter().chain(&part.torques);
+            header.extend(channels.map(|c| c.column.clone()));
         }
-        if let Some(part) = actuator {
-            extend(&mut values, &part.positions, &recording.x[k]);
-            extend(&mut values, &part.torques, &recording.volts[k]);
-            let status = recording.status[k].iter().take(recording.coordinates.len());
-            values.extend(status.map(|s| f64::from(s.code())));
+        if actuator.is_some() {
+            let motors = 1..=run.coordinates.len();
+            header.extend(motors.map(|i| format!("status_{i}")));
         }
+        Self { layout, header }
     }
-    (header, values)
+
+    /// The rows as the log shows them, one after the other.
+    fn values<const J: usize>(&self, run: &SimulatedRun<J>) -> Vec<f64> {
+        let (joint, actuator) = parts(&self.layout);
+        let mut values = Vec::with_capacity(self.header.len() * run.rows());
+        for k in 0..run.rows() {
+            values.push(logged(&self.layout.time, run.t[k]));
+            if let Some(part) = joint {
+                extend(&mut values, &part.positions, &run.q[k]);
+                extend(&mut values, &part.torques, &run.torque[k]);
+            }
+            if let Some(part) = actuator {
+                extend(&mut values, &part.positions, &run.x[k]);
+                extend(&mut values, &part.torques, &run.volts[k]);
+                let status = run.status[k].iter().take(run.coordinates.len());
+                values.extend(status.map(|s| f64::from(s.code())));
+            }
+        }
+        values
+    }
+}
+
+/// The parts of a layout that read joint channels, and motor channels.
+fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
+    match layout.channels {
+        Channels::Joint => (Some(layout), layout.otherwise.as_deref()),
+        Channels::Actuator => (None, Some(layout)),
+    }
 }
 
 fn extend(values: &mut Vec<f64>, channels: &[Channel], numbers: &[f64]) {

@@ -7,6 +7,7 @@ use super::integrate::DormandPrince;
 use super::mechanism::Mechanism;
 use super::moving::{Moving, part};
 use super::plant::Plant;
+use super::recorder::Recorder;
 use super::reference::{Frame, Reference, Target};
 use super::settings::{OnLimit, Settings};
 use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
@@ -63,6 +64,31 @@ pub fn run<const J: usize>(
     drive: &Drive<J>,
     settings: &Settings<J>,
 ) -> Result<SimulatedRun<J>, SimulateError> {
+    settings.samples_in_memory()?;
+    let whole = &mut |_: &mut SimulatedRun<J>| Ok(());
+    let (mut run, effects) = run_in_blocks(plant, effects, start, drive, settings, None, whole)?;
+    let mut recorder = Recorder::new(&settings.sensors, settings.seed);
+    recorder.hear(&run);
+    recorder.measure(&mut run, &plant.mechanism, &effects);
+    Ok(run)
+}
+
+/// Takes the rows of a block, before noise and faults; they are forgotten behind it.
+pub(super) type HandOn<'a, const J: usize> =
+    &'a mut dyn FnMut(&mut SimulatedRun<J>) -> Result<(), SimulateError>;
+
+/// Runs one experiment as [`run`] does, and hands every `block` rows on; what comes back has the last rows,
+/// fewer than a block, or all where no block is asked for. The rows are those of a perfect log: no noise, no
+/// fault, none lost.
+pub(super) fn run_in_blocks<const J: usize>(
+    plant: &Plant<J>,
+    effects: Effects,
+    start: &Start<J>,
+    drive: &Drive<J>,
+    settings: &Settings<J>,
+    block: Option<usize>,
+    hand_on: HandOn<J>,
+) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
     settings.check()?;
     if let Drive::Follow { reference, control } = drive {
         reference.path.check()?;
@@ -77,7 +103,7 @@ pub fn run<const J: usize>(
     macro_rules! march_with {
         ($($size:literal)*) => {$(
             if const { compiled(J, $size) } && 2 * J + states <= $size {
-                return march::<J, $size>(moving, start, drive, settings);
+                return march::<J, $size>(moving, start, drive, settings, block, hand_on);
             }
         )*};
     }
@@ -118,14 +144,16 @@ fn march<const J: usize, const N: usize>(
     start: &Start<J>,
     drive: &Drive<J>,
     settings: &Settings<J>,
-) -> Result<SimulatedRun<J>, SimulateError> {
+    block: Option<usize>,
+    hand_on: HandOn<J>,
+) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
     let plant = moving.plant;
     let mechanism = &plant.mechanism;
     let samples = settings.samples()?;
-    let instants = settings
-        .sensors
-        .instants(samples, settings.rate_hz, settings.seed);
-    let mut recording = SimulatedRun::empty(mechanism, samples);
+    let block = block.unwrap_or(samples);
+    let sensors = &settings.sensors;
+    let mut instants = sensors.instants(settings.rate_hz, settings.seed);
+    let mut recording = SimulatedRun::empty(mechanism, samples.min(block));
     let mut integrator = DormandPrince::new(settings.tolerance);
     let mut y = initial_state::<J, N>(&mut moving, start, drive, settings)?;
     let mut drive = match drive {
@@ -134,15 +162,13 @@ fn march<const J: usize, const N: usize>(
         }
         Drive::Volts(series) => Running::Volts(series),
     };
+    let mut t = instants.next().unwrap_or(0.0);
     for k in 0..samples {
-        let t = instants[k];
         let beyond = limits_reached(&moving, settings.on_limit, t, &mut y, &mut recording)?;
         let (q, v) = (part::<J, N>(&y, 0), part::<J, N>(&y, J));
         let (motors, _) = moving.motor_side(&q, &v, &y[2 * J..]);
         let coordinates = mechanism.coordinates(&motors);
-        let seen = settings
-            .sensors
-            .encoders(&coordinates, &mechanism.resolution);
+        let seen = sensors.encoders(&coordinates, &mechanism.resolution);
         let (wanted, asked) = drive.at(mechanism, t, &coordinates, &seen)?;
         let limit = settings.saturation;
         moving.volts = asked.map(|u| u.clamp(-limit, limit));
@@ -172,12 +198,17 @@ fn march<const J: usize, const N: usize>(
             break;
         }
         if k + 1 < samples {
-            integrator.advance(&mut moving, t, instants[k + 1], &mut y)?;
+            let next = instants.next().unwrap_or(t);
+            integrator.advance(&mut moving, t, next, &mut y)?;
+            t = next;
+            if recording.rows() == block {
+                hand_on(&mut recording)?;
+                recording.clear();
+            }
         }
     }
     recording.effort = integrator.effort();
-    recording.measure(mechanism, &moving.effects, &settings.sensors, settings.seed);
-    Ok(recording)
+    Ok((recording, moving.effects))
 }
 
 /// Target of a reference in motor coordinates.

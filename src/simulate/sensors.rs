@@ -4,6 +4,7 @@
 //! has its own stream of the seed (see [`super::chance`]).
 
 use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::SimulateError;
@@ -21,12 +22,12 @@ pub enum Noise<const J: usize> {
 }
 
 impl<const J: usize> Noise<J> {
-    /// Standard deviation per channel for the rows that are to be logged.
-    pub fn deviation(&self, rows: &[[f64; J]]) -> [f64; J] {
+    /// Standard deviation per channel for rows of that root mean square.
+    pub fn deviation(&self, rms: [f64; J]) -> [f64; J] {
         match self {
             Self::None => [0.0; J],
             Self::Absolute(std) => *std,
-            Self::Relative(share) => rms(rows).map(|x| share * x),
+            Self::Relative(share) => rms.map(|x| share * x),
         }
     }
 
@@ -116,25 +117,23 @@ impl<const J: usize> Sensors<J> {
         })
     }
 
-    /// Sampling instants 0..=count \[s\] at the given rate; the first is 0.
-    pub(crate) fn instants(&self, count: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
+    /// Sampling instants \[s\] at the given rate, without end; the first is 0.
+    pub(crate) fn instants(&self, rate_hz: f64, seed: u64) -> impl Iterator<Item = f64> + use<J> {
         let mut chance = stream(seed, Purpose::Jitter);
-        (0..=count)
-            .map(|k| {
-                let draw: f64 = chance.sample(StandardNormal);
-                let offset = if k == 0 {
-                    0.0
-                } else {
-                    (self.jitter * draw).clamp(-0.45, 0.45)
-                };
-                (k as f64 + offset) / rate_hz
-            })
-            .collect()
+        let jitter = self.jitter;
+        (0_u64..).map(move |k| {
+            let draw: f64 = chance.sample(StandardNormal);
+            let offset = if k == 0 {
+                0.0
+            } else {
+                (jitter * draw).clamp(-0.45, 0.45)
+            };
+            (k as f64 + offset) / rate_hz
+        })
     }
 
-    /// Which of the rows are kept.
-    pub fn kept(&self, rows: usize, seed: u64) -> Vec<bool> {
-        let mut chance = stream(seed, Purpose::Dropout);
+    /// Which of the next rows are kept.
+    pub(super) fn kept(&self, rows: usize, chance: &mut ChaCha8Rng) -> Vec<bool> {
         (0..rows)
             .map(|_| chance.random::<f64>() >= self.dropouts)
             .collect()
@@ -145,10 +144,8 @@ impl<const J: usize> Sensors<J> {
 pub(super) fn disturb<const J: usize>(
     rows: &mut [[f64; J]],
     deviation: &[f64; J],
-    seed: u64,
-    purpose: Purpose,
+    chance: &mut ChaCha8Rng,
 ) {
-    let mut chance = stream(seed, purpose);
     for row in rows {
         for (value, std) in row.iter_mut().zip(deviation) {
             let draw: f64 = chance.sample(StandardNormal);
@@ -157,15 +154,33 @@ pub(super) fn disturb<const J: usize>(
     }
 }
 
-/// Root mean square of each column.
-fn rms<const J: usize>(rows: &[[f64; J]]) -> [f64; J] {
-    let mut sums = [0.0; J];
-    for row in rows {
-        for (sum, value) in sums.iter_mut().zip(row) {
-            *sum += value * value;
+/// Mean square of each column, row by row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeanSquare<const J: usize> {
+    sums: [f64; J],
+    rows: u64,
+}
+
+impl<const J: usize> MeanSquare<J> {
+    pub fn new() -> Self {
+        Self {
+            sums: [0.0; J],
+            rows: 0,
         }
     }
-    sums.map(|sum| (sum / rows.len().max(1) as f64).sqrt())
+
+    pub fn add(&mut self, rows: &[[f64; J]]) {
+        for row in rows {
+            for (sum, value) in self.sums.iter_mut().zip(row) {
+                *sum += value * value;
+            }
+        }
+        self.rows += rows.len() as u64;
+    }
+
+    pub fn root(&self) -> [f64; J] {
+        self.sums.map(|sum| (sum / self.rows.max(1) as f64).sqrt())
+    }
 }
 
 #[cfg(test)]
@@ -189,11 +204,16 @@ mod tests {
     #[test]
     fn noise_has_the_deviation_that_was_asked_for() {
         let clean: Vec<[f64; 2]> = (0..40_000).map(|k| [2.0, f64::from(k % 2)]).collect();
-        let deviation = Noise::Relative(0.01).deviation(&clean);
+        let rms = |rows: &[[f64; 2]]| {
+            let mut squares = MeanSquare::new();
+            squares.add(rows);
+            squares.root()
+        };
+        let deviation = Noise::Relative(0.01).deviation(rms(&clean));
         assert!((deviation[0] - 0.02).abs() < 1e-12);
         assert!((deviation[1] - 0.01 * 0.5f64.sqrt()).abs() < 1e-12);
         let mut noisy = clean.clone();
-        disturb(&mut noisy, &deviation, 5, Purpose::Torque);
+        disturb(&mut noisy, &deviation, &mut stream(5, Purpose::Torque));
         let differences: Vec<[f64; 2]> = noisy
             .iter()
             .zip(&clean)
@@ -208,14 +228,14 @@ mod tests {
     #[test]
     fn instants_increase_at_any_jitter_and_are_even_without() {
         let mut sensors = Sensors::<1>::default();
-        let even = sensors.instants(1000, 500.0, 1);
+        let even: Vec<f64> = sensors.instants(500.0, 1).take(1001).collect();
         assert!(
             even.iter()
                 .enumerate()
                 .all(|(k, t)| (t - 0.002 * k as f64).abs() < 1e-12)
         );
         sensors.jitter = 0.9;
-        let uneven = sensors.instants(1000, 500.0, 1);
+        let uneven: Vec<f64> = sensors.instants(500.0, 1).take(1001).collect();
         assert!(uneven.windows(2).all(|t| t[1] > t[0]));
         assert!(even.iter().zip(&uneven).any(|(a, b)| (a - b).abs() > 1e-4));
     }
@@ -223,10 +243,11 @@ mod tests {
     #[test]
     fn dropouts_lose_the_share_that_was_asked_for() {
         let mut sensors = Sensors::<1>::default();
-        assert!(sensors.kept(1000, 2).iter().all(|kept| *kept));
+        let mut chance = stream(2, Purpose::Dropout);
+        assert!(sensors.kept(1000, &mut chance).iter().all(|kept| *kept));
         sensors.dropouts = 0.1;
         let lost = sensors
-            .kept(20_000, 2)
+            .kept(20_000, &mut chance)
             .iter()
             .filter(|kept| !**kept)
             .count();

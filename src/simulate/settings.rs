@@ -29,6 +29,8 @@ pub struct Settings<const J: usize> {
     pub seed: u64,
 }
 
+/// Most rows of a log that goes to its file block by block: a day at 1 kHz. More is a slip of the keyboard.
+const MOST_ROWS: f64 = 1e8;
 /// Most numbers that a simulated log may have in memory, 2 GB of them.
 const MOST_NUMBERS: f64 = (1u64 << 28) as f64;
 /// Numbers of a row for each joint: positions, volts, torques, status, and what was true.
@@ -38,10 +40,21 @@ impl<const J: usize> Settings<J> {
     /// Rows of the log.
     ///
     /// # Errors
-    /// [`SimulateError::TooLong`] where they would not fit into memory, before any is made.
+    /// [`SimulateError::TooLong`] where no file could hold them, before any is made.
     pub(super) fn samples(&self) -> Result<usize, SimulateError> {
+        self.at_most(MOST_ROWS)
+    }
+
+    /// Rows of a log that is wanted as a whole.
+    ///
+    /// # Errors
+    /// [`SimulateError::TooLong`] where they would not fit into memory, before any is made.
+    pub(super) fn samples_in_memory(&self) -> Result<usize, SimulateError> {
+        self.at_most((MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor())
+    }
+
+    fn at_most(&self, most: f64) -> Result<usize, SimulateError> {
         let rows = (self.seconds * self.rate_hz).round().max(1.0);
-        let most = (MOST_NUMBERS / (NUMBERS_OF_JOINT * J + 2) as f64).floor();
         if rows > most {
             return Err(SimulateError::TooLong {
                 seconds: self.seconds,

@@ -3,11 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::chance::Purpose;
-use super::effects::{Effects, Log};
+use super::effects::Log;
 use super::integrate::Effort;
 use super::mechanism::Mechanism;
-use super::sensors::{Sensors, disturb};
 
 /// State of one motor channel at a sample (the status output of the report's Figure 9).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -24,6 +22,14 @@ impl MotorStatus {
     /// 0 running, 1 saturated, 2 limit reached.
     pub fn code(self) -> u8 {
         self as u8
+    }
+
+    /// The state that [`Self::code`] names so.
+    pub(super) fn of_code(code: f64) -> Self {
+        [Self::Running, Self::Saturated, Self::LimitReached]
+            .into_iter()
+            .find(|status| f64::from(status.code()) == code)
+            .unwrap_or_default()
     }
 }
 
@@ -123,48 +129,41 @@ impl<const J: usize> SimulatedRun<J> {
         self.t.len()
     }
 
-    /// Turns the clean rows into what is logged: noise on volts, torques by (66), noise on torques, faults of
-    /// the data, lost rows.
-    pub(super) fn measure(
-        &mut self,
-        mechanism: &Mechanism<J>,
-        effects: &Effects,
-        sensors: &Sensors<J>,
-        seed: u64,
-    ) {
-        self.volt_noise = sensors.volt_noise.deviation(&self.volts);
-        // The torque's own noise is sized by the torque without any.
-        self.torque_noise = sensors.torque_noise.deviation(&self.torque);
-        disturb(&mut self.volts, &self.volt_noise, seed, Purpose::Volts);
-        for ((torque, q), volts) in self.torque.iter_mut().zip(&self.q).zip(&self.volts) {
-            *torque = mechanism.torque(q, volts);
-        }
-        effects.spoil(&mut self.joint_channels(), true);
-        disturb(&mut self.torque, &self.torque_noise, seed, Purpose::Torque);
-        effects.spoil(&mut self.joint_channels(), false);
-        if sensors.dropouts > 0.0 {
-            let kept = sensors.kept(self.rows(), seed);
-            retain(&mut self.t, &kept);
-            retain(&mut self.status, &kept);
-            let columns = [
-                &mut self.x,
-                &mut self.volts,
-                &mut self.q,
-                &mut self.torque,
-                &mut self.actual.q,
-                &mut self.actual.v,
-                &mut self.actual.torque,
-                &mut self.actual.a,
-                &mut self.actual.target,
-            ];
-            for column in columns {
-                retain(column, &kept);
-            }
+    /// Forgets the rows, and keeps what is known of the run.
+    pub(super) fn clear(&mut self) {
+        self.t.clear();
+        self.status.clear();
+        for column in self.columns() {
+            column.clear();
         }
     }
 
+    /// Keeps the rows that are marked.
+    pub(super) fn retain(&mut self, kept: &[bool]) {
+        retain(&mut self.t, kept);
+        retain(&mut self.status, kept);
+        for column in self.columns() {
+            retain(column, kept);
+        }
+    }
+
+    /// Every column of numbers per joint or motor.
+    fn columns(&mut self) -> [&mut Vec<[f64; J]>; 9] {
+        [
+            &mut self.x,
+            &mut self.volts,
+            &mut self.q,
+            &mut self.torque,
+            &mut self.actual.q,
+            &mut self.actual.v,
+            &mut self.actual.torque,
+            &mut self.actual.a,
+            &mut self.actual.target,
+        ]
+    }
+
     /// The joint channels as faults of the data see them.
-    fn joint_channels(&mut self) -> Log<'_> {
+    pub(super) fn joint_channels(&mut self) -> Log<'_> {
         Log {
             t: &self.t,
             q: self.q.as_flattened_mut(),

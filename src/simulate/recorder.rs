@@ -1,0 +1,171 @@
+//! From perfect rows to what is logged: noise, torques by (66), faults of the data, lost rows.
+//!
+//! Noise may be a share of a channel's own root mean square, so that it is known only when the last row is
+//! there. A log that goes to its file block by block waits in a temporary file until then.
+
+use std::io::{BufReader, BufWriter, Read, Seek, Write};
+
+use rand_chacha::ChaCha8Rng;
+use tempfile::SpooledTempFile;
+
+use super::SimulateError;
+use super::chance::{Purpose, stream};
+use super::effects::Effects;
+use super::mechanism::Mechanism;
+use super::sensors::{MeanSquare, Sensors, disturb};
+use super::simulated_run::{MotorStatus, SimulatedRun};
+
+/// Bytes that wait in memory; what is more waits in a file of the system's temporary folder.
+const IN_MEMORY: usize = 64 << 20;
+
+/// Puts the noise, the faults and the gaps into the rows of one log, block by block.
+pub(super) struct Recorder<'a, const J: usize> {
+    sensors: &'a Sensors<J>,
+    volts: MeanSquare<J>,
+    torque: MeanSquare<J>,
+    /// Chance of the volts, of the torques, of the lost rows.
+    chance: [ChaCha8Rng; 3],
+}
+
+impl<'a, const J: usize> Recorder<'a, J> {
+    pub fn new(sensors: &'a Sensors<J>, seed: u64) -> Self {
+        let purposes = [Purpose::Volts, Purpose::Torque, Purpose::Dropout];
+        Self {
+            sensors,
+            volts: MeanSquare::new(),
+            torque: MeanSquare::new(),
+            chance: purposes.map(|purpose| stream(seed, purpose)),
+        }
+    }
+
+    /// Takes perfect rows into the mean squares that size the noise.
+    pub fn hear(&mut self, rows: &SimulatedRun<J>) {
+        self.volts.add(&rows.volts);
+        // The torque's own noise is sized by the torque without any.
+        self.torque.add(&rows.torque);
+    }
+
+    /// Turns the next perfect rows into what is logged. All rows must have been heard. Faults are put into the
+    /// rows of this call as a whole log.
+    pub fn measure(
+        &mut self,
+        rows: &mut SimulatedRun<J>,
+        mechanism: &Mechanism<J>,
+        effects: &Effects,
+    ) {
+        rows.volt_noise = self.sensors.volt_noise.deviation(self.volts.root());
+        rows.torque_noise = self.sensors.torque_noise.deviation(self.torque.root());
+        let [volts, torques, dropouts] = &mut self.chance;
+        disturb(&mut rows.volts, &rows.volt_noise, volts);
+        for ((torque, q), volts) in rows.torque.iter_mut().zip(&rows.q).zip(&rows.volts) {
+            *torque = mechanism.torque(q, volts);
+        }
+        effects.spoil(&mut rows.joint_channels(), true);
+        disturb(&mut rows.torque, &rows.torque_noise, torques);
+        effects.spoil(&mut rows.joint_channels(), false);
+        if self.sensors.dropouts > 0.0 {
+            let kept = self.sensors.kept(rows.rows(), dropouts);
+            rows.retain(&kept);
+        }
+    }
+}
+
+/// Perfect rows that wait, as numbers in the order t, and per joint x, volts, q, torque, status.
+pub(super) struct Waiting {
+    file: BufWriter<SpooledTempFile>,
+    joints: usize,
+    rows: u64,
+}
+
+impl Waiting {
+    /// Of rows of that many joints.
+    pub fn new(joints: usize) -> Self {
+        Self {
+            file: BufWriter::new(SpooledTempFile::new(IN_MEMORY)),
+            joints,
+            rows: 0,
+        }
+    }
+
+    /// Adds rows.
+    ///
+    /// # Errors
+    /// [`SimulateError::Waiting`] where the temporary file cannot be written.
+    pub fn push<const J: usize>(&mut self, rows: &SimulatedRun<J>) -> Result<(), SimulateError> {
+        let n = self.joints;
+        for k in 0..rows.rows() {
+            let status = rows.status[k][..n].iter().map(|s| f64::from(s.code()));
+            let parts = [&rows.x, &rows.volts, &rows.q, &rows.torque];
+            let numbers = parts.into_iter().flat_map(|part| part[k][..n].iter().copied());
+            for number in std::iter::once(rows.t[k]).chain(numbers).chain(status) {
+                self.file.write_all(&number.to_le_bytes())?;
+            }
+        }
+        self.rows += rows.rows() as u64;
+        Ok(())
+    }
+
+    /// The rows again, from the first on.
+    ///
+    /// # Errors
+    /// [`SimulateError::Waiting`] where the temporary file cannot be read.
+    pub fn rewind(self) -> Result<Waited, SimulateError> {
+        let mut file = self.file.into_inner().map_err(|error| error.into_error())?;
+        file.rewind()?;
+        Ok(Waited {
+            file: BufReader::new(file),
+            joints: self.joints,
+            left: self.rows,
+        })
+    }
+}
+
+/// Rows that have waited.
+pub(super) struct Waited {
+    file: BufReader<SpooledTempFile>,
+    joints: usize,
+    left: u64,
+}
+
+impl Waited {
+    /// Puts the next rows, at most `most`, in place of those of `rows`; whether there were any. What was true
+    /// beside them is not kept.
+    ///
+    /// # Errors
+    /// [`SimulateError::Waiting`] where the temporary file cannot be read.
+    pub fn next<const J: usize>(
+        &mut self,
+        most: u64,
+        rows: &mut SimulatedRun<J>,
+    ) -> Result<bool, SimulateError> {
+        rows.clear();
+        let count = self.left.min(most);
+        for _ in 0..count {
+            rows.t.push(self.number()?);
+            for part in [&mut rows.x, &mut rows.volts, &mut rows.q, &mut rows.torque] {
+                let mut row = [0.0; J];
+                for value in &mut row[..self.joints] {
+                    *value = number(&mut self.file)?;
+                }
+                part.push(row);
+            }
+            let mut status = [MotorStatus::default(); J];
+            for status in &mut status[..self.joints] {
+                *status = MotorStatus::of_code(number(&mut self.file)?);
+            }
+            rows.status.push(status);
+        }
+        self.left -= count;
+        Ok(count > 0)
+    }
+
+    fn number(&mut self) -> Result<f64, SimulateError> {
+        number(&mut self.file)
+    }
+}
+
+fn number(file: &mut impl Read) -> Result<f64, SimulateError> {
+    let mut bytes = [0; 8];
+    file.read_exact(&mut bytes)?;
+    Ok(f64::from_le_bytes(bytes))
+}
