@@ -7,7 +7,7 @@
 
 use super::MathError;
 use super::lanes::widest;
-use super::sos::{Section, Sos};
+use super::sos::Sos;
 
 /// Sections of the highest order that [`Sos`] offers.
 const MAX_SECTIONS: usize = 8;
@@ -46,122 +46,160 @@ impl ZeroPhase {
     /// # Errors
     /// [`MathError::TooShort`] unless there are more samples than [`Sos::pad_samples`].
     pub fn run(&self, data: &mut [f64], channels: usize) -> Result<(), MathError> {
-        if channels == 0 {
-            return Ok(());
-        }
-        let samples = data.len() / channels;
-        let pad = self.sos.pad_samples();
-        if samples <= pad {
-            return Err(MathError::TooShort {
-                samples,
-                needed: pad,
-            });
-        }
-        let mut first = 0;
-        while first < channels {
-            first += match channels - first {
-                8.. => widest(|| self.run_lanes::<8>(data, channels, first)),
-                4.. => widest(|| self.run_lanes::<4>(data, channels, first)),
-                2.. => self.run_lanes::<2>(data, channels, first),
-                _ => self.run_lanes::<1>(data, channels, first),
-            };
-        }
-        Ok(())
-    }
-
-    /// Filters one of the channels of `data` in place.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn run_channel(
-        &self,
-        data: &mut [f64],
-        channels: usize,
-        which: usize,
-    ) -> Result<(), MathError> {
-        let (samples, pad) = (data.len() / channels.max(1), self.sos.pad_samples());
-        if samples <= pad || which >= channels {
-            return Err(MathError::TooShort {
-                samples,
-                needed: pad,
-            });
-        }
-        self.run_lanes::<1>(data, channels, which);
-        Ok(())
-    }
-
-    /// Both passes over the channels `first..first + L`; returns L.
-    #[inline(always)]
-    fn run_lanes<const L: usize>(&self, data: &mut [f64], channels: usize, first: usize) -> usize {
-        let samples = data.len() / channels;
-        let pad = self.sos.pad_samples();
-        let last = samples - 1;
-        let lanes = |data: &[f64], i: usize| -> [f64; L] {
-            let at = i * channels + first;
-            std::array::from_fn(|l| data[at + l])
-        };
-        let reflected = |end: [f64; L], x: [f64; L]| -> [f64; L] {
-            std::array::from_fn(|l| 2.0 * end[l] - x[l])
-        };
-
-        // The forward pass overwrites what the extension of the far end mirrors.
-        let end = lanes(data, last);
-        let mut tail: Vec<[f64; L]> = (1..=pad)
-            .map(|i| reflected(end, lanes(data, last - i)))
-            .collect();
-
-        let start = lanes(data, 0);
-        let mut cascade = Cascade::settled(self, reflected(start, lanes(data, pad)));
-        for i in (1..=pad).rev() {
-            cascade.step(reflected(start, lanes(data, i)));
-        }
-        for sample in data.chunks_exact_mut(channels) {
-            cascade.step_in_place(sample, first);
-        }
-        for x in &mut tail {
-            *x = cascade.step(*x);
-        }
-
-        let mut cascade = Cascade::settled(self, tail.last().copied().unwrap_or(end));
-        for x in tail.iter().rev() {
-            cascade.step(*x);
-        }
-        for sample in data.chunks_exact_mut(channels).rev() {
-            cascade.step_in_place(sample, first);
-        }
-        L
+        run_each(|_| self, data, channels)
     }
 }
 
-/// Running state of a cascade over L channels, transposed direct form II.
+/// Filters `data`, `samples x channels` row-major, in place, each channel by its own filter. All filters are of
+/// one design and order: they differ in their cut-offs.
+///
+/// # Errors
+/// [`MathError::TooShort`] unless there are more samples than [`Sos::pad_samples`].
+pub fn run_each<'a>(
+    filter: impl Fn(usize) -> &'a ZeroPhase,
+    data: &mut [f64],
+    channels: usize,
+) -> Result<(), MathError> {
+    if channels == 0 {
+        return Ok(());
+    }
+    let samples = data.len() / channels;
+    let pad = filter(0).sos.pad_samples();
+    if samples <= pad {
+        return Err(MathError::TooShort {
+            samples,
+            needed: pad,
+        });
+    }
+    // A pass takes as long as its recursion, whether a lane is empty or not: few passes are fast.
+    let (filter, mut first) = (&filter as &dyn Fn(usize) -> &'a ZeroPhase, 0);
+    while first < channels {
+        let left = channels - first;
+        match left {
+            8.. => widest(|| run_lanes::<8, 8>(filter, data, channels, first)),
+            7 => widest(|| run_lanes::<8, 7>(filter, data, channels, first)),
+            6 => widest(|| run_lanes::<8, 6>(filter, data, channels, first)),
+            5 => widest(|| run_lanes::<8, 5>(filter, data, channels, first)),
+            4 => widest(|| run_lanes::<4, 4>(filter, data, channels, first)),
+            3 => widest(|| run_lanes::<4, 3>(filter, data, channels, first)),
+            2 => run_lanes::<2, 2>(filter, data, channels, first),
+            _ => run_lanes::<1, 1>(filter, data, channels, first),
+        }
+        first += left.min(8);
+    }
+    Ok(())
+}
+
+/// Both passes over the channels `first..first + W`, in L lanes of which those behind W are empty.
+#[inline(always)]
+fn run_lanes<'a, const L: usize, const W: usize>(
+    filter: &dyn Fn(usize) -> &'a ZeroPhase,
+    data: &mut [f64],
+    channels: usize,
+    first: usize,
+) {
+    let filters: [&ZeroPhase; L] = std::array::from_fn(|l| filter(first + l.min(W - 1)));
+    let samples = data.len() / channels;
+    let pad = filters[0].sos.pad_samples();
+    let last = samples - 1;
+    let lanes = |data: &[f64], i: usize| -> [f64; L] {
+        let at = i * channels + first;
+        std::array::from_fn(|l| if l < W { data[at + l] } else { 0.0 })
+    };
+    let reflected = |end: [f64; L], x: [f64; L]| -> [f64; L] {
+        std::array::from_fn(|l| 2.0 * end[l] - x[l])
+    };
+
+    // The forward pass overwrites what the extension of the far end mirrors.
+    let end = lanes(data, last);
+    let mut tail: Vec<[f64; L]> = (1..=pad)
+        .map(|i| reflected(end, lanes(data, last - i)))
+        .collect();
+
+    let start = lanes(data, 0);
+    let sections = sections(&filters);
+    let sections = &sections[..filters[0].sos.sections().len()];
+    let mut cascade = Cascade::settled(sections, reflected(start, lanes(data, pad)));
+    for i in (1..=pad).rev() {
+        cascade.step(reflected(start, lanes(data, i)));
+    }
+    for sample in data.chunks_exact_mut(channels) {
+        cascade.step_in_place::<W>(sample, first);
+    }
+    for x in &mut tail {
+        *x = cascade.step(*x);
+    }
+
+    let mut cascade = Cascade::settled(sections, tail.last().copied().unwrap_or(end));
+    for x in tail.iter().rev() {
+        cascade.step(*x);
+    }
+    for sample in data.chunks_exact_mut(channels).rev() {
+        cascade.step_in_place::<W>(sample, first);
+    }
+}
+
+/// One section of L filters.
+#[derive(Debug, Clone, Copy)]
+struct LaneSection<const L: usize> {
+    b: [[f64; L]; 3],
+    a: [[f64; L]; 2],
+    steady: [[f64; L]; 2],
+}
+
+/// The sections of L filters of one order, section by section; behind the last they are empty.
+#[inline(always)]
+fn sections<const L: usize>(filters: &[&ZeroPhase; L]) -> [LaneSection<L>; MAX_SECTIONS] {
+    let empty = [0.0; L];
+    let mut out = [LaneSection {
+        b: [empty; 3],
+        a: [empty; 2],
+        steady: [empty; 2],
+    }; MAX_SECTIONS];
+    for (l, filter) in filters.iter().enumerate() {
+        let own = filter.sos.sections().iter().zip(&filter.steady);
+        for (lanes, (section, steady)) in out.iter_mut().zip(own) {
+            for (lane, b) in lanes.b.iter_mut().zip(section.b) {
+                lane[l] = b;
+            }
+            for (lane, a) in lanes.a.iter_mut().zip(section.a) {
+                lane[l] = a;
+            }
+            for (lane, s) in lanes.steady.iter_mut().zip(steady) {
+                lane[l] = *s;
+            }
+        }
+    }
+    out
+}
+
+/// Running state of L cascades, transposed direct form II.
 struct Cascade<'a, const L: usize> {
-    sections: &'a [Section],
+    sections: &'a [LaneSection<L>],
     state: [[[f64; L]; 2]; MAX_SECTIONS],
 }
 
 impl<'a, const L: usize> Cascade<'a, L> {
     /// The state after a long constant input `x`.
     #[inline(always)]
-    fn settled(filter: &'a ZeroPhase, x: [f64; L]) -> Self {
+    fn settled(sections: &'a [LaneSection<L>], x: [f64; L]) -> Self {
         let mut state = [[[0.0; L]; 2]; MAX_SECTIONS];
-        for (state, steady) in state.iter_mut().zip(&filter.steady) {
-            *state = steady.map(|s| x.map(|x| s * x));
+        for (state, section) in state.iter_mut().zip(sections) {
+            *state = section
+                .steady
+                .map(|s| std::array::from_fn(|l| s[l] * x[l]));
         }
-        Self {
-            sections: filter.sos.sections(),
-            state,
-        }
+        Self { sections, state }
     }
 
     #[inline(always)]
     fn step(&mut self, mut x: [f64; L]) -> [f64; L] {
         for (section, [s1, s2]) in self.sections.iter().zip(&mut self.state) {
-            let [b0, b1, b2] = section.b;
-            let [a1, a2] = section.a;
+            let ([b0, b1, b2], [a1, a2]) = (&section.b, &section.a);
             for l in 0..L {
-                let y = b0 * x[l] + s1[l];
-                s1[l] = (b1 * x[l] + s2[l]) - a1 * y;
-                s2[l] = b2 * x[l] - a2 * y;
+                let y = b0[l] * x[l] + s1[l];
+                s1[l] = (b1[l] * x[l] + s2[l]) - a1[l] * y;
+                s2[l] = b2[l] * x[l] - a2[l] * y;
                 x[l] = y;
             }
         }
@@ -169,10 +207,10 @@ impl<'a, const L: usize> Cascade<'a, L> {
     }
 
     #[inline(always)]
-    fn step_in_place(&mut self, sample: &mut [f64], first: usize) {
-        let lanes = &mut sample[first..first + L];
-        let y = self.step(std::array::from_fn(|l| lanes[l]));
-        lanes.copy_from_slice(&y);
+    fn step_in_place<const W: usize>(&mut self, sample: &mut [f64], first: usize) {
+        let lanes = &mut sample[first..first + W];
+        let y = self.step(std::array::from_fn(|l| if l < W { lanes[l] } else { 0.0 }));
+        lanes.copy_from_slice(&y[..W]);
     }
 }
 
@@ -273,6 +311,27 @@ mod tests {
                 for i in 0..samples {
                     assert_eq!(together[i * channels + c], alone[i], "{channels}, {c}, {i}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn each_channel_may_have_a_cut_off_of_its_own() {
+        let filters: Vec<ZeroPhase> = (0..11)
+            .map(|c| Sos::butterworth(5, 10.0 + 7.0 * c as f64, 1000.0).expect("valid"))
+            .map(ZeroPhase::new)
+            .collect();
+        let value = |i: usize, c: usize| ((i * (c + 3)) as f64 * 0.05).sin() + c as f64;
+        for channels in 1..=11 {
+            let mut together: Vec<f64> = (0..90 * channels)
+                .map(|k| value(k / channels, k % channels))
+                .collect();
+            run_each(|c| &filters[c], &mut together, channels).expect("long enough");
+            for (c, filter) in filters[..channels].iter().enumerate() {
+                let mut alone: Vec<f64> = (0..90).map(|i| value(i, c)).collect();
+                filter.run(&mut alone, 1).expect("long enough");
+                let own = together.iter().skip(c).step_by(channels);
+                assert!(own.eq(&alone), "{channels}, {c}");
             }
         }
     }

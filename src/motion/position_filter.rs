@@ -2,7 +2,7 @@
 
 use super::MotionError;
 use crate::math::sos::Sos;
-use crate::math::zero_phase::ZeroPhase;
+use crate::math::zero_phase::{ZeroPhase, run_each};
 
 /// A position cut-off that is not asked for stays below this share of the sampling rate.
 pub(super) const HIGHEST_SHARE: f64 = 0.4;
@@ -47,13 +47,7 @@ impl PositionFilter {
     /// # Errors
     /// [`MotionError`] for too few samples.
     pub fn run(&self, q: &mut [f64], joints: usize) -> Result<(), MotionError> {
-        if let [all] = self.filters.as_slice() {
-            return Ok(all.run(q, joints)?);
-        }
-        for joint in 0..joints {
-            self.of(joint).run_channel(q, joints, joint)?;
-        }
-        Ok(())
+        Ok(run_each(|joint| self.of(joint), q, joints)?)
     }
 
     /// The filter of a joint.
