@@ -419,7 +419,11 @@ fn rows_that_are_handed_on_block_by_block_are_those_of_the_log_in_memory() {
     assert_eq!(known.truth, whole.truth);
     assert_eq!(known.limits, whole.limits);
     assert_eq!(known.saturated, whole.saturated);
-    assert!(taken.most <= 4096 && whole.rows().len() > 4 * 4096, "{}", taken.most);
+    assert!(
+        taken.most <= 4096 && whole.rows().len() > 4 * 4096,
+        "{}",
+        taken.most
+    );
 
     let mut stopped = Taken {
         calls_left: Some(1),

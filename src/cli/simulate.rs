@@ -18,9 +18,7 @@ use crate::output::LogWriter;
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::simulate::effects::EffectValue;
-use crate::simulate::{
-    self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order,
-};
+use crate::simulate::{self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order};
 
 const EXAMPLE: &str = "\
 Example:
@@ -445,7 +443,10 @@ fn render(robot: &RobotFile, figures: &LogFigures, log: &str) -> String {
         .flat_map(|part| part.positions.iter().chain(&part.torques))
         .collect();
     for column in &figures.columns {
-        let Some(channel) = channels.iter().find(|channel| channel.column == column.name) else {
+        let Some(channel) = channels
+            .iter()
+            .find(|channel| channel.column == column.name)
+        else {
             continue;
         };
         let rms = (column.squares / figures.rows.max(1) as f64).sqrt();

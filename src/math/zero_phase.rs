@@ -106,9 +106,8 @@ fn run_lanes<'a, const L: usize, const W: usize>(
         let at = i * channels + first;
         std::array::from_fn(|l| if l < W { data[at + l] } else { 0.0 })
     };
-    let reflected = |end: [f64; L], x: [f64; L]| -> [f64; L] {
-        std::array::from_fn(|l| 2.0 * end[l] - x[l])
-    };
+    let reflected =
+        |end: [f64; L], x: [f64; L]| -> [f64; L] { std::array::from_fn(|l| 2.0 * end[l] - x[l]) };
 
     // The forward pass overwrites what the extension of the far end mirrors.
     let end = lanes(data, last);
@@ -185,9 +184,7 @@ impl<'a, const L: usize> Cascade<'a, L> {
     fn settled(sections: &'a [LaneSection<L>], x: [f64; L]) -> Self {
         let mut state = [[[0.0; L]; 2]; MAX_SECTIONS];
         for (state, section) in state.iter_mut().zip(sections) {
-            *state = section
-                .steady
-                .map(|s| std::array::from_fn(|l| s[l] * x[l]));
+            *state = section.steady.map(|s| std::array::from_fn(|l| s[l] * x[l]));
         }
         Self { sections, state }
     }

@@ -96,7 +96,9 @@ impl Waiting {
         for k in 0..rows.rows() {
             let status = rows.status[k][..n].iter().map(|s| f64::from(s.code()));
             let parts = [&rows.x, &rows.volts, &rows.q, &rows.torque];
-            let numbers = parts.into_iter().flat_map(|part| part[k][..n].iter().copied());
+            let numbers = parts
+                .into_iter()
+                .flat_map(|part| part[k][..n].iter().copied());
             for number in std::iter::once(rows.t[k]).chain(numbers).chain(status) {
                 self.file.write_all(&number.to_le_bytes())?;
             }
