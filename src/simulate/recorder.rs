@@ -53,8 +53,8 @@ impl<'a, const J: usize> Recorder<'a, J> {
         mechanism: &Mechanism<J>,
         effects: &Effects,
     ) {
-        rows.volt_noise = self.sensors.volt_noise.deviation(self.volts.root());
-        rows.torque_noise = self.sensors.torque_noise.deviation(self.torque.root());
+        rows.volt_noise = self.sensors.volt_noise.of_rms(self.volts.root());
+        rows.torque_noise = self.sensors.torque_noise.of_rms(self.torque.root());
         let [volts, torques, dropouts] = &mut self.chance;
         disturb(&mut rows.volts, &rows.volt_noise, volts);
         for ((torque, q), volts) in rows.torque.iter_mut().zip(&rows.q).zip(&rows.volts) {
