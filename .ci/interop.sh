@@ -39,4 +39,7 @@ tool convert -q "$work/sim.csv" "$work/converted.mcap" > /dev/null || exit 1
 tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/simulated.mcap" > /dev/null ||
   exit 1
 "$work/venv/bin/python" fixtures/logs/read.py "$work/sim.csv" \
-  "$work/converted.mcap" "$work/simulated.mcap"
+  "$work/converted.mcap" "$work/simulated.mcap" || exit 1
+tool excite -q --check configs/table3.toml --rate 50 --samples "$work/motion.csv" \
+  --trajectory-message "$work/motion.mcap" > /dev/null || exit 1
+"$work/venv/bin/python" fixtures/logs/read_trajectory.py "$work/motion.csv" "$work/motion.mcap"

@@ -81,6 +81,46 @@ fn a_design_is_written_with_its_samples_and_its_picture_and_passes_its_own_check
 }
 
 #[test]
+fn a_motion_is_written_as_controllers_take_it_and_says_first_what_nobody_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "--check configs/table3.toml --rate 50 --samples m.csv --trajectory-message m.yaml";
+    excite(folder.path(), line)
+        .assert()
+        .code(0)
+        .stdout(contains("written: m.yaml"));
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let yaml = read("m.yaml");
+    assert!(yaml.starts_with("# NOT CHECKED: collisions"), "{yaml}");
+    assert!(yaml.contains("# Checked: the limits of cft.toml along the whole motion."));
+    assert!(yaml.contains("joint_names:\n  - \"q1\"\n  - \"q2\"\n"));
+    // the points are those of the samples
+    let samples = read("m.csv");
+    let rows: Vec<&str> = samples.lines().skip(1).collect();
+    assert_eq!(yaml.matches("  - positions: [").count(), rows.len());
+    let last: Vec<&str> = rows[rows.len() - 1].split(',').collect();
+    let numbers = last[1..5]
+        .iter()
+        .map(|x| format!("{:?}", x.parse::<f64>().unwrap()));
+    let numbers: Vec<String> = numbers.collect();
+    assert!(yaml.contains(&format!("  - positions: [{}]", numbers.join(", "))));
+
+    // a program needs six joints that turn
+    excite(
+        folder.path(),
+        "--check configs/table3.toml --urscript m.script",
+    )
+    .assert()
+    .code(2)
+    .stderr(contains("the joints q1, q2, q4, q5"));
+    // and what breaks limits says so
+    let line = "--check configs/table3.toml -r configs/cft-dspace.toml --rate 50 --trajectory-message b.mcap";
+    excite(folder.path(), line).assert().code(1);
+    let bytes = fs::read(folder.path().join("b.mcap")).unwrap();
+    assert!(String::from_utf8_lossy(&bytes).contains("BREAKS LIMITS: position of x_c4"));
+    assert!(!folder.path().join("m.script").exists());
+}
+
+#[test]
 fn outputs_are_the_same_bytes_at_any_number_of_threads() {
     let outputs = ["1", "3"].map(|threads| {
         let folder = tempfile::tempdir().unwrap();

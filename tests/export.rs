@@ -8,6 +8,7 @@ use cft_ident::robot::Robot;
 use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::robot::standard::Body;
+use predicates::prelude::PredicateBooleanExt;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
@@ -366,6 +367,44 @@ fn bodies(model: &Model, seed: u64) -> Vec<f64> {
     theta
 }
 
+/// A model file whose links can exist, with the bodies as `lsq --feasible` writes them.
+fn feasible(robot: RobotFile) -> ModelFile {
+    let mut model = model(robot.robot(), false, 3);
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(41));
+    let robot_model = model.robot.clone();
+    let links = robot_model.tree().links().iter().map(|link| LinkBody {
+        name: link.name.clone(),
+        mass: 2.0 + draw.one(1.0),
+        centre: std::array::from_fn(|_| draw.one(0.1)),
+        inertia: [0.03, draw.one(0.002), 0.0, 0.04, draw.one(0.002), 0.05],
+    });
+    let links: Vec<LinkBody> = links.collect();
+    let mut standard: Vec<f64> = Vec::new();
+    for link in &links {
+        let body = Body {
+            mass: link.mass,
+            centre: link.centre,
+            inertia: link.inertia,
+        };
+        standard.extend(body.standard());
+    }
+    let mut drives = std::collections::BTreeMap::new();
+    if robot_model.drive_inertia() {
+        for name in robot_model.joint_names() {
+            drives.insert(name.clone(), 0.2 + draw.one(0.1));
+            standard.push(drives[name]);
+        }
+    }
+    model.theta = robot_model.base_of(&standard);
+    let couplings = model.theta.len()..robot_model.parameters().len();
+    model.theta.extend(couplings.map(|_| 0.02));
+    ModelFile {
+        links,
+        drive_inertia: drives,
+        ..file_of(robot, &model)
+    }
+}
+
 /// Largest difference of the torques of two models, over the size of the terms of the first.
 fn difference(one: &Model, other: &Model) -> f64 {
     let mut worst: f64 = 0.0;
@@ -611,18 +650,20 @@ fn what_a_urdf_cannot_hold_is_refused_with_a_way_out() {
 }
 
 #[test]
-fn the_command_writes_its_files_and_refuses_effects_unless_told() {
+fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
     let folder = tempfile::tempdir().unwrap();
-    let mut model = model(gantry().robot(), false, 3);
-    model.theta = bodies(&model, 13);
-    let mut file = file_of(gantry(), &model);
+    let mut file = feasible(gantry());
     let path = folder.path().join("model.toml");
     std::fs::write(&path, file.to_toml().unwrap()).unwrap();
     let command = |more: &[&str]| {
         assert_cmd::Command::cargo_bin("cft-ident")
             .unwrap()
             .current_dir(folder.path())
-            .args(["export", "-m", "model.toml"])
+            .arg("export")
+            .args(match more.contains(&"-m") {
+                true => &[][..],
+                false => &["-m", "model.toml"],
+            })
             .args(more)
             .assert()
     };
@@ -638,18 +679,101 @@ fn the_command_writes_its_files_and_refuses_effects_unless_told() {
     }
     command(&[]).code(2);
     command(&["--c", "ff.txt"]).code(2);
-    file.effects.push(cft_ident::config::model_file::Effect {
-        name: "ripple".to_owned(),
-        joint: Some("elbow".to_owned()),
-        parameters: Default::default(),
-    });
-    std::fs::write(&path, file.to_toml().unwrap()).unwrap();
+    let mut effect = |name: &str, numbers: &[(&str, f64)]| {
+        let number = |value| cft_ident::config::model_file::EffectParameter {
+            value,
+            std: None,
+            unit: String::new(),
+        };
+        let numbers = numbers
+            .iter()
+            .map(|(key, x)| ((*key).to_owned(), number(*x)));
+        file.effects = vec![cft_ident::config::model_file::Effect {
+            name: name.to_owned(),
+            joint: Some("elbow".to_owned()),
+            parameters: numbers.collect(),
+        }];
+        std::fs::write(&path, file.to_toml().unwrap()).unwrap();
+    };
+    effect("quantisation", &[]);
     command(&["--c", "refused.h"])
         .code(3)
-        .stderr(predicates::str::contains("ripple of elbow"))
+        .stderr(predicates::str::contains("the grain of a logged channel"))
         .stderr(predicates::str::contains("--without-effects"));
     assert!(!folder.path().join("refused.h").exists());
+    effect("ripple", &[("order", 3.0), ("sin", 0.2), ("cos", 0.1)]);
+    command(&[
+        "--c",
+        "ripple.h",
+        "--urdf",
+        "ripple.urdf",
+        "--mjcf",
+        "ripple.xml",
+    ])
+    .success();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(read("ripple.h").contains("Effects: ripple of elbow."));
+    assert!(
+        read("ripple.urdf")
+            .contains("Effects are in the file beside the URDF alone: ripple of elbow.")
+    );
+    assert!(read("ripple.toml").contains("name = \"ripple\""));
+    assert!(read("ripple.xml").contains("no log was given"));
+    assert!(read("ripple.xml.left-out.toml").contains("what = \"ripple of elbow\""));
+    // links that no body can be are for none of these
+    let wild = file_of(gantry(), &model(gantry().robot(), false, 3));
+    std::fs::write(folder.path().join("wild.toml"), wild.to_toml().unwrap()).unwrap();
+    for option in [
+        ["--mjcf", "wild.xml"],
+        ["--sdf", "wild.sdf"],
+        ["--usd", "wild.usda"],
+    ] {
+        command(&[&["-m", "wild.toml"], &option[..]].concat())
+            .code(3)
+            .stderr(
+                predicates::str::contains("can be no body")
+                    .and(predicates::str::contains("--feasible")),
+            );
+    }
     command(&["--c", "told.h", "--without-effects"]).success();
     let text = std::fs::read_to_string(folder.path().join("told.h")).unwrap();
     assert!(text.contains("NOT in here, though the model has it: ripple of elbow."));
+}
+
+#[test]
+fn the_users_urdf_keeps_what_is_not_inertia_or_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = feasible(gantry());
+    let source = std::fs::read_to_string(fixtures("urdf").join("gantry.urdf")).unwrap();
+    let source = source.replace(
+        "<robot name=\"gantry\">",
+        "<robot name=\"gantry\">\n  <!-- of the maker --><gazebo><plugin name=\"x\"/></gazebo>",
+    );
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("gantry.urdf"), &source).unwrap();
+    std::fs::write(path("model.toml"), file.to_toml().unwrap()).unwrap();
+    let command = |more: &[&str]| {
+        assert_cmd::Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(folder.path())
+            .args(["export", "-m", "model.toml", "--urdf", "new.urdf", "--urdf-source"])
+            .args(more)
+            .assert()
+    };
+    command(&["gantry.urdf"]).success();
+    let text = std::fs::read_to_string(path("new.urdf")).unwrap();
+    assert!(text.contains("<!-- of the maker --><gazebo><plugin name=\"x\"/></gazebo>"));
+    let origins = |text: &str| text.matches("<parent link=").count();
+    assert_eq!(origins(&text), origins(&source));
+    // with the model file beside it, it is the model
+    let back = ModelFile::load(&path("new.toml")).unwrap();
+    let model = file.model("model.toml").unwrap();
+    let worst = difference(&model, &back.model("new.toml").unwrap());
+    assert!(worst < 1e-9, "{worst:e}");
+    // a joint that is not there, and one that sits elsewhere
+    let elsewhere = source.replace("\"elbow\"", "\"knee\"");
+    std::fs::write(path("knee.urdf"), elsewhere).unwrap();
+    command(&["knee.urdf"])
+        .code(3)
+        .stderr(predicates::str::contains("has no joint `elbow`"));
 }

@@ -25,12 +25,50 @@ pub fn render(words: &[&str]) -> Rendered {
         ["arm-friction", names @ ..] => arms::friction(names),
         ["arm-parameters", names @ ..] => arms::named(names),
         ["setup-faults", study] => setup::faults(study),
+        ["left-out", result] => Ok(left_out(&json(result)?)),
+        ["replay", result] => Ok(replay(&json(result)?)),
         ["text", name] => {
             let text = read(&format!("{name}.txt"))?;
             Ok(format!("```text\n{}\n```\n", text.trim_end()))
         }
         _ => Err(format!("`{}` is no known kind of table", words.join(" "))),
     }
+}
+
+/// What a file of a simulator cannot say.
+fn left_out(result: &Value) -> String {
+    let each = rows(&result["left_out"]).iter().map(|part| {
+        let percent = significant(number(&part["percent_of_torque"]), 3);
+        vec![text(&part["what"]).to_owned(), format!("{percent} %")]
+    });
+    table(
+        &["<not in the file", "of the torque"],
+        &each.collect::<Vec<_>>(),
+    )
+}
+
+/// Errors of windows that were replayed in a simulator.
+fn replay(result: &Value) -> String {
+    let degrees = |value: &Value| format!("{}°", significant(number(value), 3));
+    let each = rows(&result["errors"]).iter().map(|line| {
+        vec![
+            text(&line["joint"]).to_owned(),
+            format!("{} s", number(&line["seconds"])),
+            number(&line["windows"]).to_string(),
+            degrees(&line["before_deg"]),
+            degrees(&line["after_deg"]),
+            degrees(&line["after_offsets_deg"]),
+        ]
+    });
+    let columns = [
+        "<joint",
+        "window",
+        "windows",
+        "before",
+        "after",
+        "after, offsets taken off",
+    ];
+    table(&columns, &each.collect::<Vec<_>>())
 }
 
 fn read(name: &str) -> Result<String, String> {

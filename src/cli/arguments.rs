@@ -86,6 +86,17 @@ pub(super) fn log_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
+/// A message to be written: the ending chooses the format.
+pub(super) fn message_file(text: &str) -> Result<PathBuf, String> {
+    let known = with_ending(text, "yaml").or_else(|_| with_ending(text, "mcap"));
+    known.map_err(|_| "must end in .yaml or .mcap".into())
+}
+
+/// A program in URScript to be written.
+pub(super) fn script_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "script")
+}
+
 /// A picture to be written: the ending chooses the format.
 pub(super) fn picture_file(text: &str) -> Result<PathBuf, String> {
     let known = with_ending(text, "svg").or_else(|_| with_ending(text, "png"));
@@ -105,6 +116,21 @@ pub(super) fn urdf_file(text: &str) -> Result<PathBuf, String> {
 /// A C header to be written.
 pub(super) fn header_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "h")
+}
+
+/// An MJCF file to be written.
+pub(super) fn mjcf_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "xml")
+}
+
+/// An SDF file to be written.
+pub(super) fn sdf_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "sdf")
+}
+
+/// A USD file to be written, as text.
+pub(super) fn usd_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "usda")
 }
 
 /// A Rust module to be written.

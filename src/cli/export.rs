@@ -1,15 +1,23 @@
-//! `cft-ident export`: a model for other programs, as C header, Rust module or URDF.
+//! `cft-ident export`: a model for other programs, as C header, Rust module, URDF or file of a simulator.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::files::Given;
 use super::{CliError, Context, Outcome, arguments, files};
-use crate::config::ModelFile;
+use crate::config::{self, ModelFile, RobotFile, UrdfReplacement, replaced_in_urdf};
+use crate::effect::AugmentedModel;
+use crate::effect::as_code::no_torque;
+use crate::export::arm::{Arm, Says};
 use crate::export::dissipative::below_zero;
-use crate::export::{self, ExportError, Note, Program};
-use crate::log::escape;
+use crate::export::{self, ExportError, Note, Program, urdf_source};
+use crate::identify::{self, Log, LoggedRobot};
+use crate::log::{LogSpec, Provenance, escape};
+use crate::motion::Stretch;
+use crate::number;
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 
@@ -17,28 +25,48 @@ const EXAMPLE: &str = "\
 Example:
   cft-ident export -m model.toml --c feedforward.h
   cft-ident export -m model.toml --rust feedforward.rs
-  cft-ident export -m myarm-model.toml --urdf myarm-identified.urdf";
+  cft-ident export -m myarm-model.toml --urdf myarm-identified.urdf
+  cft-ident export -m myarm-model.toml --mjcf myarm.xml --usd myarm.usda unseen.csv";
 
-/// Write a model for other programs: a C header, a Rust module, a URDF.
+/// Write a model for other programs: a C header, a Rust module, a URDF, files of simulators.
 ///
-/// Header and module hold tau(q, v, a) for feed-forward, gravity(q), friction(v) and the rigid links
-/// alone; they need nothing but the standard library, and keep no state. A URDF holds chain and
-/// inertials; a model file beside it, FILE.toml, holds what a URDF cannot (drive inertias,
-/// couplings, friction, offsets) and is read as any model file.
+/// Header and module hold tau(q, v, a) for feed-forward with all effects, gravity(q), friction(v), friction
+/// compensation and the rigid links alone; they need nothing but the standard library. What remembers the
+/// motion (presliding, backlash, warm-up) has a state: init, then step once a sample. Files of links (URDF,
+/// MJCF, SDF, USD) hold chain, inertials, damping and friction, where they can the inertia of drives. A model
+/// file beside a URDF, FILE.toml, holds the rest and is read as any model file; beside the others
+/// FILE.left-out.toml lists what they cannot say, with its size along the logs that are given.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 #[command(
     override_usage = "cft-ident export [OPTIONS] --model <MODEL.toml>\n       \
-    <--urdf <FILE.urdf> | --c <FILE.h> | --rust <FILE.rs>>..."
+    <--c <FILE.h> | --rust <FILE.rs> | --urdf <FILE.urdf> | --mjcf <FILE.xml> |\n        \
+    --sdf <FILE.sdf> | --usd <FILE.usda>>... [LOG]..."
 )]
 #[command(group = clap::ArgGroup::new("into").required(true).multiple(true))]
 pub struct Args {
+    /// Logs along which the size of what files of links cannot say is taken; LOG@0..70% is a part of one
+    #[arg(value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
     /// URDF to write, with FILE.toml beside it (serial robots and single joints)
     #[arg(long, value_name = "FILE.urdf", group = "into", value_parser = arguments::urdf_file)]
     pub urdf: Option<PathBuf>,
+    /// URDF of the same robot whose meshes, names and frames the one of --urdf keeps: only inertials and
+    /// friction are replaced
+    #[arg(long, value_name = "FILE.urdf", requires = "urdf")]
+    pub urdf_source: Option<PathBuf>,
+    /// MJCF file of MuJoCo to write
+    #[arg(long, value_name = "FILE.xml", group = "into", value_parser = arguments::mjcf_file)]
+    pub mjcf: Option<PathBuf>,
+    /// SDF file of Gazebo to write
+    #[arg(long, value_name = "FILE.sdf", group = "into", value_parser = arguments::sdf_file)]
+    pub sdf: Option<PathBuf>,
+    /// USD file of Isaac Sim to write, as text
+    #[arg(long, value_name = "FILE.usda", group = "into", value_parser = arguments::usd_file)]
+    pub usd: Option<PathBuf>,
     /// C99 header to write
     #[arg(long, value_name = "FILE.h", group = "into", value_parser = arguments::header_file)]
     pub c: Option<PathBuf>,
@@ -57,6 +85,21 @@ pub struct Exported {
     files: Vec<Written>,
     /// Effects that the files do not hold.
     left_out: Vec<String>,
+    /// What the files of simulators cannot say, file by file.
+    beyond: Vec<Beyond>,
+}
+
+/// What a format cannot say.
+#[derive(Debug, Serialize, JsonSchema)]
+struct Beyond {
+    /// The file.
+    file: String,
+    /// What it is.
+    what: String,
+    /// Joint where it is largest; null where no log tells.
+    joint: Option<String>,
+    /// Its rms over that of the joint's torque along the logs, in percent; null where no log tells.
+    percent_of_torque: Option<f64>,
 }
 
 /// A file that was written.
@@ -88,28 +131,224 @@ fn effects(file: &ModelFile) -> Vec<String> {
     file.effects.iter().map(of).collect()
 }
 
+/// A format of a simulator that is asked for.
+struct Format<'a> {
+    path: &'a Path,
+    what: &'static str,
+    /// The list beside it.
+    side: PathBuf,
+    says: Says,
+    text: fn(&Arm, &[String]) -> String,
+}
+
+/// Those of the command line.
+fn formats(args: &Args) -> Vec<Format<'_>> {
+    use export::{mjcf, sdf, usd};
+    let all: [(
+        &Option<PathBuf>,
+        &'static str,
+        Says,
+        fn(&Arm, &[String]) -> String,
+    ); 3] = [
+        (&args.mjcf, "MJCF", mjcf::SAYS, mjcf::mjcf),
+        (&args.sdf, "SDF", sdf::SAYS, sdf::sdf),
+        (&args.usd, "USD", usd::SAYS, usd::usd),
+    ];
+    let asked = all.into_iter().filter_map(|(path, what, says, text)| {
+        let path = path.as_deref()?;
+        let mut side = path.as_os_str().to_owned();
+        side.push(".left-out.toml");
+        Some(Format {
+            path,
+            what,
+            side: side.into(),
+            says,
+            text,
+        })
+    });
+    asked.collect()
+}
+
+/// The motion along which sizes are taken.
+#[derive(Default)]
+struct Along {
+    stretches: Vec<Stretch>,
+    names: Vec<String>,
+    inputs: Vec<Provenance>,
+    warnings: Vec<String>,
+}
+
+impl Along {
+    fn read(args: &Args, given: &Given<ModelFile>, context: &Context) -> Result<Self, CliError> {
+        if args.logs.is_empty() {
+            return Ok(Self::default());
+        }
+        let machine = LoggedRobot::new(&given.name, given.value.robot.clone());
+        let logs: Vec<Log> = args.logs.iter().map(Log::from).collect();
+        let whole = identify::read_whole(&machine, &logs, context.control())?;
+        Ok(Self {
+            stretches: whole.stretches,
+            names: logs.iter().map(|log| escape(&log.name())).collect(),
+            inputs: whole.inputs,
+            warnings: whole.warnings,
+        })
+    }
+}
+
+/// A URDF that stands for the robot, and the robot that it is read as.
+struct Source {
+    text: String,
+    robot: RobotFile,
+}
+
+fn source(path: &Path) -> Result<Given<Source>, CliError> {
+    let shown = escape(&path.to_string_lossy());
+    let file = path.file_name().unwrap_or(path.as_os_str());
+    let file = file.to_string_lossy();
+    let text = config::text(path)?;
+    let section = toml::Value::from(&*file);
+    let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
+    Ok(Given {
+        provenance: Provenance::of_text(&file, &text),
+        value: Source {
+            robot: RobotFile::parse_in(&shown, &robot, path.parent())?,
+            text,
+        },
+        name: shown,
+    })
+}
+
+/// What the controller calls joints that the model calls otherwise.
+fn controller_names(file: &ModelFile) -> BTreeMap<String, String> {
+    let joints = file.robot.log.joint.iter();
+    let named = joints.filter_map(|(joint, of)| Some((joint.clone(), of.name.clone()?)));
+    named.collect()
+}
+
+/// What the files of simulators cannot say, as a table.
+fn beyond_table(beyond: &[Beyond]) -> String {
+    if beyond.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(&[
+        ("file", Align::Left),
+        ("what it cannot say", Align::Left),
+        ("% of torque", Align::Decimal),
+        ("at", Align::Left),
+    ]);
+    for part in beyond {
+        let percent = part.percent_of_torque;
+        table.row([
+            part.file.as_str(),
+            &part.what,
+            &percent.map_or("-".to_owned(), |x| number::significant(x, 3)),
+            part.joint.as_deref().unwrap_or("-"),
+        ]);
+    }
+    format!("\n{table}")
+}
+
+/// The file, with or without its effects.
+fn without(file: &ModelFile, effects: bool) -> ModelFile {
+    let mut file = file.clone();
+    if effects {
+        file.effects.clear();
+    }
+    file
+}
+
+/// What a header or module says of effects.
+fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
+    if !left_out.is_empty() {
+        let all = left_out.join(", ");
+        return vec![format!("NOT in here, though the model has it: {all}.")];
+    }
+    let mut lines = vec!["Nothing of the model is left out.".to_owned()];
+    let effects = &program.effects;
+    if !effects.told.is_empty() {
+        let told: Vec<String> = effects.told.iter().map(|name| escape(name)).collect();
+        lines.push(format!("Effects: {}.", told.join(", ")));
+    }
+    if effects.remember_anything() {
+        lines.push("Some remember the motion: init, then step once a sample.".to_owned());
+    }
+    let late = effects.lead_s.iter().zip(&program.joints);
+    for (lead, joint) in late.filter(|(lead, _)| **lead != 0.0) {
+        lines.push(format!(
+            "The logged torque of {} is late by {} s, {} samples at 1 kHz: these functions give the torque \
+             without it; send it that much earlier.",
+            escape(joint),
+            number::significant(*lead, 6),
+            number::significant(1000.0 * lead, 4),
+        ));
+    }
+    lines
+}
+
+/// What a URDF says of effects.
+fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
+    let (own, all) = (effects(file), left_out.join(", "));
+    match (own.is_empty(), left_out.is_empty()) {
+        (_, false) => vec![format!("NOT in here, though the model has it: {all}.")],
+        (true, true) => vec!["Nothing of the model is left out.".to_owned()],
+        (false, true) => vec![format!(
+            "Effects are in the file beside the URDF alone: {}.",
+            own.join(", ")
+        )],
+    }
+}
+
+/// Speeds below which joints may rest: a hundredth of what the robot file allows, where it says.
+fn rest_speeds(file: &ModelFile, usual: &[f64]) -> Vec<f64> {
+    let names = file.robot.joint_names();
+    let limit = |name: &String| file.robot.limits.get(name).and_then(|limits| limits.speed);
+    let each = names.iter().zip(usual);
+    each.map(|(name, usual)| limit(name).map_or(*usual, |top| top / 100.0))
+        .collect()
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Every [`CliError`]; a file that cannot be made keeps none from being written that was.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let side = args.urdf.as_ref().map(|path| path.with_extension("toml"));
-    let outputs = [&args.urdf, &side, &args.c, &args.rust];
-    let outputs: Vec<&Path> = outputs.iter().filter_map(|path| path.as_deref()).collect();
-    context.check_outputs(&[&args.model], &outputs)?;
-    let given = files::model(&args.model, context)?;
-    let model = given.value.model(&given.name)?;
-    let left_out = effects(&given.value);
-    if !left_out.is_empty() && !args.without_effects {
-        return Err(CliError::input(format!(
-            "{}: the model has effects that these files cannot hold: {}",
-            given.name,
-            left_out.join(", ")
-        ))
-        .hint("export the rest with --without-effects")
-        .hint("`cft-ident torque` computes the torque with all effects"));
+    let formats = formats(args);
+    if !args.logs.is_empty() && formats.is_empty() && args.urdf.is_none() {
+        return Err(CliError::usage(
+            "logs belong to --urdf, --mjcf, --sdf and --usd, whose files cannot say all of a model",
+        ));
     }
-    let program = Program::of(&model);
+    let outputs = [&args.urdf, &side, &args.c, &args.rust];
+    let outputs = outputs.into_iter().filter_map(|path| path.as_deref());
+    let beside = formats.iter().flat_map(|f| [f.path, f.side.as_path()]);
+    let outputs: Vec<&Path> = outputs.chain(beside).collect();
+    let logs = args.logs.iter().map(|log| log.path.as_path());
+    let inputs = logs.chain([args.model.as_path()]);
+    let inputs: Vec<&Path> = inputs.chain(args.urdf_source.as_deref()).collect();
+    context.check_outputs(&inputs, &outputs)?;
+    let given = files::model(&args.model, context)?;
+    for effect in &given.value.effects {
+        if let (Some(reason), false) = (no_torque(&effect.name), args.without_effects) {
+            return Err(CliError::input(format!(
+                "{}: the effect {} cannot be a torque: {reason}",
+                given.name,
+                escape(&effect.name)
+            ))
+            .hint("export the rest with --without-effects"));
+        }
+    }
+    let (refined, left_out) = match args.without_effects {
+        true => {
+            let model = given.value.model(&given.name)?;
+            (AugmentedModel::plain(model), effects(&given.value))
+        }
+        false => (identify::refined(&given.value, &given.name)?, Vec::new()),
+    };
+    let model = &refined.model;
+    let failed = |error: ExportError| CliError::input(format!("{}: {error}", given.name));
+    let mut program = Program::with_effects(&refined).map_err(failed)?;
+    program.rest = rest_speeds(&given.value, &program.rest);
     let mut lines = vec![
         format!(
             "Dynamic model written by cft-ident {} from {} (SHA-256 {}).",
@@ -119,27 +358,83 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         ),
         "tau = Y(q, v, a) theta + F(v) + offset, SI units and radians.".to_owned(),
     ];
-    lines.push(match left_out.is_empty() {
-        true => "Nothing of the model is left out.".to_owned(),
-        false => format!(
-            "NOT in here, though the model has it: {}.",
-            left_out.join(", ")
-        ),
-    });
+    let base_lines = lines.clone();
+    let mut urdf_lines = lines.clone();
+    lines.extend(about_effects(&program, &left_out));
     let torque_units: Vec<String> = (0..program.joints.len())
         .map(|j| given.value.robot.torque_unit(j).to_owned())
         .collect();
+    let along = Along::read(args, &given, context)?;
+    let source = args.urdf_source.as_deref().map(source).transpose()?;
+    let mut told = Vec::new();
     // every text is made before the first is written
     let mut texts: Vec<(&Path, &str, String)> = Vec::new();
+    let mut beyond = Vec::new();
     if let (Some(path), Some(side)) = (&args.urdf, &side) {
-        let made = export::urdf::urdf(&given.value, &model, &name(path), &lines);
-        let made =
-            made.map_err(|error: ExportError| CliError::input(format!("{}: {error}", given.name)))?;
+        let kept = without(&given.value, args.without_effects);
+        urdf_lines.extend(beside_urdf(&kept, &left_out));
+        // of the model alone: effects are in the file beside it
+        let arm = Arm::of(&kept, &AugmentedModel::plain(model.clone()));
+        if let Ok(arm) = &arm {
+            let says = export::sdf::SAYS;
+            let found = export::left_out::left_out(arm, &refined, says, &along.stretches);
+            urdf_lines.extend(export::left_out::lines(&found, &along.names));
+        }
+        let mut made =
+            export::urdf::urdf(&kept, model, &name(path), &urdf_lines).map_err(failed)?;
+        let mut beside = true;
+        if let Some(source) = &source {
+            let arm = arm.map_err(failed)?;
+            let replacement = urdf_source::replacement(
+                &arm,
+                &source.value.robot,
+                &source.name,
+                &controller_names(&given.value),
+            );
+            let replacement = UrdfReplacement {
+                notes: urdf_lines.clone(),
+                ..replacement.map_err(failed)?
+            };
+            made.urdf = replaced_in_urdf(&source.name, &source.value.text, &replacement)?;
+            beside = urdf_source::same_names(&arm, &source.value.robot);
+        }
         texts.push((path, "URDF", made.urdf));
-        texts.push((side, "model file of the URDF", made.side));
+        if beside {
+            texts.push((side, "model file of the URDF", made.side));
+        } else {
+            told.push(format!(
+                "{}: joints have other names there than in the model, so no model file stands beside {}",
+                source.as_ref().map_or("", |source| source.name.as_str()),
+                name(path)
+            ));
+        }
+    }
+    if !formats.is_empty() {
+        let arm = Arm::of(&given.value, &refined).map_err(failed)?;
+        for format in &formats {
+            let says = format.says;
+            let found = export::left_out::left_out(&arm, &refined, says, &along.stretches);
+            let mut head = base_lines.clone();
+            if !left_out.is_empty() {
+                let all = left_out.join(", ");
+                head.push(format!("NOT in here, though the model has it: {all}."));
+            }
+            head.extend(below_zero(&given.value, model));
+            let side = export::left_out::side_file(&found, &head, &along.names).map_err(failed)?;
+            head.extend(export::left_out::lines(&found, &along.names));
+            head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
+            texts.push((format.path, format.what, (format.text)(&arm, &head)));
+            texts.push((&format.side, "what it cannot say", side));
+            beyond.extend(found.into_iter().map(|part| Beyond {
+                file: name(format.path),
+                what: part.what,
+                joint: part.joint,
+                percent_of_torque: part.percent_of_torque,
+            }));
+        }
     }
     let note = Note {
-        lines: lines.clone(),
+        lines,
         torque_units,
     };
     if let Some(path) = &args.c {
@@ -165,8 +460,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         true => Vec::new(),
         false => vec![format!("left out: {}", left_out.join(", "))],
     };
-    if args.urdf.is_some() {
-        warnings.extend(below_zero(&given.value, &model));
+    if args.urdf.is_some() || !formats.is_empty() {
+        warnings.extend(below_zero(&given.value, model));
     }
     let written = texts.iter().map(|(path, what, _)| Written {
         file: name(path),
@@ -176,10 +471,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         joints: program.joints.clone(),
         files: written.collect(),
         left_out,
+        beyond,
     };
+    let mut inputs = vec![given.provenance];
+    inputs.extend(source.map(|source| source.provenance));
+    inputs.extend(along.inputs);
+    warnings.extend(told);
+    warnings.extend(along.warnings);
+    let mut text = table.to_string();
+    text += &beyond_table(&result.beyond);
     Ok(Outcome {
-        text: table.to_string(),
-        document: Document::new("export", &[given.provenance], &warnings, &result)?,
+        text,
+        document: Document::new("export", &inputs, &warnings, &result)?,
         missed: Vec::new(),
     })
 }

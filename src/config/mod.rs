@@ -34,3 +34,4 @@ pub use robot_file::RobotFile;
 pub use trajectory::Trajectory;
 pub use urdf::UrdfChain;
 pub use urdf::beside::DRIVE_INERTIA;
+pub use urdf::source::{Replacement as UrdfReplacement, replaced as replaced_in_urdf};

@@ -6,10 +6,12 @@
 //! the simulator and a line there.
 
 mod added;
+pub mod as_code;
 mod augmented_model;
 mod cover;
 pub(crate) mod entry;
 mod law;
+pub(crate) mod law_text;
 mod order;
 pub(crate) mod place;
 pub(crate) mod unit;

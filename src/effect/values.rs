@@ -13,6 +13,8 @@ pub enum EffectError {
         joint: String,
         known: String,
     },
+    #[error("no code is known for the effect {effect}")]
+    NoCode { effect: String },
     #[error("effect `{name}` cannot sit there on this robot")]
     Place { name: String },
     #[error("effect `{name}` lacks its parameter `{key}`; it takes {known}")]

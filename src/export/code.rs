@@ -4,8 +4,10 @@ use std::fmt::Write;
 
 use super::Program;
 use super::note::Note;
+use crate::effect::as_code::Effects;
+use crate::effect::law_text::{exact, law};
 use crate::robot::JointKind;
-use crate::robot::model::JointFriction;
+use crate::robot::standard::STANDARD;
 use crate::robot::tree::{Coordinate, Dependence};
 
 /// The words of a language.
@@ -15,12 +17,8 @@ pub(super) struct Language {
     open: char,
     close: char,
     comment: &'static str,
-    /// Indentation of the lines of a function.
-    pub indent: &'static str,
-    pub tanh: fn(&str) -> String,
-    pub sign: fn(&str) -> String,
-    /// Statement that begins a variable.
-    pub variable: &'static str,
+    /// What stands for the marks of statements: `$f(`, `state.`, `let `, `&state.`.
+    marks: [&'static str; 4],
 }
 
 pub(super) const C: Language = Language {
@@ -32,10 +30,7 @@ pub(super) const C: Language = Language {
     open: '{',
     close: '}',
     comment: " * ",
-    indent: "    ",
-    tanh: |x| format!("tanh({x})"),
-    sign: |x| format!("@name@_sign({x})"),
-    variable: "const double",
+    marks: ["@name@_", "state->", "const double ", "state->"],
 };
 
 pub(super) const RUST: Language = Language {
@@ -49,16 +44,8 @@ pub(super) const RUST: Language = Language {
     open: '[',
     close: ']',
     comment: "//! ",
-    indent: "    ",
-    tanh: |x| format!("({x}).tanh()"),
-    sign: |x| format!("sign({x})"),
-    variable: "let",
+    marks: ["", "state.", "let ", "&mut state."],
 };
-
-/// A number that reads back bit for bit.
-fn exact(x: f64) -> String {
-    format!("{x:?}")
-}
 
 impl Language {
     /// Nested values, one row of the innermost to a line.
@@ -139,76 +126,38 @@ impl Language {
             let factors = sines.iter().flat_map(|(_, x)| x[2..].to_vec());
             out += &self.numbers("SINE_K", &[s, n], factors);
         }
-        out += &self.numbers("BODY", &[l, 10], program.bodies.iter().flatten().copied());
-        // what is at rest seems to be pushed up
-        out += &self.numbers("FALL", &[3], program.tree.gravity().map(|g| -g).into_iter());
         out
     }
 
-    /// Statements for the friction of each joint.
-    pub(super) fn friction(&self, program: &Program) -> String {
-        let mut out = String::new();
-        for (j, friction) in program.friction.iter().enumerate() {
-            let sum = match friction {
-                JointFriction::None => "0.0".to_owned(),
-                JointFriction::ViscousCoulomb(law) => format!(
-                    "{} * v[{j}] + {} * {}",
-                    exact(law.viscous),
-                    exact(law.coulomb),
-                    (self.sign)(&format!("v[{j}]"))
-                ),
-                JointFriction::DoubleTanh(law) => format!(
-                    "{} * v[{j}] + {} * {} + {} * {}",
-                    exact(law.viscous),
-                    exact(law.coulomb_1),
-                    (self.tanh)(&format!("{} * v[{j}]", exact(law.slope_1))),
-                    exact(law.coulomb_2),
-                    (self.tanh)(&format!("{} * v[{j}]", exact(law.slope_2)))
-                ),
-            };
-            let _ = writeln!(out, "{}tau[{j}] = {sum};", self.indent);
-        }
-        if program.friction.iter().all(|f| *f == JointFriction::None) {
-            let unused = if self.open == '{' {
-                "(void)v;"
-            } else {
-                "let _ = v;"
-            };
-            let _ = writeln!(out, "{}{unused}", self.indent);
-        }
-        out.trim_end().to_owned()
+    /// The standard parameters of every link.
+    pub(super) fn bodies(&self, name: &str, bodies: &[[f64; STANDARD]]) -> String {
+        let sizes = [bodies.len(), STANDARD];
+        self.numbers(name, &sizes, bodies.iter().flatten().copied())
     }
 
-    /// Statements for drive inertias, couplings and offsets.
-    pub(super) fn drives(&self, program: &Program) -> String {
+    /// A vector.
+    pub(super) fn vector(&self, name: &str, x: &[f64]) -> String {
+        self.numbers(name, &[x.len()], x.iter().copied())
+    }
+
+    /// Numbers between brackets.
+    pub(super) fn list(&self, x: &[f64]) -> String {
+        let all: Vec<String> = x.iter().copied().map(exact).collect();
+        self.nested(&all, &[x.len()])
+    }
+
+    /// Statements in the words of the language.
+    pub(super) fn statements(&self, lines: &[String]) -> String {
+        let [call, state, constant, memory] = self.marks;
         let mut out = String::new();
-        for (j, (drive, offset)) in program.drives.iter().zip(&program.offset).enumerate() {
-            let mut terms = Vec::new();
-            if *drive != 0.0 {
-                terms.push(format!("{} * a[{j}]", exact(*drive)));
-            }
-            if *offset != 0.0 {
-                terms.push(exact(*offset));
-            }
-            if !terms.is_empty() {
-                let _ = writeln!(out, "{}tau[{j}] += {};", self.indent, terms.join(" + "));
-            }
-        }
-        for (k, (c, [inertia, viscous, coulomb])) in program.couplings.iter().enumerate() {
-            let (m, o, ratio) = (c.motor, c.other, exact(c.ratio));
-            let [inertia, viscous, coulomb] = [inertia, viscous, coulomb].map(|x| exact(*x));
-            let sign = (self.sign)(&format!("v[{m}] + {ratio} * v[{o}]"));
-            for line in [
-                format!("{} turning_{k} = {coulomb} * {sign};", self.variable),
-                format!(
-                    "tau[{m}] += {ratio} * ({inertia} * a[{o}] + {viscous} * v[{o}]) + turning_{k};"
-                ),
-                format!(
-                    "tau[{o}] += {ratio} * ({inertia} * a[{m}] + {viscous} * v[{m}] + turning_{k});"
-                ),
-            ] {
-                let _ = writeln!(out, "{}{line}", self.indent);
-            }
+        for line in lines {
+            let line = line.replace('$', call).replace("&state.", memory);
+            let line = line.replace("state.", state);
+            let line = match line.strip_prefix("let ") {
+                Some(rest) => format!("{constant}{rest}"),
+                None => line,
+            };
+            let _ = writeln!(out, "    {line}");
         }
         out.trim_end().to_owned()
     }
@@ -234,6 +183,73 @@ impl Language {
             })
             .collect();
         shown.join("\n")
+    }
+}
+
+/// Statements for the friction of each joint.
+pub(super) fn friction(program: &Program) -> Vec<String> {
+    let each = program.friction.iter().enumerate();
+    let each = each.map(|(j, own)| format!("tau[{j}] = {};", law(own, &format!("v[{j}]"))));
+    each.chain(program.effects.friction.iter().cloned())
+        .collect()
+}
+
+/// Statements for drive inertias and couplings.
+pub(super) fn drives(program: &Program) -> Vec<String> {
+    let mut out = Vec::new();
+    for (j, drive) in program.drives.iter().enumerate() {
+        if *drive != 0.0 {
+            out.push(format!("tau[{j}] += {} * a[{j}];", exact(*drive)));
+        }
+    }
+    for (k, (c, [inertia, viscous, coulomb])) in program.couplings.iter().enumerate() {
+        let (m, o, ratio) = (c.motor, c.other, exact(c.ratio));
+        let [inertia, viscous, coulomb] = [inertia, viscous, coulomb].map(|x| exact(*x));
+        out.extend([
+            format!("let turning_{k} = {coulomb} * $sign(v[{m}] + {ratio} * v[{o}]);"),
+            format!(
+                "tau[{m}] += {ratio} * ({inertia} * a[{o}] + {viscous} * v[{o}]) + turning_{k};"
+            ),
+            format!(
+                "tau[{o}] += {ratio} * ({inertia} * a[{m}] + {viscous} * v[{m}] + turning_{k});"
+            ),
+        ]);
+    }
+    out
+}
+
+/// Statements for offsets and for effects without memory.
+pub(super) fn added(program: &Program) -> Vec<String> {
+    let offsets = program.offset.iter().enumerate();
+    let offsets = offsets.filter(|(_, x)| **x != 0.0);
+    offsets
+        .map(|(j, x)| format!("tau[{j}] += {};", exact(*x)))
+        .chain(program.effects.added.iter().cloned())
+        .collect()
+}
+
+/// What the function of the weight carries beside the links, in words; nothing where there is nothing.
+pub(super) fn carried(program: &Program) -> &'static str {
+    let effects = &program.effects;
+    let askew = effects.tilt.is_some() || !effects.askew.is_empty();
+    match (effects.extra.is_some(), askew) {
+        (false, false) => "",
+        (true, false) => " and the payload",
+        (false, true) => ", on a base that stands askew,",
+        (true, true) => " and the payload, on a base that stands askew,",
+    }
+}
+
+/// What at rest seems to push links up.
+pub(super) fn fall(program: &Program) -> [f64; 3] {
+    program.tree.gravity().map(|g| -g)
+}
+
+/// What the function without a state leaves to the one with it.
+pub(super) fn without_memory(effects: &Effects) -> &'static str {
+    match effects.remember_anything() {
+        true => " and the effects\n * that remember nothing: `step` has them all",
+        false => " and effects",
     }
 }
 

@@ -8,6 +8,15 @@ use crate::number;
 use crate::robot::friction::ViscousCoulomb;
 use crate::robot::model::{JointFriction, Model};
 
+/// Viscous friction and its level while the joint moves fast \[N s/m or Nm s/rad, N or Nm\].
+pub(super) fn damping_and_friction(law: &JointFriction) -> [f64; 2] {
+    match law {
+        JointFriction::None => [0.0; 2],
+        JointFriction::ViscousCoulomb(law) => [law.viscous, law.coulomb],
+        JointFriction::DoubleTanh(law) => [law.viscous, law.coulomb_1 + law.coulomb_2],
+    }
+}
+
 /// Damping and friction of joint j, not below zero; `None` where its law is another one.
 pub(super) fn dissipative(model: &Model, j: usize) -> Option<[f64; 2]> {
     match model.friction.get(j)? {

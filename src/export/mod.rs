@@ -1,49 +1,41 @@
-//! Identified models for other programs: a C header, a Rust module, a URDF.
+//! Identified models for other programs: a C header, a Rust module, a URDF, files of simulators.
 //!
 //! | file | what |
 //! |---|---|
 //! | [`program`] | a model as a chain of links with numbers |
 //! | `code` | tables and statements that C and Rust have in common |
+//! | `functions` | small functions that the statements call |
 //! | [`header`] | the C99 header |
 //! | [`module`] | the Rust module |
 //! | [`standard`] | standard parameters of links from base parameters |
 //! | [`dissipative`] | friction and drive inertias below zero |
 //! | `single` | a single joint as a chain of one link |
+//! | `prepared` | a model as links with inertials |
+//! | [`arm`] | the same as simulators take it: armature, damping, friction |
+//! | [`left_out`] | what a format cannot say, and how much of the torque that is |
+//! | [`mjcf`] [`sdf`] [`usd`] | MuJoCo, Gazebo, Isaac Sim |
 //! | [`urdf`] | the URDF, and what it cannot hold beside it |
+//! | [`urdf_source`] | the user's own URDF with what was identified |
 
+pub mod arm;
 mod code;
 pub mod dissipative;
+mod error;
+mod functions;
 pub mod header;
+pub mod left_out;
+pub mod mjcf;
 pub mod module;
 pub mod note;
+mod prepared;
 pub mod program;
+pub mod sdf;
 mod single;
 pub mod standard;
 pub mod urdf;
+pub mod urdf_source;
+pub mod usd;
 
+pub use error::ExportError;
 pub use note::Note;
 pub use program::Program;
-
-use crate::config::ConfigError;
-
-/// Why a model cannot be exported.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// A URDF has no word for this.
-    #[error("a URDF cannot hold {what}; {remedy}")]
-    NotInUrdf { what: String, remedy: &'static str },
-    /// The mass of a link comes out as 0 while its first moment does not.
-    #[error(
-        "link `{link}` has the mass {mass:e} kg by this model but the first moment {moment:.3e} kg m, \
-         which no centre of gravity gives; give it a prior mass in [[robot.link]] `inertial`, or \
-         export with --c or --rust"
-    )]
-    NoMass {
-        link: String,
-        mass: f64,
-        moment: f64,
-    },
-    /// The side file could not be written as text.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-}

@@ -1,5 +1,8 @@
 //! A model as the numbers of a recursion: what generated code is written from.
 
+use super::error::ExportError;
+use crate::effect::AugmentedModel;
+use crate::effect::as_code::Effects;
 use crate::robot::JointKind;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::STANDARD;
@@ -25,9 +28,32 @@ pub struct Program {
     pub friction: Vec<JointFriction>,
     /// Constant torque of each joint [N or Nm].
     pub offset: Vec<f64>,
+    /// What effects add.
+    pub effects: Effects,
+    /// Speed of each joint below which it may be at rest [m/s or rad/s].
+    pub rest: Vec<f64>,
+}
+
+/// Speeds below which a joint may be at rest where nothing else is said: 0.01 rad/s, 1 mm/s.
+fn slow(kind: JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute => 1e-2,
+        JointKind::Prismatic => 1e-3,
+    }
 }
 
 impl Program {
+    /// The program of a model with its effects.
+    ///
+    /// # Errors
+    /// [`ExportError::Effect`] for an effect that no code is known of.
+    pub fn with_effects(refined: &AugmentedModel) -> Result<Self, ExportError> {
+        Ok(Self {
+            effects: Effects::of(refined)?,
+            ..Self::of(&refined.model)
+        })
+    }
+
     /// The program of a model.
     pub fn of(model: &Model) -> Self {
         let robot = &model.robot;
@@ -43,6 +69,13 @@ impl Program {
                 .collect(),
             friction: model.friction.clone(),
             offset: model.offset.clone(),
+            effects: Effects {
+                lead_s: vec![0.0; robot.joints()],
+                ..Effects::default()
+            },
+            rest: (0..robot.joints())
+                .map(|j| slow(robot.joint_kind(j)))
+                .collect(),
         }
     }
 }

@@ -4,15 +4,15 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::dissipative::{below_zero, dissipative};
-use super::standard::{Identifiability, Standard, nearest};
-use super::{ExportError, single};
+use super::error::ExportError;
+use super::prepared::{Drive, Prepared, drive, joint_name, quoted, root, words};
+use super::standard::{Identifiability, Standard};
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
-use crate::config::serial_section::InertialSection;
 use crate::robot::model::Model;
 use crate::robot::standard::{Body, STANDARD, STANDARD_NAMES};
+use crate::robot::tree::Link;
 use crate::robot::tree::space::{Vector, about, add, product, roll_pitch_yaw, times, turn};
-use crate::robot::tree::{Coordinate, Link};
 use crate::robot::{JointKind, Robot};
 
 /// The two files.
@@ -26,48 +26,20 @@ pub struct Exported {
 /// `notes` stand at the head of both.
 ///
 /// # Errors
-/// [`ExportError::NotInUrdf`] for robots that no URDF can be of; [`ExportError::NoMass`].
+/// [`ExportError::NoLinks`] for robots that no URDF can be of; [`ExportError::NoMass`].
 pub fn urdf(
     file: &ModelFile,
     model: &Model,
     urdf_name: &str,
     notes: &[String],
 ) -> Result<Exported, ExportError> {
+    let Prepared {
+        file,
+        model,
+        standard,
+        of_inertials,
+    } = &Prepared::of(file, model)?;
     let robot = &model.robot;
-    if robot.transmission().coordinates().is_some() {
-        return Err(ExportError::NotInUrdf {
-            what: "the pantograph: its q3 = d + L4 sin(q4 + q5) + L4 sin q4 is no multiple of another \
-                   joint, which is all that <mimic> can say"
-                .to_owned(),
-            remedy: "export it with --c or --rust",
-        });
-    }
-    let unit = file.robot.inertial_torque_unit();
-    if !matches!(unit, "N" | "Nm") {
-        return Err(ExportError::NotInUrdf {
-            what: format!("an inertia in {unit} per acceleration"),
-            remedy: "give `torque_scale` in [log.joint] of the robot file and fit again, or export it with \
-                     --c or --rust",
-        });
-    }
-    if !robot.knows_links() {
-        let (file, model) = single::chain(file, model);
-        return urdf(&file, &model, urdf_name, notes);
-    }
-    let found = feasible(file, robot);
-    let (priors, drives) = match &found {
-        Some((bodies, drives)) => (bodies.clone(), drives.as_slice()),
-        None => {
-            let links = file.robot.robot.link.iter();
-            (links.map(|l| l.inertial.clone()).collect(), &[][..])
-        }
-    };
-    let standard = nearest(robot, &model.theta, &priors, drives);
-    let of_inertials = match (&found, standard.is_prior) {
-        (Some(_), true) => &FEASIBLE[..],
-        (Some(_), false) => &NEAR_FEASIBLE,
-        (None, _) => &NEAREST,
-    };
     let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
     let below = below_zero(file, model);
     let below = below.iter().map(String::as_str);
@@ -83,33 +55,16 @@ pub fn urdf(
     );
     for (i, link) in robot.tree().links().iter().enumerate() {
         joint(&mut out, model, file, i, link)?;
-        body(&mut out, i, link, &standard)?;
+        body(&mut out, i, link, standard)?;
     }
     frames(&mut out, robot, file);
     out.push_str("</robot>\n");
     Ok(Exported {
         urdf: out,
-        side: side_file(file, robot, &standard, urdf_name, notes)?,
+        side: side_file(file, robot, standard, urdf_name, notes)?,
     })
 }
 
-/// What the head says of inertials that are nearest to the robot file's.
-const NEAREST: [&str; 3] = [
-    "Inertials: of all that give the identified torques, those nearest to the prior of the robot",
-    "file (1 kg in the origin of a link that has none). They need not be those of a body that can",
-    "be: `lsq --feasible` finds links that can.",
-];
-/// Of those of a feasible fit.
-const FEASIBLE: [&str; 2] = [
-    "Inertials: those of the [[link]] tables of the model, of links that can exist and give the",
-    "identified torques, as `lsq --feasible` found them.",
-];
-/// Of a feasible fit whose parameters were changed afterwards.
-const NEAR_FEASIBLE: [&str; 3] = [
-    "Inertials: of all that give the torques of the model's parameters, those nearest to its",
-    "[[link]] tables, which give other torques: the parameters were changed after they were found.",
-    "They need not be those of a body that can be.",
-];
 /// Of everything.
 const IN_GENERAL: [&str; 4] = [
     "What stands over each link says which of its numbers the data determine; the others are no",
@@ -117,32 +72,6 @@ const IN_GENERAL: [&str; 4] = [
     "damping and friction here repeat viscous and Coulomb friction where that is the law. Inertia",
     "of fixed frames is in the link that they hang on. A limit of 0 is one that is not known.",
 ];
-
-/// Bodies and drives of a feasible fit, where the model has them for every link.
-fn feasible(file: &ModelFile, robot: &Robot) -> Option<(Vec<Option<InertialSection>>, Vec<f64>)> {
-    let bodies = robot.tree().links().iter().map(|link| {
-        let body = file.links.iter().find(|body| body.name == link.name)?;
-        Some(InertialSection {
-            mass: body.mass,
-            centre: body.centre,
-            inertia: body.inertia,
-        })
-    });
-    let bodies: Vec<Option<InertialSection>> = bodies.collect();
-    let drives = match robot.drive_inertia() {
-        true => {
-            let names = robot.joint_names().iter();
-            names
-                .map(|name| file.drive_inertia.get(name).copied())
-                .collect()
-        }
-        false => Some(Vec::new()),
-    };
-    bodies
-        .iter()
-        .all(Option::is_some)
-        .then_some((bodies, drives?))
-}
 
 /// Frames that are fixed to links, each as a link without inertia.
 fn frames(out: &mut String, robot: &Robot, file: &ModelFile) {
@@ -162,63 +91,6 @@ fn frames(out: &mut String, robot: &Robot, file: &ModelFile) {
             words(&frame.xyz),
             words(&frame.rpy),
         );
-    }
-}
-
-/// Name of the link that stands still.
-fn root(robot: &Robot, file: &ModelFile) -> String {
-    let mut name = "base".to_owned();
-    let frames = &file.robot.robot.frame;
-    while robot.tree().links().iter().any(|l| l.name == name)
-        || frames.iter().any(|f| f.name == name)
-    {
-        name.push_str("_frame");
-    }
-    name
-}
-
-/// A text inside an attribute.
-fn quoted(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
-/// Numbers that are read back bit for bit.
-fn words(values: &[f64]) -> String {
-    let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
-    all.join(" ")
-}
-
-/// What moves a link, in the words of a URDF.
-enum Drive {
-    /// The independent joint of this index.
-    Joint(usize),
-    /// A multiple of one: its name, the factor, an offset.
-    Mimic(String, f64, f64),
-    /// Nothing: the link is at rest at this offset.
-    Rest(f64),
-}
-
-fn drive(robot: &Robot, link: &Link) -> Result<Drive, ExportError> {
-    let follows = match &link.coordinate {
-        Coordinate::Joint(j) => return Ok(Drive::Joint(*j)),
-        Coordinate::Follows(follows) => follows,
-    };
-    match (&follows.linear[..], &follows.sines[..]) {
-        ([], []) => Ok(Drive::Rest(follows.offset)),
-        ([(j, factor)], []) => {
-            let joint = robot.joint_names()[*j].clone();
-            Ok(Drive::Mimic(joint, *factor, follows.offset))
-        }
-        _ => Err(ExportError::NotInUrdf {
-            what: format!(
-                "link `{}`, which follows several joints or the sine of one",
-                link.name
-            ),
-            remedy: "export it with --c or --rust",
-        }),
     }
 }
 
@@ -253,18 +125,13 @@ fn joint(
     link: &Link,
 ) -> Result<(), ExportError> {
     let robot = &model.robot;
-    let names = robot.joint_names();
     let drive = drive(robot, link)?;
-    let mut name = format!("{}_joint", link.name);
-    while names.contains(&name) {
-        name.push_str("_follows");
-    }
-    let mut limits = None;
-    if let Drive::Joint(j) = drive {
-        name = names[j].clone();
-        limits = file.robot.limits.get(&name);
-    }
-    let limits = limits.cloned().unwrap_or_default();
+    let name = joint_name(robot, link, &drive);
+    let limits = match drive {
+        Drive::Joint(_) => file.robot.limits.get(&name).cloned(),
+        _ => None,
+    };
+    let limits = limits.unwrap_or_default();
     let kind = match (&drive, link.kind, limits.position) {
         (Drive::Rest(_), ..) => "fixed",
         (_, JointKind::Prismatic, _) => "prismatic",
@@ -384,7 +251,6 @@ fn side_file(
     side.links.clear();
     side.drive_inertia.clear();
     side.covariance = None;
-    side.effects.clear();
     // base parameters come out of the URDF; what the drives add to them stands here
     let base: Vec<&str> = robot
         .parameters()

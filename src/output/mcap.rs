@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
@@ -49,14 +49,7 @@ pub(super) struct McapLog<W: Write> {
 impl<W: Write> McapLog<W> {
     /// Begins a recording of these columns, of which the first is the time.
     pub(super) fn new(out: W, columns: &[String]) -> io::Result<Self> {
-        // One thread compresses: the number of threads shows in the bytes.
-        let options = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0)
-            .profile("ros2")
-            .library(concat!("cft-ident ", env!("CARGO_PKG_VERSION")))
-            .disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(out)).map_err(plain)?;
+        let mut writer = options().create(NoSeek::new(out)).map_err(plain)?;
         let schema = writer
             .add_schema(
                 "sensor_msgs/msg/JointState",
@@ -69,7 +62,7 @@ impl<W: Write> McapLog<W> {
             let channel = writer
                 .add_channel(schema, &topic.name, "cdr", &quality())
                 .map_err(plain)?;
-            let names = names(&topic.names);
+            let names = cdr_names(&topic.names);
             topics.push((channel, topic, names));
         }
         Ok(Self {
@@ -128,6 +121,52 @@ impl<W: Write> McapLog<W> {
     }
 }
 
+/// A recording of one message at the time 0, with notes as metadata.
+pub(super) fn single_message(
+    topic: &str,
+    kind: &str,
+    definition: &str,
+    body: &[u8],
+    notes: &[String],
+) -> io::Result<Vec<u8>> {
+    let mut writer = options().create(NoSeek::new(Vec::new())).map_err(plain)?;
+    let schema = writer
+        .add_schema(kind, "ros2msg", definition.as_bytes())
+        .map_err(plain)?;
+    let channel = writer
+        .add_channel(schema, topic, "cdr", &quality())
+        .map_err(plain)?;
+    let header = MessageHeader {
+        channel_id: channel,
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    };
+    writer
+        .write_to_known_channel(&header, body)
+        .map_err(plain)?;
+    let numbered = notes.iter().enumerate();
+    let metadata = Metadata {
+        name: "notes".to_owned(),
+        metadata: numbered
+            .map(|(i, note)| (format!("{:02}", i + 1), note.clone()))
+            .collect(),
+    };
+    writer.write_metadata(&metadata).map_err(plain)?;
+    writer.finish().map_err(plain)?;
+    Ok(writer.into_inner().into_inner())
+}
+
+/// How recordings are written. One thread compresses: the number of threads shows in the bytes.
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        .profile("ros2")
+        .library(concat!("cft-ident ", env!("CARGO_PKG_VERSION")))
+        .disable_seeking(true)
+}
+
 /// What a recorder of ROS 2 notes of each topic.
 fn quality() -> BTreeMap<String, String> {
     BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())])
@@ -145,7 +184,7 @@ fn stamp(origin: Instant, t: f64) -> io::Result<(i128, bool)> {
 }
 
 /// A list of names as CDR, without alignment before it.
-fn names(names: &[String]) -> Vec<u8> {
+pub(super) fn cdr_names(names: &[String]) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend((names.len() as u32).to_le_bytes());
     for name in names {

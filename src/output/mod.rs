@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all, and logs as CSV and MCAP.
+//! Files that appear whole or not at all, logs as CSV and MCAP, motions as controllers take them.
 //!
 //! A file is written under another name in its own folder, brought to the disk, and renamed. Until
 //! then whatever had its name stays as it was. What is no regular file (a terminal, a pipe,
@@ -9,9 +9,11 @@ mod log;
 mod mcap;
 mod text;
 mod together;
+mod trajectory;
 
 pub use log::{LogForm, LogWriter};
 pub use together::Together;
+pub use trajectory::JointTrajectory;
 
 use std::collections::BTreeSet;
 use std::fs::File;

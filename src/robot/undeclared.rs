@@ -7,7 +7,7 @@ use super::cft::dynamics::Coefficients;
 use super::cft::links::{PseudoInertia, base_parameters};
 use super::cft::regressor::regressor22;
 use super::cft::{PRINTED, Structure, UNPRINTED};
-use super::standard::STANDARD;
+use super::standard::{Body, STANDARD};
 use super::tree::newton_euler::walk;
 use super::tree::{MOST_JOINTS, Tree};
 use super::{Form, Robot, four};
@@ -84,6 +84,55 @@ impl Robot {
             }
         });
         out
+    }
+
+    /// Links that ask of the joints what a ball on the last link does: its mass and its moment of inertia, the
+    /// same about every axis, about its centre in that link's frame. Standard parameters of each link.
+    pub(crate) fn tool_links(
+        &self,
+        [mass, ball]: [f64; 2],
+        centre: [f64; 3],
+    ) -> Vec<[f64; STANDARD]> {
+        let mut links = vec![[0.0; STANDARD]; self.tree().links().len()];
+        let inertia = [ball, 0.0, 0.0, ball, 0.0, ball];
+        links[self.tool_link()] = Body {
+            mass,
+            centre,
+            inertia,
+        }
+        .standard();
+        links
+    }
+
+    /// Likewise for the five numbers of [`Self::level_tool_row`].
+    pub(crate) fn level_tool_links(&self, numbers: [f64; 5]) -> Vec<[f64; STANDARD]> {
+        match &self.0.form {
+            Form::Inertia => self.link_parameters(&numbers[..1]),
+            Form::Report(_) => {
+                let mut theta = [0.0; 22];
+                for (body, x) in BODIES.iter().zip(numbers) {
+                    for (sum, y) in theta.iter_mut().zip(body) {
+                        *sum += x * y;
+                    }
+                }
+                self.link_parameters(&theta)
+            }
+            Form::Recursion(_) => {
+                let [mass, mx, my, mz, second] = numbers;
+                let mut links = vec![[0.0; STANDARD]; self.tree().links().len()];
+                links[self.tool_link()] = [second, 0.0, 0.0, second, 0.0, second, mx, my, mz, mass];
+                links
+            }
+        }
+    }
+
+    /// Likewise for the dropped parameters.
+    pub(crate) fn dropped_links(&self, values: &[f64]) -> Vec<[f64; STANDARD]> {
+        let mut theta = [0.0; 22];
+        for (theta, value) in theta[PRINTED..].iter_mut().zip(values) {
+            *theta = *value;
+        }
+        self.link_parameters(&theta)
     }
 
     /// Names of the base parameters of the full chain that the declared structure drops.

@@ -1,8 +1,10 @@
 //! `cft-ident excite`: a motion that makes the parameters as certain as the limits allow, judged
 //! before the robot moves; or the same judgement of a motion that is there.
 
+mod controllers;
 mod given;
 mod judge;
+mod names;
 mod samples;
 
 use std::path::{Path, PathBuf};
@@ -29,6 +31,7 @@ use crate::report::sections::provenance;
 use crate::report::{Report, stages};
 
 use judge::{head, judged, refuse_broken};
+use names::Names;
 
 const EXAMPLE: &str = "\
 Example:
@@ -109,6 +112,12 @@ pub struct Args {
     /// Write the motion sample by sample, positions, speeds and accelerations
     #[arg(long, value_name = "FILE.csv|.mcap", value_parser = arguments::log_file)]
     pub samples: Option<PathBuf>,
+    /// Write the motion for ROS 2, as trajectory_msgs/msg/JointTrajectory
+    #[arg(long, value_name = "FILE.yaml|.mcap", value_parser = arguments::message_file)]
+    pub trajectory_message: Option<PathBuf>,
+    /// Write the motion as a program for a controller of Universal Robots
+    #[arg(long, value_name = "FILE.script", value_parser = arguments::script_file)]
+    pub urscript: Option<PathBuf>,
     /// Rate of the samples, and of the logs that deviations are foreseen for [Hz] [default: that of
     /// [control], else 1000]
     #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
@@ -238,51 +247,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
 /// Rate of a log where nothing says [Hz].
 const RATE_HZ: f64 = 1000.0;
-
-/// Files of one motion.
-struct Names {
-    trajectory: Option<PathBuf>,
-    samples: Option<PathBuf>,
-    plot: Option<PathBuf>,
-    report: Option<PathBuf>,
-}
-
-impl Names {
-    /// One set for each motion; several are numbered.
-    fn of(args: &Args) -> Vec<Self> {
-        (1..=args.trajectories)
-            .map(|k| {
-                let numbered = |path: &Option<PathBuf>| {
-                    path.as_ref().map(|path| match args.trajectories {
-                        1 => path.clone(),
-                        _ => with_number(path, k),
-                    })
-                };
-                Self {
-                    trajectory: numbered(&args.output),
-                    samples: numbered(&args.samples),
-                    plot: numbered(&args.plot),
-                    report: numbered(&args.report),
-                }
-            })
-            .collect()
-    }
-
-    fn paths(&self) -> impl Iterator<Item = &Path> {
-        let all = [&self.trajectory, &self.samples, &self.plot, &self.report];
-        all.into_iter().filter_map(|path| path.as_deref())
-    }
-}
-
-/// `a/b.toml` and 2 make `a/b-2.toml`.
-fn with_number(path: &Path, k: u16) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(ending) => format!("{stem}-{k}.{}", ending.to_string_lossy()),
-        None => format!("{stem}-{k}"),
-    };
-    path.with_file_name(name)
-}
 
 /// Judges a trajectory that is there.
 fn check(bench: &mut Bench, path: &Path, names: &Names) -> Result<Outcome, CliError> {
@@ -493,6 +457,11 @@ fn written(
     }
     if let Some(path) = &names.samples {
         samples::write(bench, motion, path)?;
+        report
+            .terminal()
+            .line(&format!("written: {}", path.display()));
+    }
+    for path in controllers::write(bench, motion, judged, names)? {
         report
             .terminal()
             .line(&format!("written: {}", path.display()));

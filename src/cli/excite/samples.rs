@@ -31,16 +31,8 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
             header.extend(names.map(|name| format!("{prefix}{name}")));
         }
     }
-    if motion.seconds() * bench.rate_hz > MOST_ROWS {
-        return Err(CliError::input(format!(
-            "{} s at {} Hz are more than {MOST_ROWS:e} samples",
-            number::significant(motion.seconds(), 4),
-            number::significant(bench.rate_hz, 4),
-        ))
-        .hint("give a lower --rate, or a shorter motion"));
-    }
+    let rows = rows(bench, motion, MOST_ROWS)?;
     let mut writer = LogWriter::create(path, &header)?;
-    let rows = (motion.seconds() * bench.rate_hz + 1e-6).floor() as usize + 1;
     for k in 0..rows {
         if k % BLOCK == 0 {
             bench.context.check()?;
@@ -55,4 +47,17 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
         writer.row(std::iter::once(t).chain(values))?;
     }
     Ok(bench.context.files().add_log(writer)?)
+}
+
+/// Number of samples of a motion, of which a file may have `most`.
+pub(super) fn rows(bench: &Bench, motion: &Motion, most: f64) -> Result<usize, CliError> {
+    if motion.seconds() * bench.rate_hz > most {
+        return Err(CliError::input(format!(
+            "{} s at {} Hz are more than {most:e} samples",
+            number::significant(motion.seconds(), 4),
+            number::significant(bench.rate_hz, 4),
+        ))
+        .hint("give a lower --rate, or a shorter motion"));
+    }
+    Ok((motion.seconds() * bench.rate_hz + 1e-6).floor() as usize + 1)
 }

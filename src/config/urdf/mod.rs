@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `xml` | the text as elements with lines; the door to the XML reader |
 //! | `parts` | elements as links and joints |
+//! | [`source`] | a URDF with other inertials and friction |
 //! | `beside` | model files that leave links and inertials to a URDF |
 //! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
 //!
@@ -13,6 +14,7 @@
 
 pub(super) mod beside;
 mod parts;
+pub(super) mod source;
 mod tree;
 mod xml;
 

@@ -143,6 +143,11 @@ impl<'a> Element<'a, '_> {
         self.tree.line(self.node)
     }
 
+    /// Where it stands in the text.
+    pub(super) fn range(&self) -> std::ops::Range<usize> {
+        self.node.range()
+    }
+
     /// Value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
