@@ -40,8 +40,8 @@ Example:
 #[command(after_help = EXAMPLE)]
 #[command(
     override_usage = "cft-ident export [OPTIONS] --model <MODEL.toml>\n       \
-    <--c <FILE.h> | --rust <FILE.rs> | --urdf <FILE.urdf> | --mjcf <FILE.xml> |\n        \
-    --sdf <FILE.sdf> | --usd <FILE.usda>>... [LOG]..."
+    <--c <FILE.h> | --rust <FILE.rs> | --urdf <FILE.urdf> |\n        \
+    --mjcf <FILE.xml> | --sdf <FILE.sdf> | --usd <FILE.usda>>... [LOG]..."
 )]
 #[command(group = clap::ArgGroup::new("into").required(true).multiple(true))]
 pub struct Args {
