@@ -756,7 +756,14 @@ fn the_users_urdf_keeps_what_is_not_inertia_or_friction() {
         assert_cmd::Command::cargo_bin("cft-ident")
             .unwrap()
             .current_dir(folder.path())
-            .args(["export", "-m", "model.toml", "--urdf", "new.urdf", "--urdf-source"])
+            .args([
+                "export",
+                "-m",
+                "model.toml",
+                "--urdf",
+                "new.urdf",
+                "--urdf-source",
+            ])
             .args(more)
             .assert()
     };
