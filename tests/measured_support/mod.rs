@@ -7,6 +7,7 @@ use assert_cmd::Command;
 use serde_json::Value;
 
 /// A measured log, its span behind it where one is named; or `None` with a word about it.
+#[allow(dead_code)] // a test of what the program carries needs none
 pub fn shared(log: &str) -> Option<PathBuf> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     let file = data.join(log.split('@').next().unwrap_or(log));
