@@ -38,11 +38,12 @@ async function opened(file, { width = 1280, scheme = 'light', script = true } = 
   return { context, page, said, asked };
 }
 
-// Lengths of what each figure shows: the longest path of each visible picture.
+// How much each figure shows: the longest path of each visible picture, or its bars and dots.
 const drawn = page => page.$$eval('figure', figures => figures.map(figure => {
   const svgs = [...figure.querySelectorAll('.still > svg, .plot > svg')].filter(s => s.getClientRects().length);
   const lengths = svgs.flatMap(s => [...s.querySelectorAll('path')].map(p => p.getAttribute('d').length));
-  return Math.max(0, ...lengths);
+  const shapes = svgs.map(s => 5 * s.querySelectorAll('rect, circle').length);
+  return Math.max(0, ...lengths, ...shapes);
 }));
 
 const range = figure => figure.evaluate(f => [Number(f.dataset.from), Number(f.dataset.to)]);

@@ -72,6 +72,40 @@ fn clean_logs_have_no_fault_and_their_channels_rate_and_motion_are_told() {
 }
 
 #[test]
+fn quantisation_is_judged_within_the_cut_off_of_the_robot_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "t,q_slide,tau_slide\n".to_owned();
+    for k in 0..8000 {
+        let t = 0.001 * f64::from(k);
+        // 0.1 m at 1 Hz, by an encoder of 3 mm: 40 % noise on the acceleration below 20 Hz, 1 % below 5 Hz
+        let q = (0.1 * (std::f64::consts::TAU * t).sin() / 0.003).round() * 0.003;
+        let tau = (7.1 * t).sin() + 0.3 * (23.0 * t).cos();
+        text += &format!("{t:.3},{q:.3},{tau:.6}\n");
+    }
+    std::fs::write(folder.path().join("log.csv"), text).unwrap();
+    let severity = |cutoff_hz: f64| {
+        let robot = format!(
+            "[robot]\nmodel = \"single-joint\"\njoint = \"slide\"\nkind = \"prismatic\"\n\
+             [friction]\nlaw = \"viscous-coulomb\"\nfitted_with_inertias = true\n\
+             [filter]\ncutoff_hz = {cutoff_hz:?}\n"
+        );
+        std::fs::write(folder.path().join("slide.toml"), robot).unwrap();
+        let done = assert_cmd::Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(folder.path())
+            .args(["inspect", "log.csv", "-r", "slide.toml", "--json", "-"])
+            .assert()
+            .code(0);
+        let found: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+        let mut faults = found["faults"].as_array().unwrap().iter();
+        let coarse = faults.find(|f| f["kind"] == "quantisation" && f["channel"] == "q_slide");
+        coarse.unwrap()["severity"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(severity(20.0), "warning");
+    assert_eq!(severity(5.0), "info");
+}
+
+#[test]
 fn nan_is_an_error_at_its_row() {
     one_fault(
         |log| log.column("q_q4")[5000] = f64::NAN,
@@ -236,7 +270,7 @@ fn coarse_numbers_are_a_warning_where_they_spoil_a_fit() {
         |log| {
             log.column("q_q4")
                 .iter_mut()
-                .for_each(|q| *q = (*q / 1e-3).round() * 1e-3)
+                .for_each(|q| *q = (*q / 6e-3).round() * 6e-3)
         },
         ("warning", "quantisation", "q_q4", 0.0, 19.999),
     );
