@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::source::sha256_of;
-use super::{Layout, LogError, LogSpec, RawBlock, RawReader, Span};
+use super::{Layout, LogError, LogSpec, Provenance, RawBlock, RawReader, Span};
 
 /// Whether rows of one log are rows of the other, by the bytes of their files and by their spans; `layout` tells
 /// the time column where a robot is known. Files that cannot be read share nothing: their reader says why.
@@ -11,6 +11,14 @@ pub fn shares_rows(a: &LogSpec, b: &LogSpec, layout: Option<&Layout>) -> bool {
     let same = |(a, b): (Vec<PathBuf>, Vec<PathBuf>)| same_bytes(&a, &b);
     let files = a.files().ok().zip(b.files().ok());
     files.is_some_and(same) && overlap(a, b, layout)
+}
+
+impl Provenance {
+    /// Whether both are rows of one log and have some in common, by checksum and span.
+    pub fn shares_rows(&self, other: &Self) -> bool {
+        let span = |of: &Self| of.span.as_deref().map_or(Span::Whole, Span::read);
+        self.sha256 == other.sha256 && span(self).meets(span(other))
+    }
 }
 
 /// Whether files hold the same bytes. Only those of the same lengths are read for it.

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::LogError;
 use super::names::{escape, escape_whole, list, nearest};
-use super::{LogError, Span};
 
 /// One input of a result: enough to know the data again, and nothing of the machine it was read on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -67,12 +67,6 @@ impl Provenance {
     /// Whether something was made from these rows: from those of a log that was not held out.
     pub fn made(&self) -> bool {
         self.samples > 0 && self.role != Some(DataRole::HeldOut)
-    }
-
-    /// Whether both are rows of one log and have some in common, by checksum and span.
-    pub fn shares_rows(&self, other: &Self) -> bool {
-        let span = |of: &Self| of.span.as_deref().map_or(Span::Whole, Span::read);
-        self.sha256 == other.sha256 && span(self).meets(span(other))
     }
 
     /// An input that is no log: a model, robot, campaign or trajectory file.

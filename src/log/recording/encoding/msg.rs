@@ -399,7 +399,7 @@ mod tests {
             parse("float64\n")
         );
         assert!(parse("float64[x] y").contains("float64[x] y"));
-        assert!(parse("float64[0] y").contains("none"));
+        assert!(parse("float64[0] y").contains("invalid field"));
         assert!(parse("Other o").contains("needs Other"));
         assert!(parse("M m").contains("levels deep"));
         assert!(parse("A a\n===\nMSG: p/A\nB b\n===\nMSG: p/B\nA a\n").contains("levels deep"));
