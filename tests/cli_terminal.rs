@@ -206,6 +206,21 @@ fn open_shows_the_report_in_the_browser_that_is_named() {
     assert!(!page.contains("--open"));
 }
 
+#[test]
+fn a_held_out_log_did_not_make_the_model_and_a_fitted_one_did() {
+    let folder = copy();
+    let said = |log: &str| {
+        let line = format!("validate {log} -m refined.toml");
+        let run = tool(folder.path(), &line).assert().code(0);
+        String::from_utf8(run.get_output().stdout.clone()).unwrap()
+    };
+    let used = "was used to make this model";
+    assert!(!said("unseen.csv").contains(used));
+    assert!(said("identification.csv").contains(used));
+    let model = std::fs::read_to_string(folder.path().join("refined.toml")).unwrap();
+    assert!(model.contains("role = \"held-out\"") && model.contains("role = \"fitted\""));
+}
+
 /// Files that a reader has and the built-in campaign has not.
 const READERS_OWN: [&str; 7] = [
     "arm.toml",

@@ -73,10 +73,28 @@ fn duration_s(log: &LogSpec, layout: Option<&Layout>) -> Result<f64, LogError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::DataRole;
     use super::*;
 
     fn specs(folder: &std::path::Path, a: &str, b: &str) -> [LogSpec; 2] {
         [a, b].map(|name| folder.join(name).display().to_string().parse().unwrap())
+    }
+
+    #[test]
+    fn inputs_share_rows_where_their_spans_meet_and_a_held_out_one_made_nothing() {
+        let input = |span: &str| Provenance {
+            span: Some(span.to_owned()).filter(|span| !span.is_empty()),
+            samples: 9,
+            ..Provenance::of_text("a.csv", "rows")
+        };
+        let share = |a: &str, b: &str| input(a).shares_rows(&input(b));
+        assert!(share("", "") && share("", "0..70%") && share("0..70%", "60..100%"));
+        assert!(!share("0..70%", "70..100%") && !share("0..10s", "10..s"));
+        // of other units nothing is known
+        assert!(share("0..70%", "20..30s"));
+        assert!(!input("").shares_rows(&Provenance::of_text("a.csv", "others")));
+        assert!(input("").made() && input("").used_as(DataRole::Fitted).made());
+        assert!(!input("").used_as(DataRole::HeldOut).made());
     }
 
     #[test]
