@@ -208,7 +208,7 @@ fn errors(
     models
         .iter()
         .map(|model| {
-            let mut all = Reconstruction::new(model, &[]);
+            let mut all = Reconstruction::new(model, &[], None);
             let summary = all
                 .add(&processing(), &mut source(&log), &mut |_| {})
                 .expect("a log");

@@ -59,7 +59,8 @@
 //! | [`diagnose`](identify::diagnose()) | model, logs | effects that the model lacks, refined model | [`diagnose`] | |
 //! | [`validate`](identify::validate()) | model, logs that were not used | torque errors | [`validate`] | Figures 7 and 8 |
 //! | [`compare`](identify::compare()) | two models, logs | differences of parameters and errors | [`compare`] | Kuensch 1989 |
-//! | [`torque`](identify::torque()) | model, positions | feed-forward torque with its band | [`motion`] | |
+//! | [`torque`](identify::torque()) | model, positions | feed-forward torque with its band | [`band`] | Lei et al. 2018 |
+//! | [`watch`](identify::watch()) | model, rows as they come | external torques, alarms | [`observe`] | Pickands 1975 |
 //! | [`identify`](identify::identify()) | logs by role | all of these | [`identify`] | |
 //!
 //! Below the stages: [`log`] reads text logs, MCAP and rosbag2 recordings and arrays in memory to
@@ -80,9 +81,12 @@ pub mod log;
 
 pub mod motion;
 
+pub mod band;
 pub mod effect;
 pub mod inspect;
 pub mod mapping;
+pub mod observe;
+pub mod open_loop;
 
 pub mod friction;
 pub mod inertia;

@@ -30,6 +30,12 @@ pub struct JointError {
     pub max_abs: f64,
     /// 1 - residual variance / variance of the measured torque, filtered.
     pub r2: f64,
+    /// Share of the raw samples that the 95 % band holds; absent without a band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage_95: Option<f64>,
+    /// Mean half width of the band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_width: Option<f64>,
     /// Filtered, decimated rows.
     pub samples: u64,
     /// Those in which it rests.
@@ -85,6 +91,10 @@ struct ErrorSums {
     rows: u64,
     raw_error: f64,
     raw_torque: f64,
+    /// Raw samples, those inside the band, and the sum of its half widths.
+    raw_rows: u64,
+    inside: u64,
+    widths: f64,
     /// Squared error and torque of the rows in which the joint rests, and their number.
     rest: [f64; 2],
     resting: u64,
@@ -108,8 +118,11 @@ impl ErrorSums {
         self.scatter += d * (measured - self.mean);
     }
 
-    fn add_raw(&mut self, measured: f64, reconstructed: f64) {
+    fn add_raw(&mut self, measured: f64, reconstructed: f64, half_width: f64) {
         let e = measured - reconstructed;
+        self.raw_rows += 1;
+        self.inside += u64::from(e.abs() <= half_width);
+        self.widths += half_width;
         self.raw_error += e * e;
         self.raw_torque += measured * measured;
     }
@@ -128,10 +141,18 @@ fn ratio(error: f64, torque: f64, rows: u64) -> Option<f64> {
 #[derive(Debug, Clone, Copy)]
 pub struct Reconstructed<'a> {
     pub t: f64,
+    /// Positions [m or rad] and velocities [m/s or rad/s].
+    pub q: &'a [f64],
+    pub v: &'a [f64],
     /// Unfiltered torque as logged and as reconstructed, n numbers each.
     pub measured: &'a [f64],
     pub reconstructed: &'a [f64],
+    /// Half the width of the 95 % band; 0 without one.
+    pub half_width: &'a [f64],
 }
+
+/// Half the widths of a band from q, v, a, and the model's torque.
+pub type HalfWidths<'a> = &'a (dyn Fn([&[f64]; 3], &[f64], &mut [f64]) + Sync);
 
 /// Where the thinning of a log's rows stands.
 struct Taken<'a> {
@@ -173,6 +194,7 @@ pub struct Reconstruction<'a> {
     model: &'a Model,
     /// Speed up to which each joint rests [m/s or rad/s]; below 0 where its rows always count.
     rest_speed: Vec<f64>,
+    band: Option<HalfWidths<'a>>,
     sums: Vec<ErrorSums>,
     traces: TorqueTraces,
     /// Time of the log's own clock where the times of its rows are 0 [s].
@@ -181,8 +203,8 @@ pub struct Reconstruction<'a> {
 
 impl<'a> Reconstruction<'a> {
     /// Nothing yet. `rest_speed`: the speed up to which each joint rests [m/s or rad/s], none where rests are
-    /// not told; joints without friction never rest.
-    pub fn new(model: &'a Model, rest_speed: &[f64]) -> Self {
+    /// not told; joints without friction never rest. `band` is that of the model, where it has one.
+    pub fn new(model: &'a Model, rest_speed: &[f64], band: Option<HalfWidths<'a>>) -> Self {
         let speed = |(j, law): (usize, &JointFriction)| match (law, rest_speed.get(j)) {
             (JointFriction::None, _) | (_, None) => -1.0,
             (_, Some(speed)) => *speed,
@@ -190,6 +212,7 @@ impl<'a> Reconstruction<'a> {
         Reconstruction {
             model,
             rest_speed: model.friction.iter().enumerate().map(speed).collect(),
+            band,
             sums: vec![ErrorSums::default(); model.robot.joints()],
             traces: TorqueTraces::default(),
             zero: 0.0,
@@ -214,7 +237,7 @@ impl<'a> Reconstruction<'a> {
         row: &mut dyn FnMut(&Reconstructed),
     ) -> Result<Summary, motion::RunError<E>> {
         let n = self.model.robot.joints();
-        let (model, rest_speed) = (self.model, self.rest_speed.clone());
+        let (model, rest_speed, band) = (self.model, self.rest_speed.clone(), self.band);
         let mut full = settings.clone();
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
@@ -224,15 +247,22 @@ impl<'a> Reconstruction<'a> {
             n,
             &full,
             None,
-            3 * n,
+            4 * n,
             &|sample, out| {
                 out[..n].copy_from_slice(sample.tau);
                 model.torque(sample.q, sample.v, sample.a, &mut out[n..2 * n]);
                 for (j, speed) in rest_speed.iter().enumerate() {
                     out[2 * n + j] = rest::movement(sample.v[j], *speed);
                 }
+                if let Some(band) = band {
+                    let (tau, widths) = out[n..].split_at_mut(2 * n);
+                    band([sample.q, sample.v, sample.a], &tau[..n], widths);
+                }
             },
-            &mut |r| self.take(&mut taken, r.segment, r.t, r.raw, r.filtered, row),
+            &mut |r| {
+                let channels = [r.raw, r.filtered];
+                self.take(&mut taken, (r.segment, r.t), [r.q, r.v], channels, row);
+            },
         )?;
         Ok(Summary {
             decimation: settings.decimation_at(summary.dt),
@@ -266,18 +296,36 @@ impl<'a> Reconstruction<'a> {
             .zip(&self.rest_speed)
             .map(movement)
             .collect();
-        let channels = stretch.tau.iter().chain(reconstructed).chain(&moving);
+        let mut widths = vec![vec![0.0; stretch.len()]; n];
+        if let Some(band) = self.band {
+            let [mut q, mut v, mut a, mut tau, mut width] = [(); 5].map(|()| vec![0.0; n]);
+            for k in 0..stretch.len() {
+                stretch.at(k, &mut q, &mut v, &mut a);
+                for (tau, hat) in tau.iter_mut().zip(reconstructed) {
+                    *tau = hat[k];
+                }
+                band([&q, &v, &a], &tau, &mut width);
+                for (channel, width) in widths.iter_mut().zip(&width) {
+                    channel[k] = *width;
+                }
+            }
+        }
+        let channels = stretch.tau.iter().chain(reconstructed);
+        let channels = channels.chain(&moving).chain(&widths);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let mut taken = Taken::new(settings);
-        let (mut raw, mut filtered) = (vec![0.0; 3 * n], vec![0.0; 3 * n]);
+        let (mut raw, mut filtered) = (vec![0.0; 4 * n], vec![0.0; 4 * n]);
         let count = parallel.rows(stretch.len());
+        let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
         for (i, k) in (0..count).map(|i| (i, parallel.sample_of(i))) {
-            for c in 0..3 * n {
+            stretch.at(k, &mut q, &mut v, &mut a);
+            for c in 0..4 * n {
                 raw[c] = channels[c][k];
                 filtered[c] = rows[c][i];
             }
-            self.take(&mut taken, segment, stretch.t[k], &raw, &filtered, row);
+            let at = (segment, stretch.t[k]);
+            self.take(&mut taken, at, [&q, &v], [&raw, &filtered], row);
         }
         Ok(())
     }
@@ -286,10 +334,9 @@ impl<'a> Reconstruction<'a> {
     fn take(
         &mut self,
         taken: &mut Taken,
-        segment: usize,
-        t: f64,
-        raw: &[f64],
-        filtered: &[f64],
+        (segment, t): (usize, f64),
+        [q, v]: [&[f64]; 2],
+        [raw, filtered]: [&[f64]; 2],
         row: &mut dyn FnMut(&Reconstructed),
     ) {
         let n = self.sums.len();
@@ -298,12 +345,19 @@ impl<'a> Reconstruction<'a> {
             self.traces.breaks.push(self.traces.t.len());
         }
         for (j, s) in self.sums.iter_mut().enumerate() {
-            s.add_raw(raw[j], raw[n + j]);
+            let width = match self.band {
+                Some(_) => raw[3 * n + j],
+                None => f64::NAN,
+            };
+            s.add_raw(raw[j], raw[n + j], width);
         }
         row(&Reconstructed {
             t,
+            q,
+            v,
             measured: &raw[..n],
             reconstructed: &raw[n..2 * n],
+            half_width: &raw[3 * n..],
         });
         if keep {
             for (j, s) in self.sums.iter_mut().enumerate() {
@@ -321,6 +375,7 @@ impl<'a> Reconstruction<'a> {
     pub fn finish(self, summary: Summary) -> Validation {
         let robot = &self.model.robot;
         let n = robot.joints();
+        let has_band = self.band.is_some();
         let joints: Vec<JointError> = (0..n)
             .map(|j| {
                 let s = &self.sums[j];
@@ -333,6 +388,8 @@ impl<'a> Reconstruction<'a> {
                     relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
                     relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
                     relative_error_raw: ratio(s.raw_error, s.raw_torque, 1).unwrap_or(f64::NAN),
+                    coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
+                    half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
                     max_abs: s.largest,
                     r2: if s.scatter > 0.0 {
                         1.0 - s.error / s.scatter

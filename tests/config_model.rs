@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use cft_ident::config::held_out::{Excesses, HeldOut};
 use cft_ident::config::model_file::{
     Covariance, Effect, EffectParameter, FrictionPrior, ModelFile, ModelProvenance, Parameter,
     Verdict,
@@ -60,7 +61,7 @@ fn model(values: &[f64]) -> ModelFile {
     }
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
-        robot,
+        robot: robot.clone(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         parameters,
@@ -77,6 +78,32 @@ fn model(values: &[f64]) -> ModelFile {
             logs: Vec::new(),
             refined_by: Vec::new(),
         }],
+        held_out: robot
+            .joint_names()
+            .iter()
+            .map(|joint| HeldOut {
+                joint: joint.clone(),
+                samples: 100,
+                effective_samples: 7.5,
+                position_cutoff_hz: 56.5,
+                speed_edges: vec![0.1],
+                torque_edges: Vec::new(),
+                half_width_95: vec![vec![at(9).abs()], vec![0.5]],
+                positions_seen: [-1.0, at(10).abs()],
+                speed_seen: 1.0,
+                torque_seen: 2.0,
+                external_std: vec![0.25, 0.125],
+                external_99: 2.75,
+            })
+            .collect(),
+        excesses: Some(Excesses {
+            observed_s: 60.0,
+            position_cutoff_hz: 80.0,
+            level: 0.875,
+            clusters: 12,
+            scale: 0.0625,
+            shape: -0.125,
+        }),
         effects: vec![Effect {
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),

@@ -334,6 +334,8 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
     }
     ModelFile {
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         robot,
         parameters,
         covariance: None,

@@ -86,7 +86,10 @@ fn a_model_that_was_fitted_is_validated_without_a_file() {
     let found = lsq(&robot, &log, &LsqSettings::default(), &control).unwrap();
     let model = refined(&found.model(&robot, None), "model").unwrap();
     let mut rows = 0;
-    let validated = validate(&robot, &model, &log, &control, &mut |_, _| rows += 1).unwrap();
+    let validated = validate(&robot, (&model, None), &log, &control, &mut |_, _| {
+        rows += 1
+    })
+    .unwrap();
     assert!(validated.validation.joints[0].relative_error < 0.01);
     assert!(rows > 3000, "{rows}");
 }

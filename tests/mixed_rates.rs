@@ -99,11 +99,11 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let all = [train.as_slice(), &held_out].concat();
     let apart = |log: &Log| {
         let one = std::slice::from_ref(log);
-        let found = validate(&robot, &model, one, &control, &mut |_, _| {}).unwrap();
+        let found = validate(&robot, (&model, None), one, &control, &mut |_, _| {}).unwrap();
         found.validation.joints[0].clone()
     };
     let each: Vec<_> = all.iter().map(apart).collect();
-    let together = validate(&robot, &model, &all, &control, &mut |_, _| {}).unwrap();
+    let together = validate(&robot, (&model, None), &all, &control, &mut |_, _| {}).unwrap();
     let together = &together.validation.joints[0];
     assert_eq!(
         together.samples,

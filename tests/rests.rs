@@ -95,7 +95,7 @@ fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
 
     let model = refined(&found.model(&robot, None), "slide.toml").unwrap();
     let unseen = [slide("unseen", 0.6, 8)];
-    let all = validate(&robot, &model, &unseen, &control, &mut |_, _| {}).unwrap();
+    let all = validate(&robot, (&model, None), &unseen, &control, &mut |_, _| {}).unwrap();
     let e = &all.validation.joints[0];
     assert!(e.relative_error_moving.unwrap() < 0.06, "{e:?}");
     assert!(e.relative_error_rest.unwrap() > 0.5, "{e:?}");

@@ -254,6 +254,8 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     parameters[0].value = 130.0;
     let model = ModelFile {
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         robot: robot.clone(),
         parameters,
         covariance: None,
@@ -318,6 +320,8 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         };
     let model = ModelFile {
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         robot: robot.clone(),
         parameters: vec![
             parameter("inertia", None, 95.1089),

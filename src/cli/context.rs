@@ -29,6 +29,10 @@ pub struct Context {
     files: Arc<Together>,
     /// The last page that was written.
     page: Arc<Mutex<Option<PathBuf>>>,
+    /// The document goes to standard output.
+    prints: bool,
+    /// The error that ends the command once its results are written.
+    ending: Arc<Mutex<Option<CliError>>>,
     /// Warnings that stand before those of the command's own result.
     told: Arc<Mutex<Vec<String>>>,
 }
@@ -59,6 +63,8 @@ impl Context {
             control,
             files: Arc::default(),
             page: Arc::default(),
+            prints: false,
+            ending: Arc::default(),
             told: Arc::default(),
         }
     }
@@ -78,6 +84,28 @@ impl Context {
     /// How much of a result is shown.
     pub fn detail(&self) -> Detail {
         self.detail
+    }
+
+    /// The same for a command whose document goes to standard output.
+    pub(super) fn printing(self, prints: bool) -> Self {
+        Context { prints, ..self }
+    }
+
+    /// Whether the document goes to standard output, and nothing else.
+    pub(crate) fn prints_document(&self) -> bool {
+        self.prints
+    }
+
+    /// Ends the command with an error after its results are written.
+    pub(crate) fn end_with(&self, error: CliError) {
+        let mut ending = self.ending.lock().unwrap_or_else(PoisonError::into_inner);
+        *ending = Some(error);
+    }
+
+    /// That error.
+    pub(super) fn ending(&self) -> Option<CliError> {
+        let mut ending = self.ending.lock().unwrap_or_else(PoisonError::into_inner);
+        ending.take()
     }
 
     /// The command as it was typed, without folders from the root on and without what does not

@@ -22,6 +22,7 @@ pub mod schema;
 pub mod simulate;
 pub mod torque;
 pub mod validate;
+pub mod watch;
 
 mod arguments;
 mod browser;
@@ -138,6 +139,7 @@ commands! {
     Compare: compare,
     Diff: diff,
     Torque: torque,
+    Watch: watch,
     Simulate: simulate,
     Excite: excite,
     Export: export,
@@ -244,7 +246,8 @@ fn execute(
         (true, _) => Detail::Brief,
         (_, true) => Detail::Full,
         _ => Detail::Usual,
-    });
+    })
+    .printing(matches!(json, Some(Destination::Stdout)));
     // Told before the long run, also by a command that has no other output.
     context.check_outputs(&[], &[])?;
     let mut outcome = cli.command.run(&context)?;
@@ -262,7 +265,7 @@ fn execute(
             None => context.note("no report to open: --report FILE.html writes one"),
         }
     }
-    Ok(exit)
+    context.ending().map_or(Ok(exit), Err)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
 use crate::identify::{
     Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated,
+    Watched,
 };
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -54,6 +55,8 @@ pub enum Kind {
     Inspect,
     /// JSON document of `torque`
     Torque,
+    /// JSON document of `watch`
+    Watch,
     /// JSON document of `convert`
     Convert,
     /// JSON document of `export`
@@ -95,6 +98,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
         Kind::Inspect => json::schema::<inspect::Inspected>("inspect"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
+        Kind::Watch => json::schema::<Watched>("watch"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),
         Kind::Export => json::schema::<export::Exported>("export"),
         Kind::New => json::schema::<new::Drafted>("new"),

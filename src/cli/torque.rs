@@ -42,9 +42,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let machine = LoggedRobot::new(&name, file.robot.clone());
     let joints = machine.robot.joint_names();
     let named = |kind: &'static str| joints.iter().map(move |j| format!("{kind}_{j}"));
+    let band = match file.held_out.is_empty() {
+        true => Vec::new(),
+        false => vec!["band_lower", "band_upper"],
+    };
+    let n = joints.len();
     let columns: Vec<String> = std::iter::once("t".to_owned())
         .chain(named("tau"))
         .chain(named("tau_std"))
+        .chain(band.into_iter().flat_map(named))
         .collect();
     let mut out = LogWriter::create(&args.output, &columns)?;
     let mut failed = None;
@@ -56,9 +62,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         &mut |t, values, origin| {
             if failed.is_none() {
                 out.set_origin(origin);
-                failed = out
-                    .row(std::iter::once(t).chain(values.iter().copied()))
-                    .err();
+                let (plain, half) = values.split_at(2 * n);
+                let limits = [-1.0, 1.0].into_iter().flat_map(|sign| {
+                    let both = plain.iter().zip(half);
+                    both.map(move |(tau, half)| tau + sign * half)
+                });
+                let plain = plain.iter().copied();
+                failed = out.row(std::iter::once(t).chain(plain).chain(limits)).err();
             }
         },
     )?;

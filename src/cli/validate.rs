@@ -6,9 +6,11 @@ use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, out
 use crate::identify::{self, LoggedRobot, refined};
 use crate::log::LogSpec;
 use crate::number;
+use crate::open_loop::OpenLoop;
 use crate::output::LogWriter;
 use crate::report::json::Document;
 use crate::report::stages;
+use crate::report::table::{Align, Table};
 use crate::validate::{Reconstructed, Validation};
 
 const EXAMPLE: &str = "\
@@ -31,7 +33,12 @@ pub struct Args {
     /// End with status 1 when a joint's relative error is above X, a fraction
     #[arg(long, value_name = "X", value_parser = arguments::positive)]
     pub max_relative_error: Option<f64>,
-    /// Write measured and reconstructed torque and the residual
+    /// Simulate the motion from the measured torques too, in windows of so many seconds that begin at
+    /// measured states, and tell by how much positions are off [default: single axes from begin to
+    /// end, others 0.25]
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, value_parser = arguments::positive)]
+    pub open_loop: Option<Option<f64>>,
+    /// Write measured and reconstructed torque, the residual and the 95 % band
     #[arg(short, long, value_name = "RESIDUAL.csv|.mcap", value_parser = arguments::log_file)]
     pub output: Option<PathBuf>,
     /// Draw measured and reconstructed torque; may be given more than once
@@ -63,19 +70,65 @@ pub fn missed(validation: &Validation, limit: Option<f64>) -> Vec<String> {
         .collect()
 }
 
-/// Columns of the residual file: measured, reconstructed and residual torque of every joint.
-fn columns(joints: &[String]) -> Vec<String> {
-    let kinds = ["tau", "tau_hat", "residual"];
-    let named = kinds
+/// Columns of the residual file: measured, reconstructed and residual torque of every joint, and the band where
+/// there is one.
+fn columns(joints: &[String], band: bool) -> Vec<String> {
+    let kinds = ["tau", "tau_hat", "residual", "band_lower", "band_upper"];
+    let named = kinds[..if band { 5 } else { 3 }]
         .iter()
         .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
     std::iter::once("t".to_owned()).chain(named).collect()
 }
 
-fn residual_row(r: &Reconstructed) -> impl Iterator<Item = f64> {
+fn residual_row(r: &Reconstructed, band: bool) -> impl Iterator<Item = f64> {
     let residual = r.measured.iter().zip(r.reconstructed).map(|(a, b)| a - b);
     let torques = r.measured.iter().chain(r.reconstructed).copied();
-    std::iter::once(r.t).chain(torques).chain(residual)
+    let limits = |sign: f64| {
+        let half = r.half_width.iter().take(if band { usize::MAX } else { 0 });
+        (r.reconstructed.iter().zip(half)).map(move |(tau, half)| tau + sign * half)
+    };
+    let limits = limits(-1.0).chain(limits(1.0));
+    std::iter::once(r.t)
+        .chain(torques)
+        .chain(residual)
+        .chain(limits)
+}
+
+/// Errors of simulated positions, for a person.
+fn drifts(found: &OpenLoop) -> String {
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("rms", Align::Decimal),
+        ("at the end", Align::Decimal),
+        ("largest", Align::Decimal),
+        ("of the motion", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption(&match found.window_s {
+        Some(s) => format!(
+            "positions simulated from torques, {} windows of {s} s",
+            found.windows
+        ),
+        None => "positions simulated from torques, from begin to end".to_owned(),
+    });
+    for joint in &found.joints {
+        let [rms, end, largest] =
+            [joint.rms, joint.rms_at_end, joint.max_abs].map(|x| number::significant(x, 4));
+        let share = number::percent(joint.relative);
+        table.row([
+            joint.joint.as_str(),
+            &rms,
+            &end,
+            &largest,
+            &share,
+            joint.unit,
+        ]);
+    }
+    let astray = match found.astray {
+        0 => String::new(),
+        count => format!("{count} of them went astray\n"),
+    };
+    format!("\n{table}{astray}")
 }
 
 /// Runs the command.
@@ -95,18 +148,19 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let (name, file) = (given.name, given.value);
     let model = refined(&file, &name)?;
     let machine = LoggedRobot::new(&name, file.robot.clone());
+    let band = !file.held_out.is_empty();
     let mut residual = match &args.output {
         None => None,
         Some(path) => Some(LogWriter::create(
             path,
-            &columns(machine.robot.joint_names()),
+            &columns(machine.robot.joint_names(), band),
         )?),
     };
     let mut failed = None;
     let logs = logs_of(&args.logs);
-    let found = identify::validate(
+    let mut found = identify::validate(
         &machine,
-        &model,
+        (&model, Some(&file)),
         &logs,
         context.control(),
         &mut |r, origin| {
@@ -114,12 +168,23 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 && failed.is_none()
             {
                 file.set_origin(origin);
-                failed = file.row(residual_row(r)).err();
+                failed = file.row(residual_row(r, band)).err();
             }
         },
     )?;
     if let Some(error) = failed {
         return Err(error.into());
+    }
+    if let Some(window) = args.open_loop {
+        let control = context.control();
+        let simulated = identify::open_loop(&machine, &model, &logs, window, control)?;
+        if simulated.astray > 0 {
+            found.warnings.push(format!(
+                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit with `lsq --feasible`",
+                simulated.astray, simulated.windows
+            ));
+        }
+        found.open_loop = Some(simulated);
     }
     let names = names_of(&args.logs);
     let document = Document::new("validate", &found.inputs, &found.warnings, &found)?;
@@ -133,6 +198,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         given: &given.provenance,
     };
     let mut report = stages::validate::validate(&of);
+    if let Some(found) = &found.open_loop {
+        report.terminal().line(&drifts(found));
+    }
     if args.report.is_some() {
         let in_memory = pictures::in_memory(&machine, &logs, context)?;
         let look = pictures::look(&machine, in_memory.as_ref(), &names)?;

@@ -25,6 +25,9 @@ pub struct Contents {
     /// Joints of which it keeps what one-joint logs told.
     #[serde(default)]
     friction_prior: Vec<String>,
+    /// Joints of which it keeps what was left of torques that were set aside.
+    #[serde(default)]
+    held_out: Vec<String>,
     /// Number of physically consistent links.
     links: usize,
     /// Joints whose drive's inertia is given beside them.
@@ -57,6 +60,7 @@ impl Contents {
                 .iter()
                 .map(|p| p.joint.clone())
                 .collect(),
+            held_out: model.held_out.iter().map(|h| h.joint.clone()).collect(),
             links: model.links.len(),
             drive_inertia: model.drive_inertia.keys().cloned().collect(),
             inputs: model.provenance.inputs.len(),
@@ -78,6 +82,7 @@ impl Contents {
             ("residual_std", &self.residual_std, found.residual_std),
             ("drive_inertia", &self.drive_inertia, found.drive_inertia),
             ("friction_prior", &self.friction_prior, found.friction_prior),
+            ("held_out", &self.held_out, found.held_out),
         ];
         for (list, wanted, mut found) in names {
             for name in wanted {

@@ -13,6 +13,7 @@ pub mod correction;
 mod document;
 mod embedded;
 mod error;
+pub mod held_out;
 pub mod identified;
 pub mod model_file;
 mod model_text;

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
+use super::held_out::{Excesses, HeldOut};
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{Provenance, escape};
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -171,6 +172,10 @@ pub struct ModelFile {
     pub residual_std: BTreeMap<String, f64>,
     /// What one-joint logs told of the friction, joint by joint.
     pub friction_prior: Vec<FrictionPrior>,
+    /// What was left of torques that were set aside, of every joint in their order; empty where nothing was.
+    pub held_out: Vec<HeldOut>,
+    /// How often external torques that are none go beyond a level.
+    pub excesses: Option<Excesses>,
     /// Effects added to the declared model.
     pub effects: Vec<Effect>,
     /// Physically consistent links that give these parameters, where they were asked for.

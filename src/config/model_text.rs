@@ -10,6 +10,7 @@ use serde::Deserialize;
 use super::contents::{self, Contents};
 use super::document::Document;
 use super::embedded::other_kind;
+use super::held_out::{Excesses, HeldOut};
 use super::model_file::{
     Covariance, Effect, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
 };
@@ -48,6 +49,9 @@ pub(super) struct ModelToml {
     residual_std: BTreeMap<String, f64>,
     #[serde(default)]
     friction_prior: Vec<FrictionPrior>,
+    #[serde(default)]
+    held_out: Vec<HeldOut>,
+    excesses: Option<Excesses>,
     #[serde(default)]
     effect: Vec<Effect>,
     #[serde(default)]
@@ -105,6 +109,8 @@ impl ModelFile {
             covariance: raw.covariance,
             residual_std: raw.residual_std,
             friction_prior: raw.friction_prior,
+            held_out: raw.held_out,
+            excesses: raw.excesses,
             effects: raw.effect,
             links: raw.link,
             drive_inertia: raw.drive_inertia,
@@ -180,6 +186,16 @@ impl ModelFile {
             text.push_str("\n# Friction as one-joint logs tell it: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
             let priors = BTreeMap::from([("friction_prior", &self.friction_prior)]);
             text.push_str(&toml::to_string(&priors).map_err(unwritable)?);
+        }
+        if !self.held_out.is_empty() {
+            text.push_str("\n# What the model leaves of torques that it did not see, blocks of its logs set aside one after the other:\n# for prediction bands and alarms.\n");
+            let held = BTreeMap::from([("held_out", &self.held_out)]);
+            text.push_str(&toml::to_string(&held).map_err(unwritable)?);
+        }
+        if let Some(excesses) = &self.excesses {
+            let excesses = BTreeMap::from([("excesses", excesses)]);
+            text.push('\n');
+            text.push_str(&toml::to_string(&excesses).map_err(unwritable)?);
         }
         if !self.effects.is_empty() {
             text.push_str("\n# Effects added to the declared model.\n");
@@ -260,6 +276,36 @@ impl ModelFile {
         Ok(())
     }
 
+    fn check_held_out(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        let refit = "fit the model again; what stands here is no number to choose";
+        let mut there = self.held_out.iter().map(|held| &held.joint);
+        if !self.held_out.is_empty() && !joints.iter().all(|joint| there.next() == Some(joint)) {
+            let remedy = format!(
+                "give one table for each of {}, in this order, or none",
+                joints.join(", ")
+            );
+            return Err(document.value(
+                &["held_out", "0", "joint"],
+                "is not in its place",
+                &remedy,
+            ));
+        }
+        for (index, held) in self.held_out.iter().enumerate() {
+            if let Some((key, problem)) = held.fault() {
+                let at = ["held_out", &index.to_string(), key];
+                return Err(document.value(&at, problem, refit));
+            }
+        }
+        match &self.excesses {
+            Some(excesses) if !excesses.is_possible() => {
+                let problem = "has numbers that no excesses have";
+                Err(document.value(&["excesses", "scale"], problem, refit))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn check_rest(&self, document: &Document) -> Result<(), ConfigError> {
         let joints = self.robot.joint_names();
         for (joint, std) in &self.residual_std {
@@ -281,6 +327,7 @@ impl ModelFile {
                 return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
             }
         }
+        self.check_held_out(document)?;
         for (joint, inertia) in &self.drive_inertia {
             document.not_negative(&["drive_inertia", joint], Some(*inertia))?;
         }

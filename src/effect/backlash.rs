@@ -2,7 +2,7 @@
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
+use super::law::{Law, Memory};
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -36,19 +36,31 @@ pub static LAW: Law = Law {
         let range = cover.at(place).range();
         vec![[1e-4 * range, 0.3 * range]]
     },
+    memory: Some(Memory {
+        size: 1,
+        step: |scene, place, shape, _, far, out| {
+            let Some(j) = place.joint() else { return };
+            let (q, v) = (scene.stretch.q[j][0], scene.stretch.v[j][0]);
+            if far[0].is_nan() {
+                far[0] = q;
+            }
+            out[0] = missing(0.5 * shape[0], q, v, &mut far[0]);
+        },
+    }),
     ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;
-        let half = 0.5 * shape[0];
-        // play operator: where the far side of the gap stands
         let mut far = s.q[j].first().copied().unwrap_or(0.0);
         for (k, (q, v)) in s.q[j].iter().zip(&s.v[j]).enumerate() {
-            let before = far;
-            far = far.clamp(q - half, q + half);
-            let carried = far != before;
-            if !carried {
-                out[0][k] = -sign(*v);
-            }
+            out[0][k] = missing(0.5 * shape[0], *q, *v, &mut far);
         }
     })
 };
+
+/// -sgn(v) inside the gap. `far` is where its far side stands: a play operator.
+fn missing(half: f64, q: f64, v: f64, far: &mut f64) -> f64 {
+    let before = *far;
+    *far = far.clamp(q - half, q + half);
+    let carried = *far != before;
+    if carried { 0.0 } else { -sign(v) }
+}

@@ -8,7 +8,7 @@
 use nalgebra::Matrix4;
 
 use super::entry::{Entry, Family, Key, Search};
-use super::law::{KeyValue, Law, Reparametrisation, Scene};
+use super::law::{KeyValue, Law, Memory, Reparametrisation, Scene};
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -63,6 +63,32 @@ pub static LAW: Law = Law {
                 KeyValue::plain("inertia", inertia, 2, 3),
                 KeyValue::plain("damping", shape[1], 1, 3),
             ]
+        },
+    }),
+    // the inertia is that of the first sample: later ones are not known yet
+    memory: Some(Memory {
+        size: 4,
+        step: |scene, place, shape, _, kept, out| {
+            let Some(j) = place.joint() else { return };
+            let w = std::f64::consts::TAU * shape[0];
+            let begins = kept[0].is_nan();
+            if begins {
+                kept[0] = inertia(scene, j);
+            }
+            if kept[0] <= 0.0 {
+                return;
+            }
+            let pull = scene.load[j][0] / kept[0];
+            let z = match begins {
+                true => [pull / (w * w), 0.0],
+                false => Oscillator::new(w, shape[1], scene.stretch.dt).next(
+                    [kept[1], kept[2]],
+                    kept[3],
+                    pull,
+                ),
+            };
+            kept[1..].copy_from_slice(&[z[0], z[1], pull]);
+            out[0] = -(pull - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
         },
     }),
     ..Law::linear(&ENTRY, &["inertia"], |scene, place, shape, _, out| {

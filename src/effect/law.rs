@@ -54,8 +54,18 @@ pub struct Law {
     pub limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
     /// Adds to `out` (one vector per linear coefficient, zero before) the columns of joint `joint`.
     pub columns: Fill,
+    /// One sample at a time, where a column depends on samples before it.
+    pub memory: Option<Memory>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
+}
+
+/// A law that remembers: the same columns from a scene of one sample and numbers that it keeps.
+pub struct Memory {
+    /// How many numbers it keeps; NaN at the begin of a stretch.
+    pub size: usize,
+    /// Place, shape, joint, what it keeps, and one number for each linear coefficient, 0 before.
+    pub step: fn(&Scene, Place, &[f64], usize, &mut [f64], &mut [f64]),
 }
 
 /// Two ways to say the numbers of one effect.
@@ -90,6 +100,7 @@ impl Law {
             starts: |_, _| Ok(vec![Vec::new()]),
             limits: |_, _| Vec::new(),
             columns,
+            memory: None,
             reparametrised: None,
         }
     }

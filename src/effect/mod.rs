@@ -14,6 +14,7 @@ mod law;
 pub(crate) mod law_text;
 mod order;
 pub(crate) mod place;
+mod sampled;
 pub(crate) mod unit;
 mod values;
 
@@ -26,6 +27,7 @@ pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
 pub use law::{Law, Scene};
 pub use order::is_whole as order_is_whole;
 pub use place::{Place, Places};
+pub use sampled::Sampled;
 pub use unit::Unit;
 pub use values::{EffectError, Values};
 

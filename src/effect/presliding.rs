@@ -4,7 +4,7 @@
 //! sigma0 = fc rate.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::{KeyValue, Law, Reparametrisation};
+use super::law::{KeyValue, Law, Memory, Reparametrisation};
 use super::unit::Unit;
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -69,25 +69,42 @@ pub static LAW: Law = Law {
             ]
         },
     }),
+    memory: Some(Memory {
+        size: 1,
+        step: |scene, place, shape, _, kept, out| {
+            let Some(j) = place.joint() else { return };
+            let v = scene.stretch.v[j][0];
+            if kept[0].is_nan() {
+                kept[0] = 0.0;
+            }
+            [out[0], out[1]] = yielded(shape[0], scene.stretch.dt, v, &mut kept[0]);
+            out[0] -= saturating(&scene.laws[j], v);
+        },
+    }),
     ..Law::linear(&ENTRY, &["fc", "sigma1"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;
-        let rate = shape[0];
         let mut h = 0.0;
         let [friction, damping] = out else { return };
         for (k, (friction, damping)) in friction.iter_mut().zip(damping).enumerate() {
             let v = s.v[j][k];
-            // exact over one step of constant speed: h -> sgn(v) with exp(-rate |v| dt)
-            let target = sign(v);
-            let decay = (-rate * v.abs() * s.dt).exp();
-            let next = target + (h - target) * decay;
-            let middle = 0.5 * (h + next);
-            *friction = middle - saturating(&scene.laws[j], v);
-            *damping = (next - h) / (s.dt * rate);
-            h = next;
+            [*friction, *damping] = yielded(shape[0], s.dt, v, &mut h);
+            *friction -= saturating(&scene.laws[j], v);
         }
     })
 };
+
+/// Yields the spring h over one step of constant speed, exactly: h -> sgn(v) with exp(-rate |v| dt). Its value in
+/// the middle, and its rate of change over the rate.
+fn yielded(rate: f64, dt: f64, v: f64, h: &mut f64) -> [f64; 2] {
+    let target = sign(v);
+    let decay = (-rate * v.abs() * dt).exp();
+    let next = target + (*h - target) * decay;
+    let middle = 0.5 * (*h + next);
+    let change = (next - *h) / (dt * rate);
+    *h = next;
+    [middle, change]
+}
 
 /// Saturating part of a law over its height, -1..1.
 fn saturating(law: &JointFriction, v: f64) -> f64 {

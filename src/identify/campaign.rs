@@ -120,7 +120,8 @@ pub fn identify<E: From<IdentifyError>>(
     let numbers = refined(&model, "model.toml")?;
     let mut validated = None;
     if !logs.validation.is_empty() {
-        let found = validate(machine, &numbers, &logs.validation, control, &mut |_, _| {})?;
+        let given = (&numbers, Some(&model));
+        let found = validate(machine, given, &logs.validation, control, &mut |_, _| {})?;
         ended(StageEnd::Validated(&found))?;
         keep(&found.inputs, &found.warnings, DataRole::HeldOut);
         validated = Some(found);

@@ -278,7 +278,7 @@ fn on_logs(
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);
     let validation = |side: &Side| {
-        let mut all = Reconstruction::new(&side.model.model, &in_memory.rest_speed);
+        let mut all = Reconstruction::new(&side.model.model, &in_memory.rest_speed, None);
         for (segment, stretch) in in_memory.stretches.iter().enumerate() {
             let hat = side.model.reconstruct(stretch);
             all.add_stretch(&settings, segment, stretch, &hat, &mut |_| {})

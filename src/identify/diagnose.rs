@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
+use super::hold_out::{Held, hold_out, or_warning};
 use super::in_memory::{InMemory, read_each, read_wider};
 use super::known_friction::before_these;
 use super::log::Log;
@@ -64,6 +65,8 @@ pub struct Diagnosed {
     pub logs: Vec<String>,
     /// The model as it was given.
     pub given: AugmentedModel,
+    /// What the refined model leaves of data set aside.
+    pub held: Held,
     /// What a refined model keeps of the friction before these logs.
     friction_prior: Vec<FrictionPrior>,
     pub filters: ParallelFilters,
@@ -161,6 +164,7 @@ pub fn diagnose(
         Err(error) => return Err(IdentifyError::Diagnose(error)),
     };
     in_memory.stretches = case.stretches;
+    let train = logs.train;
     let logs: Vec<String> = all.iter().map(Log::name).collect();
     for aside in &diagnosis.set_aside {
         if aside.role == LogRole::Holdout {
@@ -171,15 +175,25 @@ pub fn diagnose(
             control.note(&text);
         }
     }
-    Ok(DiagnoseEnd::Diagnosed(Box::new(Diagnosed {
+    let mut found = Diagnosed {
         diagnosis,
         in_memory,
         logs,
         given: case.given,
+        held: Held::default(),
         friction_prior,
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
-    })))
+    };
+    let refined = found.model(machine, file);
+    let tried = hold_out(
+        machine,
+        (&refined, &found.diagnosis.model),
+        (train, &found.in_memory.inputs),
+        control,
+    );
+    found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+    Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
 }
 
 /// The logs through a wider position filter, beside the stretches of a case; none where no log gives one.
@@ -347,6 +361,7 @@ impl Diagnosed {
         model.effects = effects
             .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
             .collect();
+        self.held.write_into(&mut model);
         model
     }
 

@@ -79,6 +79,11 @@ pub enum IdentifyError {
     Gains(#[from] GainError),
     #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
     Effect { model: String, error: EffectError },
+    /// A model that nothing was set aside for.
+    #[error(
+        "{model}: holds no [[held_out]] and [excesses], so that nothing tells how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
+    )]
+    NothingHeldOut { model: String },
     #[error(transparent)]
     Diagnose(DiagnoseError),
     #[error(
@@ -123,6 +128,7 @@ impl IdentifyError {
             | Self::TooManyRows { .. }
             | Self::TooManySamples { .. }
             | Self::Effect { .. }
+            | Self::NothingHeldOut { .. }
             | Self::OtherRobot { .. } => ErrorKind::Input,
         }
     }

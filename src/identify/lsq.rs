@@ -11,10 +11,11 @@ use super::estimate::{Account, Estimated, estimate};
 use super::gain_error::GainError;
 use super::gains::{Gain, Gains};
 use super::geometry::geometry;
+use super::hold_out::{Held, hold_out, or_warning};
 use super::known_friction::{FrictionBefore, FrictionOfFit};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::model::new_model;
+use super::model::{new_model, refined};
 use super::passes::Passes;
 use super::position_cutoff::PositionCutoff;
 use super::repeated::each_row_once;
@@ -98,6 +99,9 @@ pub struct IdentifiedDynamics {
     /// What a model file keeps of the friction before the fit.
     #[serde(skip)]
     pub friction_prior: Vec<FrictionPrior>,
+    /// What the model leaves of data set aside.
+    #[serde(skip)]
+    pub held: Held,
     #[serde(skip)]
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
@@ -210,8 +214,8 @@ pub fn lsq(
     {
         return Err(IdentifyError::NothingDetermined);
     }
-    let found = geometry(machine, fit.condition.normalised, &unknowns);
-    let told = found.iter().map(|finding| &finding.meaning);
+    let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
+    let told = of_geometry.iter().map(|finding| &finding.meaning);
     warnings.extend(
         told.map(|told| format!("{told}; take the plain number unless it was measured so")),
     );
@@ -224,7 +228,8 @@ pub fn lsq(
         relative_error_moving: fit.relative_error[j].moving,
         relative_error_rest: fit.relative_error[j].rest,
     });
-    Ok(IdentifiedDynamics {
+    let mut found = IdentifiedDynamics {
+        held: Held::default(),
         essential: EssentialFit {
             count: essential.essential.iter().filter(|e| **e).count(),
             joints: RelativeError::each(machine, &essential_error),
@@ -247,8 +252,13 @@ pub fn lsq(
         summary,
         inputs,
         warnings,
-        setup: found,
-    })
+        setup: of_geometry,
+    };
+    let file = found.model(machine, friction.map(|(_, file)| file));
+    let tried = refined(&file, &machine.name)
+        .and_then(|model| hold_out(machine, (&file, &model), (logs, &found.inputs), control));
+    found.held = or_warning(tried, &mut found.warnings)?;
+    Ok(found)
 }
 
 /// Adds to the covariance of a fit that of the gains by which its torques were made.
@@ -434,6 +444,7 @@ impl IdentifiedDynamics {
         if let Some(consistent) = &self.consistent {
             consistent.write_into(&mut model);
         }
+        self.held.write_into(&mut model);
         model
     }
 }

@@ -13,6 +13,7 @@
 //! | [`validate()`] | logs that were not used, a model | [`Validated`]: torque errors |
 //! | [`compare()`] | two models, logs | [`Compared`]: differences of parameters and of errors |
 //! | [`torque()`] | positions, a model | [`FeedForward`]: torques with their band |
+//! | [`watch()`] | rows as they come, a model | [`Watched`]: external torques, alarms |
 //! | [`identify()`] | logs by role | [`Campaigned`]: all of it, one after the other |
 
 mod campaign;
@@ -31,6 +32,7 @@ mod friction;
 mod gain_error;
 mod gains;
 mod geometry;
+mod hold_out;
 mod in_memory;
 mod known_friction;
 mod log;
@@ -39,6 +41,7 @@ mod lsq;
 mod model;
 mod one_joint;
 mod open_log;
+mod open_loop;
 mod passes;
 mod position_cutoff;
 mod prior;
@@ -52,6 +55,7 @@ mod speeds;
 mod torque;
 mod unknowns;
 mod validate;
+mod watch;
 
 pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
 pub use compare::{Compared, Comparison, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
@@ -68,6 +72,7 @@ pub use friction::{
 };
 pub use gain_error::GainError;
 pub use gains::{FittedGains, Gain, Gains, PayloadLog, fit_gains};
+pub use hold_out::Held;
 pub use in_memory::{InMemory, read_whole};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
@@ -75,6 +80,7 @@ pub use logged_robot::{LoggedRobot, narrowed};
 pub use lsq::{EssentialFit, IdentifiedDynamics, LsqSettings, lsq};
 pub use model::{new_model, refined, refined_or_friction};
 pub use open_log::OpenLog;
+pub use open_loop::open_loop;
 pub use passes::Simulated;
 pub use position_cutoff::PositionCutoff;
 pub use repeated::repeated_rows;
@@ -84,3 +90,4 @@ pub use setup::{CheckedSetup, check_setup};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};
+pub use watch::{STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch};

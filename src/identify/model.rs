@@ -71,6 +71,8 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         covariance: None,
         residual_std: BTreeMap::new(),
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),

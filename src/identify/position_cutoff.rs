@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
+use crate::config::held_out::HeldOut;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::inertia::solve::Fit;
 use crate::log::Block;
@@ -204,6 +205,23 @@ impl LoggedRobot {
             machine.position_cutoffs_hz = Arc::new(each.collect());
         }
         machine
+    }
+
+    /// The same robot with position cut-offs of at most those by which a model's band was found: more noise comes
+    /// through others than the band holds. None where its own are no higher.
+    pub(super) fn as_held(&self, held: &[HeldOut]) -> Option<LoggedRobot> {
+        if held.len() != self.position_cutoffs_hz.len() {
+            return None;
+        }
+        let own = self.position_cutoffs_hz.iter().zip(held);
+        let least: Vec<f64> = own
+            .map(|(hz, held)| hz.min(held.position_cutoff_hz))
+            .collect();
+        (least != *self.position_cutoffs_hz).then(|| {
+            let mut machine = self.clone();
+            machine.position_cutoffs_hz = Arc::new(least);
+            machine
+        })
     }
 
     /// What cut-offs cost the friction of every joint on logs.

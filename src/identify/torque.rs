@@ -8,6 +8,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
+use crate::band::{Band, Deviation, NO_BAND, Reach};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::log::{Instant, Provenance};
@@ -43,8 +44,8 @@ pub struct FeedForward {
 }
 
 /// Torques along a log of positions by a model, `refined` being what its `file` stands for. `row` gets
-/// the time of each sample \[s\], the torque of every joint and then their standard deviations
-/// \[N or Nm\], and the instant from which time is counted.
+/// the time of each sample \[s\], the torque of every joint, their standard deviations and, where the file holds what
+/// it takes, half the widths of their 95 % bands \[N or Nm\], and the instant from which time is counted.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -57,10 +58,16 @@ pub fn torque(
 ) -> Result<FeedForward, IdentifyError> {
     let model = &refined.model;
     let n = machine.robot.joints();
-    let band = Band::new(machine, file, model);
+    let band = Band::new(file, model);
+    let deviation = Deviations::new(machine, file, model);
+    // torque, deviation, and half the band's width
+    let kinds = if band.is_some() { 3 } else { 2 };
+    let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
     let open = |log: &Log| machine.open_positions(log, control);
     let logs = std::slice::from_ref(log);
     let machine = &machine.with_cutoffs_along(logs, &known(model), &vec![0.0; n], &open)?;
+    let as_held = machine.as_held(&file.held_out);
+    let machine = as_held.as_ref().unwrap_or(machine);
     // every row gets its torque: nothing is decimated, and nothing left off at the ends
     let settings = FilterSettings {
         decimation: Some(1),
@@ -73,7 +80,10 @@ pub fn torque(
     let origin = open.origin();
     let mut peak = vec![0.0f64; n];
     let mut square = vec![0.0f64; n];
-    let mut emit = |t: f64, values: &[f64]| {
+    let mut emit = |t: f64, [q, v]: [&[f64]; 2], values: &[f64]| {
+        if let Some(reach) = &mut reach {
+            reach.take(q, v, &values[..n]);
+        }
         for j in 0..n {
             peak[j] = peak[j].max(values[j].abs());
             square[j] += values[j] * values[j];
@@ -84,16 +94,21 @@ pub fn torque(
     let failed = |e| IdentifyError::of_run(&log.name(), e);
     let summary = if refined.effects.is_empty() {
         let compute = |s: &motion::MotionSample, out: &mut [f64]| {
-            let (tau, std) = out.split_at_mut(n);
+            let (tau, rest) = out.split_at_mut(n);
             model.torque(s.q, s.v, s.a, tau);
-            band.at([s.q, s.v, s.a], std);
+            let (std, half) = rest.split_at_mut(n);
+            deviation.at([s.q, s.v, s.a], std);
+            if let Some(band) = &band {
+                band.half_widths([s.q, s.v, s.a], tau, half);
+            }
         };
-        let mut emit = |row: &motion::FilteredRow| emit(row.t, row.raw);
-        motion::run(&mut read, n, &settings, None, 2 * n, &compute, &mut emit).map_err(failed)?
+        let mut emit = |row: &motion::FilteredRow| emit(row.t, [row.q, row.v], row.raw);
+        let channels = kinds * n;
+        motion::run(&mut read, n, &settings, None, channels, &compute, &mut emit).map_err(failed)?
     } else {
         // effects remember: they need a stretch from its begin
         let (found, summary) = motion::stretches(0, n, &settings, &mut read).map_err(failed)?;
-        let mut values = vec![0.0; 2 * n];
+        let mut values = vec![0.0; kinds * n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for stretch in &found {
             let hat = refined.reconstruct(stretch);
@@ -102,15 +117,24 @@ pub fn torque(
                 for (x, hat) in values.iter_mut().zip(&hat) {
                     *x = hat[k];
                 }
-                band.at([&q, &v, &a], &mut values[n..]);
-                emit(*t, &values);
+                let (tau, rest) = values.split_at_mut(n);
+                let (std, half) = rest.split_at_mut(n);
+                deviation.at([&q, &v, &a], std);
+                if let Some(band) = &band {
+                    band.half_widths([&q, &v, &a], tau, half);
+                }
+                emit(*t, [&q, &v], &values);
             }
         }
         summary
     };
     drop(work);
     control.check()?;
-    let warnings = open.told(&summary);
+    let mut warnings = open.told(&summary);
+    match &reach {
+        Some(reach) => warnings.extend(reach.told()),
+        None => warnings.push(NO_BAND.to_owned()),
+    }
     let inputs = vec![open.provenance()?];
     let rows = summary.rows.max(1) as f64;
     let names = machine.robot.joint_names().iter().enumerate();
@@ -131,52 +155,27 @@ pub fn torque(
     })
 }
 
-/// Standard deviations of a model's torque.
-struct Band<'a> {
-    model: &'a Model,
-    /// Of the model's parameters, row-major.
-    covariance: Vec<f64>,
+/// Standard deviations of a model's torque: of its parameters and of what the fit left.
+struct Deviations<'a> {
+    of_parameters: Deviation<'a>,
     /// What the fit left, per joint \[N or Nm\].
     residual: Vec<f64>,
 }
 
-impl<'a> Band<'a> {
+impl<'a> Deviations<'a> {
     fn new(machine: &LoggedRobot, file: &ModelFile, model: &'a Model) -> Self {
         let joints = machine.robot.joint_names().iter();
         let residual = joints.map(|j| file.residual_std.get(j).copied().unwrap_or(0.0));
-        Band {
-            model,
-            covariance: file.model_covariance(model),
+        Deviations {
+            of_parameters: Deviation::new(file, model),
             residual: residual.collect(),
         }
     }
 
     /// Those of every joint at one position, velocity and acceleration.
-    fn at(&self, [q, v, a]: [&[f64]; 3], out: &mut [f64]) {
-        GRADIENT.with_borrow_mut(|g| {
-            g.resize(self.model.parameters(), 0.0);
-            for (j, (out, residual)) in out.iter_mut().zip(&self.residual).enumerate() {
-                self.model.gradient(j, q, v, a, g);
-                *out = (quadratic(&self.covariance, g) + residual * residual).sqrt();
-            }
-        });
+    fn at(&self, motion: [&[f64]; 3], out: &mut [f64]) {
+        for (j, (out, residual)) in out.iter_mut().zip(&self.residual).enumerate() {
+            *out = (self.of_parameters.variance(j, motion) + residual * residual).sqrt();
+        }
     }
-}
-
-thread_local! {
-    /// Gradient of one sample, kept from sample to sample.
-    static GRADIENT: std::cell::RefCell<Vec<f64>> = const { std::cell::RefCell::new(Vec::new()) };
-}
-
-/// g' C g for a row-major square C; never negative.
-fn quadratic(covariance: &[f64], g: &[f64]) -> f64 {
-    let p = g.len();
-    let sum: f64 = (0..p)
-        .filter(|i| g[*i] != 0.0)
-        .map(|i| {
-            let row = &covariance[i * p..(i + 1) * p];
-            g[i] * row.iter().zip(g).map(|(c, x)| c * x).sum::<f64>()
-        })
-        .sum();
-    sum.max(0.0)
 }

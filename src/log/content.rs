@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
+use super::stream::{Stream, Watch};
 use super::{LogError, source};
 
 /// Bytes that are looked at.
@@ -27,6 +28,8 @@ pub(super) struct Content {
     pub(super) size: u64,
     head: Vec<u8>,
     rest: Box<dyn Read + Send>,
+    /// What is known of a stream while it arrives; none of a file.
+    pub(super) watch: Option<Watch>,
 }
 
 impl Content {
@@ -65,6 +68,33 @@ impl Content {
             size,
             head,
             rest,
+            watch: None,
+        })
+    }
+
+    /// Text that arrives while it is read: no more of it is waited for than its first two lines.
+    ///
+    /// # Errors
+    /// A stream that cannot be read.
+    pub(super) fn of_stream(path: &Path, stream: Box<dyn Read + Send>) -> Result<Self, LogError> {
+        let watch = Watch::default();
+        let mut rest = Stream::new(stream, watch.clone());
+        let mut head = vec![0; HEAD];
+        let mut filled = 0;
+        while filled < HEAD && !has_two_lines(&head[..filled]) {
+            let count = rest.read(&mut head[filled..]);
+            match count.map_err(|error| source::failed(path, error))? {
+                0 => break,
+                count => filled += count,
+            }
+        }
+        head.truncate(filled);
+        Ok(Self {
+            compression: Compression::None,
+            size: 0,
+            head,
+            rest: Box::new(rest),
+            watch: Some(watch),
         })
     }
 
@@ -77,6 +107,14 @@ impl Content {
     pub(super) fn into_bytes(self) -> Bytes {
         Cursor::new(self.head).chain(self.rest)
     }
+}
+
+/// Whether two whole lines are there that are neither blank nor comments.
+fn has_two_lines(text: &[u8]) -> bool {
+    let whole = text.split_inclusive(|byte| *byte == b'\n');
+    let whole = whole.filter(|line| line.ends_with(b"\n"));
+    let told = |line: &&[u8]| !matches!(line.trim_ascii().first(), None | Some(b'#' | b'%'));
+    whole.filter(told).count() >= 2
 }
 
 /// First bytes of what zstd compressed.

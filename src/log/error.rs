@@ -146,6 +146,14 @@ pub enum LogError {
         text: String,
         remedy: &'static str,
     },
+    /// A line of JSON that is no row.
+    #[error(
+        "{at}: {problem}; write one object a line: {{\"t\": .., \"q\": [..], \"tau\": [..]}}, or the columns by their names"
+    )]
+    JsonLine { at: String, problem: String },
+    /// The input ends within a line.
+    #[error("{at}: the input ends within this line; what came before it is used")]
+    CutLine { at: String },
     /// NaN or infinity.
     #[error("{at}: column `{column}` holds {text}; {remedy}")]
     NotFinite {

@@ -25,6 +25,7 @@ mod shared;
 mod source;
 mod spec;
 mod stale;
+mod stream;
 mod text;
 mod time;
 mod time_unit;

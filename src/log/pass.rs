@@ -9,7 +9,8 @@ use super::recording::{JointStates, MessageRows, format_of};
 use super::rows::{LogRows, Strictness};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
-use super::text::TextRows;
+use super::stream::Watch;
+use super::text::{JsonRows, TextRows};
 use super::time::Instant;
 use super::{LogError, LogSpec, Span};
 
@@ -39,6 +40,8 @@ pub(super) struct LogPass {
     used: Option<(f64, f64)>,
     /// Rows handed out.
     pub(super) samples: u64,
+    /// What is known of a stream.
+    watch: Option<Watch>,
 }
 
 impl LogPass {
@@ -119,7 +122,35 @@ impl LogPass {
             span: None,
             used: None,
             samples: 0,
+            watch: None,
         }
+    }
+
+    /// Goes through the lines of a stream called `name`: CSV with its header, or JSON lines.
+    pub(super) fn of_stream(
+        name: &str,
+        stream: Box<dyn std::io::Read + Send>,
+        layout: &Layout,
+    ) -> Result<Self, LogError> {
+        let path = std::path::Path::new(name);
+        let content = Content::of_stream(path, stream)?;
+        let watch = content.watch.clone();
+        let (rows, layout): (Box<dyn LogRows>, Layout) =
+            match content.head().trim_ascii_start().first() {
+                Some(b'{') => {
+                    let (rows, layout) = JsonRows::open(path, content, layout)?;
+                    (Box::new(rows), layout)
+                }
+                _ => {
+                    let strict = Strictness::Refuse;
+                    let (rows, layout, _) = TextRows::open(path, content, layout, strict)?;
+                    (Box::new(rows), layout)
+                }
+            };
+        Ok(Self {
+            watch,
+            ..Self::of_rows(LogSpec::whole(name), rows, layout)
+        })
     }
 
     /// Says which column is the time, and how many seconds its unit has.
@@ -203,9 +234,10 @@ impl LogPass {
         Ok(Provenance {
             name: self.spec.name(),
             span: self.spec.span.label(),
-            sha256: match self.rows.sha256() {
-                Some(known) => known.to_owned(),
-                None => source::sha256_of(&self.files)?,
+            sha256: match (self.rows.sha256(), &self.watch) {
+                (Some(known), _) => known.to_owned(),
+                (None, Some(watch)) => watch.sha256(),
+                (None, None) => source::sha256_of(&self.files)?,
             },
             samples: self.samples,
             duration_s: self.duration_s(),

@@ -58,6 +58,33 @@ impl Reader {
         Ok(Self::new(LogPass::of_rows(spec, rows, layout)))
     }
 
+    /// Reads what arrives on a stream, CSV with a header line or JSON lines, by [`Self::read_on`]; times
+    /// whose unit neither the layout nor a name states are seconds.
+    ///
+    /// # Errors
+    /// A stream whose first lines lack a channel of the layout, or that cannot be read.
+    pub fn of_stream(
+        name: &str,
+        stream: Box<dyn std::io::Read + Send>,
+        layout: &Layout,
+    ) -> Result<Self, LogError> {
+        LogPass::of_stream(name, stream, layout).map(Self::new)
+    }
+
+    /// The next row or few, without waiting for more: rows that repeat the one before them come with the
+    /// next that does not, at most twenty. False, and an empty block, at the end.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`].
+    pub fn read_on(&mut self, block: &mut Block) -> Result<bool, LogError> {
+        loop {
+            let more = self.read_rows(block, 1)?;
+            if more || self.finished {
+                return Ok(more);
+            }
+        }
+    }
+
     fn new(pass: LogPass) -> Self {
         let (joints, torques) = (pass.layout.positions.len(), pass.layout.torques.len());
         let mut reader = Self {
@@ -136,9 +163,15 @@ impl Reader {
     /// A row that cannot be used, a time that does not increase, fewer than two rows in all, a
     /// torque channel that is dead; each with its place and what to do.
     pub fn read(&mut self, block: &mut Block) -> Result<bool, LogError> {
+        self.read_rows(block, Block::ROWS)
+    }
+
+    /// Fills the block up to so many rows, and with one more than were kept back in any case.
+    fn read_rows(&mut self, block: &mut Block, rows: usize) -> Result<bool, LogError> {
         block.clear();
         std::mem::swap(block, &mut self.pending);
-        while !self.finished && block.len() < Block::ROWS {
+        let most = rows.max(block.len() + 1);
+        while !self.finished && block.len() < most {
             let Some(t) = self.pass.next()? else {
                 self.finish(block)?;
                 break;

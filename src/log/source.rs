@@ -205,7 +205,7 @@ pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
 }
 
 /// SHA-256 of what it is given piece by piece.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Checksum(Sha256);
 
 impl Checksum {

@@ -15,6 +15,7 @@
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
 pub(crate) mod bootstrap;
+pub mod causal;
 pub mod descent;
 pub(crate) mod jacobi;
 pub(crate) mod lanes;

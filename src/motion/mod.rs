@@ -21,6 +21,7 @@
 //! | `settings` | what the user chooses |
 //! | `time_base` | uniform steps, gaps, torque by a zero-order hold |
 //! | `differences` | v and a from q |
+//! | `causal` | the same sample by sample, from rows as they arrive |
 //! | `position_filter` | what positions come through, of all joints or of each |
 //! | [`position_cutoff`] | what a position cut-off costs the friction at reversals |
 //! | `run` | the windows of a streamed log |
@@ -31,6 +32,7 @@
 //! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
 
 mod added_noise;
+mod causal;
 mod cutter;
 mod differences;
 mod full_rate;
@@ -44,6 +46,7 @@ mod time_base;
 mod window;
 mod zero_order_hold;
 
+pub use causal::{CausalMotion, CausalSample};
 pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};
 pub use run::{RunError, Summary, run};

@@ -155,6 +155,8 @@ q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
             relative_error_rest: None,
             relative_error_raw: 0.0052,
             rmse: 0.0123,
+            coverage_95: None,
+            half_width: None,
             max_abs: 0.09,
             r2: 0.99993,
             samples: 2000,

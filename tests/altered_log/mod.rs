@@ -115,6 +115,8 @@ pub fn write_model(path: &Path) {
     });
     let model = ModelFile {
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         robot: robot.clone(),
         parameters: truth.unwrap().truth.parameters,
         covariance: None,

@@ -224,6 +224,8 @@ fn units_follow_the_joint() {
 fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
     ModelFile {
         friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
         robot: robot.clone(),
         parameters: CftTruth::synthetic(Setup::Tuedacs)
             .plant()

@@ -10,6 +10,7 @@ use super::{head, number};
 use crate::log::content::{Bytes, Content};
 use crate::log::layout::Layout;
 use crate::log::rows::Strictness;
+use crate::log::stream::Watch;
 use crate::log::time::Instant;
 use crate::log::{LogError, escape, source};
 use crate::number::beyond;
@@ -66,6 +67,8 @@ pub(super) struct TextFile {
     ahead: bool,
     strictness: Strictness,
     malformed: u64,
+    /// What is known of a stream.
+    watch: Option<Watch>,
 }
 
 impl TextFile {
@@ -79,6 +82,7 @@ impl TextFile {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
         let found = head::look_at(path, begin, layout.section.delimiter, layout.by_number())?;
+        let watch = content.watch.clone();
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -101,6 +105,7 @@ impl TextFile {
             ahead: found.headerless,
             strictness,
             malformed: 0,
+            watch,
         };
         if let Some((names, _)) = found.header_in_comment {
             let parts = head::split(&names, found.delimiter, found.spaces);
@@ -142,6 +147,11 @@ impl TextFile {
             std::mem::swap(&mut self.record, &mut self.previous);
             if !self.advance()? {
                 return Ok(false);
+            }
+            if let Some(watch) = &self.watch
+                && watch.is_cut_at(self.reader.position().byte())
+            {
+                return Err(LogError::CutLine { at: self.place() });
             }
             if self.fields() == self.header.len() || self.is_row() {
                 return Ok(true);
@@ -326,6 +336,10 @@ impl TextFile {
     /// costs nothing before.
     #[cold]
     pub(super) fn line(&self) -> u64 {
+        if self.watch.is_some() {
+            // a stream cannot be read again
+            return self.line_hint();
+        }
         let end = self.reader.position().byte().saturating_sub(1);
         count_lines(&self.path, end).unwrap_or_else(|_| self.reader.position().line())
     }

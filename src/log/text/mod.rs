@@ -2,11 +2,13 @@
 
 mod csv;
 mod head;
+mod json_lines;
 mod number;
 
 use std::path::Path;
 
 use self::csv::TextFile;
+pub(super) use self::json_lines::JsonRows;
 use super::columns::{Header, ScaledColumns, choose};
 use super::content::Content;
 use super::layout::Layout;

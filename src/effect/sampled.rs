@@ -1,0 +1,188 @@
+//! A model with effects one sample after the other, as rows arrive.
+
+use super::augmented_model::AugmentedModel;
+use super::entry::Role;
+use super::law::Scene;
+use crate::motion::Stretch;
+
+/// A model, and what its effects keep from sample to sample.
+#[derive(Debug, Clone)]
+pub struct Sampled {
+    model: AugmentedModel,
+    /// Of one sample.
+    stretch: Stretch,
+    hat: Vec<Vec<f64>>,
+    load: Vec<Vec<f64>>,
+    plain: Vec<f64>,
+    columns: Vec<Vec<Vec<f64>>>,
+    /// Of each effect, joint after joint.
+    kept: Vec<Vec<f64>>,
+    out: Vec<f64>,
+}
+
+impl Sampled {
+    /// For samples `dt` seconds apart.
+    pub fn new(model: AugmentedModel, dt: f64) -> Self {
+        let n = model.model.robot.joints();
+        let one = || vec![vec![0.0]; n];
+        let effects = model.effects.iter();
+        let columns = effects
+            .clone()
+            .map(|e| vec![vec![0.0]; e.law.linear.len()])
+            .collect();
+        let kept = effects
+            .map(|e| vec![f64::NAN; n * e.law.memory.as_ref().map_or(0, |m| m.size)])
+            .collect();
+        let most = model.effects.iter().map(|e| e.law.linear.len()).max();
+        Self {
+            stretch: Stretch {
+                dt,
+                t: vec![0.0],
+                q: one(),
+                v: one(),
+                a: one(),
+                tau: one(),
+                ..Stretch::default()
+            },
+            hat: one(),
+            load: one(),
+            plain: vec![0.0; n],
+            columns,
+            kept,
+            out: vec![0.0; most.unwrap_or(0)],
+            model,
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &AugmentedModel {
+        &self.model
+    }
+
+    /// Says that the next sample begins a stretch.
+    pub fn begin(&mut self) {
+        self.kept.iter_mut().for_each(|kept| kept.fill(f64::NAN));
+    }
+
+    /// Torque of every joint, before shifts, `since` seconds after the begin of the log.
+    pub fn torque(&mut self, since: f64, [q, v, a]: [&[f64]; 3], tau: &mut [f64]) {
+        let model = &self.model.model;
+        let n = tau.len();
+        let s = &mut self.stretch;
+        (s.began, s.t[0]) = (since, since);
+        for j in 0..n {
+            (s.q[j][0], s.v[j][0], s.a[j][0]) = (q[j], v[j], a[j]);
+        }
+        model.robot.torque(&model.theta, q, v, a, &mut self.plain);
+        for j in 0..n {
+            self.load[j][0] = self.plain[j];
+            tau[j] = self.plain[j] + model.friction[j].torque(v[j]) + model.offset[j];
+            self.hat[j][0] = tau[j];
+        }
+        let scene = Scene {
+            robot: &model.robot,
+            theta: &model.theta,
+            laws: &model.friction,
+            stretch: &self.stretch,
+            hat: &self.hat,
+            load: &self.load,
+        };
+        for (i, effect) in self.model.effects.iter().enumerate() {
+            if effect.law.entry.role == Role::Shift {
+                continue;
+            }
+            for (j, tau) in tau.iter_mut().enumerate() {
+                if !effect.place.touches(j) {
+                    continue;
+                }
+                let out = &mut self.out[..effect.linear.len()];
+                out.fill(0.0);
+                if let Some(memory) = &effect.law.memory {
+                    let kept = &mut self.kept[i][j * memory.size..(j + 1) * memory.size];
+                    (memory.step)(&scene, effect.place, &effect.shape, j, kept, out);
+                } else {
+                    let columns = &mut self.columns[i];
+                    columns.iter_mut().for_each(|column| column[0] = 0.0);
+                    (effect.law.columns)(&scene, effect.place, &effect.shape, j, columns);
+                    for (x, column) in out.iter_mut().zip(columns) {
+                        *x = column[0];
+                    }
+                }
+                *tau += out
+                    .iter()
+                    .zip(&effect.linear)
+                    .map(|(x, c)| c * x)
+                    .sum::<f64>();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect;
+    use crate::robot::friction::ViscousCoulomb;
+    use crate::robot::model::{JointFriction, Model};
+    use crate::robot::{JointKind, Robot};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn sample_by_sample_effects_give_the_torques_of_whole_stretches() {
+        let robot = Robot::single_joint("q1", JointKind::Revolute);
+        let law = ViscousCoulomb {
+            viscous: 0.4,
+            coulomb: 1.3,
+        };
+        let add = |name: &str, values: &[(&str, f64)]| {
+            let values = values.iter().map(|(k, x)| ((*k).to_owned(), *x));
+            let values: BTreeMap<String, f64> = values.collect();
+            effect::read(&robot, name, Some("q1"), &values).unwrap()
+        };
+        let model = AugmentedModel {
+            model: Model {
+                robot: robot.clone(),
+                theta: vec![0.8],
+                friction: vec![JointFriction::ViscousCoulomb(law)],
+                offset: vec![0.1],
+            },
+            effects: vec![
+                add(
+                    "presliding",
+                    &[("sigma0", 300.0), ("sigma1", 0.2), ("fc", 1.1)],
+                ),
+                add("backlash", &[("gap", 0.02), ("c", 0.3)]),
+                add("warm-up", &[("k", -0.2), ("T", 3.0)]),
+                add("ripple", &[("order", 6.0), ("sin", 0.2), ("cos", -0.1)]),
+                add(
+                    "load-friction",
+                    &[("mu_c", 0.1), ("mu_v", 0.02), ("w", 50.0)],
+                ),
+                add("gain", &[("k", 0.05)]),
+            ],
+        };
+        let dt = 1e-3;
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * dt).collect();
+        let of = |f: fn(f64) -> f64| vec![t.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
+        let stretch = Stretch {
+            dt,
+            began: 0.25,
+            q: of(|t| 0.5 * (3.0 * t).sin()),
+            v: of(|t| 1.5 * (3.0 * t).cos()),
+            a: of(|t| -4.5 * (3.0 * t).sin()),
+            tau: vec![vec![0.0; t.len()]],
+            t,
+            ..Stretch::default()
+        };
+        let whole = model.torques(&stretch).hat;
+        let mut sampled = Sampled::new(model, dt);
+        sampled.begin();
+        let mut tau = [0.0];
+        for k in 0..stretch.len() {
+            let [q, v, a] = [&stretch.q, &stretch.v, &stretch.a].map(|x| [x[0][k]]);
+            let since = stretch.began + dt * k as f64;
+            sampled.torque(since, [&q, &v, &a], &mut tau);
+            assert!((tau[0] - whole[0][k]).abs() < 1e-12, "{k}");
+        }
+    }
+}

@@ -1,0 +1,362 @@
+//! What a model leaves of torques that it did not see: blocks of its logs set aside one after the other, or logs
+//! that made nothing of it.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::position_cutoff::known;
+use crate::band::{self, Deviation, Error, Folds, FreeColumns, held_out, without_each};
+use crate::config::ModelFile;
+use crate::config::held_out::{Excesses, HeldOut};
+use crate::effect::AugmentedModel;
+use crate::log::{Block, Provenance};
+use crate::motion::{FilterSettings, ParallelFilters, Stretch, stretches};
+use crate::observe::{KEPT, Observer, Quiet, QuietSample};
+use crate::robot::model::JointFriction;
+
+/// Blocks that are set aside one after the other.
+const FOLDS: usize = 3;
+/// Rows over all logs by which models are moved and bands found; of longer logs pieces all along them.
+const MOST_ROWS: u64 = 150_000;
+/// Rows along which external torques are observed: rare excesses take more.
+const MOST_OBSERVED: u64 = 1_500_000;
+/// Pieces of a log that is longer.
+const PIECES: f64 = 12.0;
+/// Errors of each joint that quantiles are formed from.
+const MOST_ERRORS: usize = 40_000;
+/// Time before a block from which its observer runs, in periods of the cut-off.
+const LEAD: f64 = 12.0;
+
+/// What is kept of it in a model file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Held {
+    pub joints: Vec<HeldOut>,
+    pub excesses: Option<Excesses>,
+}
+
+impl Held {
+    pub(super) fn write_into(&self, file: &mut ModelFile) {
+        file.held_out.clone_from(&self.joints);
+        file.excesses.clone_from(&self.excesses);
+    }
+}
+
+/// Which rows of a long log are looked at.
+#[derive(Debug, Clone, Copy)]
+struct Pieces {
+    length_s: f64,
+    share: f64,
+}
+
+impl Pieces {
+    /// So many of all rows.
+    fn of(most: u64, rows: u64, log: &Provenance) -> Self {
+        Self {
+            length_s: log.duration_s / PIECES,
+            share: (most as f64 / rows.max(1) as f64).min(1.0),
+        }
+    }
+
+    fn keep(&self, block: &mut Block, first: f64) {
+        if self.share < 1.0 && self.length_s > 0.0 {
+            block.retain(|t| ((t - first) / self.length_s).fract() < self.share);
+        }
+    }
+}
+
+/// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs.
+///
+/// # Errors
+/// Logs that are too short for it, and interruption.
+pub(super) fn hold_out(
+    machine: &LoggedRobot,
+    (file, model): (&ModelFile, &AugmentedModel),
+    (logs, inputs): (&[Log], &[Provenance]),
+    control: &Control,
+) -> Result<Held, IdentifyError> {
+    Trial::new(machine, (file, model), (logs, inputs), control).run(FOLDS)
+}
+
+/// The same of logs that the model has nothing from.
+///
+/// # Errors
+/// Those of [`hold_out`].
+pub(super) fn on_other_logs(
+    machine: &LoggedRobot,
+    (file, model): (&ModelFile, &AugmentedModel),
+    logs: &[Log],
+    control: &Control,
+) -> Result<(Held, Vec<Provenance>), IdentifyError> {
+    let machine = &machine.with_position_cutoffs(logs, &known(&model.model), control)?;
+    let mut inputs = Vec::new();
+    for log in logs {
+        let mut open = machine.open(log, control)?;
+        let mut block = Block::default();
+        while open.read(&mut block)? {}
+        inputs.push(open.provenance()?);
+    }
+    let held = Trial::new(machine, (file, model), (logs, &inputs), control).run(1)?;
+    Ok((held, inputs))
+}
+
+struct Trial<'a> {
+    machine: &'a LoggedRobot,
+    settings: FilterSettings,
+    file: &'a ModelFile,
+    model: &'a AugmentedModel,
+    logs: &'a [Log],
+    pieces: Vec<Pieces>,
+    observed: Vec<Pieces>,
+    control: &'a Control,
+}
+
+impl<'a> Trial<'a> {
+    fn new(
+        machine: &'a LoggedRobot,
+        (file, model): (&'a ModelFile, &'a AugmentedModel),
+        (logs, inputs): (&'a [Log], &[Provenance]),
+        control: &'a Control,
+    ) -> Self {
+        let rows = inputs.iter().take(logs.len()).map(|log| log.samples).sum();
+        let each = |most: u64| {
+            let inputs = inputs.iter();
+            inputs.map(|log| Pieces::of(most, rows, log)).collect()
+        };
+        Self {
+            machine,
+            settings: machine.settings(),
+            file,
+            model,
+            logs,
+            pieces: each(MOST_ROWS),
+            observed: each(MOST_OBSERVED),
+            control,
+        }
+    }
+
+    fn run(&self, folds: usize) -> Result<Held, IdentifyError> {
+        let work = self.control.begin("held-out data", None);
+        let stretches = self.read()?;
+        let folds = Folds::of(&stretches, folds);
+        let failed = |error| IdentifyError::motion(&self.logs[0].name(), error);
+        let models = match folds.count() {
+            1 => vec![self.model.clone()],
+            _ => {
+                let filters = ParallelFilters::design(&self.settings, &stretches);
+                let speeds = self.machine.rest_speeds(self.logs, self.control)?;
+                without_each(
+                    self.model,
+                    &self.free(),
+                    &stretches,
+                    &filters.map_err(failed)?,
+                    &speeds,
+                    &folds,
+                )
+                .map_err(failed)?
+            }
+        };
+        self.control.check()?;
+        let mut joints = self.errors(&stretches, &folds, &models);
+        drop(stretches);
+        work.doing("external torques");
+        let excesses = self.quiet(&folds, &models, &mut joints)?;
+        Ok(Held { joints, excesses })
+    }
+
+    /// Whether the logs told of a joint's friction and offset: what one-joint logs told is not theirs.
+    fn free(&self) -> FreeColumns {
+        let joints = self.machine.robot.joint_names();
+        let laws = joints.iter().zip(&self.model.model.friction);
+        let friction = laws.map(|(joint, law)| {
+            let known = self.file.friction_prior.iter().any(|p| p.joint == *joint);
+            *law != JointFriction::None && !known
+        });
+        let offset = joints
+            .iter()
+            .map(|joint| self.file.find("offset", Some(joint)).is_some());
+        FreeColumns {
+            friction: friction.collect(),
+            offset: offset.collect(),
+        }
+    }
+
+    /// Pieces of the logs, smoothed.
+    fn read(&self) -> Result<Vec<Stretch>, IdentifyError> {
+        let n = self.machine.robot.joints();
+        let mut all = Vec::new();
+        for (index, log) in self.logs.iter().enumerate() {
+            let mut open = self.machine.open(log, self.control)?;
+            let mut first = None;
+            let (found, _) = stretches(index, n, &self.settings, &mut |block| {
+                let more = open.read(block)?;
+                if let Some(t) = block.t.first() {
+                    let first = *first.get_or_insert(*t);
+                    self.pieces[index].keep(block, first);
+                }
+                Ok(more)
+            })
+            .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            all.extend(found);
+        }
+        Ok(all)
+    }
+
+    /// What each block leaves of the torques by the model of the others.
+    fn errors(
+        &self,
+        stretches: &[Stretch],
+        folds: &Folds,
+        models: &[AugmentedModel],
+    ) -> Vec<HeldOut> {
+        let n = self.machine.robot.joints();
+        let samples: usize = stretches.iter().map(Stretch::len).sum();
+        let every = samples.div_ceil(MOST_ERRORS).max(1);
+        let deviation = Deviation::new(self.file, &self.model.model);
+        let mut errors: Vec<Vec<Error>> = vec![Vec::with_capacity(samples / every + 1); n];
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        for stretch in stretches {
+            let of_fold: Vec<usize> = (stretch.t.iter())
+                .map(|t| folds.of_time(stretch.log, *t))
+                .collect();
+            for (fold, model) in models.iter().enumerate() {
+                let Some(from) = of_fold.iter().position(|f| *f == fold) else {
+                    continue;
+                };
+                let until = of_fold.iter().rposition(|f| *f == fold).unwrap_or(from) + 1;
+                // effects remember from the begin of the stretch
+                let begin = if model.effects.is_empty() { from } else { 0 };
+                let hat = model.reconstruct(&part(stretch, begin, until));
+                for k in (from..until).step_by(every) {
+                    stretch.at(k, &mut q, &mut v, &mut a);
+                    for (j, errors) in errors.iter_mut().enumerate() {
+                        let torque = hat[j][k - begin];
+                        errors.push(Error {
+                            position: q[j],
+                            speed: v[j],
+                            torque,
+                            error: stretch.tau[j][k] - torque,
+                            variance: deviation.variance(j, [&q, &v, &a]),
+                        });
+                    }
+                }
+            }
+        }
+        let dt = stretches.first().map_or(1e-3, |s| s.dt);
+        let independent = (2.0 * self.settings.cutoff_hz * dt * every as f64).min(1.0);
+        let names = self.machine.robot.joint_names().iter();
+        let plain = self.settings.plain_q_cutoff_hz(1.0 / dt);
+        let cutoffs = &self.settings.joint_q_cutoffs_hz;
+        let all = names.zip(&errors).enumerate();
+        all.map(|(j, (joint, errors))| {
+            let mut held = held_out(joint, errors, errors.len() as u64, independent);
+            held.samples = samples as u64;
+            held.position_cutoff_hz = cutoffs.get(j).copied().unwrap_or(plain);
+            held
+        })
+        .collect()
+    }
+
+    /// External torques along the blocks, each by the model of the others.
+    fn quiet(
+        &self,
+        folds: &Folds,
+        models: &[AugmentedModel],
+        held: &mut [HeldOut],
+    ) -> Result<Option<Excesses>, IdentifyError> {
+        let cutoff = self.settings.cutoff_hz;
+        let mut quiet: Option<Quiet> = None;
+        let lead = LEAD / cutoff;
+        for (index, log) in self.logs.iter().enumerate() {
+            for (fold, model) in models.iter().enumerate() {
+                let failed = |error| IdentifyError::motion(&log.name(), error);
+                let mut observer = Observer::new(model.clone(), &self.settings).map_err(failed)?;
+                let mut open = self.machine.open(log, self.control)?;
+                let mut block = Block::default();
+                let (mut first, mut next, mut begins) = (None, f64::NEG_INFINITY, true);
+                let mut more = true;
+                while more {
+                    more = open.read(&mut block)?;
+                    if let Some(t) = block.t.first() {
+                        let first = *first.get_or_insert(*t);
+                        self.observed[index].keep(&mut block, first);
+                    }
+                    let of = |t: f64| folds.of_time(index, t);
+                    block.retain(|t| of(t) == fold || of(t + lead) == fold);
+                    let (step, mut taken) = (observer.step_s(), Vec::new());
+                    let every = 1.0 / (KEPT * cutoff);
+                    let pushed = observer.push(&block, !more, &mut |o| {
+                        begins |= o.begins;
+                        if of(o.t) != fold || o.t < next {
+                            return;
+                        }
+                        next = o.t + every * (1.0 - 1e-6);
+                        taken.push(QuietSample {
+                            t: o.t,
+                            begins: std::mem::take(&mut begins),
+                            external: o.external.to_vec(),
+                            speed: o.speed.to_vec(),
+                        });
+                    });
+                    pushed.map_err(failed)?;
+                    let step = step.or(observer.step_s()).unwrap_or(every);
+                    // kept at multiples of the sampling step
+                    let kept = step * (every / step).ceil().max(1.0);
+                    let quiet = quiet.get_or_insert_with(|| Quiet::new(kept));
+                    taken.into_iter().for_each(|sample| quiet.push(sample));
+                }
+            }
+        }
+        let lowest = self
+            .settings
+            .joint_q_cutoffs_hz
+            .iter()
+            .copied()
+            .reduce(f64::min);
+        let position = lowest.unwrap_or_else(|| self.settings.plain_q_cutoff_hz(f64::INFINITY));
+        let learnt = quiet.and_then(|quiet| quiet.learn(held, cutoff, position));
+        if learnt.is_none() {
+            // torques of too few samples: those of the band stand for them
+            for held in held.iter_mut() {
+                let wide = held.half_width_95.iter().flatten();
+                let wide = wide.fold(f64::MIN_POSITIVE, |m, x| m.max(*x));
+                held.external_std = vec![wide / band::NORMAL_95; held.speed_edges.len() + 1];
+                held.external_99 = 2.6;
+            }
+        }
+        Ok(learnt)
+    }
+}
+
+/// Samples `from..until` of a stretch.
+fn part(stretch: &Stretch, from: usize, until: usize) -> Stretch {
+    let of = |x: &Vec<Vec<f64>>| x.iter().map(|x| x[from..until].to_vec()).collect();
+    Stretch {
+        log: stretch.log,
+        dt: stretch.dt,
+        began: stretch.began + stretch.dt * from as f64,
+        t: stretch.t[from..until].to_vec(),
+        zero: stretch.zero,
+        q: of(&stretch.q),
+        v: of(&stretch.v),
+        a: of(&stretch.a),
+        tau: of(&stretch.tau),
+    }
+}
+
+/// A word where a model goes without: interruption is passed on.
+pub(super) fn or_warning(
+    held: Result<Held, IdentifyError>,
+    warnings: &mut Vec<String>,
+) -> Result<Held, IdentifyError> {
+    match held {
+        Err(IdentifyError::Interrupted) => Err(IdentifyError::Interrupted),
+        Err(error) => {
+            warnings.push(format!(
+                "no block of these logs could be set aside, so that the model has no prediction band and no alarms: {error}"
+            ));
+            Ok(Held::default())
+        }
+        Ok(held) => Ok(held),
+    }
+}

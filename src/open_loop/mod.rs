@@ -1,0 +1,13 @@
+//! The motion that a model makes of measured torques: forward dynamics in windows that begin at measured states,
+//! and how far the positions are off.
+//!
+//! M(q) a = tau - C v - G - F(v) - effects. One step takes smooth friction implicitly (Rosenbrock's method with
+//! dF/dv), and friction that jumps at rest as an impulse of at most Fc dt against the motion, joint after joint
+//! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A model is told by it
+//! where torques alone hardly tell: errors of slow friction and of gravity add up.
+
+mod stepper;
+mod windows;
+
+pub use stepper::Stepper;
+pub use windows::{JointDrift, OpenLoop, WindowLength, along};
