@@ -134,6 +134,18 @@ fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_
     assert!((mean(&found, "before", "holdout") - 0.082).abs() < 0.002);
     assert!(mean(&found, "after", "train") <= 0.022);
     assert!(mean(&found, "after", "holdout") <= 0.035);
+    for step in found["steps"].as_array().unwrap() {
+        assert!(step["p_value"].as_f64().unwrap() <= 0.01, "{step}");
+    }
+    // what is left has its signals, the strongest first, each beyond chance
+    let dependence = found["dependence"].as_array().unwrap();
+    let share = |told: &Value| told["share"].as_f64().unwrap();
+    assert!(!dependence.is_empty());
+    assert!(dependence.windows(2).all(|w| share(&w[0]) >= share(&w[1])));
+    for told in dependence {
+        assert_eq!(told["joint"], "q1");
+        assert!(told["p_value"].as_f64().unwrap() <= 0.01, "{told}");
+    }
     // the model file carries its effects: validate computes the same torque
     let validated = run(at, &["validate", &unseen, "-m", "refined.toml"]);
     let error = validated["overall"]["mean_relative_error"]
@@ -276,6 +288,7 @@ fn what_the_catalogue_does_not_have_is_unexplained_and_not_its_nearest_neighbour
         );
         assert_eq!(found["verdict"], "unexplained-residual", "{name}");
         for step in found["steps"].as_array().unwrap() {
+            assert!(step["p_value"].as_f64().unwrap() <= 0.01, "{name}: {step}");
             assert_eq!(step["assured"], false, "{name}: {}", step["effect"]);
         }
         let left = &found["unexplained"][0];

@@ -107,6 +107,46 @@ fn a_gain_is_found_with_its_factor_where_the_model_is_held() {
     );
 }
 
+/// Two general logs of the robot with effects, along two motions, diagnosed together.
+fn two_logs(name: &str, effects: &str) -> Value {
+    loaded(&format!("{name}.csv"), effects);
+    let simulate = format!(
+        "simulate -r {ROBOT} --reference configs/cft-validation.toml --seconds 20 --seed 10 --effect {effects} \
+         -o {name}-2.csv"
+    );
+    run(unloaded(), &simulate);
+    run(
+        unloaded(),
+        &format!("diagnose {name}.csv {name}-2.csv -m model.toml"),
+    )
+}
+
+#[test]
+fn asymmetric_friction_is_one_effect_and_no_offset_beside_it() {
+    let found = two_logs("asymmetric", "asymmetric-friction:q1:coulomb=2,viscous=3");
+    assert_eq!(effects(&found), ["asymmetric-friction"]);
+    let step = &found["steps"][0];
+    assert_eq!(step["joint"], "q1");
+    assert!(step["p_value"].as_f64().unwrap() <= 0.01, "{step}");
+}
+
+/// One rotor explains little without the other, and ten terms of the links explain both.
+#[test]
+fn rotors_on_both_screws_are_two_rotors_and_not_terms_of_the_links() {
+    let found = two_logs(
+        "rotors",
+        "rotor-inertia:x_r:J=10 --effect rotor-inertia:y_r:J=10",
+    );
+    assert_eq!(effects(&found), ["rotor-inertia", "rotor-inertia"]);
+    for step in found["steps"].as_array().unwrap() {
+        let p = &step["parameters"]["J"];
+        let (value, std) = (p["value"].as_f64().unwrap(), p["std"].as_f64().unwrap());
+        assert!((value - 10.0).abs() < 4.0 * std, "{value} +- {std}");
+    }
+    let path = found["path"].as_array().unwrap();
+    assert_eq!(path.last().unwrap()["action"], "replaced", "{path:?}");
+}
+
 #[test]
 fn joints_that_are_held_are_no_candidates_and_have_no_error() {
     let found = run(unloaded(), "diagnose q1.csv -m model.toml");

@@ -207,7 +207,15 @@ impl<'a> Diagnosing<'a> {
         };
         let (at, problem) = (&self.at, &self.problem);
         let all = |_: &Law, _: Place| true;
-        let mut found = search(at, problem, case, &baseline, &torques, (&all, self.stop))?;
+        let mut found = search(
+            at,
+            problem,
+            case,
+            &baseline,
+            &torques,
+            (&all, 0.0),
+            self.stop,
+        )?;
         accept(
             &mut found.candidates,
             &case.limits,

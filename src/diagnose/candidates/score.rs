@@ -107,7 +107,7 @@ impl<'a> CandidateTest<'a> {
     }
 
     /// Sums of a candidate over every piece.
-    fn cross(&self, columns: &CandidateColumns, k: usize) -> Vec<CrossProducts> {
+    pub(crate) fn cross(&self, columns: &CandidateColumns, k: usize) -> Vec<CrossProducts> {
         let base = &self.at.base;
         let u = base.unknowns.len();
         let piece = |piece: &Piece| {
@@ -163,12 +163,11 @@ impl<'a> CandidateTest<'a> {
     }
 
     /// The same, with what it is pulled by block by block; none where no column has a part of its own.
-    pub fn gain_by_blocks(
+    pub(crate) fn gain_by_blocks(
         &self,
-        columns: &CandidateColumns,
+        cross: &[CrossProducts],
         k: usize,
     ) -> (f64, Option<BlockScores>) {
-        let cross = self.cross(columns, k);
         let mut sums: Vec<CrossProducts> = self
             .blocks
             .sums
@@ -176,7 +175,7 @@ impl<'a> CandidateTest<'a> {
             .map(|_| CrossProducts::none(self.at.base.unknowns.len(), k))
             .collect();
         let mut total = CrossProducts::none(self.at.base.unknowns.len(), k);
-        for (block, c) in self.blocks.signs.of_piece.iter().zip(&cross) {
+        for (block, c) in self.blocks.signs.of_piece.iter().zip(cross) {
             if let Some(block) = *block {
                 sums[block].add(c);
                 total.add(c);
@@ -204,20 +203,29 @@ impl<'a> CandidateTest<'a> {
         k: usize,
         shapes: usize,
     ) -> Option<CandidateScore> {
-        let cross = self.cross(columns, k);
-        let total = self.over(&cross, k, &RowRole::fitted);
+        self.score_of(columns, &self.cross(columns, k), (k, shapes))
+    }
+
+    /// The same, of sums that are known.
+    pub(crate) fn score_of(
+        &self,
+        columns: &CandidateColumns,
+        cross: &[CrossProducts],
+        (k, shapes): (usize, usize),
+    ) -> Option<CandidateScore> {
+        let total = self.over(cross, k, &RowRole::fitted);
         let (solution, share) = partial(&total, &self.inverse, &self.at.pull, SHARE);
         let solution = solution?;
-        let (p_value, effective_rows) = self.significance(&cross, &total, &solution, columns);
+        let (p_value, effective_rows) = self.significance(cross, &total, &solution, columns);
         let (before, after, rows) = self.touched(columns, &solution, &total);
         let effective = effective_rows.min(rows);
         let free = (solution.kept.len() + shapes) as f64;
         let delta_bic = effective * (before / after).ln() - free * effective.max(2.0).ln();
 
-        let in_folds = self.over(&cross, k, &|r| matches!(r, RowRole::Fold(_)));
+        let in_folds = self.over(cross, k, &|r| matches!(r, RowRole::Fold(_)));
         let mut folds = Vec::with_capacity(self.folds.len());
         for (f, fold) in self.folds.iter().enumerate() {
-            let held_out = self.over(&cross, k, &|r| r == RowRole::Fold(f));
+            let held_out = self.over(cross, k, &|r| r == RowRole::Fold(f));
             let train = in_folds.without(&held_out);
             let (solved, _) = partial(&train, &fold.inverse, &fold.score, 0.0);
             folds.push(match solved {
@@ -227,7 +235,7 @@ impl<'a> CandidateTest<'a> {
         }
         let base: f64 = self.base_folds.iter().sum();
         let with: f64 = folds.iter().sum();
-        let vetoes = [self.base_vetoes.clone(), self.vetoes(&cross, &solution)];
+        let vetoes = [self.base_vetoes.clone(), self.vetoes(cross, &solution)];
         Some(CandidateScore {
             beta: solution.beta.iter().copied().collect(),
             gain: solution.removed / self.at.square.max(f64::MIN_POSITIVE),
@@ -245,9 +253,10 @@ impl<'a> CandidateTest<'a> {
     /// Chance of what a candidate shows beyond that which processing alone makes of it; 1 where no column has a part
     /// of its own.
     pub fn p_value_beyond(&self, columns: &CandidateColumns, k: usize, artefact: &Artefact) -> f64 {
-        let total = self.over(&self.cross(columns, k), k, &RowRole::fitted);
+        let cross = self.cross(columns, k);
+        let total = self.over(&cross, k, &RowRole::fitted);
         let (solution, _) = partial(&total, &self.inverse, &self.at.pull, SHARE);
-        let (Some(s), (_, Some(scores))) = (solution, self.gain_by_blocks(columns, k)) else {
+        let (Some(s), (_, Some(scores))) = (solution, self.gain_by_blocks(&cross, k)) else {
             return 1.0;
         };
         let mut pull = -s.projection.tr_mul(&artefact.pull);

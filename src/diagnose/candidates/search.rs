@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::baseline::Baseline;
 use super::candidate::Candidate;
 use super::columns::{CandidateColumns, columns, kept_by_filter};
+use super::cross_products::CrossProducts;
 use super::orders::SCANNED;
 use super::score::CandidateTest;
 use crate::diagnose::placebo::draws::Tried;
@@ -31,7 +32,8 @@ pub struct Found<'a> {
     pub test: CandidateTest<'a>,
 }
 
-/// Tries once everything that is `wanted`.
+/// Tries once everything that is `wanted`, and goes into what removes at least the fraction `needed` of the weighted
+/// squares.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -41,10 +43,8 @@ pub fn search<'a>(
     case: &Case,
     baseline: &Baseline,
     torques: &'a [Torques],
-    (wanted, stop): (
-        &(dyn Fn(&Law, Place) -> bool + Sync),
-        &(dyn Fn() -> bool + Sync),
-    ),
+    (wanted, needed): (&(dyn Fn(&Law, Place) -> bool + Sync), f64),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Found<'a>, MotionError> {
     let round = SearchRound {
         at,
@@ -52,6 +52,7 @@ pub fn search<'a>(
         test: CandidateTest::new(at, problem),
         torques,
         keep: case.keep,
+        needed,
     };
     let robot = &at.model.model.robot;
     let laws = &at.model.model.friction;
@@ -91,7 +92,12 @@ struct SearchRound<'a> {
     torques: &'a [Torques],
     /// The given model is kept within its covariance.
     keep: bool,
+    /// Least fraction of the weighted squares that a candidate must remove before its shape is refined.
+    needed: f64,
 }
+
+/// Columns of a candidate and their sums over every piece.
+type Sums = (CandidateColumns, Vec<CrossProducts>);
 
 impl SearchRound<'_> {
     /// One effect at one place: the best of its shapes, refined where it removes more than `least`; and the shapes
@@ -122,13 +128,19 @@ impl SearchRound<'_> {
             shape: Vec::new(),
             linear: vec![0.0; law.linear.len()],
         };
-        let Some(gain) = self.best_start(&mut effect, starts, &mut tried)? else {
+        let Some((gain, mut sums)) = self.best_start(&mut effect, starts, &mut tried)? else {
             let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
                           [filter] to look for them";
             return refused(reason, tried);
         };
-        if gain > least {
-            self.refine(&mut effect)?;
+        if gain < self.needed {
+            return refused("it removes less than what it would stand in for", tried);
+        }
+        if gain > least && self.refine(&mut effect)? {
+            sums = self.sums(&effect)?;
+            let (_, scores) = self.test.gain_by_blocks(&sums.1, effect.linear.len());
+            tried.best = tried.starts.len();
+            tried.starts.extend(scores);
         }
         if self
             .added(law, place)
@@ -145,8 +157,8 @@ impl SearchRound<'_> {
                 return refused(&reason, tried);
             }
         }
-        let columns = self.columns(&effect)?;
-        let score = (self.test).score(&columns, effect.linear.len(), effect.shape.len());
+        let numbers = (effect.linear.len(), effect.shape.len());
+        let score = self.test.score_of(&sums.0, &sums.1, numbers);
         let reason = match &score {
             None => "the declared parameters explain all of it",
             Some(s) => {
@@ -197,8 +209,9 @@ impl SearchRound<'_> {
         effect: &mut Added,
         starts: Vec<Vec<f64>>,
         tried: &mut Tried,
-    ) -> Result<Option<f64>, MotionError> {
-        let mut best = (f64::NEG_INFINITY, Vec::new());
+    ) -> Result<Option<(f64, Sums)>, MotionError> {
+        let mut best = None;
+        let mut highest = f64::NEG_INFINITY;
         for shape in starts {
             effect.shape = shape;
             if effect.law.entry.search == Search::Orders {
@@ -207,25 +220,35 @@ impl SearchRound<'_> {
                     continue;
                 }
             }
-            let columns = self.columns(effect)?;
-            let (gain, scores) = self.test.gain_by_blocks(&columns, effect.linear.len());
-            if gain > best.0 {
-                best = (gain, effect.shape.clone());
+            let sums = self.sums(effect)?;
+            let (gain, scores) = self.test.gain_by_blocks(&sums.1, effect.linear.len());
+            if gain > highest {
+                highest = gain;
+                best = Some((effect.shape.clone(), sums));
                 tried.best = tried.starts.len();
             }
             tried.starts.extend(scores);
         }
-        effect.shape = best.1;
-        Ok((best.0 > f64::NEG_INFINITY).then_some(best.0))
+        Ok(best.map(|(shape, sums)| {
+            effect.shape = shape;
+            (highest, sums)
+        }))
     }
 
-    /// Refines a shape that is free, in ratios to where it starts.
-    fn refine(&self, effect: &mut Added) -> Result<(), MotionError> {
+    /// Columns of an effect and their sums.
+    fn sums(&self, effect: &Added) -> Result<Sums, MotionError> {
+        let columns = self.columns(effect)?;
+        let cross = self.test.cross(&columns, effect.linear.len());
+        Ok((columns, cross))
+    }
+
+    /// Refines a shape that is free, in ratios to where it starts; whether there is one.
+    fn refine(&self, effect: &mut Added) -> Result<bool, MotionError> {
         let (law, cover) = (effect.law, &self.problem.cover);
         let limits = (law.limits)(cover, effect.place);
         let free = limits.iter().all(|[low, high]| low < high);
         if effect.shape.is_empty() || !law.entry.search.refines() || !free {
-            return Ok(());
+            return Ok(false);
         }
         let centre = effect.shape.clone();
         let shape_at = |x: &[f64]| -> Vec<f64> {
@@ -262,7 +285,7 @@ impl SearchRound<'_> {
             Some(error) => Err(error),
             None => {
                 effect.shape = shape_at(&found.x);
-                Ok(())
+                Ok(true)
             }
         }
     }

@@ -88,8 +88,8 @@ fn divided(pieces: &[Piece]) -> Vec<Option<usize>> {
     let fitted = pieces.iter().filter(|p| p.role.fitted());
     let rows: usize = fitted.clone().map(|p| p.rows.len()).sum();
     let longest = fitted.map(|p| p.rows.len()).max().unwrap_or(1);
-    // a block is some correlation times long, as a piece is
-    let least = (rows / MOST).max(longest.min(rows / 16)).max(1);
+    // a piece is some correlation times long, and so is a block; the short ones at the ends of folds join others
+    let least = (rows / MOST).max(longest * 3 / 5).max(1);
     let mut found = Vec::with_capacity(pieces.len());
     let (mut block, mut filled): (Option<usize>, usize) = (None, 0);
     let mut before: Option<&Piece> = None;

@@ -13,7 +13,7 @@ use crate::diagnose::candidates::search::search;
 use crate::diagnose::problem::case::{Case, SelectionLimits};
 use crate::diagnose::problem::fit::{FittedModel, fit};
 use crate::diagnose::problem::fit_problem::FitProblem;
-use crate::effect::{Added, LAWS, Law, Place, Role, Torques};
+use crate::effect::{Added, LAWS, Law, Place, Role, Search, Torques};
 use crate::motion::MotionError;
 
 /// Other effects in place of some.
@@ -25,8 +25,10 @@ pub(crate) struct Replacement {
     pub fitted: FittedModel,
 }
 
-/// Most candidates for one place in a set that are fitted jointly.
+/// Sets that are fitted jointly, the likeliest, in the place of one effect or two.
 const FITTED: usize = 3;
+/// Least part of what the effects removed that another must remove with the shape that its search begins from.
+const NEEDED: f64 = 0.3;
 
 /// The first replacement that these data do not tell from what is there and that has fewer numbers, or that they tell
 /// to be better. `known` says which sets have been tried.
@@ -51,7 +53,9 @@ pub(crate) fn replacement(
             of_gone.push(model.effects.remove(*i));
         }
         let without = fit(&model, problem)?;
-        let sets = instead(&without, problem, case, baseline, (&of_gone, stop))?;
+        let left = at.square_with(&without.weights, &problem.split) / without.square;
+        let of = (of_gone.as_slice(), NEEDED * (1.0 - left).max(0.0));
+        let sets = instead(&without, problem, case, baseline, of, stop)?;
         for come in sets {
             let mut model = without.model.clone();
             model.effects.extend(come.iter().map(|c| c.effect.clone()));
@@ -97,7 +101,8 @@ fn instead(
     problem: &FitProblem,
     case: &Case,
     baseline: &Baseline,
-    (gone, stop): (&[Added], &(dyn Fn() -> bool + Sync)),
+    (gone, needed): (&[Added], f64),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Vec<Candidate>>, MotionError> {
     let torques = problem.torques(&without.model);
     let joints = without.weights.len();
@@ -109,8 +114,11 @@ fn instead(
     let same = |law: &Law, place: Place| {
         gone.len() == 1 && gone[0].name() == law.entry.name && gone[0].place == place
     };
-    let wanted = |law: &Law, place: Place| fewer(law) && moved(place) && !same(law, place);
-    let found = search(without, problem, case, baseline, &torques, (&wanted, stop))?;
+    // an order is not simpler than what it would stand in for
+    let open = |law: &Law| law.entry.search != Search::Orders && fewer(law);
+    let wanted = |law: &Law, place: Place| open(law) && moved(place) && !same(law, place);
+    let of = (&wanted as &(dyn Fn(&Law, Place) -> bool + Sync), needed);
+    let found = search(without, problem, case, baseline, &torques, of, stop)?;
     let mut sets: Vec<(f64, Vec<Candidate>)> = Vec::new();
     for candidate in found.candidates {
         if let Some(score) = candidate
