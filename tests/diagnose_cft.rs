@@ -147,6 +147,44 @@ fn rotors_on_both_screws_are_two_rotors_and_not_terms_of_the_links() {
     assert_eq!(path.last().unwrap()["action"], "replaced", "{path:?}");
 }
 
+/// A filter of the positions that is too narrow for a fast motion smears its reversals, and what that leaves in the
+/// residual looks like friction with a memory.
+#[test]
+fn what_a_narrow_position_filter_makes_is_no_effect() {
+    let at = unloaded();
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let robot = std::fs::read_to_string(here.join(ROBOT)).unwrap();
+    let narrow = robot.replacen("[filter]", "[filter]\nposition_cutoff_hz = 50.0", 1);
+    assert_ne!(robot, narrow);
+    std::fs::write(at.join("narrow.toml"), narrow).unwrap();
+    let motion = here.join("examples/study_rows/designed.toml");
+    let motion = motion.to_string_lossy();
+    run(
+        at,
+        &format!("simulate -r {ROBOT} --reference {motion} --seconds 20 --seed 2 -o fast.csv"),
+    );
+    run(
+        at,
+        "friction q1.csv q2.csv q4.csv q5.csv -r narrow.toml -o narrow-friction.toml",
+    );
+    run(
+        at,
+        "lsq fast.csv -r narrow.toml -m narrow-friction.toml -o narrow-model.toml",
+    );
+    let found = run(at, "diagnose fast.csv -m narrow-model.toml");
+    assert_eq!(effects(&found), [""; 0]);
+    let candidates = found["candidates"].as_array().unwrap();
+    let processed = |c: &&Value| {
+        c["reason"]
+            .as_str()
+            .unwrap()
+            .starts_with("processing makes")
+    };
+    let processed: Vec<_> = candidates.iter().filter(processed).collect();
+    let memory = |c: &&Value| c["family"] == "memory";
+    assert!(processed.iter().any(memory), "{processed:?}");
+}
+
 #[test]
 fn joints_that_are_held_are_no_candidates_and_have_no_error() {
     let found = run(unloaded(), "diagnose q1.csv -m model.toml");
