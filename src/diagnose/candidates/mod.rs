@@ -3,7 +3,6 @@
 pub mod baseline;
 pub mod candidate;
 pub mod columns;
-pub mod cross_products;
 pub mod orders;
 pub mod score;
 pub mod search;

@@ -8,10 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::columns::CandidateColumns;
-use super::cross_products::CrossProducts;
 use crate::diagnose::placebo::blocks::Blocks;
 use crate::diagnose::placebo::processing::Artefact;
 use crate::diagnose::placebo::scores::BlockScores;
+use crate::diagnose::problem::cross_products::CrossProducts;
 use crate::diagnose::problem::data_split::{Piece, RowRole};
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;

@@ -126,8 +126,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::diagnose::candidates::cross_products::CrossProducts;
     use crate::diagnose::placebo::blocks::Signs;
+    use crate::diagnose::problem::cross_products::CrossProducts;
     use crate::diagnose::problem::data_split::{Piece, RowRole};
     use crate::diagnose::problem::normal_equations::NormalEquations;
 

@@ -5,7 +5,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::blocks::Blocks;
 use super::processing::taken;
-use crate::diagnose::candidates::cross_products::CrossProducts;
+use crate::diagnose::problem::cross_products::CrossProducts;
 use crate::math::rank_revealing::RankRevealingInverse;
 
 /// Least part of what tells of a candidate that must be the other blocks'.

@@ -1,6 +1,7 @@
 //! What is fitted: which rows do what, the unknowns, their filtered columns, what is known of them, and the joint fit.
 
 pub mod case;
+pub mod cross_products;
 pub mod data_split;
 pub mod fit;
 pub mod fit_problem;
