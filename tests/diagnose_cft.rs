@@ -144,7 +144,8 @@ fn rotors_on_both_screws_are_two_rotors_and_not_terms_of_the_links() {
         assert!((value - 10.0).abs() < 4.0 * std, "{value} +- {std}");
     }
     let path = found["path"].as_array().unwrap();
-    assert_eq!(path.last().unwrap()["action"], "replaced", "{path:?}");
+    let replaced = |turn: &Value| turn["action"] == "replaced";
+    assert!(path.iter().any(replaced), "{path:?}");
 }
 
 /// A filter of the positions that is too narrow for a fast motion smears its reversals, and what that leaves in the
