@@ -13,6 +13,7 @@ use crate::effect::AugmentedModel;
 use crate::effect::as_code::no_torque;
 use crate::export::arm::{Arm, Says};
 use crate::export::dissipative::below_zero;
+use crate::export::left_out::{self, Elsewhere};
 use crate::export::{self, ExportError, Note, Program, urdf_source};
 use crate::identify::{self, Log, LoggedRobot};
 use crate::log::{LogSpec, Provenance, escape};
@@ -372,17 +373,26 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut beyond = Vec::new();
     if let (Some(path), Some(side)) = (&args.urdf, &side) {
         let kept = without(&given.value, args.without_effects);
-        urdf_lines.extend(beside_urdf(&kept, &left_out));
         // of the model alone: effects are in the file beside it
         let arm = Arm::of(&kept, &AugmentedModel::plain(model.clone()));
+        let mut beside = true;
+        if let (Ok(arm), Some(source)) = (&arm, &source) {
+            beside = urdf_source::same_names(arm, &source.value.robot);
+        }
+        let elsewhere = match beside {
+            true => Elsewhere::Beside,
+            false => Elsewhere::Nowhere,
+        };
+        if beside {
+            urdf_lines.extend(beside_urdf(&kept, &left_out));
+        }
         if let Ok(arm) = &arm {
             let says = export::sdf::SAYS;
-            let found = export::left_out::left_out(arm, &refined, says, &along.stretches);
-            urdf_lines.extend(export::left_out::lines(&found, &along.names));
+            let found = left_out::left_out(arm, &refined, says, &along.stretches);
+            urdf_lines.extend(left_out::lines(&found, &along.names, elsewhere));
         }
         let mut made =
             export::urdf::urdf(&kept, model, &name(path), &urdf_lines).map_err(failed)?;
-        let mut beside = true;
         if let Some(source) = &source {
             let arm = arm.map_err(failed)?;
             let replacement = urdf_source::replacement(
@@ -396,7 +406,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
                 ..replacement.map_err(failed)?
             };
             made.urdf = replaced_in_urdf(&source.name, &source.value.text, &replacement)?;
-            beside = urdf_source::same_names(&arm, &source.value.robot);
         }
         texts.push((path, "URDF", made.urdf));
         if beside {
@@ -421,7 +430,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             }
             head.extend(below_zero(&given.value, model));
             let side = export::left_out::side_file(&found, &head, &along.names).map_err(failed)?;
-            head.extend(export::left_out::lines(&found, &along.names));
+            head.extend(left_out::lines(&found, &along.names, Elsewhere::Nowhere));
             head.extend(arm.of_inertials.iter().map(|line| (*line).to_owned()));
             texts.push((format.path, format.what, (format.text)(&arm, &head)));
             texts.push((&format.side, "what it cannot say", side));

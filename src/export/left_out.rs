@@ -163,8 +163,17 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
     out
 }
 
+/// Where what a file cannot say is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Elsewhere {
+    /// Nowhere.
+    Nowhere,
+    /// In the model file beside a URDF.
+    Beside,
+}
+
 /// The list as lines for the head of a file; `logs` names the logs of the sizes.
-pub fn lines(left_out: &[LeftOut], logs: &[String]) -> Vec<String> {
+pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: Elsewhere) -> Vec<String> {
     if left_out.is_empty() {
         return vec!["Nothing of the model's torque is left out.".to_owned()];
     }
@@ -175,7 +184,11 @@ pub fn lines(left_out: &[LeftOut], logs: &[String]) -> Vec<String> {
             logs.join(", ")
         ),
     };
-    let mut out = vec![format!("NOT in here, though the model has it ({along}):")];
+    let head = match elsewhere {
+        Elsewhere::Nowhere => "NOT in here, though the model has it",
+        Elsewhere::Beside => "Not in the URDF, but in the model file beside it",
+    };
+    let mut out = vec![format!("{head} ({along}):")];
     for part in left_out {
         let size = match (part.percent_of_torque, &part.joint) {
             (Some(percent), Some(joint)) => {
