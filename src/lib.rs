@@ -106,6 +106,7 @@ pub mod export;
 pub mod output;
 
 pub mod compare;
+pub mod track;
 
 pub mod identify;
 

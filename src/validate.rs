@@ -199,6 +199,19 @@ pub struct Reconstruction<'a> {
     traces: TorqueTraces,
     /// Time of the log's own clock where the times of its rows are 0 [s].
     zero: f64,
+    /// Rows of which sums alone are known: nothing is told then of single ones.
+    summed: bool,
+}
+
+/// Squares of one joint over filtered, decimated rows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SummedRows {
+    /// Squared error [N^2 or N^2 m^2], of the rows in which the joint moves and of those in which it rests.
+    pub error: [f64; 2],
+    /// Squared measured torque of both.
+    pub torque: [f64; 2],
+    /// Number of both.
+    pub rows: [u64; 2],
 }
 
 impl<'a> Reconstruction<'a> {
@@ -216,6 +229,7 @@ impl<'a> Reconstruction<'a> {
             sums: vec![ErrorSums::default(); model.robot.joints()],
             traces: TorqueTraces::default(),
             zero: 0.0,
+            summed: false,
         }
     }
 
@@ -330,6 +344,19 @@ impl<'a> Reconstruction<'a> {
         Ok(())
     }
 
+    /// Adds rows of one joint of which the sums are known, and nothing else: of the errors of single rows and of the
+    /// raw samples nothing is told any more.
+    pub fn add_sums(&mut self, joint: usize, rows: &SummedRows) {
+        self.summed = true;
+        let sums = &mut self.sums[joint];
+        sums.error += rows.error[0] + rows.error[1];
+        sums.torque += rows.torque[0] + rows.torque[1];
+        sums.rest[0] += rows.error[1];
+        sums.rest[1] += rows.torque[1];
+        sums.rows += rows.rows[0] + rows.rows[1];
+        sums.resting += rows.rows[1];
+    }
+
     /// Takes one row at full rate.
     fn take(
         &mut self,
@@ -376,6 +403,7 @@ impl<'a> Reconstruction<'a> {
         let robot = &self.model.robot;
         let n = robot.joints();
         let has_band = self.band.is_some();
+        let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
         let joints: Vec<JointError> = (0..n)
             .map(|j| {
                 let s = &self.sums[j];
@@ -387,11 +415,11 @@ impl<'a> Reconstruction<'a> {
                     relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
                     relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
                     relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
-                    relative_error_raw: ratio(s.raw_error, s.raw_torque, 1).unwrap_or(f64::NAN),
+                    relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
                     coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
                     half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
-                    max_abs: s.largest,
-                    r2: if s.scatter > 0.0 {
+                    max_abs: known(Some(s.largest)),
+                    r2: if s.scatter > 0.0 && !self.summed {
                         1.0 - s.error / s.scatter
                     } else {
                         f64::NAN

@@ -49,6 +49,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         "compare",
         &["math", "robot", "config", "motion", "effect", "verdict"],
     ),
+    ("track", &[]),
     (
         "identify",
         &[
@@ -70,6 +71,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "band",
             "observe",
             "open_loop",
+            "track",
         ],
     ),
     (
@@ -95,6 +97,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "band",
             "observe",
             "open_loop",
+            "track",
         ],
     ),
     (
@@ -125,6 +128,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "band",
             "observe",
             "open_loop",
+            "track",
         ],
     ),
 ];

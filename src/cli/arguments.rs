@@ -108,6 +108,11 @@ pub(super) fn html_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "html")
 }
 
+/// A file of reduced logs to be written.
+pub(super) fn reduced_file(text: &str) -> Result<PathBuf, String> {
+    with_ending(text, "cfi")
+}
+
 /// A URDF to be written.
 pub(super) fn urdf_file(text: &str) -> Result<PathBuf, String> {
     with_ending(text, "urdf")

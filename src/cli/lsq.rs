@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
-use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, pictures, setup};
+use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup};
 use crate::config::campaign::EstimatorKind;
-use crate::identify::{self, LoggedRobot, LsqSettings, refined};
+use crate::identify::{self, Log, LoggedRobot, LsqSettings, refined};
 use crate::log::LogSpec;
 use crate::report::json::Document;
 use crate::report::stages;
@@ -23,7 +23,7 @@ Example:
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE, override_usage = "cft-ident lsq [OPTIONS] -r ROBOT.toml -o MODEL.toml LOG...")]
 pub struct Args {
-    /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
     /// Robot file, or a built-in one such as configs/cft.toml
@@ -90,7 +90,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = friction
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
-    let logs = logs_of(&args.logs);
+    let logs = logs(&args.logs)?;
+    let whole: Vec<Log> = (logs.iter())
+        .filter(|log| !matches!(log, Log::Reduced(_)))
+        .cloned()
+        .collect();
     let fitted = match &args.fit_gains {
         None => None,
         Some(payload) => {
@@ -116,7 +120,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         gains: gains.as_ref(),
     };
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(machine, (robot, &edits), &logs, known, &args.setup, context)?;
+    let checked = setup::checked(
+        machine,
+        (robot, &edits),
+        &whole,
+        known,
+        &args.setup,
+        context,
+    )?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
     found
@@ -136,10 +147,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let in_memory = pictures::in_memory(machine, &logs, context)?;
+        let in_memory = pictures::in_memory(machine, &whole, context)?;
+        let in_memory = in_memory.filter(|_| whole.len() == logs.len());
         let look = pictures::look(machine, in_memory.as_ref(), &names)?;
         let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let quality = pictures::inspected(&args.logs, machine, context)?;
+        let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
+        let quality = pictures::inspected(files, machine, context)?;
         stages::lsq::pictures(
             &mut report.page(),
             &of,

@@ -18,9 +18,11 @@ pub mod inspect;
 pub mod lsq;
 pub mod man;
 pub mod new;
+pub mod reduce;
 pub mod schema;
 pub mod simulate;
 pub mod torque;
+pub mod track;
 pub mod validate;
 pub mod watch;
 
@@ -48,7 +50,7 @@ use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 
-use crate::identify::Log;
+use crate::identify::{Log, ReducedLogs, is_reduced};
 use crate::log::LogSpec;
 use crate::output;
 use crate::report::Detail;
@@ -68,6 +70,26 @@ fn names_of(specs: &[LogSpec]) -> Vec<String> {
 /// Files as logs of the library.
 fn logs_of(specs: &[LogSpec]) -> Vec<Log> {
     specs.iter().map(Log::from).collect()
+}
+
+/// The same where files of reduced logs may stand for those that they were made from.
+fn logs(specs: &[LogSpec]) -> Result<Vec<Log>, CliError> {
+    let mut all = Vec::new();
+    for spec in specs {
+        if !is_reduced(&spec.path) {
+            all.push(Log::from(spec));
+            continue;
+        }
+        if let Some(span) = spec.span.label() {
+            let name = spec.name();
+            return Err(CliError::usage(format!(
+                "{name}@{span}: a file of reduced logs has no spans"
+            ))
+            .hint("choose the span as the log is reduced: `cft-ident reduce LOG@0..70% ..`"));
+        }
+        all.extend(ReducedLogs::load(&spec.path)?.as_logs());
+    }
+    Ok(all)
 }
 
 const EXAMPLES: &str = "\
@@ -135,7 +157,9 @@ commands! {
     Friction: friction,
     Lsq: lsq,
     Validate: validate,
+    Reduce: reduce,
     Diagnose: diagnose,
+    Track: track,
     Compare: compare,
     Diff: diff,
     Torque: torque,
@@ -221,6 +245,21 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             error.exit()
         }
     }
+}
+
+/// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it
+/// writes get their names.
+///
+/// # Errors
+/// Every [`CliError`]; arguments that are not understood are one of usage.
+pub fn perform(arguments: &[OsString], interrupted: Arc<AtomicBool>) -> Result<Outcome, CliError> {
+    let cli = Cli::try_parse_from(arguments)
+        .map_err(|answer| CliError::usage(answer.render().to_string().trim_end()))?;
+    let context = Context::new(true, None, interrupted).called(arguments);
+    let mut outcome = cli.command.run(&context)?;
+    outcome.document.warn_first(context.warnings());
+    context.files().commit()?;
+    Ok(outcome)
 }
 
 fn execute(

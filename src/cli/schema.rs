@@ -4,13 +4,13 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
-use crate::cli::{convert, example, export, identify, inspect, new, simulate};
+use crate::cli::{convert, example, export, identify, inspect, new, reduce, simulate};
 use crate::compare::RunDifference;
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
 use crate::identify::{
-    Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Validated,
-    Watched,
+    Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Tracked,
+    Validated, Watched,
 };
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -39,6 +39,10 @@ pub enum Kind {
     Lsq,
     /// JSON document of `validate`
     Validate,
+    /// JSON document of `reduce`
+    Reduce,
+    /// JSON document of `track`
+    Track,
     /// JSON document of `diagnose`
     Diagnose,
     /// JSON document of `compare`
@@ -90,6 +94,8 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Friction => json::schema::<IdentifiedFriction>("friction"),
         Kind::Lsq => json::schema::<IdentifiedDynamics>("lsq"),
         Kind::Validate => json::schema::<Validated>("validate"),
+        Kind::Reduce => json::schema::<reduce::Reduced>("reduce"),
+        Kind::Track => json::schema::<Tracked>("track"),
         Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
         Kind::Compare => json::schema::<Comparison>("compare"),
         Kind::Diff => json::schema::<RunDifference>("diff"),

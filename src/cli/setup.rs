@@ -80,7 +80,7 @@ pub fn checked(
         warnings.extend(
             refusals
                 .iter()
-                .map(|f| format!("kept as declared: {}", told(f))),
+                .map(|f| format!("kept as declared: {}", f.told())),
         );
         let new_file = match args.fix_setup.as_ref().filter(|_| !before.is_empty()) {
             Some(path) => {
@@ -104,7 +104,7 @@ pub fn checked(
     warnings.extend(
         refusals
             .iter()
-            .map(|f| format!("put right in {}: {}", path.display(), told(f))),
+            .map(|f| format!("put right in {}: {}", path.display(), f.told())),
     );
     Ok(Checked {
         machine: LoggedRobot::new(&path.to_string_lossy(), corrected),
@@ -161,23 +161,8 @@ fn new_text(
         .map_err(|error| CliError::output(format!("{}: {error}", path.display())))
 }
 
-fn told(finding: &Finding) -> String {
-    let mut out = finding.meaning.clone();
-    if !finding.remedy.is_empty() {
-        out += &format!("; write {}", finding.remedy);
-    }
-    let ties = finding
-        .tied_with
-        .iter()
-        .filter(|tie| !tie.remedy.is_empty());
-    for tie in ties.take(2) {
-        out += &format!("; these data say as well: {}", tie.remedy);
-    }
-    out
-}
-
 fn likely(finding: &Finding) -> String {
-    format!("the set-up may be wrong: {}", told(finding))
+    format!("the set-up may be wrong: {}", finding.told())
 }
 
 /// The error with which a fit refuses the logs.

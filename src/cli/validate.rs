@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
-use crate::identify::{self, LoggedRobot, refined};
-use crate::log::LogSpec;
+use super::{CliError, Context, Outcome, arguments, files, logs, names_of, outputs, pictures};
+use crate::identify::{self, Log, LoggedRobot, refined};
+use crate::log::{LogSpec, escape};
 use crate::number;
 use crate::open_loop::OpenLoop;
 use crate::output::LogWriter;
@@ -24,7 +24,7 @@ Example:
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
     /// Model file
@@ -157,7 +157,17 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         )?),
     };
     let mut failed = None;
-    let logs = logs_of(&args.logs);
+    let logs = logs(&args.logs)?;
+    let part = logs.iter().find(|log| matches!(log, Log::Reduced(_)));
+    if let Some(part) = part
+        && (args.output.is_some() || args.report.is_some() || !args.plot.is_empty())
+    {
+        let name = escape(&part.name());
+        let text = format!("{name} is a reduced log: there are no rows of it to write or to draw");
+        return Err(
+            CliError::input(text).hint("give the log itself, or leave -o, --plot and --report out")
+        );
+    }
     let mut found = identify::validate(
         &machine,
         (&model, Some(&file)),

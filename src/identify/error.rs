@@ -2,6 +2,8 @@
 
 use super::error_kind::ErrorKind;
 use super::gain_error::GainError;
+use super::reduced::error::ReducedError;
+use super::track_error::TrackError;
 use crate::config::ConfigError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
@@ -20,6 +22,10 @@ pub enum IdentifyError {
     Config(#[from] ConfigError),
     #[error(transparent)]
     Fit(#[from] FitError),
+    #[error(transparent)]
+    Reduced(#[from] ReducedError),
+    #[error(transparent)]
+    Track(#[from] TrackError),
     #[error("interrupted")]
     Interrupted,
     #[error("no log is given")]
@@ -118,7 +124,10 @@ impl IdentifyError {
             Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
             Self::Diagnose(_) => ErrorKind::Undetermined,
             Self::Gains(error) => error.kind(),
-            Self::WithoutGains { .. }
+            Self::Reduced(ReducedError::Empty) | Self::Track(TrackError::Empty) => ErrorKind::Usage,
+            Self::Reduced(_)
+            | Self::Track(_)
+            | Self::WithoutGains { .. }
             | Self::Log(_)
             | Self::Config(_)
             | Self::Fit(FitError::Math(_) | FitError::Prior { .. })

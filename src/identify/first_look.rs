@@ -11,4 +11,6 @@ pub(super) struct FirstLook {
     pub(super) rest_speed: Vec<f64>,
     /// Greatest speed of each joint [m/s or rad/s].
     pub(super) fastest: Vec<f64>,
+    /// Its first and last time, from where its times are counted [s].
+    pub(super) bounds: [f64; 2],
 }

@@ -77,7 +77,10 @@ impl FrictionBefore {
         control: &Control,
     ) -> Result<Self, IdentifyError> {
         let known = logs.iter().filter(|_| !hold);
-        let known = known.map(|log| machine.open(log, control)?.provenance());
+        let known = known.map(|log| match log {
+            Log::Reduced(part) => Ok(part.provenance.clone()),
+            log => machine.open(log, control)?.provenance(),
+        });
         let given = known.collect::<Result<Vec<_>, _>>()?;
         let mut before = FrictionBefore {
             known: Vec::new(),

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use crate::log::{Arrays, Layout, LogError, LogSpec, Reader};
+use super::reduced::reduced_log::ReducedLog;
+use crate::log::{Arrays, Layout, LogError, LogSpec, Reader, escape};
 
 /// A log.
 #[derive(Debug, Clone)]
@@ -13,6 +14,8 @@ pub enum Log {
     File(LogSpec),
     /// Arrays of joint positions and torques, in SI units.
     Arrays(Arc<Arrays>),
+    /// What a linear fit needs of a log: `lsq` and `validate` take it.
+    Reduced(Arc<ReducedLog>),
 }
 
 impl Log {
@@ -50,10 +53,18 @@ impl Log {
     /// Another number of values than there are positions.
     pub fn with_references(self, references: &[f64]) -> Result<Self, LogError> {
         match self {
-            Self::File(_) => Ok(self),
+            Self::File(_) | Self::Reduced(_) => Ok(self),
             Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
                 Arrays::clone(&arrays).with_references(references.to_vec())?,
             ))),
+        }
+    }
+
+    /// The log, where it is reduced.
+    pub(super) fn reduced(&self) -> Option<&ReducedLog> {
+        match self {
+            Self::Reduced(part) => Some(part),
+            _ => None,
         }
     }
 
@@ -62,13 +73,14 @@ impl Log {
         match self {
             Self::File(spec) => spec.name(),
             Self::Arrays(arrays) => arrays.name().to_owned(),
+            Self::Reduced(part) => part.name().to_owned(),
         }
     }
 
     /// The same log with the torques of each joint times a factor of its own, where it is in memory.
     pub(super) fn with_torques_times(&self, factors: &[f64]) -> Result<Self, LogError> {
         Ok(match self {
-            Self::File(_) => self.clone(),
+            Self::File(_) | Self::Reduced(_) => self.clone(),
             Self::Arrays(arrays) => Self::Arrays(Arc::new(arrays.with_torques_times(factors)?)),
         })
     }
@@ -78,6 +90,7 @@ impl Log {
         match self {
             Self::File(spec) => spec.to_string(),
             Self::Arrays(arrays) => format!("{} {}", arrays.name(), arrays.sha256()),
+            Self::Reduced(part) => format!("{} {}", part.name(), part.provenance.sha256),
         }
     }
 
@@ -85,6 +98,11 @@ impl Log {
     pub(super) fn reader(&self, layout: &Layout, joints: &[String]) -> Result<Reader, LogError> {
         match self {
             Self::File(spec) => Reader::open(spec, layout),
+            Self::Reduced(part) => Err(LogError::Format {
+                file: escape(part.name()),
+                kind: "a reduced log",
+                remedy: "its rows are not there any more: give the log itself",
+            }),
             Self::Arrays(arrays) => {
                 let plain = Layout::joint_columns(joints);
                 Reader::of_arrays(

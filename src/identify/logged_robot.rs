@@ -155,7 +155,16 @@ impl LoggedRobot {
         logs: &[Log],
         control: &Control,
     ) -> Result<Vec<f64>, IdentifyError> {
-        self.greatest(logs, |look| &look.fastest, control)
+        let (reduced, whole): (Vec<Log>, Vec<Log>) =
+            (logs.iter().cloned()).partition(|log| matches!(log, Log::Reduced(_)));
+        let mut fastest = self.greatest(&whole, |look| &look.fastest, control)?;
+        for log in &reduced {
+            if let Log::Reduced(part) = log {
+                let pairs = fastest.iter_mut().zip(&part.fastest);
+                pairs.for_each(|(fastest, of_log)| *fastest = of_log.max(*fastest));
+            }
+        }
+        Ok(fastest)
     }
 
     /// What the first looks at logs found of each joint, the greatest of all logs.
@@ -173,6 +182,16 @@ impl LoggedRobot {
             }
         }
         Ok(greatest)
+    }
+
+    /// First and last time of a log, by its own clock [s].
+    ///
+    /// # Errors
+    /// Those of [`Self::rest_speeds`].
+    pub(super) fn bounds(&self, log: &Log, control: &Control) -> Result<[f64; 2], IdentifyError> {
+        let look = self.first_look(log, &self.file.layout(), control)?;
+        let zero = look.gate.origin().seconds();
+        Ok(look.bounds.map(|t| zero + t))
     }
 
     /// Whether the robot moves as without its motors where torques are exactly 0.
@@ -233,6 +252,7 @@ impl LoggedRobot {
             gate: gate.ok_or(IdentifyError::Interrupted)?,
             rest_speed: speeds.borrow().resting(),
             fastest: speeds.borrow().fastest(),
+            bounds: speeds.borrow().bounds(),
         })
     }
 
@@ -308,6 +328,7 @@ impl LoggedRobot {
             Log::Arrays(arrays) => arrays
                 .references()
                 .map(|references| (Log::Arrays(Arc::clone(references)), plain())),
+            Log::Reduced(_) => None,
         };
         let Some((log, layout)) = opened else {
             return Ok(None);

@@ -16,8 +16,11 @@ use super::known_friction::{FrictionBefore, FrictionOfFit};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{new_model, refined};
+use super::own_settings::CutoffCosts;
 use super::passes::Passes;
 use super::position_cutoff::PositionCutoff;
+use super::reduced::error::ReducedError;
+use super::reduced::reduced_log::{MadeWith, ReducedLog};
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
@@ -144,21 +147,38 @@ pub fn lsq(
             estimator: estimator.name(),
         });
     }
+    let reduced: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+    if let Some(part) = reduced.first()
+        && !matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls)
+    {
+        return Err(ReducedError::NeedsLog {
+            log: part.name().to_owned(),
+            what: format!("what the estimator {} reads", estimator.name()),
+            remedy: "give the log itself, or take `--estimator wls` or `ols`, with `--feasible` if wanted",
+        }
+        .into());
+    }
     let before = friction.map(|given| {
-        let hold = settings.hold_friction || estimator == EstimatorKind::Ols;
+        let hold = settings.hold_friction || estimator == EstimatorKind::Ols || !reduced.is_empty();
         FrictionBefore::of(machine, given, logs, (estimator, hold), control)
     });
     let before = before.transpose()?;
-    let mut linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
-    let speeds = machine.rest_speeds(logs, control)?;
+    let linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
+    let name = friction.map(|(name, _)| name);
+    let wanted = MadeWith::of(
+        &machine.file,
+        name.zip(before.as_ref().map(|b| b.known.as_slice())),
+    );
+    for part in &reduced {
+        part.belongs_to(&wanted)?;
+    }
     let known = linear.known.iter();
     let laws: Vec<_> = known
         .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
         .collect();
-    let costs = machine.cutoff_costs(logs, &laws, &speeds, &|log| machine.open(log, control))?;
-    let machine = &machine.with_cutoffs(&costs);
-    linear.rest_at(speeds);
-    let mut passes = Passes::new(machine, logs, control);
+    let own = machine.own_settings(logs, &laws, control)?;
+    let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
+    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
     let mut estimated = estimate(&mut passes, linear, estimator, law)?;
     if let Some(gains) = settings.gains {
         share_uncertainty(&mut estimated, gains)?;
@@ -187,6 +207,7 @@ pub fn lsq(
         warnings.push(with_friction(law).to_owned());
     }
     warnings.extend(account.warnings());
+    warnings.extend(held_by_parts(settings, &reduced));
     warnings.append(&mut passes.warnings);
     warnings.extend(rests(machine, &resting));
     let mut friction_of_fit = Vec::new();
@@ -206,7 +227,8 @@ pub fn lsq(
     let unknowns = unknowns(machine, &columns, &fit, &essential);
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
-    let (position_cutoffs, wrong) = costs.told(machine, &columns, &fit);
+    let costs: Vec<&CutoffCosts> = costs.iter().collect();
+    let (position_cutoffs, wrong) = CutoffCosts::told(&costs, machine, &columns, &fit);
     warnings.extend(wrong);
     if unknowns
         .iter()
@@ -254,10 +276,13 @@ pub fn lsq(
         warnings,
         setup: of_geometry,
     };
-    let file = found.model(machine, friction.map(|(_, file)| file));
-    let tried = refined(&file, &machine.name)
-        .and_then(|model| hold_out(machine, (&file, &model), (logs, &found.inputs), control));
-    found.held = or_warning(tried, &mut found.warnings)?;
+    // what is set aside is looked at row by row
+    if reduced.is_empty() {
+        let file = found.model(machine, friction.map(|(_, file)| file));
+        let tried = refined(&file, &machine.name)
+            .and_then(|model| hold_out(machine, (&file, &model), (logs, &found.inputs), control));
+        found.held = or_warning(tried, &mut found.warnings)?;
+    }
     Ok(found)
 }
 
@@ -269,6 +294,20 @@ fn share_uncertainty(estimated: &mut Estimated, gains: &Gains) -> Result<(), Fit
     let slopes = by_gains(&basis.sums, &weights, &basis.shift)?;
     fit.covariance += &slopes * &gains.covariance * slopes.transpose();
     Ok(())
+}
+
+/// Friction that could move with the rows of logs stays where reduced ones have it: a warning.
+fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<String> {
+    let part = reduced.first()?;
+    let moved = settings.friction.is_some()
+        && !settings.hold_friction
+        && settings.estimator == EstimatorKind::Wls;
+    moved.then(|| {
+        format!(
+            "the friction stays as it was given to `reduce`, as by --hold-friction: {} is a reduced log, and its rows hold no other; give logs to refine it",
+            part.name()
+        )
+    })
 }
 
 fn with_friction(law: bool) -> &'static str {

@@ -10,7 +10,9 @@
 //! | [`fit_gains()`] | logs of currents, one with a known payload | [`FittedGains`]: torque per ampere of each joint |
 //! | [`lsq()`] | logs of all joints, friction | [`IdentifiedDynamics`]: theta 1..12, or base parameters |
 //! | [`diagnose()`] | a model, logs | [`Diagnosed`]: effects that the model lacks, the refined model |
+//! | [`reduce()`] | logs | [`ReducedLogs`]: what a linear fit needs of each, for a small file |
 //! | [`validate()`] | logs that were not used, a model | [`Validated`]: torque errors |
+//! | [`track()`] | reduced logs or models in order of time | [`Tracked`]: courses of parameters, changes, robots that differ |
 //! | [`compare()`] | two models, logs | [`Compared`]: differences of parameters and of errors |
 //! | [`torque()`] | positions, a model | [`FeedForward`]: torques with their band |
 //! | [`watch()`] | rows as they come, a model | [`Watched`]: external torques, alarms |
@@ -42,9 +44,12 @@ mod model;
 mod one_joint;
 mod open_log;
 mod open_loop;
+mod own_settings;
 mod passes;
 mod position_cutoff;
 mod prior;
+mod reduce;
+mod reduced;
 mod reference;
 mod repeated;
 mod residual;
@@ -53,6 +58,8 @@ mod setup;
 mod setup_words;
 mod speeds;
 mod torque;
+mod track;
+mod track_error;
 mod unknowns;
 mod validate;
 mod watch;
@@ -83,11 +90,20 @@ pub use open_log::OpenLog;
 pub use open_loop::open_loop;
 pub use passes::Simulated;
 pub use position_cutoff::PositionCutoff;
+pub use reduce::reduce;
+pub use reduced::{
+    FORMAT, FrictionGiven, MadeWith, ReducedError, ReducedLog, ReducedLogs, is_reduced,
+};
 pub use repeated::repeated_rows;
 pub use residual::{JointResidual, RelativeError};
 pub use separate::separating_command;
 pub use setup::{CheckedSetup, check_setup};
 pub use torque::{FeedForward, JointAlong, TorqueAlong, torque};
+pub use track::{
+    FleetDifference, RobotSources, TrackSource, Tracked, TrackedChange, TrackedParameter,
+    TrackedRobot, track,
+};
+pub use track_error::TrackError;
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};
 pub use watch::{STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch};

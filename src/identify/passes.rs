@@ -8,6 +8,7 @@ use super::control::{Control, Work};
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::{LoggedRobot, narrowed};
+use super::own_settings::OwnSettings;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
 use crate::inertia::closed_loop::Gains;
@@ -52,6 +53,11 @@ pub struct Passes<'a> {
     pub summary: Option<Summary>,
     /// Sampling step of each log, by the first reading [s].
     steps: Vec<f64>,
+    /// What each log calls for by itself; empty where the machine and the columns say it.
+    own: Vec<OwnSettings>,
+    /// Logs in the order of their checksums, by the first reading: sums do not depend on the order in which
+    /// logs are given.
+    order: Vec<usize>,
 }
 
 impl<'a> Passes<'a> {
@@ -65,12 +71,46 @@ impl<'a> Passes<'a> {
             warnings: Vec::new(),
             summary: None,
             steps: Vec::new(),
+            own: Vec::new(),
+            order: Vec::new(),
         }
+    }
+
+    /// The same with what each log calls for by itself: its joints rest, and its positions are smoothed, as that log
+    /// alone tells.
+    pub(super) fn each_by_itself(self, own: Vec<OwnSettings>) -> Self {
+        Passes { own, ..self }
+    }
+
+    /// The columns of a log's rows.
+    fn columns_of(&self, columns: &RegressorColumns, log: usize) -> RegressorColumns {
+        let mut columns = columns.clone();
+        if let Some(own) = self.own.get(log) {
+            columns.rest_at(own.rest_speed.clone());
+        }
+        columns
+    }
+
+    /// The sums of all logs as one.
+    fn together(&self, sums: Vec<BlockFactors>) -> Result<BlockFactors, IdentifyError> {
+        let mut sums: Vec<Option<BlockFactors>> = sums.into_iter().map(Some).collect();
+        let mut total: Option<BlockFactors> = None;
+        let in_order = self.order.iter();
+        for sums in in_order.filter_map(|log| sums.get_mut(*log)?.take()) {
+            match &mut total {
+                None => total = Some(sums),
+                Some(total) => total.merge(sums),
+            }
+        }
+        total.ok_or(IdentifyError::NoLog)
     }
 
     /// The processing of a log; a narrower filter is that of the log's own rate.
     fn settings(&self, filter: PositionFilter, log: usize) -> FilterSettings {
-        let declared = self.machine.settings();
+        let mut declared = self.machine.settings();
+        if let Some(own) = self.own.get(log) {
+            declared.joint_q_cutoffs_hz.clone_from(&own.cutoffs_hz);
+        }
         match filter {
             PositionFilter::Declared => declared,
             PositionFilter::Narrower => narrowed(&declared, 1.0 / self.step_of(log)),
@@ -89,13 +129,25 @@ impl<'a> Passes<'a> {
         mut weigher: Option<&mut Weigher>,
     ) -> Result<BlockFactors, IdentifyError> {
         let first = self.summary.is_none();
-        let mut total: Option<BlockFactors> = None;
+        let mut all = Vec::new();
         for (index, log) in self.logs.iter().enumerate() {
             let settings = self.settings(filter, index);
+            let columns = self.columns_of(columns, index);
+            if let Log::Reduced(part) = log {
+                all.push(match filter {
+                    PositionFilter::Declared => part.rows(columns)?,
+                    PositionFilter::Narrower => part.narrower_rows(columns)?,
+                });
+                if first {
+                    self.warnings.extend(part.warnings.iter().cloned());
+                    self.saw(part.provenance.clone(), part.summary.clone());
+                }
+                continue;
+            }
             let mut open = self.machine.open(log, self.control)?;
             let (sums, summary) = accumulate_weighted(
                 &self.machine.robot,
-                columns,
+                &columns,
                 weigher.as_deref_mut(),
                 &settings,
                 &mut |block| open.read(block),
@@ -103,17 +155,28 @@ impl<'a> Passes<'a> {
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
             if first {
                 self.warnings.extend(open.told(&summary));
-                self.inputs.push(open.provenance()?);
-                self.steps.push(summary.dt);
-                self.summary.get_or_insert(summary);
+                self.saw(open.provenance()?, summary);
             }
-            match &mut total {
-                None => total = Some(sums),
-                Some(total) => total.merge(sums),
-            }
+            all.push(match filter {
+                PositionFilter::Declared => sums,
+                PositionFilter::Narrower => sums.in_one_block(),
+            });
             self.work.advance(1);
         }
-        total.ok_or(IdentifyError::NoLog)
+        if first {
+            let key = |log: &usize| (&self.inputs[*log].sha256, &self.inputs[*log].span);
+            let mut order: Vec<usize> = (0..all.len()).collect();
+            order.sort_by(|a, b| key(a).cmp(&key(b)));
+            self.order = order;
+        }
+        self.together(all)
+    }
+
+    /// Remembers what the first reading of a log found.
+    fn saw(&mut self, input: Provenance, summary: Summary) {
+        self.inputs.push(input);
+        self.steps.push(summary.dt);
+        self.summary.get_or_insert(summary);
     }
 
     /// Rows with instruments from the loop under `theta`.
@@ -140,9 +203,10 @@ impl<'a> Passes<'a> {
                 Ok(more)
             };
             let robot = &self.machine.robot;
+            let columns = self.columns_of(columns, index);
             let read = instruments::accumulate(
                 robot,
-                columns,
+                &columns,
                 theta,
                 reference,
                 &settings,
@@ -178,25 +242,30 @@ impl<'a> Passes<'a> {
         grid: u32,
         mut weigher: Option<&mut Weigher>,
     ) -> Result<Option<BlockFactors>, IdentifyError> {
-        let mut total: Option<BlockFactors> = None;
-        let settings = self.machine.settings();
-        for log in self.logs {
+        let mut all = Vec::new();
+        for (index, log) in self.logs.iter().enumerate() {
+            let settings = self.settings(PositionFilter::Declared, index);
+            let columns = self.columns_of(columns, index);
+            if let Log::Reduced(part) = log {
+                all.extend(part.shifted_rows(grid, columns)?);
+                continue;
+            }
             let mut open = self.machine.open(log, self.control)?;
             let sums = accumulate_shifted(
                 &self.machine.robot,
-                columns,
+                &columns,
                 weigher.as_deref_mut(),
                 &settings,
                 grid,
                 &mut |block| open.read(block),
             )
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
-            match (&mut total, sums) {
-                (Some(total), Some(sums)) => total.merge(sums),
-                (none, sums) => *none = sums,
-            }
+            all.extend(sums.map(|sums| sums.in_one_block()));
             self.work.advance(1);
         }
-        Ok(total)
+        match all.len() == self.logs.len() {
+            true => Ok(Some(self.together(all)?)),
+            false => Ok(None),
+        }
     }
 }

@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
+use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
 use crate::config::held_out::HeldOut;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::inertia::solve::Fit;
@@ -47,59 +48,60 @@ pub struct PositionCutoff {
     pub unit: String,
 }
 
-/// What cut-offs cost every joint.
-#[derive(Debug, Clone)]
-pub(super) struct CutoffCosts {
-    /// `[joint][cut-off]`; nothing for a joint that never moves.
-    of_joint: Vec<Vec<CutoffCost>>,
-    /// Whether the friction that they are about was known: in torque then, else in parts of the Coulomb level.
-    known: Vec<bool>,
-    /// That of the robot file \[Hz\].
-    declared: Option<f64>,
-    /// That of a joint for which the logs determine none \[Hz\].
-    plain: f64,
+/// Root of the mean square of numbers that do not depend on their order.
+fn root_mean_square(numbers: impl Iterator<Item = f64>) -> f64 {
+    let mut squares: Vec<f64> = numbers.map(|x| x * x).collect();
+    squares.sort_by(f64::total_cmp);
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 impl CutoffCosts {
-    /// The cut-off of a joint's filter \[Hz\].
-    fn chosen(&self, joint: usize) -> f64 {
-        let found = || least(&self.of_joint[joint]).map_or(self.plain, |cost| cost.cutoff_hz);
-        self.declared.unwrap_or_else(found)
+    /// The cut-off of every joint's filter where it is found \[Hz\].
+    pub(super) fn found(&self) -> Vec<f64> {
+        let each = self.of_joint.iter();
+        each.map(|cost| cost.as_ref().map_or(self.plain, |cost| cost.at.cutoff_hz))
+            .collect()
     }
 
-    fn cost(&self, joint: usize, cutoff_hz: f64) -> Option<CutoffCost> {
-        let mut costs = self.of_joint[joint].iter();
-        costs.find(|cost| cost.cutoff_hz == cutoff_hz).copied()
-    }
-
-    /// The cut-offs of a fit, whose friction scales those of joints without a known law, and what is wrong with
-    /// them, as warnings.
+    /// The cut-offs of a fit of logs with these costs, whose friction scales those of joints without a known law, and
+    /// what is wrong with them, as warnings. Where logs call for several cut-offs the lowest is told, and of the costs
+    /// the root of the mean square.
     pub(super) fn told(
-        &self,
+        logs: &[&CutoffCosts],
         machine: &LoggedRobot,
         columns: &RegressorColumns,
         fit: &Fit,
     ) -> (Vec<PositionCutoff>, Vec<String>) {
         let (mut list, mut warnings) = (Vec::new(), Vec::new());
         for (j, joint) in machine.robot.joint_names().iter().enumerate() {
-            let scale = match self.known[j] {
-                true => 1.0,
-                false => coulomb_level(columns, fit, j),
+            let costs = logs.iter().filter_map(|log| log.of_joint[j].as_ref());
+            let costs: Vec<&JointCost> = costs.collect();
+            let lowest = |of: fn(&JointCost) -> f64| {
+                let each = costs.iter().map(|cost| of(cost));
+                each.reduce(f64::min)
             };
-            let (Some(best), Some(at)) = (least(&self.of_joint[j]), self.cost(j, self.chosen(j)))
+            let (Some(cutoff_hz), Some(best_hz)) =
+                (lowest(|c| c.at.cutoff_hz), lowest(|c| c.best.cutoff_hz))
             else {
                 continue;
             };
+            let scale = match logs.iter().all(|log| log.known[j]) {
+                true => 1.0,
+                false => coulomb_level(columns, fit, j),
+            };
+            let mean = |of: fn(&JointCost) -> f64| {
+                scale * root_mean_square(costs.iter().map(|cost| of(cost)))
+            };
             let own = PositionCutoff {
                 joint: joint.clone(),
-                cutoff_hz: at.cutoff_hz,
-                declared: self.declared.is_some(),
-                best_hz: best.cutoff_hz,
-                smear: scale * at.smear,
-                noise: scale * at.noise,
+                cutoff_hz,
+                declared: logs.iter().any(|log| log.declared.is_some()),
+                best_hz,
+                smear: mean(|c| c.at.smear),
+                noise: mean(|c| c.at.noise),
                 unit: machine.file.torque_unit(j).to_owned(),
             };
-            warnings.extend(own.wrong(scale * best.total(), fit.residual_std[j]));
+            warnings.extend(own.wrong(mean(|c| c.best.total()), fit.residual_std[j]));
             list.push(own);
         }
         (list, warnings)
@@ -191,18 +193,49 @@ impl LoggedRobot {
         Ok(self.with_cutoffs(&self.cutoff_costs(logs, laws, rest_speed, open)?))
     }
 
+    /// What each log calls for. `laws` is the friction of each joint, none where it is not known.
+    ///
+    /// # Errors
+    /// A log that cannot be used, and interruption.
+    pub(super) fn own_settings(
+        &self,
+        logs: &[Log],
+        laws: &[Option<JointFriction>],
+        control: &Control,
+    ) -> Result<Vec<OwnSettings>, IdentifyError> {
+        logs.iter()
+            .map(|log| {
+                if let Log::Reduced(part) = log {
+                    return Ok(part.own.clone());
+                }
+                let rest_speed = self.rest_speeds(std::slice::from_ref(log), control)?;
+                let open = |log: &Log| self.open(log, control);
+                let costs =
+                    self.cutoff_costs(std::slice::from_ref(log), laws, &rest_speed, &open)?;
+                let cutoffs_hz = match self.finds_cutoffs() {
+                    true => costs.found(),
+                    false => Vec::new(),
+                };
+                Ok(OwnSettings {
+                    rest_speed,
+                    cutoffs_hz,
+                    costs,
+                })
+            })
+            .collect()
+    }
+
     /// Whether position cut-offs are found from the logs.
-    fn finds_cutoffs(&self) -> bool {
+    pub(super) fn finds_cutoffs(&self) -> bool {
         let filter = &self.file.filter;
         filter.position_cutoff_hz.is_none() && filter.position_order != Some(0)
     }
 
     /// The same robot with the cut-offs that cost least.
-    pub(super) fn with_cutoffs(&self, costs: &CutoffCosts) -> LoggedRobot {
+    fn with_cutoffs(&self, costs: &CutoffCosts) -> LoggedRobot {
         let mut machine = self.clone();
         if self.finds_cutoffs() {
-            let each = (0..self.robot.joints()).map(|j| costs.chosen(j));
-            machine.position_cutoffs_hz = Arc::new(each.collect());
+            machine.position_cutoffs_hz = Arc::new(costs.found());
         }
         machine
     }
@@ -270,8 +303,14 @@ impl LoggedRobot {
                 .add(stretch)
                 .map_err(|e| IdentifyError::motion(&logs[stretch.log].name(), e))?;
         }
+        let of_joint = |costs: &Vec<CutoffCost>| {
+            let best = least(costs)?;
+            let wanted = settings.q_cutoff_hz.unwrap_or(best.cutoff_hz);
+            let at = *costs.iter().find(|cost| cost.cutoff_hz == wanted)?;
+            Some(JointCost { at, best })
+        };
         Ok(CutoffCosts {
-            of_joint: trial.costs(),
+            of_joint: trial.costs().iter().map(of_joint).collect(),
             known: (0..n)
                 .map(|j| matches!(laws.get(j), Some(Some(_))))
                 .collect(),

@@ -3,7 +3,7 @@
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use crate::log::{Layout, escape, shares_rows};
+use crate::log::{Layout, Provenance, escape, sha256, shares_rows};
 
 /// Logs by what they are used for.
 pub(super) type Role<'a> = (&'static str, &'a [Log]);
@@ -65,6 +65,10 @@ fn same_rows(a: &Log, b: &Log, layout: Option<&Layout>) -> bool {
     match (a, b) {
         (Log::File(a), Log::File(b)) => shares_rows(a, b, layout),
         (Log::Arrays(a), Log::Arrays(b)) => a.sha256() == b.sha256(),
+        (Log::Reduced(a), Log::Reduced(b)) => a.shares_rows(b),
+        (Log::Reduced(part), log) | (log, Log::Reduced(part)) => log
+            .provenance()
+            .is_some_and(|p| p.shares_rows(&part.provenance)),
         _ => false,
     }
 }
@@ -78,6 +82,27 @@ impl Log {
                 None => escape(&spec.name()),
             },
             Self::Arrays(arrays) => escape(arrays.name()),
+            Self::Reduced(part) => match &part.provenance.span {
+                Some(span) => format!("{}@{span}", escape(part.name())),
+                None => escape(part.name()),
+            },
         }
+    }
+
+    /// What tells its rows from others, where it can be read.
+    fn provenance(&self) -> Option<Provenance> {
+        let (span, sha256) = match self {
+            Self::File(spec) => (spec.span.label(), sha256(&spec.path).ok()?),
+            Self::Arrays(arrays) => (None, arrays.sha256().to_owned()),
+            Self::Reduced(part) => return Some(part.provenance.clone()),
+        };
+        Some(Provenance {
+            name: self.name(),
+            span,
+            sha256,
+            samples: 0,
+            duration_s: 0.0,
+            role: None,
+        })
     }
 }

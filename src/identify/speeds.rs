@@ -17,6 +17,7 @@ pub(super) struct SpeedMeter {
     squares: Vec<f64>,
     fastest: Vec<f64>,
     seconds: f64,
+    bounds: Option<[f64; 2]>,
 }
 
 impl SpeedMeter {
@@ -28,6 +29,7 @@ impl SpeedMeter {
             squares: Vec::new(),
             fastest: Vec::new(),
             seconds: 0.0,
+            bounds: None,
         }
     }
 
@@ -36,6 +38,9 @@ impl SpeedMeter {
         let n = block.joints();
         if n == 0 {
             return;
+        }
+        if let (Some(first), Some(last)) = (block.t.first(), block.t.last()) {
+            self.bounds = Some([self.bounds.map_or(*first, |[first, _]| first), *last]);
         }
         self.squares.resize(n, 0.0);
         self.fastest.resize(n, 0.0);
@@ -66,6 +71,11 @@ impl SpeedMeter {
             self.last = known.then_some(*t);
             std::mem::swap(&mut self.now, &mut self.before);
         }
+    }
+
+    /// First and last time [s].
+    pub(super) fn bounds(&self) -> [f64; 2] {
+        self.bounds.unwrap_or_default()
     }
 
     /// Greatest speed of each joint [m/s or rad/s].

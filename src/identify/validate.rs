@@ -9,13 +9,18 @@ use super::in_memory::read_whole;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
+use super::reduced::error::ReducedError;
+use super::reduced::reduced_log::ReducedLog;
 use super::repeated::repeated_rows;
+use super::unknowns::columns;
 use crate::band::{Band, NO_BAND, Reach};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
+use crate::inertia::columns::Own;
 use crate::log::{Instant, Provenance};
 use crate::open_loop::OpenLoop;
-use crate::validate::{HalfWidths, Reconstructed, Reconstruction, Validation};
+use crate::robot::model::JointFriction;
+use crate::validate::{HalfWidths, Reconstructed, Reconstruction, SummedRows, Validation};
 
 /// What `validate` found.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -46,7 +51,13 @@ pub fn validate(
     control: &Control,
     row: &mut dyn FnMut(&Reconstructed, Instant),
 ) -> Result<Validated, IdentifyError> {
-    let machine = machine.with_position_cutoffs(logs, &known(&refined.model), control)?;
+    let whole = not_reduced(logs);
+    let machine = match whole.is_empty() {
+        true => machine.clone(),
+        false => machine.with_position_cutoffs(&whole, &known(&refined.model), control)?,
+    };
+    // a band is of single rows, which a reduced log has not
+    let file = file.filter(|_| whole.len() == logs.len());
     let band = file.and_then(|file| Band::new(file, &refined.model));
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
@@ -77,6 +88,12 @@ pub fn validate(
     Ok(found)
 }
 
+/// The logs whose rows are there.
+fn not_reduced(logs: &[Log]) -> Vec<Log> {
+    let whole = logs.iter().filter(|log| log.reduced().is_none());
+    whole.cloned().collect()
+}
+
 fn reconstruct(
     machine: &LoggedRobot,
     refined: &AugmentedModel,
@@ -90,13 +107,21 @@ fn reconstruct(
         |motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]| band.half_widths(motion, tau, out)
     });
     let widths: Option<HalfWidths> = widths.as_ref().map(|widths| widths as HalfWidths);
-    let speeds = machine.rest_speeds(logs, control)?;
+    let speeds = machine.rest_speeds(&not_reduced(logs), control)?;
     let mut all = Reconstruction::new(&refined.model, &speeds, widths);
     let (mut inputs, mut last) = (Vec::new(), None);
     let mut warnings = repeated_rows(logs, Some(&machine.file.layout()));
     let settings = machine.settings();
     let mut segments = 0;
     for log in logs {
+        if let Some(part) = log.reduced() {
+            add_reduced(&mut all, machine, refined, part)?;
+            warnings.extend(part.warnings.iter().cloned());
+            inputs.push(part.provenance.clone());
+            last = Some(part.summary.clone());
+            work.advance(1);
+            continue;
+        }
         if refined.effects.is_empty() {
             let mut open = machine.open(log, control)?;
             let origin = open.origin();
@@ -126,6 +151,12 @@ fn reconstruct(
         }
         work.advance(1);
     }
+    if let Some(part) = logs.iter().find_map(Log::reduced) {
+        warnings.push(format!(
+            "{} is a reduced log: the errors of single rows (the largest, R2, those before the filter) are not known of it",
+            part.name()
+        ));
+    }
     let summary = last.ok_or(IdentifyError::NoLog)?;
     let mut validation = all.finish(summary);
     machine.name_units(&mut validation);
@@ -135,4 +166,66 @@ fn reconstruct(
         inputs,
         warnings,
     })
+}
+
+/// Adds the errors of a model that is linear in the columns of a reduced log.
+fn add_reduced(
+    all: &mut Reconstruction,
+    machine: &LoggedRobot,
+    refined: &AugmentedModel,
+    part: &ReducedLog,
+) -> Result<(), IdentifyError> {
+    let needs = |what: &str, remedy| ReducedError::NeedsLog {
+        log: part.name().to_owned(),
+        what: what.to_owned(),
+        remedy,
+    };
+    let model = &refined.model;
+    if !refined.effects.is_empty() {
+        let what = "the rows that effects are computed along";
+        return Err(needs(what, "give the log itself, or a model without effects").into());
+    }
+    part.belongs_to_robot(&machine.file)?;
+    let known = part.known_friction();
+    let columns = columns(machine, known.as_deref());
+    for (j, friction) in model.friction.iter().enumerate() {
+        let same = match (friction, columns.known[j].as_ref()) {
+            (JointFriction::DoubleTanh(law), Some(known)) => {
+                law.parameters() == known.law.parameters()
+            }
+            (JointFriction::ViscousCoulomb(_) | JointFriction::None, None) => true,
+            _ => false,
+        };
+        if !same {
+            let what = "the friction of this model: its columns were made with another";
+            let remedy = "reduce the log again with `-m` and this model, or give the log itself";
+            return Err(needs(what, remedy).into());
+        }
+    }
+    let mut theta = model.theta.clone();
+    for (j, own) in columns.own.iter().enumerate() {
+        let viscous_coulomb = match &model.friction[j] {
+            JointFriction::ViscousCoulomb(law) => [law.viscous, law.coulomb],
+            _ => [0.0, 0.0],
+        };
+        theta.extend(own.iter().map(|own| match own {
+            Own::Viscous => viscous_coulomb[0],
+            Own::Coulomb => viscous_coulomb[1],
+            Own::Offset => model.offset[j],
+            Own::Saturating(_) | Own::Law(_) => 0.0,
+        }));
+    }
+    let rows = part.rows(columns)?;
+    for (j, sums) in rows.squares(&theta.into()).into_iter().enumerate() {
+        let [moving, resting] = [rows.moving[j], rows.resting[j]];
+        all.add_sums(
+            j,
+            &SummedRows {
+                error: sums,
+                torque: [moving.torque_square, resting.torque_square],
+                rows: [moving.count, resting.count],
+            },
+        );
+    }
+    Ok(())
 }

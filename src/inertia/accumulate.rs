@@ -2,15 +2,22 @@
 //!
 //! Blocks keep what a covariance under correlated residuals needs, the score of any parameter
 //! vector over a stretch of time, without a second reading. Their number is bounded: when there
-//! are too many, neighbours merge and the block length doubles.
+//! are too many, neighbours merge and the block length doubles. In a file there are fewer.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use super::columns::{GRADIENT, RegressorColumns};
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
 const MOST_BLOCKS: usize = 512;
+/// Most blocks that are kept of a log in a file: few enough for its size, and as many as deviations need.
+const MOST_IN_FILE: usize = 32;
+/// Bytes of a value in a text log, with what parts it from the next: six digits, a sign, a point and a comma.
+const TEXT_BYTES: u64 = 10;
+/// Bytes that a file of the blocks takes besides, and for each joint.
+const HEAD_BYTES: u64 = 2048;
 
 /// One block of time: the R factor of each joint's rows.
 #[derive(Debug, Clone)]
@@ -43,7 +50,8 @@ pub struct Accumulator {
 }
 
 /// How many rows of a joint there are.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct JointRows {
     pub count: u64,
     /// Squared norm of the filtered torque.
@@ -145,17 +153,9 @@ impl Accumulator {
     fn halve(&mut self) {
         self.block_rows = self.block_rows.map(|rows| 2 * rows);
         self.block_seconds *= 2.0;
-        let old = std::mem::take(&mut self.blocks);
-        let mut old = old.into_iter().peekable();
-        while let Some(mut first) = old.next() {
-            if let Some(second) = old.next_if(|b| b.stretch == first.stretch) {
-                for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
-                    *a = stacked([&*a, b], self.columns.row_width(j)).short();
-                }
-                first.rows += second.rows;
-            }
-            self.blocks.push(first);
-        }
+        merge_pairs(&mut self.blocks, &self.columns, |a, b| {
+            a.stretch == b.stretch
+        });
     }
 
     /// Closes the last block and hands everything over.
@@ -171,6 +171,24 @@ impl Accumulator {
             at_rest: at_rest.iter().map(RFactor::r).collect(),
             rows: self.rows,
         }
+    }
+}
+
+/// Merges neighbours that belong together two by two.
+fn merge_pairs(
+    blocks: &mut Vec<BlockFactor>,
+    columns: &RegressorColumns,
+    belong: impl Fn(&BlockFactor, &BlockFactor) -> bool,
+) {
+    let mut old = std::mem::take(blocks).into_iter().peekable();
+    while let Some(mut first) = old.next() {
+        if let Some(second) = old.next_if(|b| belong(&first, b)) {
+            for (j, (a, b)) in first.r.iter_mut().zip(&second.r).enumerate() {
+                *a = stacked([&*a, b], columns.row_width(j)).short();
+            }
+            first.rows += second.rows;
+        }
+        blocks.push(first);
     }
 }
 
@@ -232,6 +250,35 @@ pub struct BlockFactors {
 }
 
 impl BlockFactors {
+    /// The factors of one log of `samples` rows in at most 32 blocks, and in so few that they and its factors by
+    /// `others` more processings take less than half of what the log takes as text: a rule that sees this log alone.
+    /// Neighbours of one stretch merge two by two; where stretches are so many that it does not help, those of two.
+    pub fn in_few_blocks(mut self, samples: u64, others: u64) -> BlockFactors {
+        let of_text = samples * (1 + 2 * self.columns.joints as u64) * TEXT_BYTES;
+        let bytes = |factors: &[DMatrix<f64>]| -> u64 {
+            let numbers = factors.iter().flat_map(DMatrix::iter);
+            8 * numbers.filter(|x| **x != 0.0).count() as u64
+        };
+        let head = HEAD_BYTES * (1 + self.columns.joints as u64) + bytes(&self.at_rest);
+        while self.blocks.len() > 1 {
+            let each: Vec<u64> = self.blocks.iter().map(|b| bytes(&b.r)).collect();
+            let largest = each.iter().max().copied().unwrap_or(0);
+            let all = each.iter().sum::<u64>() + others * largest + head;
+            if self.blocks.len() <= MOST_IN_FILE && 2 * all <= of_text {
+                break;
+            }
+            let many = self.blocks.len();
+            merge_pairs(&mut self.blocks, &self.columns, |a, b| {
+                a.stretch == b.stretch
+            });
+            if 4 * self.blocks.len() > 3 * many {
+                merge_pairs(&mut self.blocks, &self.columns, |_, _| true);
+            }
+            self.block_seconds *= 2.0;
+        }
+        self
+    }
+
     /// Joins the block factors of another set of logs with the same columns; stretches stay apart.
     pub fn merge(&mut self, other: BlockFactors) {
         let shift = self.blocks.last().map_or(0, |b| b.stretch + 1);
@@ -321,6 +368,16 @@ impl BlockFactors {
             at_rest: self.at_rest.clone(),
             rows: self.rows,
         }
+    }
+
+    /// |b - X theta|^2 of every joint, over the rows in which it moves and those in which it rests.
+    pub fn squares(&self, theta: &DVector<f64>) -> Vec<[f64; 2]> {
+        let of = |j| {
+            let own = self.own_unknowns(theta, j);
+            let moving = self.parts(&self.joint(j), j).residual_square(&own);
+            [moving, self.square_at_rest(theta, j)]
+        };
+        (0..self.columns.joints).map(of).collect()
     }
 
     /// |b - X theta|^2 of joint j over the rows in which it rests.

@@ -99,8 +99,9 @@ pub(super) fn covariance(
 /// Time over whose sums of scores the correlation from one to the next is taken [s]; filters alone make shorter
 /// ones alike.
 const NEIGHBOUR_SECONDS: f64 = 0.25;
-/// Least number of such neighbours that count as correlated.
+/// Least number of such neighbours that count as correlated, and least time where a block is longer than they are [s].
 const LEAST_LAG: f64 = 4.0;
+const LEAST_SECONDS: f64 = 1.25;
 
 /// Andrews' automatic bandwidth for Bartlett's kernel, in blocks of `block_seconds`, from first-order autoregressions
 /// of each score, equal weights after normalisation. Sums begin at every block, so that it does not matter
@@ -133,7 +134,11 @@ pub(super) fn bandwidth(scores: &[(usize, DVector<f64>)], u: usize, block_second
     let lag = 1.1447 * (above / below * n).cbrt();
     // the parallel filter alone correlates neighbouring blocks; and a fifth of the record is the
     // longest correlation that it can still show
-    let lag = lag.max(LEAST_LAG).min(n / 5.0);
+    let least = match block_seconds > NEIGHBOUR_SECONDS {
+        true => (LEAST_SECONDS / block_seconds - 1.0).clamp(0.0, LEAST_LAG),
+        false => LEAST_LAG,
+    };
+    let lag = lag.max(least).min(n / 5.0);
     (lag + 1.0) * k as f64 - 1.0
 }
 

@@ -7,6 +7,9 @@ use std::path::Path;
 use super::stream::{Stream, Watch};
 use super::{LogError, source};
 
+/// First bytes of a file of reduced logs.
+pub const REDUCED: &[u8] = b"cft-ident reduced\n";
+
 /// Bytes that are looked at.
 pub(super) const HEAD: usize = 1 << 16;
 
@@ -62,6 +65,13 @@ impl Content {
                 return Err(fail(error));
             }
             rest = Box::new(CutOff(error.kind(), error.to_string()));
+        }
+        if head.starts_with(REDUCED) {
+            return Err(LogError::Format {
+                file: source::shown(path),
+                kind: "a file of reduced logs",
+                remedy: "`lsq`, `validate`, `reduce` and `track` take it; give the log itself here",
+            });
         }
         Ok(Self {
             compression,

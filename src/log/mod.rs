@@ -32,6 +32,7 @@ mod time_unit;
 
 pub use arrays::Arrays;
 pub use block::Block;
+pub use content::REDUCED;
 pub use error::LogError;
 pub use layout::{Channel, Channels, Conversion, Layout};
 pub use mend::{Bridge, Mending, Unwrap};
@@ -54,4 +55,4 @@ pub(crate) use columns::unit_of;
 pub(crate) use content::unpacked;
 pub(crate) use layout::channel;
 pub(crate) use names::{did_you_mean, is_hidden, list};
-pub(crate) use source::{named_beside, remedy, shown};
+pub(crate) use source::{bytes, named_beside, remedy, sha256_of_bytes, shown};

@@ -186,6 +186,24 @@ pub fn sha256(path: &Path) -> Result<String, LogError> {
     sha256_of(&[path.to_owned()])
 }
 
+/// SHA-256 of bytes, hexadecimal.
+pub(crate) fn sha256_of_bytes(bytes: &[u8]) -> String {
+    let mut checksum = Checksum::default();
+    checksum.update(bytes);
+    checksum.hexadecimal()
+}
+
+/// Bytes of a whole file.
+///
+/// # Errors
+/// A file that cannot be read.
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
+    let mut all = Vec::new();
+    let read = open(path)?.read_to_end(&mut all);
+    read.map_err(|error| failed(path, error))?;
+    Ok(all)
+}
+
 /// SHA-256 of whole files one after the other, hexadecimal.
 pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
     let mut checksum = Checksum::default();

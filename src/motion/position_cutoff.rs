@@ -14,6 +14,7 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::added_noise::middle_roughness;
 use super::position_filter::HIGHEST_SHARE;
@@ -31,7 +32,8 @@ const SETTLED: f64 = 10.0;
 
 /// What a cut-off costs the friction of one joint: root mean squares over filtered rows in which it moves, in the
 /// unit of the friction law.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CutoffCost {
     /// \[Hz\]
     pub cutoff_hz: f64,

@@ -118,6 +118,21 @@ pub struct Finding {
     pub meaning: String,
 }
 
+impl Finding {
+    /// As it is told: what is wrong, what to write, and what these data say as well.
+    pub fn told(&self) -> String {
+        let mut out = self.meaning.clone();
+        if !self.remedy.is_empty() {
+            out += &format!("; write {}", self.remedy);
+        }
+        let ties = self.tied_with.iter().filter(|tie| !tie.remedy.is_empty());
+        for tie in ties.take(2) {
+            out += &format!("; these data say as well: {}", tie.remedy);
+        }
+        out
+    }
+}
+
 /// Power that the friction of a joint takes, where it is negative by more than two deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FrictionPower {

@@ -5,6 +5,7 @@
 //! bytes.
 
 mod axis;
+mod course;
 mod decimate;
 mod effect;
 mod errors;
@@ -19,6 +20,7 @@ mod residual;
 mod svg;
 mod torque;
 
+pub use course::{CourseFigure, CoursePanel};
 pub use effect::EffectFigure;
 pub use errors::{ErrorBar, ErrorFigure, JointBars};
 pub use friction::{FrictionFigure, FrictionPanel};

@@ -11,4 +11,5 @@ pub mod identify;
 pub mod inspect;
 pub mod lsq;
 pub mod setup;
+pub mod track;
 pub mod validate;

@@ -1,0 +1,247 @@
+//! A fleet over its logs: false alarms, and how soon changes are found.
+//!
+//! `cargo run --release --example study_track -- [ROBOTS] [FOLDER]` writes one line per robot to
+//! target/study_track.jsonl as it goes and, at the end, FOLDER/study_track.json, from which
+//! docs/how-to-fleet.md has its table. Of every ten robots one changes: the Coulomb friction of one joint grows by
+//! 10 to 50 % from one log to the next or log by log. Estimates of 54 parameters are drawn with their covariance, for
+//! 50 logs a robot; temperature scales the friction of all joints, and one log in ten carries a payload. Each
+//! robot is followed as its logs come in, and an alarm counts when it is first told. One part of each robot is simulated the
+//! whole way (motion, noise, `reduce`), to show that estimates scatter by their covariance.
+
+#[allow(dead_code)] // it uses its share
+#[path = "study/mod.rs"]
+mod study;
+
+use cft_ident::config::RobotFile;
+use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq, reduce};
+use cft_ident::track::{Estimate, follow};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+use study::{percent, quantile, study, write_summary};
+
+/// Joints, and parameters of the links.
+const JOINTS: usize = 6;
+const LINKS: usize = 36;
+const PARAMETERS: usize = LINKS + 3 * JOINTS;
+const LOGS: usize = 50;
+/// Probability of an alarm over all parameters of a robot, as `cft-ident track` has it.
+const ALARMS: f64 = 0.005;
+/// Least number of logs at which one looks.
+const FIRST: usize = 8;
+/// Changes of one robot in ten, as parts of the friction.
+const SIZES: [f64; 4] = [0.1, 0.2, 0.3, 0.5];
+/// A change is to be found within so many logs.
+const SOON: usize = 10;
+
+fn main() {
+    let (rows, folder) = study("study_track", 200, robot);
+    let robots = rows.len();
+    let steady: Vec<&Value> = rows.iter().filter(|r| r["changed"].is_null()).collect();
+    let alarms = steady.iter().filter(|r| r["alarms"].as_u64() > Some(0));
+    let mut summary = vec![json!({
+        "case": "no change",
+        "robots": steady.len(),
+        "with an alarm over 50 logs": alarms.count(),
+        "found within 5 logs": "-",
+        "found within 10 logs": "-",
+        "median delay [logs]": "-",
+        "size found": "-",
+    })];
+    for kind in ["step", "ramp"] {
+        for size in SIZES {
+            let of = |r: &&Value| r["kind"] == kind && r["size"].as_f64() == Some(size);
+            let changed: Vec<&Value> = rows
+                .iter()
+                .filter_map(|r| r["changed"].as_array())
+                .flatten()
+                .filter(of)
+                .collect();
+            let delays: Vec<f64> = changed.iter().filter_map(|r| r["delay"].as_f64()).collect();
+            let within = |logs: f64| {
+                let found = delays.iter().filter(|d| **d <= logs).count();
+                format!("{found} of {}", changed.len())
+            };
+            let sizes: Vec<f64> = changed.iter().filter_map(|r| r["found"].as_f64()).collect();
+            summary.push(json!({
+                "case": format!("{kind} of {}", percent(size)),
+                "robots": changed.len(),
+                "with an alarm over 50 logs": delays.len(),
+                "found within 5 logs": within(5.0),
+                "found within 10 logs": within(SOON as f64),
+                "median delay [logs]": match delays.is_empty() {
+                    true => "-".to_owned(),
+                    false => format!("{}", quantile(delays.clone(), 0.5)),
+                },
+                "size found": match sizes.is_empty() {
+                    true => "-".to_owned(),
+                    false => percent(quantile(sizes, 0.5)),
+                },
+            }));
+        }
+    }
+    let off: Vec<f64> = (rows.iter().filter_map(|r| r["off"].as_array()).flatten())
+        .filter_map(Value::as_f64)
+        .collect();
+    let inside = off.iter().filter(|z| z.abs() < 1.96).count();
+    summary.push(json!({
+        "case": format!("{} parts the whole way: {} of {} parameters within 1.96 deviations", rows.len(), inside, off.len()),
+        "robots": "-",
+        "with an alarm over 50 logs": "-",
+        "found within 5 logs": "-",
+        "found within 10 logs": "-",
+        "median delay [logs]": "-",
+        "size found": "-",
+    }));
+    write_summary(
+        &folder,
+        "study_track",
+        "robots followed over 50 logs each",
+        "study_track",
+        robots,
+        summary,
+    );
+}
+
+/// Normal numbers.
+fn chance(seed: u64) -> impl FnMut() -> f64 {
+    let mut chance = ChaCha8Rng::seed_from_u64(seed);
+    move || (0..12).map(|_| chance.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// Estimates of all parameters over all logs, `[parameter][log]`, with friction of joint `joint` changed by `change`.
+fn simulated(seed: u64, joint: usize, change: &dyn Fn(usize) -> f64) -> Vec<Vec<Estimate>> {
+    let mut draw = chance(seed);
+    // relative deviation of each parameter in one log, and what the robot's own are
+    let friction = |p: usize| p >= LINKS && (p - LINKS) % 3 < 2;
+    let relative: Vec<f64> = (0..PARAMETERS)
+        .map(|p| match friction(p) {
+            true => 0.03 * (0.3 * draw()).exp(),
+            false => 0.06 * (0.5 * draw()).exp(),
+        })
+        .collect();
+    let truth: Vec<f64> = (0..PARAMETERS)
+        .map(|_| 5.0 * (0.5 * draw()).exp())
+        .collect();
+    let mut warm = 0.0;
+    let mut out = vec![Vec::with_capacity(LOGS); PARAMETERS];
+    for log in 0..LOGS {
+        // the temperature of a day is partly that of the day before; a degree is 1 %
+        warm = 0.7 * warm + 0.7 * draw();
+        let loaded = draw() > 1.28;
+        // errors of the parameters of one joint are correlated
+        let common: Vec<f64> = (0..JOINTS + 1).map(|_| draw()).collect();
+        for p in 0..PARAMETERS {
+            let of_joint = match p < LINKS {
+                true => JOINTS,
+                false => (p - LINKS) / 3,
+            };
+            let coulomb = p >= LINKS && (p - LINKS) % 3 == 1;
+            let mut value = truth[p];
+            if friction(p) {
+                value *= 1.0 - 0.01 * warm;
+            }
+            if coulomb && of_joint == joint {
+                value *= 1.0 + change(log);
+            }
+            if loaded && (LINKS - 4..LINKS).contains(&p) {
+                value += 0.8 * truth[p];
+            }
+            let std = relative[p] * truth[p];
+            let error = 0.6 * common[of_joint] + 0.8 * draw();
+            out[p].push(Estimate {
+                time: 86_400.0 * log as f64,
+                value: value + std * error,
+                variance: std * std,
+            });
+        }
+    }
+    out
+}
+
+/// Parameters in which a change is told once the first `logs` logs are there, with its relative size.
+fn told(estimates: &[Vec<Estimate>], logs: usize) -> Vec<(usize, f64)> {
+    let level = ALARMS / PARAMETERS as f64;
+    let mut out = Vec::new();
+    for (p, all) in estimates.iter().enumerate() {
+        let course = follow(&all[..logs], level);
+        if let Some(change) = course.changes.last() {
+            let before = course.values[change.at.saturating_sub(1)];
+            out.push((p, change.size / before));
+        }
+    }
+    out
+}
+
+/// One robot: most do not change; of every ten the last does, in all sizes and kinds one after the other.
+fn robot(seed: u64) -> Value {
+    let off = whole_way(seed);
+    if seed % 10 != 9 {
+        let estimates = simulated(seed, 0, &|_| 0.0);
+        let alarms = (FIRST..=LOGS).find(|logs| !told(&estimates, *logs).is_empty());
+        return json!({ "seed": seed, "alarms": u64::from(alarms.is_some()), "off": off });
+    }
+    let mut changed = Vec::new();
+    for kind in ["step", "ramp"] {
+        for size in SIZES {
+            let from = 15 + (7 * seed / 10 % 20) as usize;
+            let joint = (seed / 10) as usize % JOINTS;
+            let change = |log: usize| match kind {
+                _ if log < from => 0.0,
+                "step" => size,
+                // in ten logs, and from there on
+                _ => size * ((log - from + 1) as f64 / 10.0).min(1.0),
+            };
+            let estimates = simulated(seed, joint, &change);
+            let parameter = LINKS + 3 * joint + 1;
+            let mut row = json!({ "kind": kind, "size": size });
+            for logs in from + 1..=LOGS {
+                let found = told(&estimates[parameter..=parameter], logs);
+                if let Some((_, relative)) = found.first() {
+                    row["delay"] = json!(logs - from);
+                    row["found"] = json!(relative);
+                    break;
+                }
+            }
+            changed.push(row);
+        }
+    }
+    json!({ "seed": seed, "size": "all", "changed": changed, "off": off })
+}
+
+/// Errors over deviations of the parameters of a slide in one part that is simulated the whole way.
+fn whole_way(seed: u64) -> Vec<f64> {
+    let text = r#"
+        robot = { model = "single-joint", joint = "slide", kind = "prismatic" }
+        friction = { law = "viscous-coulomb", fitted_with_inertias = true, offset = true }
+        filter = { cutoff_hz = 20.0, position_cutoff_hz = 80.0 }
+    "#;
+    let file = RobotFile::parse("slide.toml", text).expect("a robot file");
+    let machine = LoggedRobot::new("slide.toml", file);
+    let truth = [12.0, 30.0, 8.0, 4.0];
+    let mut noise = chance(seed + 1_000_000);
+    let waves = [(0.11, 1.9), (0.05, 4.7), (0.02, 9.1)];
+    let (mut t, mut q, mut tau) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut error, phase) = (0.0, seed as f64);
+    for k in 0..6000 {
+        let now = 0.005 * f64::from(k);
+        let sum = |of: &dyn Fn(f64, f64) -> f64| waves.iter().map(|(a, w)| of(*a, *w)).sum::<f64>();
+        let v = sum(&|a, w| a * w * (w * now + phase).cos());
+        let a = sum(&|a, w| -a * w * w * (w * now + phase).sin());
+        // correlated over a tenth of a second
+        error = 0.95 * error + 0.3 * noise();
+        t.push(now);
+        q.push(sum(&|a, w| a * (w * now + phase).sin()));
+        tau.push(truth[0] * a + truth[1] * v + truth[2] * v.signum() + truth[3] + error);
+    }
+    let control = Control::default();
+    let log = Log::of_rows("part", &t, &q, &tau).expect("a log");
+    let part = reduce(&machine, &[log], None, &control)
+        .expect("a part")
+        .as_logs();
+    let found = lsq(&machine, &part, &LsqSettings::default(), &control).expect("a fit");
+    let pairs = truth.iter().enumerate();
+    pairs
+        .map(|(i, truth)| (found.fit.theta[i] - truth) / found.fit.covariance[(i, i)].sqrt())
+        .collect()
+}

@@ -1,0 +1,28 @@
+"""Reduce logs on a Dask cluster (``distributed``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+
+def reduce_dask(client: Any, urls: Iterable[str], robot: str, *, model: str | None = None, store: str | None = None,
+                as_declared: bool = False) -> "Fleet":
+    """Reduce logs where workers of ``client`` are free, and merge them in a tree.
+
+    ``robot`` and ``model`` are paths of files. With a ``store``, a folder that all workers see, logs that were reduced
+    before are not reduced again. A worker that is lost has its logs reduced by another one.
+    """
+    from dask.distributed import as_completed
+
+    from . import Fleet, Part, _sorted_out, merge_bytes, reduce_one, text_of, tree
+
+    texts = (text_of(robot), text_of(model))
+    # the scheduler gives a lost worker's tasks to the others
+    jobs = [client.submit(reduce_one, url, *texts, store, as_declared, pure=False, retries=3) for url in urls]
+    found = [job.result() for job in as_completed(jobs)]
+    parts, failures, reused = _sorted_out(found)
+    joined = tree(parts.items(), lambda some: client.submit(merge_bytes, some, pure=False, retries=3))
+    if joined is not None and not isinstance(joined, bytes):
+        joined = joined.result()
+    return Fleet(Part.from_bytes(joined) if joined else None, failures, reused)

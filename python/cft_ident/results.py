@@ -1,0 +1,106 @@
+"""Results: the document of a command, its tables and its page."""
+
+from __future__ import annotations
+
+import html
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import Model
+
+
+class Result:
+    """What a stage found: ``to_dict`` is the JSON document of the command, ``html`` its page, ``str`` its tables."""
+
+    def __init__(self, document: str, page: str | None, text: str):
+        self.json = document
+        self.html = page
+        self._text = text
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document; undetermined numbers are ``None``."""
+        return json.loads(self.json)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What did not come as it should."""
+        return self.to_dict()["warnings"]
+
+    def save_html(self, path: Any) -> None:
+        """Write the report as one page."""
+        if self.html is None:
+            raise ValueError("this result has no page")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.html)
+
+    def _repr_html_(self) -> str:
+        if self.html is None:
+            return f"<pre>{html.escape(self._text)}</pre>"
+        # a page of its own inside the notebook's
+        return f'<iframe srcdoc="{html.escape(self.html, quote=True)}" width="100%" height="600" frameborder="0"></iframe>'
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.to_dict()['schema']}>"
+
+
+class Fit(Result):
+    """A fit with its model."""
+
+    def __init__(self, document: str, page: str, text: str, model: Model):
+        super().__init__(document, page, text)
+        self.model = model
+
+    def parameters(self) -> Any:
+        """A pandas frame of the model's parameters."""
+        return self.model.parameters()
+
+
+class Diagnosis(Result):
+    """A diagnosis; ``model`` is refined, or ``None`` where the data are at fault."""
+
+    def __init__(self, document: str, page: str, text: str, model: Model | None):
+        super().__init__(document, page, text)
+        self.model = model
+
+
+class Track(Result):
+    """Parameters over logs."""
+
+    def courses(self) -> Any:
+        """A pandas frame: robot, parameter, joint, log, time, estimate, value, std."""
+        import pandas
+
+        rows = []
+        for robot in self.to_dict()["robots"]:
+            for p in robot["parameters"]:
+                columns = zip(robot["logs"], p["times"], p["estimates"], p["values"], p["std"])
+                rows += [(robot["name"], p["name"], p["joint"], *row) for row in columns]
+        names = ["robot", "parameter", "joint", "log", "time", "estimate", "value", "std"]
+        return pandas.DataFrame(rows, columns=names)
+
+    def changes(self) -> Any:
+        """A pandas frame of all changes."""
+        import pandas
+
+        rows = [{"robot": r["name"], **c} for r in self.to_dict()["robots"] for c in r["changes"]]
+        return pandas.DataFrame(rows)
+
+
+class Excitation(Result):
+    """A motion that was designed; ``path`` is its trajectory file."""
+
+    def __init__(self, document: str, page: None, text: str, path: str):
+        super().__init__(document, page, text)
+        self.path = path
+
+
+class Simulation(Result):
+    """A log that was simulated; ``path`` is its file."""
+
+    def __init__(self, document: str, page: None, text: str, path: str):
+        super().__init__(document, page, text)
+        self.path = path

@@ -1,0 +1,250 @@
+//! Robots, logs, models and reduced logs as Python holds them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use cft_ident::config::{ModelFile, RobotFile};
+use cft_ident::identify::{self, LoggedRobot, ReducedLogs, is_reduced};
+use cft_ident::log::{LogSpec, Provenance};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::{UsageError, of_input, of_stage};
+
+/// A robot file.
+#[pyclass(frozen, module = "cft_ident._native")]
+pub struct Robot {
+    pub machine: LoggedRobot,
+}
+
+#[pymethods]
+impl Robot {
+    /// From a file, or one that comes with the package such as `configs/ur10.toml`.
+    #[staticmethod]
+    fn load(path: &str) -> PyResult<Self> {
+        let machine = LoggedRobot::load(path).map_err(of_stage)?;
+        Ok(Robot { machine })
+    }
+
+    /// From TOML text; `name` stands for it in messages.
+    #[staticmethod]
+    fn parse(text: &str, name: &str) -> PyResult<Self> {
+        let file = RobotFile::parse(name, text).map_err(of_input)?;
+        Ok(Robot {
+            machine: LoggedRobot::new(name, file),
+        })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.machine.name
+    }
+
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.machine.robot.joint_names().to_vec()
+    }
+}
+
+/// A log: a file, arrays, or a reduced log.
+#[pyclass(frozen, module = "cft_ident._native")]
+pub struct Log {
+    pub logs: Vec<identify::Log>,
+    pub spec: Option<LogSpec>,
+}
+
+#[pymethods]
+impl Log {
+    /// A file; a part of it as in `log.csv@0..70%`. A file of reduced logs counts as its logs.
+    #[staticmethod]
+    fn load(path: &str) -> PyResult<Self> {
+        let spec: LogSpec = path.parse().map_err(of_input)?;
+        if is_reduced(&spec.path) {
+            let parts = ReducedLogs::load(&spec.path).map_err(of_stage)?;
+            return Ok(Log {
+                logs: parts.as_logs(),
+                spec: None,
+            });
+        }
+        Ok(Log {
+            logs: vec![identify::Log::from(&spec)],
+            spec: Some(spec),
+        })
+    }
+
+    /// Arrays: times `[s]`, positions and torques with one row per sample and one column per joint, in SI units.
+    #[staticmethod]
+    #[pyo3(signature = (name, t, q, tau, reference=None))]
+    fn arrays(
+        name: &str,
+        t: PyReadonlyArray1<f64>,
+        q: PyReadonlyArray2<f64>,
+        tau: PyReadonlyArray2<f64>,
+        reference: Option<PyReadonlyArray2<f64>>,
+    ) -> PyResult<Self> {
+        let whole = "arrays must be contiguous, row after row: use numpy.ascontiguousarray";
+        let rows = |x: &PyReadonlyArray2<f64>| -> PyResult<Vec<f64>> {
+            let slice = x.as_slice().map_err(|_| UsageError::new_err(whole))?;
+            Ok(slice.to_vec())
+        };
+        let t = t.as_slice().map_err(|_| UsageError::new_err(whole))?;
+        let log = identify::Log::of_rows(name, t, &rows(&q)?, &rows(&tau)?).map_err(of_stage)?;
+        let log = match reference {
+            Some(reference) => log.with_references(&rows(&reference)?).map_err(of_stage)?,
+            None => log,
+        };
+        Ok(Log {
+            logs: vec![log],
+            spec: None,
+        })
+    }
+
+    #[getter]
+    fn name(&self) -> String {
+        let names: Vec<String> = self.logs.iter().map(identify::Log::name).collect();
+        names.join(", ")
+    }
+
+    /// The file with its span, where it is one.
+    #[getter]
+    fn path(&self) -> Option<String> {
+        self.spec.as_ref().map(ToString::to_string)
+    }
+}
+
+/// A model file.
+#[pyclass(frozen, module = "cft_ident._native")]
+pub struct Model {
+    pub name: String,
+    pub file: ModelFile,
+    pub text: String,
+}
+
+impl Model {
+    pub fn of(name: &str, file: ModelFile) -> PyResult<Self> {
+        let text = file.to_toml().map_err(of_input)?;
+        Ok(Model {
+            name: name.to_owned(),
+            file,
+            text,
+        })
+    }
+
+    pub fn provenance(&self) -> Provenance {
+        Provenance::of_text(&self.name, &self.text)
+    }
+}
+
+#[pymethods]
+impl Model {
+    #[staticmethod]
+    fn load(path: &str) -> PyResult<Self> {
+        let text = cft_ident::config::text(Path::new(path)).map_err(of_input)?;
+        let file = ModelFile::parse_in(path, &text, Path::new(path).parent()).map_err(of_input)?;
+        Ok(Model {
+            name: path.to_owned(),
+            file,
+            text: text.to_string(),
+        })
+    }
+
+    #[staticmethod]
+    fn parse(text: &str, name: &str) -> PyResult<Self> {
+        let file = ModelFile::parse(name, text).map_err(of_input)?;
+        Ok(Model {
+            name: name.to_owned(),
+            file,
+            text: text.to_owned(),
+        })
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The file as TOML.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.file.robot.joint_names()
+    }
+
+    /// Name, joint, value, standard deviation and unit of every parameter.
+    #[getter]
+    fn parameters(&self) -> Vec<(String, Option<String>, f64, Option<f64>, String)> {
+        let told = self.file.parameters.iter();
+        told.map(|p| {
+            (
+                p.name.clone(),
+                p.joint.clone(),
+                p.value,
+                p.std,
+                p.unit.clone(),
+            )
+        })
+        .collect()
+    }
+}
+
+/// Reduced logs.
+#[pyclass(frozen, module = "cft_ident._native")]
+pub struct Part {
+    pub logs: Arc<ReducedLogs>,
+}
+
+#[pymethods]
+impl Part {
+    #[staticmethod]
+    fn load(path: &str) -> PyResult<Self> {
+        let logs = ReducedLogs::load(Path::new(path)).map_err(of_stage)?;
+        Ok(Part {
+            logs: Arc::new(logs),
+        })
+    }
+
+    #[staticmethod]
+    fn from_bytes(data: &[u8], name: &str) -> PyResult<Self> {
+        let logs = ReducedLogs::from_bytes(name, data).map_err(of_stage)?;
+        Ok(Part {
+            logs: Arc::new(logs),
+        })
+    }
+
+    /// The bytes of a `.cfi` file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.logs.to_bytes().map_err(of_stage)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Name, SHA-256, samples, seconds, first and last time, and kept blocks of every log.
+    #[getter]
+    fn logs(&self) -> Vec<(String, String, u64, f64, [f64; 2], usize)> {
+        let told = self.logs.logs().iter().map(|log| {
+            let p = &log.provenance;
+            let (name, sha) = (p.name.clone(), p.sha256.clone());
+            (
+                name,
+                sha,
+                p.samples,
+                p.duration_s,
+                log.bounds_s,
+                log.blocks(),
+            )
+        });
+        told.collect()
+    }
+
+    /// The same as a log for `lsq` and `validate`.
+    fn as_log(&self) -> Log {
+        Log {
+            logs: self.logs.as_logs(),
+            spec: None,
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! `cft-ident reduce`: what a fit needs of logs, in a small file.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CliError, Context, Outcome, arguments, files, logs, setup};
+use crate::identify::{self, FORMAT, Log, LoggedRobot, MadeWith, ReducedLogs};
+use crate::log::{LogSpec, Provenance, escape};
+use crate::report::Report;
+use crate::report::json::Document;
+use crate::report::table::{Align, Table};
+use crate::setup::Finding;
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident reduce identification.csv -r robot.toml -m friction.toml -o a.cfi
+  cft-ident reduce unseen.csv -r robot.toml -m friction.toml -o b.cfi
+  cft-ident reduce a.cfi b.cfi -r robot.toml -m friction.toml -o all.cfi";
+
+/// Reduce logs to what a linear fit needs of them: a small file that stands where `lsq` and
+/// `validate` take a log.
+///
+/// From it `lsq` fits by `wls` and `ols`, with --feasible too; the other estimators and everything that
+/// looks at single rows need the logs. Friction that a model gives with -m is held. Reduced logs may be
+/// merged: give them instead of logs.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident reduce [OPTIONS] -r ROBOT.toml -o PART.cfi LOG...")]
+pub struct Args {
+    /// Logs, or reduced ones to merge; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Robot file, or a built-in one such as configs/emps.toml
+    #[arg(short, long, value_name = "ROBOT.toml")]
+    pub robot: String,
+    /// Model file that holds the friction; left out where friction is fitted with the inertias
+    #[arg(short, long, value_name = "FRICTION.toml")]
+    pub model: Option<PathBuf>,
+    /// File of reduced logs to write
+    #[arg(short, long, value_name = "PART.cfi", value_parser = arguments::reduced_file)]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub setup: setup::SetupArgs,
+}
+
+/// What a file of reduced logs holds.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Reduced {
+    /// Number of the file's format.
+    format: u32,
+    /// What the logs were reduced with.
+    made_with: MadeWith,
+    /// The logs, in the order of their checksums.
+    logs: Vec<LogInFile>,
+    /// Size of the file.
+    bytes: u64,
+    /// What the torques say against the set-up that the robot file declares.
+    setup: Vec<Finding>,
+}
+
+/// One log in the file.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct LogInFile {
+    #[serde(flatten)]
+    log: Provenance,
+    /// First and last time, by the log's own clock [s].
+    bounds_s: [f64; 2],
+    /// Blocks of time that are kept, from which deviations come.
+    blocks: usize,
+    /// Filtered, decimated rows.
+    rows: u64,
+    /// What was left out of it or mended.
+    faults: Vec<String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let inputs: Vec<&Path> = args.logs.iter().map(|l| l.path.as_path()).collect();
+    let mut outputs = vec![args.output.as_path()];
+    outputs.extend(args.setup.fix_setup.as_deref());
+    context.check_outputs(&inputs, &outputs)?;
+    let robot = files::robot(Path::new(&args.robot))?;
+    let machine = LoggedRobot::new(&args.robot, robot.value);
+    let friction = match &args.model {
+        None => None,
+        Some(path) => {
+            let model = files::model_of(path, &machine.file, context)?;
+            Some((model.name, model.value))
+        }
+    };
+    if friction.is_none() && machine.file.needs_friction_first() {
+        return Err(CliError::usage("reduce needs the friction of every joint")
+            .hint("identify it first with `cft-ident friction`, and give its model with -m")
+            .hint("or set `fitted_with_inertias = true` in [friction] of the robot file"));
+    }
+    let known = friction
+        .as_ref()
+        .map(|(name, model)| (name.as_str(), model));
+    let logs = logs(&args.logs)?;
+    let whole: Vec<Log> = (logs.iter())
+        .filter(|log| !matches!(log, Log::Reduced(_)))
+        .cloned()
+        .collect();
+    let checked = setup::checked(
+        machine,
+        (Path::new(&args.robot), &[]),
+        &whole,
+        known,
+        &args.setup,
+        context,
+    )?;
+    let found = identify::reduce(&checked.machine, &logs, known, context.control())?;
+    context.check()?;
+    let bytes = found.to_bytes().map_err(identify::IdentifyError::from)?;
+    let result = Reduced {
+        format: FORMAT,
+        made_with: found
+            .made_with()
+            .cloned()
+            .ok_or_else(|| CliError::usage("no log is given"))?,
+        logs: found.logs().iter().map(|log| in_file(log)).collect(),
+        bytes: bytes.len() as u64,
+        setup: checked.report.findings.clone(),
+    };
+    let told = found.logs().iter().flat_map(|log| log.warnings.clone());
+    let warnings: Vec<String> = checked.warnings.iter().cloned().chain(told).collect();
+    let inputs: Vec<Provenance> = found.logs().iter().map(|l| l.provenance.clone()).collect();
+    let document = Document::new("reduce", &inputs, &warnings, &result)?;
+    checked.write(context)?;
+    context.files().write(&args.output, &bytes)?;
+    Ok(Outcome {
+        text: report(&found, &result, args).text_for(context.detail()),
+        document,
+        missed: Vec::new(),
+    })
+}
+
+fn in_file(log: &identify::ReducedLog) -> LogInFile {
+    LogInFile {
+        log: log.provenance.clone(),
+        bounds_s: log.bounds_s,
+        blocks: log.blocks(),
+        rows: log.summary.rows,
+        faults: log.warnings.clone(),
+    }
+}
+
+/// The file for a terminal.
+fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
+    let columns = [
+        ("log", Align::Left),
+        ("samples", Align::Right),
+        ("duration [s]", Align::Decimal),
+        ("rows", Align::Right),
+        ("blocks", Align::Right),
+    ];
+    let mut table = Table::new(&columns).caption("reduced logs");
+    for log in found.logs() {
+        let p = &log.provenance;
+        let span = p.span.as_ref().map(|span| format!("@{span}"));
+        table.row(vec![
+            format!("{}{}", escape(&p.name), span.unwrap_or_default()),
+            p.samples.to_string(),
+            format!("{:.1}", p.duration_s),
+            log.summary.rows.to_string(),
+            log.blocks().to_string(),
+        ]);
+    }
+    let mut report = Report::new("Reduced logs");
+    let mut terminal = report.terminal();
+    terminal.table(table);
+    terminal.line("");
+    terminal.paragraph(
+        "From these `lsq` fits by wls and ols, also with --feasible, and `validate` tells the errors of \
+         models that are linear in their columns; irls, iv, oe and everything that looks at single rows \
+         need the logs.",
+    );
+    terminal.line(&format!(
+        "written: {} ({} kB)",
+        args.output.display(),
+        result.bytes.div_ceil(1000)
+    ));
+    report
+}

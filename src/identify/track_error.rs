@@ -1,0 +1,30 @@
+//! Why logs cannot be followed over time, and the way out.
+
+/// Why logs cannot be followed. Texts read `what is wrong; what to do`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TrackError {
+    #[error(
+        "{robot}: the clocks of {first} and {second} overlap, and a file of several reduced logs has no other order; give a file for each log, in order of time"
+    )]
+    NoOrder {
+        robot: String,
+        first: String,
+        second: String,
+    },
+    #[error("{robot}: {first} and {second} hold the same rows; give each log once")]
+    Twice {
+        robot: String,
+        first: String,
+        second: String,
+    },
+    #[error(
+        "{robot}: {source_name} {difference}; keep the files of each robot in a folder of its own, and reduce them alike"
+    )]
+    Other {
+        robot: String,
+        source_name: String,
+        difference: String,
+    },
+    #[error("no reduced log and no model is given")]
+    Empty,
+}
