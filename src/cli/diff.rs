@@ -53,7 +53,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 
 fn read(path: &Path) -> Result<(String, Value, Provenance), CliError> {
     let name = escape(&path.to_string_lossy());
-    let text = config::text(path)?;
+    let text = config::text_of_kind(path, config::Wanted::Own)?;
     let value = serde_json::from_str(&text).map_err(|error| {
         CliError::input(format!("{name}:{}: no JSON: {error}", error.line()))
             .hint("give documents that a command wrote with --json FILE")

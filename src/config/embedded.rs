@@ -66,6 +66,8 @@ pub enum Wanted {
     Trajectory,
     /// A file of the user's: a model, a campaign, a document.
     Own,
+    /// Any of them.
+    Any,
 }
 
 impl Wanted {
@@ -75,16 +77,17 @@ impl Wanted {
             Wanted::Robot => text.contains("[robot]"),
             Wanted::Trajectory => text.contains("kind = ") && !text.contains("[robot]"),
             Wanted::Own => false,
+            Wanted::Any => true,
         }
     }
 }
 
-/// Text of a file of the user's: the one on the disk, else the one that comes with the tool.
+/// Text of a configuration file: the one on the disk, else the one that comes with the tool.
 ///
 /// # Errors
 /// [`ConfigError::Read`] where there is neither.
 pub fn text(path: &Path) -> Result<String, ConfigError> {
-    text_of_kind(path, Wanted::Own)
+    text_of_kind(path, Wanted::Any)
 }
 
 /// Text of a file of one kind, likewise.
@@ -193,7 +196,11 @@ impl RobotFile {
 impl ModelFile {
     /// Reads and checks a model file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse_in(&shown(path), &text(path)?, path.parent())
+        Self::parse_in(
+            &shown(path),
+            &text_of_kind(path, Wanted::Own)?,
+            path.parent(),
+        )
     }
 }
 
@@ -207,7 +214,7 @@ impl Trajectory {
 impl Campaign {
     /// Reads and checks a campaign file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        Self::parse(&shown(path), &text(path)?)
+        Self::parse(&shown(path), &text_of_kind(path, Wanted::Own)?)
     }
 }
 
