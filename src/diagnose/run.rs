@@ -52,6 +52,8 @@ pub enum DiagnoseError {
     Interrupted,
 }
 
+/// Most times that effects take the place of others.
+const MOST_REPLACEMENTS: usize = 3;
 /// Most disturbances that are cut out.
 const MOST_DISTURBANCES: usize = 8;
 
@@ -324,9 +326,12 @@ impl<'a> Diagnosing<'a> {
 
     /// Puts other effects in the place of some, where they say the same with fewer numbers or more; whether it did.
     fn replace(&mut self) -> Result<bool, DiagnoseError> {
-        if self.at.model.effects.is_empty() || self.case.limits.steps == 0 {
+        let replaced = |turn: &&Turn| matches!(turn, Turn::Replaced { .. });
+        let times = self.path.iter().filter(replaced).count();
+        if self.steps.is_empty() || times >= MOST_REPLACEMENTS {
             return Ok(false);
         }
+        let own: Vec<usize> = self.steps.iter().map(|s| s.effect).collect();
         let torques = self.problem.torques(&self.at.model);
         let of_fitted = self.case.fitted_torques(&torques);
         let residuals = residuals(&self.at.model, &self.stretches, of_fitted);
@@ -339,7 +344,7 @@ impl<'a> Diagnosing<'a> {
         let model = &self.at.model;
         let known = |effects: &[Added]| self.known.contains(&titles(model, effects));
         let (at, problem) = (&self.at, &self.problem);
-        let found = replacement(at, problem, self.case, &baseline, (&known, self.stop))?;
+        let found = replacement(at, problem, self.case, &baseline, &own, (&known, self.stop))?;
         self.unless_stopped()?;
         let Some(found) = found else {
             return Ok(false);

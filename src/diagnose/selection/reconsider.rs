@@ -25,13 +25,15 @@ pub(crate) struct Replacement {
     pub fitted: FittedModel,
 }
 
+/// Most single effects and pairs that others are looked for in the place of.
+const GROUPS: usize = 8;
 /// Sets that are fitted jointly, the likeliest, in the place of one effect or two.
 const FITTED: usize = 3;
 /// Least part of what the effects removed that another must remove with the shape that its search begins from.
 const NEEDED: f64 = 0.3;
 
 /// The first replacement that these data do not tell from what is there and that has fewer numbers, or that they tell
-/// to be better. `known` says which sets have been tried.
+/// to be better. Only effects in `found` go, by their indices; `known` says which sets have been tried.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -40,10 +42,13 @@ pub(crate) fn replacement(
     problem: &FitProblem,
     case: &Case,
     baseline: &Baseline,
+    found: &[usize],
     (known, stop): (&dyn Fn(&[Added]) -> bool, &(dyn Fn() -> bool + Sync)),
 ) -> Result<Option<Replacement>, MotionError> {
     let present = Errors::of(at, at, problem)?;
-    for gone in groups(&at.model.effects, at.weights.len()) {
+    let mut groups = groups(&at.model.effects, at.weights.len());
+    groups.retain(|gone| gone.iter().all(|i| found.contains(i)));
+    for gone in groups.into_iter().take(GROUPS) {
         if stop() {
             return Ok(None);
         }
