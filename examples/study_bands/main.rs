@@ -15,6 +15,7 @@ mod simulated;
 #[allow(dead_code)] // each study uses its share
 mod study;
 
+use std::cell::LazyCell;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -30,13 +31,14 @@ fn main() {
     let measured: Vec<Value> = (machines::ALL.iter())
         .filter_map(|machine| done.once(machine.name, &|| machine.study()))
         .collect();
-    let campaign = simulated::Campaign::new();
+    // the simulated campaign is fitted where a minute of it is still to be done
+    let campaign = LazyCell::new(simulated::Campaign::new);
     let simulated: Vec<Value> = (0..minutes)
         .filter_map(|seed| done.once(&format!("minute {seed}"), &|| Some(campaign.minute(seed))))
         .collect();
     let command = format!("cargo run --release --example study_bands -- {minutes}");
     let mut bands: Vec<Value> = measured.iter().map(machines::band_row).collect();
-    bands.push(simulated::band_row(&simulated));
+    bands.extend(simulated::merged(&simulated).iter().map(machines::band_row));
     write(
         &folder,
         "study_bands",
@@ -45,7 +47,11 @@ fn main() {
         bands,
     );
     let mut watch: Vec<Value> = measured.iter().map(machines::watch_row).collect();
-    watch.push(simulated::watch_row(&simulated));
+    watch.extend(
+        simulated::merged(&simulated)
+            .iter()
+            .map(machines::watch_row),
+    );
     write(
         &folder,
         "study_watch",

@@ -9,7 +9,7 @@ use cft_ident::simulate::cft::follow;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::machines::{Scored, band_row as row_of_bands, list, watch_row as row_of_watch};
+use super::machines::{Scored, list};
 use super::study::{along, block, noisy, series};
 
 /// Minutes that the model is fitted to.
@@ -54,8 +54,11 @@ impl Campaign {
     }
 }
 
-/// All minutes as one machine.
-fn merged(minutes: &[Value]) -> Value {
+/// All minutes as one machine; none of no minutes.
+pub fn merged(minutes: &[Value]) -> Option<Value> {
+    if minutes.is_empty() {
+        return None;
+    }
     let joints = minutes.first().map_or(0, |m| list(&m["coverage"]).len());
     let total = |of: &dyn Fn(&Value) -> f64| minutes.iter().map(of).sum::<f64>();
     let samples: Vec<f64> = (0..joints)
@@ -66,7 +69,7 @@ fn merged(minutes: &[Value]) -> Value {
         .collect();
     let widths: Vec<f64> = minutes.iter().flat_map(|m| list(&m["widths"])).collect();
     let beyond = [0, 1].map(|i| total(&|m| list(&m["beyond"])[i]));
-    json!({
+    Some(json!({
         "key": "CFT, simulated",
         "coverage": coverage,
         "samples": samples,
@@ -74,13 +77,5 @@ fn merged(minutes: &[Value]) -> Value {
         "beyond": beyond,
         "alarms": total(&|m| m["alarms"].as_f64().unwrap_or(0.0)) as u64,
         "watched_s": total(&|m| m["watched_s"].as_f64().unwrap_or(0.0)),
-    })
-}
-
-pub fn band_row(minutes: &[Value]) -> Value {
-    row_of_bands(&merged(minutes))
-}
-
-pub fn watch_row(minutes: &[Value]) -> Value {
-    row_of_watch(&merged(minutes))
+    }))
 }
