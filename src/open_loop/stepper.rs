@@ -154,7 +154,7 @@ mod tests {
             assert!(stepper.step(f64::from(k) * 1e-3, &[tau]));
         }
         assert!((stepper.q[0] - 0.25).abs() < 1e-9, "{}", stepper.q[0]);
-        assert_eq!(stepper.v[0], 0.0);
+        assert!(stepper.v[0].abs() < 1e-12, "{}", stepper.v[0]);
     }
 
     #[test]
