@@ -319,6 +319,10 @@ fn filters_limits_and_simulator_settings_that_cannot_be_are_refused() {
             ["is empty", "lower end"],
         ),
         ("[limits.q4]\nspeed = -2\n", ["is -2", "limits.q4.speed"]),
+        (
+            "[drive.q4]\nbacklash_max = -1\n",
+            ["is -1", "drive.q4.backlash_max"],
+        ),
         ("[control]\nkp = [1, 2]\n", ["2 numbers", "give 4"]),
         ("[control]\nrate_hz = 0\n", ["is 0", "control.rate_hz"]),
         ("[sensors]\ndropouts = 0.7\n", ["0.5", "sensors.dropouts"]),
@@ -328,6 +332,8 @@ fn filters_limits_and_simulator_settings_that_cannot_be_are_refused() {
         robot_refused(CFT, rest, &words);
     }
     robot_refused(CFT, "[limits.x_c9]\n", &["limits.x_c9", "x_c1"]);
+    robot_refused(CFT, "[drive.q9]\n", &["drive.q9", "q1"]);
+    robot_refused(CFT, "[drive.q4]\nkind = \"magic\"\n", &["harmonic"]);
     robot_refused(
         CFT,
         "[sensors]\ntorque_noise = [1, 1, 1, 1]\ntorque_noise_relative = 0.1\n",

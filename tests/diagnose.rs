@@ -127,7 +127,8 @@ fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_
     );
     assert_eq!(found["verdict"], "effects-found");
     let named = effects(&found);
-    for effect in ["asymmetric-friction", "delay", "stribeck"] {
+    // friction that does not jump at rest, and no Stribeck friction of a negative size
+    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
         assert!(named.contains(&(effect, Some("q1"))), "{named:?}");
     }
     assert!((mean(&found, "before", "train") - 0.071).abs() < 0.002);
@@ -160,7 +161,7 @@ fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_
         at,
         &["diagnose", &id, "-m", "refined.toml", "--holdout", &unseen],
     );
-    for effect in ["asymmetric-friction", "delay", "stribeck"] {
+    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
         assert!(!effects(&again).contains(&(effect, Some("q1"))), "{effect}");
     }
 }
@@ -234,6 +235,17 @@ fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads()
         mean(&found, "after", "holdout"),
     );
     assert!(after < 0.9 * before, "{before} {after}");
+    // one joint: its error is the mean, and the interval of the change says that it falls
+    let joint = &step["joints"][0];
+    assert_eq!(joint["joint"], "q1");
+    for (key, mean) in [("before", "holdout_before"), ("after", "holdout_after")] {
+        assert_eq!(joint[key], step[mean]);
+    }
+    assert!(joint["interval_95"][1].as_f64().unwrap() < 0.0, "{joint}");
+    assert_eq!(joint["worsened"], false);
+    assert_eq!(step["holdout_worsened"], false);
+    // without noise something is left above it, whatever is found
+    assert_eq!(step["status"], "tentative", "{step}");
     assert_eq!(found, diagnose("1"));
 }
 
@@ -244,7 +256,7 @@ type Torque<'a> = &'a dyn Fn(f64, f64) -> f64;
 fn add_torque(from: &Path, to: &Path, torque: Torque) {
     let mut log = csv::Reader::from_path(from).unwrap();
     let header = log.headers().unwrap().clone();
-    assert_eq!(header.iter().collect::<Vec<_>>(), ["t", "q1", "tau1"]);
+    assert_eq!(header.len(), 3, "{header:?}");
     let rows: Vec<[f64; 3]> = log.deserialize().map(|row| row.unwrap()).collect();
     let noise = rand_distr::Normal::new(0.0, 0.5).unwrap();
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(7);
@@ -297,6 +309,133 @@ fn what_the_catalogue_does_not_have_is_unexplained_and_not_its_nearest_neighbour
         let share = left["share"].as_f64().unwrap();
         assert!((0.0005..0.003).contains(&share), "{name}: {share}");
         assert!(left["over_floor"].as_f64().unwrap() > 50.0, "{name}");
+    }
+}
+
+/// Robot and model of a slide whose friction is smooth at rest.
+const SMOOTH: &str = r#"
+[robot]
+model = "single-joint"
+joint = "q1"
+kind = "prismatic"
+
+[friction]
+law = "double-tanh"
+
+[filter]
+cutoff_hz = 20.0
+
+[limits.q1]
+position = [0.0, 0.25]
+
+[[parameter]]
+name = "inertia"
+value = 95.0
+unit = "kg"
+
+[[parameter]]
+name = "viscous"
+joint = "q1"
+value = 200.0
+unit = "N s/m"
+
+[[parameter]]
+name = "coulomb_1"
+joint = "q1"
+value = 20.0
+unit = "N"
+
+[[parameter]]
+name = "coulomb_2"
+joint = "q1"
+value = 0.0
+unit = "N"
+
+[[parameter]]
+name = "slope_1"
+joint = "q1"
+value = 60.0
+unit = "s/m"
+
+[[parameter]]
+name = "slope_2"
+joint = "q1"
+value = 10.0
+unit = "s/m"
+"#;
+
+#[test]
+fn friction_that_varies_along_the_travel_of_a_smooth_law_is_one_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("smooth.toml"), SMOOTH).unwrap();
+    let robot = SMOOTH.split("[[parameter]]").next().unwrap();
+    std::fs::write(at.join("robot.toml"), robot).unwrap();
+    for (log, seed) in [("log.csv", "2"), ("unseen.csv", "3")] {
+        let simulate = "simulate -r robot.toml -m smooth.toml --seconds 25 --seed";
+        let mut arguments: Vec<&str> = simulate.split(' ').collect();
+        arguments.extend([seed, "-o", log]);
+        run(at, &arguments);
+        let wave = |q: f64| 3.0 * (std::f64::consts::TAU * 20.0 * q + 0.3).sin();
+        let friction = |q: f64, v: f64| (60.0 * v).tanh() * wave(q);
+        add_torque(&at.join(log), &at.join(format!("with-{log}")), &friction);
+    }
+    let found = run(
+        at,
+        &[
+            "diagnose",
+            "with-log.csv",
+            "-m",
+            "smooth.toml",
+            "--holdout",
+            "with-unseen.csv",
+        ],
+    );
+    let friction = |e: &&(&str, Option<&str>)| e.0 != "delay";
+    let named: Vec<_> = effects(&found)
+        .into_iter()
+        .filter(|e| friction(&e))
+        .collect();
+    assert_eq!(named, [("position-friction", Some("q1"))]);
+}
+
+/// Simulator and estimator draw the same curves, each by an algorithm of its own.
+#[test]
+fn a_curve_of_a_model_file_is_the_torque_that_the_simulator_adds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "plain.csv", "12", "2", &[]);
+    let error = |log: &str, model: &str| {
+        let found = run(at, &["validate", log, "-m", model]);
+        // friction at rest is no curve
+        let error = &found["joints"][0]["relative_error_moving"];
+        error.as_f64().unwrap()
+    };
+    let model = std::fs::read_to_string(at.join("drive.toml")).unwrap();
+    // position, position by direction, speed, way since the last reversal
+    for (signal, from, to) in [
+        (1, 0.0, 0.25),
+        (2, 0.0, 0.25),
+        (3, -0.2, 0.2),
+        (5, 0.0, 0.1),
+    ] {
+        let mut curve = "[[effect]]\nname = \"empirical\"\njoint = \"q1\"\n".to_owned();
+        let knots = [6.0, -18.0, 9.0, 24.0, -12.0, 15.0].into_iter().enumerate();
+        let knots = knots.map(|(i, m)| (format!("m_{}", i + 1), m));
+        let shape = [("signal", f64::from(signal)), ("from", from), ("to", to)];
+        let shape = shape.map(|(key, x)| (key.to_owned(), x));
+        for (key, value) in shape.into_iter().chain(knots) {
+            curve += &format!("[effect.parameters.{key}]\nvalue = {value:?}\n");
+        }
+        std::fs::write(at.join("curve.toml"), format!("{model}\n{curve}")).unwrap();
+        let simulate = "simulate -r robot.toml -m curve.toml --seconds 12 --seed 2 -o curve.csv";
+        run(at, &simulate.split(' ').collect::<Vec<_>>());
+        let (with, without) = (
+            error("curve.csv", "curve.toml"),
+            error("curve.csv", "drive.toml"),
+        );
+        println!("{signal}: {with} {without}");
+        assert!(with < 0.02 && without > 0.1, "{signal}");
     }
 }
 

@@ -99,7 +99,20 @@ fn a_gain_is_found_with_its_factor_where_the_model_is_held() {
     loaded("gain.csv", "gain:q4:k=0.03");
     let found = run(unloaded(), "diagnose gain.csv -m model.toml --keep");
     assert_eq!(effects(&found), ["gain"]);
-    assert_eq!(found["steps"][0]["joint"], "q4");
+    let step = &found["steps"][0];
+    assert_eq!(step["joint"], "q4");
+    // held-out data confirm it joint by joint, and only the joint that it sits on gains
+    let joints = step["joints"].as_array().unwrap();
+    let names: Vec<&str> = joints
+        .iter()
+        .map(|j| j["joint"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, JOINTS);
+    for joint in joints {
+        let high = joint["interval_95"][1].as_f64().unwrap();
+        assert_eq!(high < 0.0, joint["joint"] == "q4", "{joint}");
+        assert_eq!(joint["worsened"], false, "{joint}");
+    }
     let (value, std) = number(&found, "k");
     assert!(
         (value - 0.03).abs() < 4.0 * std && std < 0.001,
@@ -188,8 +201,12 @@ fn what_a_narrow_position_filter_makes_is_no_effect() {
 
 #[test]
 fn joints_that_are_held_are_no_candidates_and_have_no_error() {
-    let found = run(unloaded(), "diagnose q1.csv -m model.toml");
+    let found = run(unloaded(), "diagnose q1.csv -m model.toml -o same.toml");
     assert_eq!(found["verdict"], "nothing-missing");
+    // no effect, no new model
+    let text = |name: &str| std::fs::read_to_string(unloaded().join(name)).unwrap();
+    assert_eq!(text("same.toml"), text("model.toml"));
+    assert_eq!(found["before"], found["after"]);
     let candidates = found["candidates"].as_array().unwrap();
     let mut held = 0;
     for c in candidates {

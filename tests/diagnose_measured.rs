@@ -57,6 +57,11 @@ const SETS: &[Set] = &[
         &["tx40/tx40_joint.csv@0..70%"],
         &["tx40/tx40_joint.csv@70..100%"],
     ),
+    set(
+        "configs/pendulum.toml",
+        &["pendulum/060143.csv"],
+        &["pendulum/060245.csv"],
+    ),
 ];
 
 const fn set(
@@ -102,6 +107,36 @@ fn assert_covariance(model: &toml::Value) {
     }
 }
 
+/// No effect has a number that no machine has, or a size that its deviation passes half of.
+#[track_caller]
+fn assert_names(found: &Value) {
+    for step in found["steps"].as_array().unwrap() {
+        let value = |key: &str| step["parameters"][key]["value"].as_f64().unwrap();
+        let std = |key: &str| step["parameters"][key]["std"].as_f64();
+        let known = |key: &str| match std(key) {
+            Some(std) => std <= 0.5 * value(key).abs(),
+            None => step["parameters"][key]["bound"] == true,
+        };
+        let turns = step["parameters"]["gap"]["unit"] == "rad";
+        let holds = match step["effect"].as_str().unwrap() {
+            "stribeck" => value("c") >= 0.0 && known("vs"),
+            "smooth-coulomb" => value("fc") >= 0.0 && known("vs"),
+            "load-friction" => value("mu_c") >= 0.0 && value("mu_v") >= 0.0 && known("w"),
+            "drive-efficiency" => (0.0..=0.6).contains(&value("k")),
+            "backlash" => value("gap") <= if turns { 0.03 } else { 2e-3 },
+            "presliding" => value("sigma0") > 0.0 && known("sigma0"),
+            "elasticity" => value("damping") <= 0.5 && value("inertia") > 0.0,
+            "delay" => value("d").abs() <= 0.1 && known("d"),
+            "warm-up" => value("T") >= 5.0 && known("T"),
+            "gain" => known("k"),
+            "rotor-inertia" => value("J") > 0.0 && known("J"),
+            "empirical" => step["status"] == "empirical",
+            _ => true,
+        };
+        assert!(holds, "{step}");
+    }
+}
+
 #[test]
 fn the_final_model_is_no_worse_on_unseen_data_than_the_declared_one() {
     for set in SETS {
@@ -123,6 +158,7 @@ fn the_final_model_is_no_worse_on_unseen_data_than_the_declared_one() {
         }
         diagnose.extend(words("-o refined.toml"));
         let found = run(folder.path(), &diagnose);
+        assert_names(&found);
         let text = std::fs::read_to_string(folder.path().join("refined.toml")).unwrap();
         assert_covariance(&toml::from_str(&text).unwrap());
         let joints = |when: &str| found[when]["holdout"]["joints"].as_array().unwrap().clone();

@@ -69,6 +69,28 @@ fn links(text: &str) -> Vec<&str> {
 }
 
 #[test]
+fn the_page_tells_of_every_effect_whose_numbers_have_a_range() {
+    let page = fs::read_to_string(root().join("docs/closing-the-loop.md")).unwrap();
+    let (_, rest) = page.split_once("## What a name must satisfy").unwrap();
+    let (section, _) = rest.split_once("\n## ").unwrap();
+    let rows = section.lines().filter(|line| line.starts_with("| "));
+    let names = rows
+        .skip(2)
+        .flat_map(|row| row.split('|').nth(1).unwrap().split(','));
+    let told: Vec<&str> = names.map(str::trim).collect();
+    let mut held: Vec<&str> = cft_ident::effect::LAWS
+        .iter()
+        .filter(|law| !law.entry.must.is_empty())
+        .map(|law| law.entry.name)
+        .collect();
+    held.dedup();
+    for name in &held {
+        assert!(told.contains(name), "{name} is not told of");
+    }
+    assert_eq!(told.len(), held.len(), "{told:?}");
+}
+
+#[test]
 fn every_link_inside_the_repository_leads_somewhere() {
     for path in blocks::documents(root()) {
         let text = fs::read_to_string(&path).unwrap();

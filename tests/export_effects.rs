@@ -47,14 +47,9 @@ fn shape(key: &str, i: usize) -> f64 {
 /// An effect of the catalogue with numbers of its own.
 fn some(law: &'static Law, place: Place) -> Added {
     let keys = law.shape.iter().enumerate();
-    Added {
-        law,
-        place,
-        shape: keys.map(|(i, key)| shape(key, i)).collect(),
-        linear: (0..law.linear.len())
-            .map(|i| 0.7 + 0.31 * i as f64)
-            .collect(),
-    }
+    let shape = keys.map(|(i, key)| shape(key, i)).collect();
+    let linear = (0..law.linear.len()).map(|i| 0.7 + 0.31 * i as f64);
+    Added::new(law, place, shape, linear.collect())
 }
 
 /// One of each kind of place.

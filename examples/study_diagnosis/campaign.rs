@@ -611,6 +611,7 @@ impl Campaign {
             filters: ParallelFilters::design(&lab.processing, &self.stretches).expect("a filter"),
             cutoff_hz: lab.processing.cutoff_hz,
             rest_speed: vec![-1.0; joints],
+            drives: vec![Default::default(); joints],
             units: (0..joints)
                 .map(|j| lab.robot.joint_unit(j).to_owned())
                 .collect(),

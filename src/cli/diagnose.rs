@@ -141,7 +141,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if let Some(path) = &args.output {
         context.write_text(path, &found.model(&machine, &file).to_toml()?)?;
-        let written = format!("written: {}", path.display());
+        let unchanged = match found.diagnosis.steps.is_empty() {
+            true => ", the given model unchanged: nothing was added",
+            false => "",
+        };
+        let written = format!("written: {}{unchanged}", path.display());
         report.terminal().line(&written);
     }
     Ok(Outcome {

@@ -17,6 +17,12 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
         document.not_negative(&at("torque_std"), noise.torque_std)?;
     }
     limits(file, document)?;
+    document.known_names(&["drive"], &file.drive, &file.joint_names())?;
+    for (joint, drive) in &file.drive {
+        let at = |key| ["drive", joint.as_str(), key];
+        document.not_negative(&at("backlash_max"), drive.backlash_max)?;
+        document.not_negative(&at("presliding_max"), drive.presliding_max)?;
+    }
     simulator(file, document)
 }
 

@@ -21,6 +21,7 @@ use super::robot_file::{
 use super::robot_file::{ModelKind, Notes};
 use super::{ConfigError, check, urdf};
 use crate::log::LogSection;
+use crate::robot::drive::Drive;
 
 /// The file as it is written: the sections of a robot file, and what was identified.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -38,6 +39,8 @@ pub(super) struct ModelToml {
     noise: NoiseSection,
     #[serde(default)]
     limits: BTreeMap<String, CoordinateLimits>,
+    #[serde(default)]
+    drive: BTreeMap<String, Drive>,
     #[serde(default)]
     control: ControlSection,
     #[serde(default)]
@@ -86,6 +89,7 @@ impl ModelFile {
             filter: raw.filter,
             noise: raw.noise,
             limits: raw.limits,
+            drive: raw.drive,
             control: raw.control,
             sensors: raw.sensors,
             notes: Notes::default(),

@@ -9,6 +9,7 @@ use super::document::is_default;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::log::LogSection;
 use crate::robot::cft::{self, Setup, Structure};
+use crate::robot::drive::Drive;
 use crate::robot::{JointKind, Robot};
 
 /// `[robot] model`.
@@ -301,6 +302,9 @@ pub struct RobotFile {
     /// Limits by joint or actuator coordinate.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub limits: BTreeMap<String, CoordinateLimits>,
+    /// Drives by joint: what play and presliding it can have.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub drive: BTreeMap<String, Drive>,
     /// Controller of the simulator.
     #[serde(default, skip_serializing_if = "is_default")]
     pub control: ControlSection,

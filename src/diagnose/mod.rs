@@ -23,9 +23,11 @@
 //! | `run` | the loop over all of these |
 
 mod candidates;
+mod error;
 mod faults;
 mod outcome;
 mod placebo;
+mod prepare;
 mod problem;
 mod run;
 mod selection;
@@ -34,16 +36,17 @@ mod unexplained;
 
 pub use candidates::candidate::Candidate;
 pub use candidates::score::CandidateScore;
+pub use error::DiagnoseError;
 pub use faults::channels::Suspicion;
 pub use faults::disturbance::CutDisturbance;
-pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors, Turn};
+pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors, StepStatus, Turn};
 pub use problem::case::{Case, SelectionLimits};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::prior::ParameterPrior;
 pub use problem::unknowns::{FreeParameters, Unknown};
 pub use problem::wide_motion::{TIMES as WIDE_TIMES, WideMotion};
-pub use run::{DiagnoseError, diagnose};
+pub use run::diagnose;
 pub use unexplained::dependence::{Dependence, Signal};
-pub use unexplained::errors::{Errors, JointErrors, OverallErrors};
+pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};
 pub use unexplained::evidence::{JointEvidence, evidence};
 pub use unexplained::{STRUCTURED, Unexplained};

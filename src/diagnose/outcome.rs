@@ -1,15 +1,18 @@
 //! What a diagnosis finds.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::candidates::candidate::Candidate;
 use super::faults::disturbance::CutDisturbance;
 use super::problem::data_split::SetAside;
 use super::problem::unknowns::Unknown;
+use super::uncertainty::covariance;
 use super::unexplained::Unexplained;
 use super::unexplained::dependence::Dependence;
-use super::unexplained::errors::Errors;
-use crate::effect::{Added, AugmentedModel};
+use super::unexplained::errors::{Errors, JointChange};
+use crate::effect::AugmentedModel;
 
 /// Part of a joint's structure that may be left where effects are named for the rest of it.
 const NAMED: f64 = 0.1;
@@ -24,6 +27,36 @@ pub struct AcceptedEffect {
     pub alternatives: Vec<Candidate>,
     /// Mean relative error on the holdout before and after the step.
     pub holdout: Option<[f64; 2]>,
+    /// The same joint by joint.
+    pub joints: Vec<JointChange>,
+}
+
+/// How firm the name of an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StepStatus {
+    /// These data separate it from all other candidates, nothing else is left that chance does not explain, and
+    /// data that decided nothing confirm it.
+    Assured,
+    /// One of these does not hold.
+    Tentative,
+    /// A curve that was measured, and no named law.
+    Empirical,
+}
+
+impl AcceptedEffect {
+    /// Whether data that decided nothing confirm the step: the 95 % CI of the change of the error lies below zero
+    /// on a joint, and above it on none.
+    pub fn confirmed(&self) -> bool {
+        self.joints.iter().any(JointChange::improved) && !self.worsens()
+    }
+
+    /// Whether it makes data that decided nothing worse: as the mean over the joints, or on one of them by its
+    /// whole interval.
+    pub fn worsens(&self) -> bool {
+        self.holdout.is_some_and(|[before, after]| after > before)
+            || self.joints.iter().any(|j| j.worsened)
+    }
 }
 
 /// One turn of the search.
@@ -49,9 +82,9 @@ pub struct SplitErrors {
 
 /// The outcome.
 pub struct Diagnosis {
-    /// The model with what was added.
+    /// The model with what was added, all refitted; the given one where nothing was added.
     pub model: AugmentedModel,
-    /// Unknowns of the final fit and their covariance.
+    /// Unknowns of the final fit and their covariance; where nothing was added, of the given model's refit.
     pub unknowns: Vec<Unknown>,
     pub covariance: DMatrix<f64>,
     pub steps: Vec<AcceptedEffect>,
@@ -105,6 +138,17 @@ impl Diagnosis {
         !self.structured() && self.remainder().next().is_none()
     }
 
+    /// How firm the name of a step's effect is.
+    pub fn status(&self, step: &AcceptedEffect) -> StepStatus {
+        if self.model.effects[step.effect].curve().is_some() {
+            return StepStatus::Empirical;
+        }
+        match step.alternatives.is_empty() && self.assured() && step.confirmed() {
+            true => StepStatus::Assured,
+            false => StepStatus::Tentative,
+        }
+    }
+
     /// Whether what was added leaves at most a small part of the structure on the joints that a step's effect
     /// touches, so that there is something to its name.
     pub fn explained(&self, step: &AcceptedEffect) -> bool {
@@ -115,30 +159,6 @@ impl Diagnosis {
 
     /// Covariance of (shape, linear) of one effect, row-major; a shape that was not refined has none.
     pub fn covariance_of(&self, effect: usize) -> Vec<f64> {
-        let added: &Added = &self.model.effects[effect];
-        let k = added.parameters();
-        let shapes = added.shape.len();
-        let place = |wanted: Unknown| self.unknowns.iter().position(|u| *u == wanted);
-        let places: Vec<Option<usize>> = (0..k)
-            .map(|i| {
-                if i < shapes {
-                    place(Unknown::Shape { effect, k: i })
-                } else {
-                    place(Unknown::Linear {
-                        effect,
-                        k: i - shapes,
-                    })
-                }
-            })
-            .collect();
-        let mut out = vec![0.0; k * k];
-        for (a, pa) in places.iter().enumerate() {
-            for (b, pb) in places.iter().enumerate() {
-                if let (Some(pa), Some(pb)) = (pa, pb) {
-                    out[a * k + b] = self.covariance[(*pa, *pb)];
-                }
-            }
-        }
-        out
+        covariance::of_effect(&self.unknowns, &self.covariance, &self.model, effect)
     }
 }

@@ -8,52 +8,34 @@ use super::candidates::baseline::Baseline;
 use super::candidates::candidate::Candidate;
 use super::candidates::orders;
 use super::candidates::search::search;
-use super::faults::channels::{Suspicion, suspicion};
+use super::error::DiagnoseError;
 use super::faults::disturbance::{self, CutDisturbance};
 use super::outcome::{AcceptedEffect, Diagnosis, SplitErrors, Turn};
+use super::prepare::{check, data_split};
 use super::problem::case::Case;
-use super::problem::data_split::{DataSplit, LogRole, RowRole};
+use super::problem::data_split::{LogRole, RowRole};
 use super::problem::fit::{FittedModel, fit};
 use super::problem::fit_problem::{FitProblem, inertial_of};
 use super::problem::rests::rest_weight;
 use super::problem::unknowns::Unknowns;
 use super::selection::accept::{accept, beyond_chance};
 use super::selection::choose::{alternatives, choose};
-use super::selection::reconsider::replacement;
+use super::selection::physics::{refused, seen, settled};
+use super::selection::reconsider::{replacement, titles};
 use super::selection::removal::superfluous;
+use super::selection::stand_in::stand_in;
 use super::uncertainty::covariance::covariance;
 use super::unexplained::dependence::dependences;
-use super::unexplained::errors::{Counted, Errors, errors};
+use super::unexplained::errors::{self, Counted, Errors, Pieces};
 use super::unexplained::{noise, part_unexplained, unexplained};
-use crate::effect::{Added, AugmentedModel, Cover, Law, Place, Search, Torques, stationary_joints};
+use crate::effect::{Added, AugmentedModel, Cover, Law, Place, Torques};
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
-/// Why no diagnosis came out.
-#[derive(Debug, thiserror::Error)]
-pub enum DiagnoseError {
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    #[error(
-        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
-         unknowns; give a longer log, or logs of their own by --veto and --holdout"
-    )]
-    TooFewRows { rows: usize, unknowns: usize },
-    #[error(
-        "these logs determine none of the {unknowns} unknowns of the model; log a motion of every joint"
-    )]
-    NothingDetermined { unknowns: usize },
-    #[error("the torque of joint {joint} is zero throughout; check its channel")]
-    NoTorque { joint: String },
-    #[error("a torque channel looks sign-flipped or swapped")]
-    Channels(Suspicion),
-    #[error("interrupted")]
-    Interrupted,
-}
-
 /// Most times that effects take the place of others.
 const MOST_REPLACEMENTS: usize = 3;
+
 /// Most disturbances that are cut out.
 const MOST_DISTURBANCES: usize = 8;
 
@@ -80,6 +62,7 @@ pub fn diagnose(
             break;
         }
     }
+    work.drop_refused()?;
     work.evaluate()
 }
 
@@ -105,6 +88,10 @@ struct Diagnosing<'a> {
     disturbances: Vec<CutDisturbance>,
     /// Candidates that came to nothing.
     candidates: Vec<Candidate>,
+    /// Noise in the residual, per joint, of the round that is under way.
+    noise: Vec<f64>,
+    /// Covariance of the last fit, once it is known.
+    covariance: Option<DMatrix<f64>>,
 }
 
 impl<'a> Diagnosing<'a> {
@@ -157,6 +144,8 @@ impl<'a> Diagnosing<'a> {
             known: Vec::new(),
             disturbances: Vec::new(),
             candidates: Vec::new(),
+            noise: Vec::new(),
+            covariance: None,
         })
     }
 
@@ -193,7 +182,7 @@ impl<'a> Diagnosing<'a> {
     fn search(&mut self) -> Result<Vec<Candidate>, DiagnoseError> {
         let case = self.case;
         let squares = || self.at.base.residual_squares(&self.problem.split);
-        let declared = self.declared.get_or_insert_with(squares);
+        let declared = self.declared.get_or_insert_with(squares).clone();
         let torques = self.problem.torques(&self.at.model);
         let of_fitted = case.fitted_torques(&torques);
         let residuals = residuals(&self.at.model, &self.stretches, of_fitted);
@@ -204,35 +193,54 @@ impl<'a> Diagnosing<'a> {
             return Ok(Vec::new());
         }
         let baseline = Baseline {
-            declared,
+            declared: &declared,
             noise: &noise,
         };
         let (at, problem) = (&self.at, &self.problem);
         let all = |_: &Law, _: Place| true;
-        let mut found = search(
-            at,
-            problem,
-            case,
-            &baseline,
-            &torques,
-            (&all, 0.0),
-            self.stop,
-        )?;
-        accept(
-            &mut found.candidates,
-            &case.limits,
-            (at, &problem.split),
-            &baseline,
-        );
+        let wanted = (&all as &(dyn Fn(&Law, Place) -> bool + Sync), 0.0);
+        let mut found = search(at, problem, case, &baseline, &torques, wanted, self.stop)?;
+        self.judge(&mut found.candidates, &baseline);
         let wide = case.wide.as_ref();
         beyond_chance(&mut found, &case.limits, (at, problem), &torques, wide)?;
-        Ok(found.candidates)
+        let found = found.candidates;
+        self.noise = noise;
+        Ok(found)
+    }
+
+    /// Decides on candidates but for chance.
+    fn judge(&self, found: &mut [Candidate], baseline: &Baseline) {
+        let (case, at, problem) = (self.case, &self.at, &self.problem);
+        let seen = |place| seen(&at.model, &problem.cover, &case.drives, place);
+        accept(found, &case.limits, (at, &problem.split), baseline, &seen);
+    }
+
+    /// Adds to the candidates a curve in the place of each whose numbers no machine has, where there is one to add.
+    fn add_curves(&self, found: &mut Vec<Candidate>) -> Result<(), MotionError> {
+        let baseline = Baseline {
+            declared: self.declared.as_deref().unwrap_or_default(),
+            noise: &self.noise,
+        };
+        let impossible = found.iter().filter(|c| c.impossible).cloned();
+        for refused in impossible.collect::<Vec<_>>() {
+            let curve = stand_in(&refused, &self.at, &self.problem, found)?;
+            let mut curve = Vec::from_iter(curve);
+            self.judge(&mut curve, &baseline);
+            found.extend(curve);
+        }
+        Ok(())
     }
 
     /// Adds the best of the accepted candidates that a joint refit confirms; whether there is one. The others
     /// are kept for the report where it is the last round.
     fn add_best(&mut self, mut found: Vec<Candidate>) -> Result<bool, DiagnoseError> {
-        let Some((chosen, others, fitted)) = self.confirmed(&mut found)? else {
+        let mut best = self.confirmed(&mut found)?;
+        if best.is_none() {
+            // a curve is the last resort: it fits what a name would explain
+            self.add_curves(&mut found)?;
+            best = self.confirmed(&mut found)?;
+        }
+        let Some((chosen, others, fitted)) = best else {
             for candidate in found.iter_mut().filter(|c| c.accepted) {
                 candidate.accepted = false;
                 candidate.reason =
@@ -252,6 +260,7 @@ impl<'a> Diagnosing<'a> {
             candidate: found[chosen].clone(),
             alternatives: alternatives(&found, chosen, &others, robot.joints()),
             holdout: None,
+            joints: Vec::new(),
         });
         self.models.push(fitted.model.clone());
         self.at = fitted;
@@ -282,6 +291,16 @@ impl<'a> Diagnosing<'a> {
                 continue;
             }
             let fitted = fit(&model, &self.problem)?;
+            let newest = fitted.model.effects.len() - 1;
+            let fitted = match settled(fitted, &self.problem, self.case, newest)? {
+                Ok(fitted) => fitted,
+                Err(refusal) => {
+                    found[chosen].reject(&refusal.reason);
+                    found[chosen].impossible = refusal.impossible;
+                    vetoed.push(chosen);
+                    continue;
+                }
+            };
             let vetoing = |of: &FittedModel| of.veto_squares(&fitted.weights, split);
             let kept = !self.case.limits.vetoes(&vetoing(at), &vetoing(&fitted));
             if kept && fitted.square_with(&at.weights, split) < at.square {
@@ -298,17 +317,46 @@ impl<'a> Diagnosing<'a> {
     fn drop_superfluous(&mut self) -> Result<bool, DiagnoseError> {
         let before = self.at.model.effects.len();
         while let Some(effect) = superfluous(&self.at, &self.problem, &self.case.limits)? {
-            let mut model = self.at.model.clone();
-            let title = model.effects[effect].title(&model.model.robot);
+            let title = self.at.model.effects[effect].title(&self.at.model.model.robot);
             (self.progress)(&format!("{title} is not needed any more"));
-            model.effects.remove(effect);
-            self.at = fit(&model, &self.problem)?;
-            self.forget(effect);
-            self.known
-                .push(titles(&self.at.model, &self.at.model.effects));
-            self.path.push(Turn::Dropped(title));
+            self.drop(effect)?;
         }
         Ok(self.at.model.effects.len() < before)
+    }
+
+    /// Takes an effect out of the model and fits the rest again; the step that it came with.
+    fn drop(&mut self, effect: usize) -> Result<Option<AcceptedEffect>, MotionError> {
+        let mut model = self.at.model.clone();
+        let gone = model.effects.remove(effect);
+        self.at = fit(&model, &self.problem)?;
+        self.known
+            .push(titles(&self.at.model, &self.at.model.effects));
+        let title = gone.title(&model.model.robot);
+        self.path.push(Turn::Dropped(title));
+        Ok(self.forget(effect))
+    }
+
+    /// What the whole covariance of the last fit says to be unknown, or beyond what a machine has, goes too.
+    fn drop_refused(&mut self) -> Result<(), DiagnoseError> {
+        while self.case.limits.deviations && !self.steps.is_empty() {
+            let covariance = covariance(&self.at, &self.problem, self.case.cutoff_hz)?;
+            let refused = self.steps.iter().find_map(|step| {
+                let of = (step.effect, &covariance);
+                let refusal = refused(&self.at, &self.problem, self.case, of)?;
+                Some((step.effect, refusal))
+            });
+            let Some((effect, refusal)) = refused else {
+                self.covariance = Some(covariance);
+                return Ok(());
+            };
+            self.unless_stopped()?;
+            if let Some(step) = self.drop(effect)? {
+                let mut gone = step.candidate;
+                gone.reject(&refusal.reason);
+                self.candidates.push(gone);
+            }
+        }
+        Ok(())
     }
 
     /// The step that an effect of the model came with, and the places of the others beside it.
@@ -346,9 +394,19 @@ impl<'a> Diagnosing<'a> {
         let (at, problem) = (&self.at, &self.problem);
         let found = replacement(at, problem, self.case, &baseline, &own, (&known, self.stop))?;
         self.unless_stopped()?;
-        let Some(found) = found else {
+        let Some(mut found) = found else {
             return Ok(false);
         };
+        let first = found.fitted.model.effects.len() - found.come.len();
+        let tried = titles(&found.fitted.model, &found.fitted.model.effects);
+        match settled(found.fitted, &self.problem, self.case, first)? {
+            Ok(fitted) => found.fitted = fitted,
+            // numbers that no machine has, or that these data do not tell: another set is tried
+            Err(_) => {
+                self.known.push(tried);
+                return self.replace();
+            }
+        }
         let named = |effects: &[Added]| -> Vec<String> {
             let robot = &self.case.given.model.robot;
             effects.iter().map(|e| e.title(robot)).collect()
@@ -375,7 +433,6 @@ impl<'a> Diagnosing<'a> {
                 (a, b) => a.or(b),
             };
         }
-        let first = found.fitted.model.effects.len() - found.come.len();
         for (i, mut candidate) in found.come.into_iter().enumerate() {
             candidate.accepted = true;
             candidate.significant = true;
@@ -386,6 +443,7 @@ impl<'a> Diagnosing<'a> {
                 candidate,
                 alternatives: Vec::new(),
                 holdout: None,
+                joints: Vec::new(),
             });
             self.models.push(found.fitted.model.clone());
         }
@@ -399,16 +457,24 @@ impl<'a> Diagnosing<'a> {
     /// Everything is decided: the holdout may be looked at.
     fn evaluate(mut self) -> Result<Diagnosis, DiagnoseError> {
         let case = self.case;
-        let mean = |model| {
-            let errors = self.errors(model, &is_holdout, Counted::All)?;
-            Ok(errors.map(|e| e.overall.mean_relative_error))
-        };
-        let means = self.models.iter().map(mean);
-        let means = means.collect::<Result<Vec<_>, MotionError>>()?;
-        for (step, pair) in self.steps.iter_mut().zip(means.windows(2)) {
-            step.holdout = pair[0].zip(pair[1]).map(|(before, after)| [before, after]);
+        let unseen = |model| self.pieces(model, &is_holdout, Counted::All);
+        let unseen = self.models.iter().map(unseen);
+        let unseen = unseen.collect::<Result<Vec<_>, MotionError>>()?;
+        let joints = case.given.model.robot.joint_names();
+        for (step, pair) in self.steps.iter_mut().zip(unseen.windows(2)) {
+            let [before, after] = [&pair[0], &pair[1]];
+            let means = [before, after].map(errors::mean_relative_error);
+            step.holdout = means[0]
+                .zip(means[1])
+                .map(|(before, after)| [before, after]);
+            step.joints = errors::changes(joints, before, after);
         }
-        let last = &self.at.model;
+        // without an effect the given model stands; what it lacks is judged with its numbers refitted, for those
+        // that other logs gave are no missing physics
+        let last = match self.steps.is_empty() {
+            true => &case.given,
+            false => &self.at.model,
+        };
         let before = self.split_errors(&case.given, Counted::All)?;
         let refitted = self.split_errors(&self.models[0], Counted::All)?.train;
         let after = self.split_errors(last, Counted::All)?;
@@ -422,9 +488,12 @@ impl<'a> Diagnosing<'a> {
         let (given, found) = match case.given.model.friction.iter().any(JointFriction::jumps) {
             true => (
                 self.split_errors(&case.given, Counted::Moving)?,
-                self.split_errors(last, Counted::Moving)?,
+                self.split_errors(&self.at.model, Counted::Moving)?,
             ),
-            false => (before.clone(), after.clone()),
+            false => (
+                before.clone(),
+                self.split_errors(&self.at.model, Counted::All)?,
+            ),
         };
         self.unless_stopped()?;
         let (base, split) = (&self.at.base, &self.problem.split);
@@ -444,14 +513,15 @@ impl<'a> Diagnosing<'a> {
             part_unexplained: part_unexplained(&floor, &given.train, &found.train),
             unexplained: left,
             dependence,
-            covariance: match case.limits.deviations {
-                true => covariance(&self.at, &self.problem, case.cutoff_hz)?,
-                false => DMatrix::from_element(unknowns, unknowns, f64::NAN),
+            covariance: match (self.covariance, case.limits.deviations) {
+                (Some(known), _) => known,
+                (None, true) => covariance(&self.at, &self.problem, case.cutoff_hz)?,
+                (None, false) => DMatrix::from_element(unknowns, unknowns, f64::NAN),
             },
             unknowns: base.unknowns.list.clone(),
             residual_std: base.residual_rms(split),
             set_aside: split.set_aside.clone(),
-            model: self.at.model,
+            model: last.clone(),
             steps: self.steps,
             path: self.path,
             candidates: self.candidates,
@@ -470,10 +540,20 @@ impl<'a> Diagnosing<'a> {
         wanted: &dyn Fn(RowRole) -> bool,
         counted: Counted,
     ) -> Result<Option<Errors>, MotionError> {
+        let pieces = self.pieces(model, wanted, counted)?;
+        Ok(errors::summed(model, &self.case.units, &pieces))
+    }
+
+    /// The same piece by piece.
+    fn pieces(
+        &self,
+        model: &AugmentedModel,
+        wanted: &dyn Fn(RowRole) -> bool,
+        counted: Counted,
+    ) -> Result<Pieces, MotionError> {
         let case = self.case;
-        errors(
+        errors::pieces(
             model,
-            &case.units,
             &case.stretches,
             (&case.filters, &case.rest_speed),
             &self.problem.split,
@@ -505,66 +585,8 @@ impl<'a> Diagnosing<'a> {
     }
 }
 
-/// Effects of a model by their titles, in one order; waves with their orders, to two digits.
-fn titles(model: &AugmentedModel, effects: &[Added]) -> Vec<String> {
-    let title = |e: &Added| {
-        let order = match e.law.entry.search {
-            Search::Orders => e
-                .shape
-                .first()
-                .map_or(String::new(), |o| format!(" {o:.1e}")),
-            _ => String::new(),
-        };
-        e.title(&model.model.robot) + &order
-    };
-    let mut titles: Vec<String> = effects.iter().map(title).collect();
-    titles.sort();
-    titles
-}
-
 fn is_holdout(role: RowRole) -> bool {
     role == RowRole::Holdout
-}
-
-/// Which rows do what. Of a log that is fitted or may veto those of stationary joints count for nothing; along the
-/// others nothing counts.
-fn data_split(case: &Case, fitted: &[Stretch]) -> DataSplit {
-    let robot = &case.given.model.robot;
-    let mut of_fitted = stationary_joints(robot, fitted).into_iter();
-    let vetoing = case.stretches_of(LogRole::Veto);
-    let mut of_vetoing = stationary_joints(robot, &vetoing).into_iter();
-    let of = |s: &Stretch| match case.roles[s.log] {
-        LogRole::Train => of_fitted.next(),
-        LogRole::Veto => of_vetoing.next(),
-        LogRole::Holdout => None,
-    };
-    let all = vec![true; robot.joints()];
-    let ignored = case.stretches.iter().map(of);
-    DataSplit {
-        ignored: ignored.map(|i| i.unwrap_or_else(|| all.clone())).collect(),
-        stationary: stationary_joints(robot, &case.stretches),
-        ..DataSplit::of(&case.stretches, &case.roles, &case.filters, case.cutoff_hz)
-    }
-}
-
-/// Refuses what cannot be fitted. Faults of the data come before any physics.
-fn check(case: &Case, split: &DataSplit, unknowns: usize) -> Result<(), DiagnoseError> {
-    let rows = split.fitted_rows();
-    if rows < 10 * unknowns || split.folds < 3 {
-        return Err(DiagnoseError::TooFewRows { rows, unknowns });
-    }
-    for (j, joint) in case.given.model.robot.joint_names().iter().enumerate() {
-        let silent = |s: &Stretch| s.tau[j].iter().all(|x| *x == 0.0);
-        if case.stretches.iter().all(silent) {
-            return Err(DiagnoseError::NoTorque {
-                joint: joint.clone(),
-            });
-        }
-    }
-    match suspicion(&case.given, &case.stretches, &case.filters, split)? {
-        Some(found) => Err(DiagnoseError::Channels(found)),
-        None => Ok(()),
-    }
 }
 
 /// Raw residuals along stretches, `[stretch][joint][sample]`.

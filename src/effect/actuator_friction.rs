@@ -18,6 +18,7 @@ pub static ENTRY: Entry = Entry {
     places: Places::Actuators,
     search: Search::Refined,
     ladder: Some(Ladder::USUAL),
+    friction: true,
     separate_by: "move one actuator alone, both ways at several speeds, at three poses of the other",
     formula: "J_a' (viscous v_a + coulomb tanh(slope v_a)), v_a = J_a v",
     source: "seals and nuts of the screws that move two joints",

@@ -1,7 +1,8 @@
 //! An effect with its numbers, as it stands in a model.
 
 use super::entry::{Family, Role};
-use super::law::{Law, Scene};
+use super::law::{KeyValue, Law, Scene};
+use super::physics::{Rule, Seen};
 use super::place::Place;
 use super::unit::Unit;
 use super::values::{EffectError, Values};
@@ -14,6 +15,8 @@ pub struct EffectNumber {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
+    /// Held at a bound, for these data do not tell it.
+    pub bound: bool,
 }
 
 /// An effect in a model.
@@ -23,6 +26,8 @@ pub struct Added {
     pub place: Place,
     pub shape: Vec<f64>,
     pub linear: Vec<f64>,
+    /// Which of (shape, linear) a fit leaves where they are: what the data do not tell, at a bound.
+    pub held: Vec<bool>,
 }
 
 impl PartialEq for Added {
@@ -35,6 +40,17 @@ impl PartialEq for Added {
 }
 
 impl Added {
+    /// An effect with its numbers, all of them open to a fit.
+    pub fn new(law: &'static Law, place: Place, shape: Vec<f64>, linear: Vec<f64>) -> Self {
+        Added {
+            held: vec![false; shape.len() + linear.len()],
+            law,
+            place,
+            shape,
+            linear,
+        }
+    }
+
     /// The effect at the place and with the numbers that a file gives.
     ///
     /// # Errors
@@ -47,34 +63,62 @@ impl Added {
     ) -> Result<Self, EffectError> {
         let place = law.entry.places.named(robot, joint, values)?;
         let [shape, linear] = law.of_keys(values)?;
-        Ok(Added {
-            law,
-            place,
-            shape,
-            linear,
-        })
+        Ok(Added::new(law, place, shape, linear))
+    }
+
+    /// Whether its torque is the same while its joint rests.
+    pub(crate) fn at_rest(&self) -> bool {
+        match self.law.varied {
+            Some(of) => of(&self.shape).1,
+            None => self.law.entry.at_rest,
+        }
     }
 
     /// As results and files name it.
-    /// Whether its torque is the same while its joint rests.
-    pub(crate) fn at_rest(&self) -> bool {
-        self.law.entry.at_rest
-    }
-
     pub fn name(&self) -> &'static str {
         self.law.entry.name
     }
 
     /// Family.
     pub fn family(&self) -> Family {
-        self.law.entry.family()
+        match self.law.varied {
+            Some(of) => of(&self.shape).0,
+            None => self.law.entry.family(),
+        }
     }
 
-    /// Whether its numbers have signs that the effect can have.
-    pub fn is_possible(&self) -> bool {
+    /// The first rule of its entry, but for those to `skip`, that its numbers break, with the reason in words.
+    pub fn broken(
+        &self,
+        seen: &Seen,
+        skip: &dyn Fn(&Rule) -> bool,
+    ) -> Option<(&'static Rule, String)> {
         let keys = self.law.keys(&self.shape, &self.linear);
-        let positive = |key: &str| self.law.entry.positive.contains(&key);
-        keys.iter().all(|k| k.value > 0.0 || !positive(k.key))
+        let value = |key: &str| keys.iter().find(|k| k.key == key).map(|k| k.value);
+        let mut rules = self.law.entry.must.iter().filter(|rule| !skip(rule));
+        rules.find_map(|rule| Some((rule, rule.broken(&value, seen)?)))
+    }
+
+    /// Values and covariance of its sizes, where `covariance` is that of (shape, linear), row-major. A size that
+    /// has none, or an infinite one, is left out.
+    pub fn sizes(&self, covariance: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let size = |k: &KeyValue| self.law.entry.key(k.key).is_some_and(|key| key.size);
+        let told = |k: &KeyValue| {
+            let variance = spread(&k.slopes, &k.slopes, covariance);
+            variance > 0.0 && variance.is_finite()
+        };
+        let mut keys = self.law.keys(&self.shape, &self.linear);
+        keys.retain(|k| size(k) && told(k));
+        let of = |a: &KeyValue| {
+            let row = keys
+                .iter()
+                .map(|b| spread(&a.slopes, &b.slopes, covariance));
+            row.collect()
+        };
+        (
+            keys.iter().map(|k| k.value).collect(),
+            keys.iter().map(of).collect(),
+        )
     }
 
     /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for
@@ -143,12 +187,21 @@ impl Added {
         let own = self.law.keys(&self.shape, &self.linear).into_iter();
         let own = own.map(|number| {
             let unit = self.law.entry.key(number.key);
-            let unit = unit.map_or(Unit::One, |key| key.unit);
+            let unit = match unit.map_or(Unit::One, |key| key.unit) {
+                Unit::Signal => self.curve().map_or(Unit::One, |(signal, _)| signal.unit()),
+                unit => unit,
+            };
+            // a number of held ones alone
+            let open = |(slope, held): (&f64, &bool)| *slope != 0.0 && !held;
+            let bound =
+                self.held.contains(&true) && !number.slopes.iter().zip(&self.held).any(open);
+            let std = covariance.and_then(|c| deviation(&number.slopes, c));
             EffectNumber {
                 key: number.key.to_owned(),
                 value: number.value,
-                std: covariance.and_then(|c| deviation(&number.slopes, c)),
+                std: std.filter(|_| !bound),
                 unit: unit.in_files(kind, from, torque),
+                bound,
             }
         });
         let place = self.place.keys().into_iter();
@@ -157,23 +210,30 @@ impl Added {
             value,
             std: None,
             unit: String::new(),
+            bound: false,
         });
         own.chain(place).collect()
     }
 }
 
-/// Standard deviation of a number with these slopes, where it is one.
-fn deviation(slopes: &[f64], covariance: &[f64]) -> Option<f64> {
-    let k = slopes.len();
-    let mut variance = 0.0;
+/// Covariance of two numbers with these slopes.
+fn spread(one: &[f64], other: &[f64], covariance: &[f64]) -> f64 {
+    let k = one.len();
+    let mut sum = 0.0;
     for a in 0..k {
         for b in 0..k {
             // a variance may be infinite
-            if slopes[a] != 0.0 && slopes[b] != 0.0 {
-                variance += slopes[a] * slopes[b] * covariance[a * k + b];
+            if one[a] != 0.0 && other[b] != 0.0 {
+                sum += one[a] * other[b] * covariance[a * k + b];
             }
         }
     }
+    sum
+}
+
+/// Standard deviation of a number with these slopes, where it is one.
+fn deviation(slopes: &[f64], covariance: &[f64]) -> Option<f64> {
+    let variance = spread(slopes, slopes, covariance);
     // rounding may leave nothing below nothing; what is not a number is no deviation
     let std = if variance < 0.0 { 0.0 } else { variance.sqrt() };
     std.is_finite().then_some(std)

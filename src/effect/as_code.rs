@@ -5,10 +5,11 @@
 //! what the model remembers, `let x = ..;` begins a constant, and `&state.x` hands a memory to a function.
 //! Each law is that of the effect's own file, which a test compares along motions.
 
+use super::empirical::cubes;
 use super::law_text::{exact, law};
-use super::{Added, AugmentedModel, EffectError, Place, Role, entry};
+use super::{Added, AugmentedModel, EffectError, Place, Role, Signal, entry};
 use crate::robot::cft::geometry::L4;
-use crate::robot::model::Model;
+use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::{Body, STANDARD};
 use crate::robot::{JointKind, Robot};
 
@@ -65,13 +66,19 @@ impl Effects {
             ..Effects::default()
         };
         for (i, effect) in refined.effects.iter().enumerate() {
-            out.add(i, effect, &refined.model)?;
+            out.add(i, effect, refined)?;
             out.told.push(effect.title(&refined.model.robot));
         }
         Ok(out)
     }
 
-    fn add(&mut self, i: usize, effect: &Added, model: &Model) -> Result<(), EffectError> {
+    fn add(
+        &mut self,
+        i: usize,
+        effect: &Added,
+        refined: &AugmentedModel,
+    ) -> Result<(), EffectError> {
+        let model = &refined.model;
         let robot = &model.robot;
         let unknown = || EffectError::NoCode {
             effect: effect.title(robot),
@@ -99,7 +106,8 @@ impl Effects {
                     .push(to(format!("{} * (load[{j}] + ({own} + {offset}))", x(0))));
             }
             ("asymmetric-friction", Place::Joint(_)) => self.friction.push(to(format!(
-                "0.5 * (1.0 + $sign({v})) * ({} + {} * {v})",
+                "0.5 * (1.0 + {}) * ({} + {} * {v})",
+                direction(refined, j, &v),
                 x(0),
                 x(1)
             ))),
@@ -109,6 +117,26 @@ impl Effects {
                     "{} * ($sign({v}) * exp(-({share} * {share})))",
                     x(0)
                 )));
+            }
+            ("smooth-coulomb", Place::Joint(_)) => self.friction.push(to(format!(
+                "{} * (tanh({v} / {}) - $sign({v}))",
+                x(0),
+                s(0)
+            ))),
+            ("empirical", Place::Joint(_)) => {
+                let (signal, friction) = match effect.curve() {
+                    Some((Signal::Position, _)) => (q, false),
+                    Some((Signal::Friction, _)) => (q, true),
+                    Some((Signal::Speed, _)) => (v.clone(), false),
+                    Some((Signal::Load, _)) => (format!("load[{j}]"), true),
+                    // it would have to remember where the joint turned
+                    Some((Signal::Way, _)) | None => return Err(unknown()),
+                };
+                let curve = curve_text(effect, &signal);
+                self.added.push(to(match friction {
+                    true => format!("{} * ({curve})", direction(refined, j, &v)),
+                    false => curve,
+                }));
             }
             ("nonlinear-viscous", Place::Joint(_)) => self.friction.push(to(format!(
                 "{} * ($sign({v}) * pow(fabs({v}), {}))",
@@ -196,7 +224,7 @@ impl Effects {
                 let sum = format!("{} * sin({angle}) + {} * cos({angle})", x(0), x(1));
                 self.added.push(to(match effect.name() {
                     "ripple" => sum,
-                    _ => format!("$sign({v}) * ({sum})"),
+                    _ => format!("{} * ({sum})", direction(refined, j, &v)),
                 }));
             }
             ("spring", Place::Joint(_)) => {
@@ -356,7 +384,6 @@ impl Effects {
 
 /// Saturating part of a joint's law over its height, -1..1.
 fn saturating(model: &Model, j: usize, v: &str) -> String {
-    use crate::robot::model::JointFriction;
     match &model.friction[j] {
         JointFriction::None => "0.0".to_owned(),
         JointFriction::DoubleTanh(own) if (own.coulomb_1 + own.coulomb_2).abs() > 1e-12 => {
@@ -395,6 +422,40 @@ impl Added {
             _ => None,
         }
     }
+}
+
+/// Direction of a joint's friction at the speed `v`: that of its law, or of what was added to make it smooth.
+fn direction(refined: &AugmentedModel, j: usize, v: &str) -> String {
+    let smooth = |e: &&Added| e.law.direction.is_some() && e.place == Place::Joint(j);
+    match refined.effects.iter().find(smooth) {
+        Some(e) if refined.model.friction[j].jumps() => {
+            format!("tanh({v} / {})", exact(e.shape[0]))
+        }
+        _ if refined.model.friction[j] == JointFriction::None => format!("$sign({v})"),
+        _ => format!("({})", saturating(&refined.model, j, v)),
+    }
+}
+
+/// The curve of an effect over a signal, as a sum of cubes that begin at its knots.
+fn curve_text(effect: &Added, signal: &str) -> String {
+    let above = |x: &str| format!("0.5 * ({x} + fabs({x}))");
+    let (from, to) = (effect.shape[1], effect.shape[2]);
+    let cubes = cubes(&effect.linear);
+    let (steps, terms) = cubes.split_at(2);
+    let per_step = terms.len() as f64 / (to - from);
+    let x = above(&format!(
+        "(({signal} - {}) * {})",
+        exact(from),
+        exact(per_step)
+    ));
+    let beyond = above(&format!("({x} - {})", exact(terms.len() as f64)));
+    let x = format!("({x} - {beyond})");
+    let mut out = format!("{} + {} * {x}", exact(steps[0]), exact(steps[1]));
+    for (k, cube) in terms.iter().enumerate() {
+        let part = above(&format!("({x} - {})", exact(k as f64)));
+        out += &format!(" + {} * pow({part}, 3.0)", exact(*cube));
+    }
+    out
 }
 
 /// Why an effect of this name is no torque that a controller could send; `None` where it is one.

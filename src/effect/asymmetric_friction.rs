@@ -12,6 +12,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("viscous", Unit::Viscous),
     ],
     ladder: Some(Ladder::USUAL),
+    friction: true,
     separate_by: "move the joint both ways at three or more constant speeds and hold it still \
                   between them: an offset holds at standstill, friction does not",
     formula: "(coulomb + viscous v) H(v)",
@@ -33,14 +34,8 @@ pub static LAW: Law = Law {
         |scene, place, _, _, out| {
             let Some(j) = place.joint() else { return };
             for (k, v) in scene.stretch.v[j].iter().enumerate() {
-                // half at standstill, where neither direction has it
-                let forward = if *v > 0.0 {
-                    1.0
-                } else if *v < 0.0 {
-                    0.0
-                } else {
-                    0.5
-                };
+                // half at standstill, where neither direction has it; between as smooth as the joint's own law
+                let forward = 0.5 * (1.0 + scene.direction(j, k));
                 out[0][k] = forward;
                 out[1][k] = forward * v;
             }

@@ -2,6 +2,7 @@
 
 use super::added::Added;
 use super::law::Scene;
+use super::place::Place;
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 
@@ -19,6 +20,8 @@ pub struct Torques {
     pub hat: Vec<Vec<f64>>,
     /// Inertial part alone.
     pub load: Vec<Vec<f64>>,
+    /// Direction of each joint's friction where an effect makes it smooth; else empty.
+    pub direction: Vec<Vec<f64>>,
 }
 
 impl AugmentedModel {
@@ -51,6 +54,7 @@ impl AugmentedModel {
         }
         // a gain multiplies what the plain model gives: effects see that, and not one another
         let plain = hat.clone();
+        let direction: Vec<Vec<f64>> = (0..n).map(|j| self.direction(stretch, j)).collect();
         let scene = Scene {
             robot: &self.model.robot,
             theta: &self.model.theta,
@@ -58,6 +62,7 @@ impl AugmentedModel {
             stretch,
             hat: &plain,
             load: &load,
+            direction: &direction,
         };
         let mut extra = vec![0.0; samples];
         for effect in &self.effects {
@@ -70,7 +75,21 @@ impl AugmentedModel {
                 }
             }
         }
-        Torques { hat, load }
+        Torques {
+            hat,
+            load,
+            direction,
+        }
+    }
+
+    /// Direction of a joint's friction where an effect makes smooth what jumps; else empty.
+    pub(super) fn direction(&self, stretch: &Stretch, j: usize) -> Vec<f64> {
+        let mut own = self.effects.iter().filter(|e| e.place == Place::Joint(j));
+        let smooth = own.find_map(|e| Some((e.law.direction?, &e.shape)));
+        match smooth.filter(|_| self.model.friction[j].jumps()) {
+            Some((of, shape)) => stretch.v[j].iter().map(|v| of(shape, *v)).collect(),
+            None => Vec::new(),
+        }
     }
 
     /// Time by which the torque of joint `joint` is late \[s\].

@@ -3,6 +3,8 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{Law, Memory};
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -14,6 +16,16 @@ pub static ENTRY: Entry = Entry {
         Key::size("c", Unit::Torque),
     ],
     search: Search::Refined,
+    must: &[
+        Rule::at_most(
+            Number::Key("gap"),
+            Limit::Backlash,
+            "the play of a gear is at most 0.03 rad or 2 mm, of a harmonic or direct drive none, or what \
+             [drive] declares",
+        ),
+        Rule::not_negative("c", "play takes torque away, and adds none"),
+    ],
+    otherwise: Some(Signal::Way),
     ladder: Some(Ladder::NARROW),
     separate_by: "reversals with a ladder of amplitudes: a gap keeps its width, a presliding loop \
                   shrinks with the amplitude",

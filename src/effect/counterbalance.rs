@@ -3,6 +3,8 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::JointKind;
 
@@ -33,6 +35,12 @@ pub static ENTRY: Entry = Entry {
         moment("m_6"),
     ],
     search: Search::Grid,
+    must: &[Rule::at_least(
+        Number::Weight,
+        Limit::Is(1.0),
+        "the joint carries no weight that a counterbalance would carry",
+    )],
+    otherwise: Some(Signal::Position),
     ladder: Some(Ladder::USUAL),
     separate_by: "a slow sweep over the whole travel, both ways, with two payloads",
     formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \

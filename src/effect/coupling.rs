@@ -7,6 +7,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::physics::Rule;
 use super::place::{Place, Places};
 use super::unit::Unit;
 use crate::robot::friction::sign;
@@ -23,6 +24,11 @@ pub static ENTRY: Entry = Entry {
     ],
     places: Places::Pairs,
     search: Search::Grid,
+    must: &[
+        Rule::not_negative("viscous", TRAIN).or_zero(),
+        Rule::not_negative("coulomb", TRAIN).or_zero(),
+        Rule::not_negative("inertia", TRAIN).or_zero(),
+    ],
     ladder: Some(Ladder::USUAL),
     separate_by: "move the other joint alone, both ways at several speeds",
     formula: "viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j of joint j = from, counted \
@@ -31,6 +37,9 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     ..Entry::USUAL
 };
+
+/// Why its numbers are not negative.
+const TRAIN: &str = "what a gear train turns has mass, and takes power";
 
 pub static LAW: Law = Law {
     shape: &["r"],

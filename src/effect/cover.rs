@@ -13,6 +13,8 @@ pub struct JointCover {
     pub speed: [f64; 2],
     /// Root mean square of the speed.
     pub speed_rms: f64,
+    /// Root mean square of the acceleration.
+    pub acceleration_rms: f64,
     /// Changes of direction with a travel of at least a thousandth of the range between them.
     pub reversals: usize,
     /// Orders with a peak in the angle-domain spectrum of the residual that keeps its sign.
@@ -23,6 +25,8 @@ pub struct JointCover {
     pub full_range: Option<f64>,
     /// The joint is stationary in every log.
     pub stationary: bool,
+    /// Gravity acts on it, as far as the robot's model knows.
+    pub weight: bool,
 }
 
 /// What the logs cover.
@@ -52,7 +56,7 @@ impl Cover {
         let stationary = stationary_joints(robot, stretches);
         for (j, joint) in cover.joints.iter_mut().enumerate() {
             let mut position = [f64::INFINITY, f64::NEG_INFINITY];
-            let (mut square, mut count) = (0.0, 0usize);
+            let (mut square, mut acceleration, mut count) = (0.0, 0.0, 0usize);
             joint.stationary = stationary.iter().all(|s| s[j]);
             let moving: Vec<&Stretch> = stretches
                 .iter()
@@ -67,12 +71,17 @@ impl Cover {
                     square += v * v;
                     count += 1;
                 }
+                acceleration += s.a[j].iter().map(|a| a * a).sum::<f64>();
             }
             joint.speed_rms = (square / count.max(1) as f64).sqrt();
+            joint.acceleration_rms = (acceleration / count.max(1) as f64).sqrt();
             let least = 1e-3 * (position[1] - position[0]);
             joint.reversals = moving.iter().map(|s| reversals(&s.q[j], least)).sum();
             joint.position = position;
             joint.full_range = robot.transmission().full_travel(j);
+        }
+        for (joint, weight) in cover.joints.iter_mut().zip(weights(robot, stretches)) {
+            joint.weight = weight;
         }
         for s in stretches {
             let end = s.began + s.dt * s.len() as f64;
@@ -130,6 +139,30 @@ impl JointCover {
         self.speed[1] > 0.0 && self.speed[0] < 0.0 && self.reversals > 0
     }
 }
+
+/// Poses at which a stretch is asked where gravity acts.
+const POSES: usize = 5;
+
+/// Whether a body's weight acts on each joint: its row of the regressor at rest is not zero.
+fn weights(robot: &Robot, stretches: &[Stretch]) -> Vec<bool> {
+    let (n, p) = (robot.joints(), robot.parameters().len());
+    let (rest, mut y) = (vec![0.0; n], vec![0.0; n * p]);
+    let mut found = vec![false; n];
+    for s in stretches.iter().filter(|s| !s.is_empty()) {
+        for i in 0..POSES {
+            let k = i * (s.len() - 1) / (POSES - 1);
+            let q: Vec<f64> = s.q.iter().map(|q| q[k]).collect();
+            robot.regressor(&q, &rest, &rest, &mut y);
+            for (found, row) in found.iter_mut().zip(y.chunks(p.max(1))) {
+                *found |= row.iter().any(|x| x.abs() > WEIGHTLESS);
+            }
+        }
+    }
+    found
+}
+
+/// Least element of a regressor's row at rest that is no rounding [m/s^2 and its like].
+const WEIGHTLESS: f64 = 1e-6;
 
 /// Sampling step of the slowest log; the first log's where all have one rate \[s\].
 fn slowest(stretches: &[Stretch]) -> f64 {

@@ -2,6 +2,7 @@
 
 use super::entry::{Entry, Family, Key, Role};
 use super::law::Law;
+use super::physics::{Limit, Number, Rule};
 use super::place::Places;
 use super::unit::Unit;
 
@@ -11,6 +12,11 @@ pub static ENTRY: Entry = Entry {
     keys: &[Key::size("d", Unit::Fixed("s"))],
     places: Places::JointsOrAll,
     role: Role::Shift,
+    must: &[Rule::at_most(
+        Number::Size("d"),
+        Limit::Is(0.1),
+        "clocks and filters of drives differ by less than 0.1 s",
+    )],
     separate_by: "log one signal twice, once beside the positions and once beside the torques",
     formula: "none; the log shows the torque of d before",
     source: "torques and positions stamped by two clocks, or a filter in the drive",

@@ -2,6 +2,8 @@
 
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -12,11 +14,20 @@ pub static ENTRY: Entry = Entry {
         9.0,
         "must lie in -0.9..9 (k = 1/efficiency - 1)",
     )],
+    must: &[
+        Rule::not_negative("k", LOSS),
+        Rule::at_most(Number::Key("k"), Limit::Is(0.6), LOSS),
+    ],
+    otherwise: Some(Signal::Load),
+    friction: true,
     separate_by: "lift and lower a known payload at the same speeds",
     formula: "k tau_l H(tau_l v)",
     source: "a gear or screw that loses part of the power while it drives the load",
     ..Entry::USUAL
 };
+
+/// Why k lies where it does.
+const LOSS: &str = "efficiencies lie between 0.63 and 1";
 
 pub static LAW: Law = Law {
     starts: |cover, place| {

@@ -9,6 +9,7 @@ use nalgebra::Matrix4;
 
 use super::entry::{Entry, Family, Key, Search};
 use super::law::{KeyValue, Law, Memory, Reparametrisation, Scene};
+use super::physics::{Limit, Number, Rule};
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -22,7 +23,20 @@ pub static ENTRY: Entry = Entry {
         Key::shape("damping", Unit::One).within(0.0, f64::INFINITY, "must not be below 0"),
     ],
     search: Search::Refined,
-    positive: &["inertia"],
+    must: &[
+        Rule::not_negative("inertia", "a body behind a spring has mass"),
+        Rule::not_negative("stiffness", "a spring pushes back"),
+        Rule::at_most(
+            Number::Key("damping"),
+            Limit::Is(0.5),
+            "a gear, belt or shaft rings: its damping ratio is below 0.5",
+        ),
+        Rule::at_least(
+            Number::Ratio("stiffness", "inertia"),
+            Limit::MotionSquared(4.0),
+            "its frequency lies within the motion's band, where a delay or a coupling does the same",
+        ),
+    ],
     separate_by: "reversals with high jerk at two poses of different inertia: the ringing keeps its \
                   frequency at any speed",
     formula: "a spring between motor and link of that inertia, four fifths of the joint's by \

@@ -1,7 +1,9 @@
 //! What is known of an effect, whoever models it. The estimator and the simulator read the same entries and
 //! have laws of their own, so that each checks the other.
 
+use super::physics::Rule;
 use super::place::Places;
+use super::signal::Signal;
 use super::unit::Unit;
 
 /// Families of effects that look alike: named first, the member only where the data separate it.
@@ -50,6 +52,8 @@ pub enum Role {
     Kept,
     /// The data are cut or refused where it shows: no parameter is found.
     Fault,
+    /// Takes the place of what breaks a range, and is not looked for by itself.
+    StandIn,
 }
 
 /// What the search does with the parameters that shape an effect's columns.
@@ -192,8 +196,12 @@ pub struct Entry {
     pub search: Search,
     /// Whether its torque is the same while its joint rests. Friction takes any torque there.
     pub at_rest: bool,
-    /// Keys that are above zero where the effect is real: a fit with another sign has found something else.
-    pub positive: &'static [&'static str],
+    /// Whether it is friction: with all other friction of its joints it takes power.
+    pub friction: bool,
+    /// What its numbers must satisfy to bear its name.
+    pub must: &'static [Rule],
+    /// The signal over which a curve takes its place where they do not.
+    pub otherwise: Option<Signal>,
     /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
     pub ladder: Option<Ladder>,
     /// The experiment that separates it, in words.
@@ -214,7 +222,9 @@ impl Entry {
         role: Role::Columns,
         search: Search::Linear,
         at_rest: false,
-        positive: &[],
+        friction: false,
+        must: &[],
+        otherwise: None,
         ladder: None,
         separate_by: "",
         formula: "",

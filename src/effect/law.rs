@@ -2,7 +2,7 @@
 //! shaped by others.
 
 use super::cover::Cover;
-use super::entry::Entry;
+use super::entry::{Entry, Family};
 use super::place::Place;
 use super::values::{EffectError, Values};
 use crate::motion::Stretch;
@@ -19,6 +19,8 @@ pub struct Scene<'a> {
     pub hat: &'a [Vec<f64>],
     /// Load torque per joint: the reconstructed torque less friction and offset.
     pub load: &'a [Vec<f64>],
+    /// Direction of each joint's friction; empty where it is that of its law.
+    pub direction: &'a [Vec<f64>],
 }
 
 impl Scene<'_> {
@@ -30,6 +32,14 @@ impl Scene<'_> {
     /// Whether the stretch holds no sample.
     pub fn is_empty(&self) -> bool {
         self.stretch.is_empty()
+    }
+
+    /// Saturating part of a joint's friction over its level at sample k: -1 and 1 at speed, between them as smooth
+    /// as the declared law, or as what was added to make it smooth.
+    #[inline]
+    pub fn direction(&self, j: usize, k: usize) -> f64 {
+        let known = self.direction.get(j).and_then(|d| d.get(k)).copied();
+        known.unwrap_or_else(|| self.laws[j].direction(self.stretch.v[j][k]))
     }
 }
 
@@ -56,6 +66,10 @@ pub struct Law {
     pub columns: Fill,
     /// One sample at a time, where a column depends on samples before it.
     pub memory: Option<Memory>,
+    /// Direction of the joint's friction at a speed, where the effect makes it smooth: shape, speed.
+    pub direction: Option<fn(&[f64], f64) -> f64>,
+    /// Family and whether it is the same torque at rest, where these hang on the shape.
+    pub varied: Option<fn(&[f64]) -> (Family, bool)>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
 }
@@ -101,6 +115,8 @@ impl Law {
             limits: |_, _| Vec::new(),
             columns,
             memory: None,
+            direction: None,
+            varied: None,
             reparametrised: None,
         }
     }

@@ -3,6 +3,8 @@
 
 use super::entry::{Entry, Family, Key, Search};
 use super::law::Law;
+use super::physics::Rule;
+use super::signal::Signal;
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -14,11 +16,20 @@ pub static ENTRY: Entry = Entry {
         Key::shape("w", Unit::Slope),
     ],
     search: Search::Refined,
+    must: &[
+        Rule::not_negative("mu_c", LOADED).or_zero(),
+        Rule::not_negative("mu_v", LOADED).or_zero(),
+    ],
+    otherwise: Some(Signal::Load),
+    friction: true,
     separate_by: "the same path at the same speed with and without a known payload",
     formula: "(mu_c + mu_v abs(v)) abs(tau_l) tanh(w v)",
     source: "gear teeth and bearings under load (Hamon, Gautier and Garrec 2010)",
     ..Entry::USUAL
 };
+
+/// Why its numbers are not negative.
+const LOADED: &str = "teeth and bearings rub more under load";
 
 pub static LAW: Law = Law {
     shape: &["w"],

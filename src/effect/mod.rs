@@ -13,8 +13,10 @@ pub(crate) mod entry;
 mod law;
 pub(crate) mod law_text;
 mod order;
+pub(crate) mod physics;
 pub(crate) mod place;
 mod sampled;
+mod signal;
 pub(crate) mod unit;
 mod values;
 
@@ -26,8 +28,10 @@ pub use cover::{Cover, JointCover, stationary_joints};
 pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
 pub use law::{Law, Scene};
 pub use order::is_whole as order_is_whole;
+pub use physics::{Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
+pub use signal::Signal;
 pub use unit::Unit;
 pub use values::{EffectError, Values};
 
@@ -53,6 +57,7 @@ catalogue! {
     gain,
     asymmetric_friction,
     stribeck,
+    smooth_coulomb,
     nonlinear_viscous,
     load_friction,
     drive_efficiency,
@@ -71,6 +76,7 @@ catalogue! {
     carried,
     warm_up,
     drift,
+    empirical,
 }
 
 catalogue! {

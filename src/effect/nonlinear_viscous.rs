@@ -2,6 +2,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -18,6 +19,8 @@ pub static ENTRY: Entry = Entry {
     ],
     search: Search::Refined,
     ladder: Some(Ladder::USUAL),
+    friction: true,
+    otherwise: Some(Signal::Speed),
     separate_by: "plateaus of constant speed, both ways, up to the top speed",
     formula: "c sgn(v) abs(v)^p",
     source: "lubricants that shear thin, or churn at speed",

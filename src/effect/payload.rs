@@ -4,6 +4,7 @@
 
 use super::entry::{Entry, Family, Key, Role, Search};
 use super::law::{KeyValue, Law, Reparametrisation};
+use super::physics::Rule;
 use super::place::Places;
 use super::unit::Unit;
 use super::values::{EffectError, Values};
@@ -22,6 +23,10 @@ pub static ENTRY: Entry = Entry {
     places: Places::Whole,
     role: Role::Kept,
     search: Search::Refined,
+    must: &[
+        Rule::not_negative("mass", BODY),
+        Rule::not_negative("inertia", BODY).or_zero(),
+    ],
     separate_by: "identify unloaded, then diagnose loaded logs with --keep",
     formula: "a body with its centre at (mx, my, mz)/mass in the frame of the last link, and its \
                 inertia about that centre: about the vertical axis, on a serial robot the same \
@@ -30,6 +35,9 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     ..Entry::USUAL
 };
+
+/// Why its numbers are not negative.
+const BODY: &str = "a body has mass and inertia";
 
 pub static LAW: Law = Law {
     fits: |robot, _, _| robot.tool_stays_level(),

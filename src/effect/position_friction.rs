@@ -1,11 +1,13 @@
 //! `position-friction`: friction whose width changes with position, sgn(v) (sin, cos at an order):
-//! it flips with the direction, a ripple does not (Remark 1 of the report).
+//! it flips with the direction, a ripple does not (Remark 1 of the report). Where the joint's law is smooth at
+//! rest, so is the sign.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::order::{order_limits, orders, wavenumber};
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
-use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
     name: "position-friction",
@@ -16,7 +18,14 @@ pub static ENTRY: Entry = Entry {
         Key::size("cos", Unit::Torque),
     ],
     search: Search::Orders,
+    must: &[Rule::at_most(
+        Number::Amplitude("sin", "cos"),
+        Limit::Coulomb(1.0),
+        "with more than the joint's Coulomb friction it would drive the joint",
+    )],
+    otherwise: Some(Signal::Friction),
     ladder: Some(Ladder::USUAL),
+    friction: true,
     separate_by: "the same stretch of travel in both directions at one speed",
     formula: "sgn(v) (sin sin(order q) + cos cos(order q))",
     source: "a bent screw or an eccentric gear that rubs more at some positions (Remark 1 of the \
@@ -36,11 +45,11 @@ pub static LAW: Law = Law {
     ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let per_unit = wavenumber(scene.robot, j, shape[0]);
-        let motion = scene.stretch.q[j].iter().zip(&scene.stretch.v[j]);
-        for (k, (q, v)) in motion.enumerate() {
+        for (k, q) in scene.stretch.q[j].iter().enumerate() {
             let (s, c) = (per_unit * q).sin_cos();
-            out[0][k] = sign(*v) * s;
-            out[1][k] = sign(*v) * c;
+            let direction = scene.direction(j, k);
+            out[0][k] = direction * s;
+            out[1][k] = direction * c;
         }
     })
 };

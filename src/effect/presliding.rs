@@ -5,6 +5,8 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{KeyValue, Law, Memory, Reparametrisation};
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -23,13 +25,26 @@ pub static ENTRY: Entry = Entry {
         Key::shape("fc", Unit::Torque),
     ],
     search: Search::Refined,
-    positive: &["fc"],
+    must: &[
+        Rule::not_negative("sigma0", BRISTLES),
+        Rule::not_negative("fc", BRISTLES),
+        Rule::not_negative("sigma1", BRISTLES).or_zero(),
+        Rule::at_most(
+            Number::Ratio("fc", "sigma0"),
+            Limit::Presliding,
+            "rolling contacts and seals slip after 0.05 rad or 5 mm, or what [drive] declares",
+        ),
+    ],
+    otherwise: Some(Signal::Way),
     ladder: Some(Ladder::NARROW),
     separate_by: "slow reversals with a ladder of amplitudes below and above breakaway",
     formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",
     source: "bristles that bend before they slip (Dahl 1968; Canudas de Wit et al. 1995)",
     ..Entry::USUAL
 };
+
+/// Why its numbers are not negative.
+const BRISTLES: &str = "bristles push back, and their damping takes power";
 
 pub static LAW: Law = Law {
     shape: &["rate"],
@@ -109,15 +124,8 @@ fn yielded(rate: f64, dt: f64, v: f64, h: &mut f64) -> [f64; 2] {
 /// Saturating part of a law over its height, -1..1.
 fn saturating(law: &JointFriction, v: f64) -> f64 {
     match law {
+        // a joint that declares no friction has none to replace
         JointFriction::None => 0.0,
-        JointFriction::ViscousCoulomb(_) => sign(v),
-        JointFriction::DoubleTanh(law) => {
-            let height = law.coulomb_1 + law.coulomb_2;
-            if height.abs() > 1e-12 {
-                (law.torque(v) - law.viscous * v) / height
-            } else {
-                sign(v)
-            }
-        }
+        law => law.direction(v),
     }
 }

@@ -4,6 +4,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder};
 use super::law::Law;
+use super::physics::Rule;
 use super::place::{Place, Places};
 use super::unit::Unit;
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
@@ -13,6 +14,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Inertia],
     keys: &[Key::size("J", Unit::Inertia)],
     places: Places::JointsAndActuators,
+    must: &[Rule::not_negative("J", "a rotor has mass")],
     ladder: Some(Ladder::USUAL),
     separate_by: "fast reversals of one actuator at several poses of the arm",
     formula: "J a; at a screw J_a' J (J_a a + dJ_a/dt v)",

@@ -13,6 +13,7 @@ pub struct Sampled {
     stretch: Stretch,
     hat: Vec<Vec<f64>>,
     load: Vec<Vec<f64>>,
+    direction: Vec<Vec<f64>>,
     plain: Vec<f64>,
     columns: Vec<Vec<Vec<f64>>>,
     /// Of each effect, joint after joint.
@@ -46,6 +47,7 @@ impl Sampled {
             },
             hat: one(),
             load: one(),
+            direction: vec![Vec::new(); n],
             plain: vec![0.0; n],
             columns,
             kept,
@@ -79,6 +81,9 @@ impl Sampled {
             tau[j] = self.plain[j] + model.friction[j].torque(v[j]) + model.offset[j];
             self.hat[j][0] = tau[j];
         }
+        for (j, direction) in self.direction.iter_mut().enumerate() {
+            *direction = self.model.direction(&self.stretch, j);
+        }
         let scene = Scene {
             robot: &model.robot,
             theta: &model.theta,
@@ -86,6 +91,7 @@ impl Sampled {
             stretch: &self.stretch,
             hat: &self.hat,
             load: &self.load,
+            direction: &self.direction,
         };
         for (i, effect) in self.model.effects.iter().enumerate() {
             if effect.law.entry.role == Role::Shift {

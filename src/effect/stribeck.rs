@@ -3,6 +3,8 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -15,7 +17,20 @@ pub static ENTRY: Entry = Entry {
         Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
     ],
     search: Search::Refined,
+    must: &[
+        Rule::not_negative(
+            "c",
+            "Stribeck friction is higher at low speed; friction that is lower there does not jump at rest",
+        ),
+        Rule::at_most(
+            Number::Key("vs"),
+            Limit::TopSpeed(0.3),
+            "a lubricant film builds up at low speed, below 0.3 of the top speed",
+        ),
+    ],
+    otherwise: Some(Signal::Speed),
     ladder: Some(Ladder::USUAL),
+    friction: true,
     separate_by: "a ladder of slow constant speeds, both ways, from a hundredth of the top speed up",
     formula: "c sgn(v) exp(-(v/vs)^2)",
     source: "a lubricant film that builds up with speed (Armstrong-Helouvry, Dupont and Canudas \

@@ -39,6 +39,8 @@ pub enum Unit {
     CoupledInertia,
     /// Speed of this joint per speed of the joint `from`.
     CoupledRatio,
+    /// That of the signal that the key `signal` numbers.
+    Signal,
 }
 
 impl Unit {
@@ -74,6 +76,7 @@ impl Unit {
             },
             Self::CoupledRatio if kind == from => "1".to_owned(),
             Self::CoupledRatio => format!("{position}/{other}"),
+            Self::Signal => "of the signal".to_owned(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
+use super::physics::{Limit, Number, Rule};
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -16,7 +17,25 @@ pub static ENTRY: Entry = Entry {
         Key::shape("T", Unit::Fixed("s")).above_zero("must be above 0 s"),
     ],
     search: Search::Refined,
+    must: &[
+        Rule::at_least(
+            Number::Key("T"),
+            Limit::Is(5.0),
+            "no grease warms up within 5 s",
+        ),
+        Rule::at_most(
+            Number::Key("T"),
+            Limit::Duration(3.0),
+            "a log tells of no warm-up that takes three times as long: that is a drift",
+        ),
+        Rule::at_least(
+            Number::Key("k"),
+            Limit::Is(-1.0),
+            "friction would drive the joint",
+        ),
+    ],
     ladder: Some(Ladder::LONG),
+    friction: true,
     separate_by: "the same segment of motion at the begin and at the end of an hour",
     formula: "F(v) k (1 - exp(-t/T))",
     source: "grease that warms up",

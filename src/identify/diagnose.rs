@@ -23,6 +23,7 @@ use crate::diagnose::{
 use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::log::DataRole;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
+use crate::robot::drive::Drive;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::setup::{Finding, FindingKind};
@@ -270,6 +271,7 @@ fn case(
         filters,
         cutoff_hz: processing.cutoff_hz,
         rest_speed: in_memory.rest_speed.clone(),
+        drives: drives(machine),
         units: (0..machine.robot.joints())
             .map(|j| machine.file.torque_unit(j).to_owned())
             .collect(),
@@ -278,6 +280,13 @@ fn case(
         without: Vec::new(),
         limits: settings.limits,
     })
+}
+
+/// The drives that the robot file declares, joint by joint.
+fn drives(machine: &LoggedRobot) -> Vec<Drive> {
+    let names = machine.robot.joint_names().iter();
+    let declared = names.map(|name| machine.file.drive.get(name).cloned());
+    declared.map(Option::unwrap_or_default).collect()
 }
 
 /// A torque channel that the model knows otherwise, as a fault.
@@ -322,9 +331,12 @@ impl Diagnosed {
         )
     }
 
-    /// The refined model, where `file` is the one that was given.
+    /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
     pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
         let diagnosis = &self.diagnosis;
+        if diagnosis.steps.is_empty() {
+            return file.clone();
+        }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
         model.friction_prior.clone_from(&self.friction_prior);

@@ -9,7 +9,8 @@ use super::diagnose::{DataFault, Diagnosed};
 use super::logged_robot::LoggedRobot;
 use super::separate::separating_command;
 use crate::diagnose::{
-    AcceptedEffect, Candidate, Dependence, Errors, LogRole, Signal, SplitErrors, Turn,
+    AcceptedEffect, Candidate, Dependence, Errors, JointChange, LogRole, Signal, SplitErrors,
+    StepStatus, Turn,
 };
 use crate::effect::disturbance;
 use crate::motion::Summary;
@@ -69,7 +70,9 @@ pub struct DiagnosisStep {
     /// Candidates that these data do not separate from it, best first.
     #[schemars(length(max = 3))]
     pub alternatives: Vec<&'static str>,
-    /// False where it may stand in for what no known effect explains.
+    /// How firm its name is.
+    pub status: StepStatus,
+    /// Whether the status is `assured`.
     pub assured: bool,
     /// A command whose motion would separate it from its alternatives.
     pub separate_command: Option<String>,
@@ -89,7 +92,10 @@ pub struct DiagnosisStep {
     pub holdout_before: Option<f64>,
     /// The same after it.
     pub holdout_after: Option<f64>,
+    /// The mean over the joints rises, or the error of a joint by its whole interval.
     pub holdout_worsened: bool,
+    /// Errors on data that decided nothing, joint by joint.
+    pub joints: Vec<JointChange>,
 }
 
 /// One turn of the search.
@@ -130,6 +136,9 @@ pub struct EffectValueFound {
     pub value: f64,
     pub std: Option<f64>,
     pub unit: String,
+    /// It is held at a bound, for these data do not tell it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub bound: bool,
 }
 
 /// Errors on the logs that were fitted and on held-out data.
@@ -316,6 +325,7 @@ impl Diagnosed {
                 value: t.value,
                 std: t.std,
                 unit: t.unit,
+                bound: t.bound,
             };
             (t.key, found)
         };
@@ -329,7 +339,8 @@ impl Diagnosed {
             joint: effect.place.name(robot),
             parameters: parameters.collect(),
             alternatives,
-            assured: d.assured(),
+            status: d.status(step),
+            assured: d.status(step) == StepStatus::Assured,
             separate_command: alike.then(|| separating_command(effect, robot)).flatten(),
             separate_by: alike.then_some(effect.law.entry.separate_by),
             unique_share: score.map(|s| s.unique_share),
@@ -339,7 +350,8 @@ impl Diagnosed {
             p_value: step.candidate.placebo_p_value,
             holdout_before: step.holdout.map(|h| h[0]),
             holdout_after: step.holdout.map(|h| h[1]),
-            holdout_worsened: step.holdout.is_some_and(|h| h[1] > h[0]),
+            holdout_worsened: step.worsens(),
+            joints: step.joints.clone(),
         }
     }
 }

@@ -37,12 +37,8 @@ mod tests {
         let robot = Robot::cft(Setup::Tuedacs, Structure::Printed12);
         let told = |name: &str, place: Place| {
             let law = law(&robot, name).unwrap();
-            let effect = Added {
-                law,
-                place,
-                shape: vec![0.0; law.shape.len()],
-                linear: vec![0.0; law.linear.len()],
-            };
+            let (shape, linear) = (vec![0.0; law.shape.len()], vec![0.0; law.linear.len()]);
+            let effect = Added::new(law, place, shape, linear);
             separating_command(&effect, &robot)
         };
         let friction = told("actuator-friction", Place::Actuator(0)).unwrap();

@@ -5,6 +5,7 @@
 //! | file | what |
 //! |---|---|
 //! | [`joint`] | kinds of joints, words of parameters |
+//! | [`drive`] | what turns a joint |
 //! | [`friction`] | friction laws of a joint |
 //! | [`standard`] | bodies in standard parameters |
 //! | [`tree`] | links as a tree, its regressor and base parameters |
@@ -19,6 +20,7 @@
 
 pub mod bodies;
 pub mod cft;
+pub mod drive;
 pub mod dynamics;
 pub mod error;
 pub mod friction;

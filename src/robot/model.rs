@@ -1,7 +1,7 @@
 //! An identified model: a robot with numbers, tau = Y(q, v, a) theta + F(v) + offset.
 
 use super::Robot;
-use super::friction::{DoubleTanh, ViscousCoulomb};
+use super::friction::{DoubleTanh, ViscousCoulomb, sign};
 
 /// Friction of one joint in a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +22,31 @@ impl JointFriction {
             Self::None => 0.0,
             Self::DoubleTanh(law) => law.torque(v),
             Self::ViscousCoulomb(law) => law.torque(v),
+        }
+    }
+
+    /// Level of its saturating part at speed, N or N m; none without such a part.
+    pub fn coulomb(&self) -> Option<f64> {
+        match self {
+            Self::None => None,
+            Self::DoubleTanh(law) => Some(law.coulomb_1 + law.coulomb_2),
+            Self::ViscousCoulomb(law) => Some(law.coulomb),
+        }
+    }
+
+    /// Its saturating part over its level at speed: -1 and 1 at speed in either direction, between them as smooth
+    /// as the law.
+    #[inline]
+    pub fn direction(&self, v: f64) -> f64 {
+        match self {
+            Self::DoubleTanh(law) => {
+                let level = law.coulomb_1 + law.coulomb_2;
+                match level.abs() > 1e-12 {
+                    true => (law.torque(v) - law.viscous * v) / level,
+                    false => sign(v),
+                }
+            }
+            Self::None | Self::ViscousCoulomb(_) => sign(v),
         }
     }
 

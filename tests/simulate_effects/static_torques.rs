@@ -338,6 +338,15 @@ fn a_single_joint_has_the_same_effects_where_they_have_a_place() {
     assert_axis("stribeck:q1:c=5,vs=0.05", 1e-6, &|_, v, _| {
         5.0 * v.signum() * (-(v / 0.05_f64).powi(2)).exp()
     });
+    assert_axis("smooth-coulomb:q1:vs=0.02,fc=12", 1e-9, &|_, v, _| {
+        12.0 * (v / 0.02).tanh() - (truth.friction.torque(v) - 200.0 * v)
+    });
+    // knots on a straight line
+    assert_axis(
+        "empirical:q1:signal=3,from=-1,to=1,m_1=-5,m_2=-3,m_3=-1,m_4=1,m_5=3,m_6=5",
+        1e-9,
+        &|_, v, _| 5.0 * v.clamp(-1.0, 1.0),
+    );
     assert_axis("load-friction:q1:mu_c=0.1,w=5000", 1e-6, &|_, v, a| {
         0.1 * (95.0 * a).abs() * v.signum()
     });

@@ -15,6 +15,8 @@ pub struct Candidate {
     /// Chance of one as good among all candidates where nothing is missing, by placebos; none where other tests
     /// had refused it.
     pub placebo_p_value: Option<f64>,
+    /// It passes every test, with numbers that no machine has: a curve may take its place.
+    pub impossible: bool,
     /// Why not; empty where accepted.
     pub reason: String,
 }
@@ -28,18 +30,15 @@ impl Candidate {
             accepted: false,
             significant: false,
             placebo_p_value: None,
+            impossible: false,
             reason: reason.to_owned(),
         }
     }
 
     /// One that was not tried.
     pub fn refused(law: &'static Law, place: Place, reason: &str) -> Self {
-        let effect = Added {
-            law,
-            place,
-            shape: vec![f64::NAN; law.shape.len()],
-            linear: vec![0.0; law.linear.len()],
-        };
+        let open = vec![f64::NAN; law.shape.len()];
+        let effect = Added::new(law, place, open, vec![0.0; law.linear.len()]);
         Candidate::open(effect, None, reason)
     }
 
@@ -47,6 +46,7 @@ impl Candidate {
     pub fn reject(&mut self, reason: &str) {
         self.accepted = false;
         self.significant = false;
+        self.impossible = false;
         reason.clone_into(&mut self.reason);
     }
 }

@@ -58,6 +58,7 @@ pub fn search<'a>(
     let laws = &at.model.model.friction;
     let places: Vec<(&'static Law, Place)> = LAWS
         .iter()
+        .filter(|law| law.entry.role != Role::StandIn)
         .filter(|law| !case.without.iter().any(|name| name == law.entry.name))
         .flat_map(|law| law.places(robot, laws).into_iter().map(|p| (*law, p)))
         .filter(|(law, place)| wanted(law, *place))
@@ -122,12 +123,8 @@ impl SearchRound<'_> {
             // a peak was picked out of all orders that were looked at
             tried.picked_from = SCANNED;
         }
-        let mut effect = Added {
-            law,
-            place,
-            shape: Vec::new(),
-            linear: vec![0.0; law.linear.len()],
-        };
+        let open = vec![f64::NAN; law.shape.len()];
+        let mut effect = Added::new(law, place, open, vec![0.0; law.linear.len()]);
         let Some((gain, mut sums)) = self.best_start(&mut effect, starts, &mut tried)? else {
             let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
                           [filter] to look for them";

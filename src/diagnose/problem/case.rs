@@ -6,6 +6,7 @@ use super::unknowns::FreeParameters;
 use super::wide_motion::WideMotion;
 use crate::effect::{AugmentedModel, Torques};
 use crate::motion::{ParallelFilters, Stretch};
+use crate::robot::drive::Drive;
 
 /// What a diagnosis works on.
 pub struct Case {
@@ -23,6 +24,8 @@ pub struct Case {
     pub cutoff_hz: f64,
     /// Speed up to which each joint rests [m/s or rad/s].
     pub rest_speed: Vec<f64>,
+    /// What turns each joint, as far as it is declared.
+    pub drives: Vec<Drive>,
     /// Torque unit per joint.
     pub units: Vec<String>,
     /// Torques are means of two rows, as by a zero-order hold.

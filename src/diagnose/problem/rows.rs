@@ -173,7 +173,7 @@ fn raw_columns(
 }
 
 /// Gradient of a friction law along a motion, `[parameter][sample]`.
-fn friction_columns(law: &JointFriction, v: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn friction_columns(law: &JointFriction, v: &[f64]) -> Vec<Vec<f64>> {
     let mut columns = vec![vec![0.0; v.len()]; law.parameters()];
     let mut gradient = [0.0; 5];
     for (i, v) in v.iter().enumerate() {
@@ -198,6 +198,7 @@ pub fn scene<'a>(
         stretch,
         hat: &torques.hat,
         load: &torques.load,
+        direction: &torques.direction,
     }
 }
 

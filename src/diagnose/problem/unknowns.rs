@@ -48,12 +48,15 @@ impl Unknowns {
         }
         list.extend((0..n).filter(|j| open.offset[*j]).map(Unknown::Offset));
         for (effect, added) in model.effects.iter().enumerate() {
-            list.extend((0..added.linear.len()).map(|k| Unknown::Linear { effect, k }));
+            let shapes = added.shape.len();
+            let linear = (0..added.linear.len()).filter(|k| !added.held[shapes + k]);
+            list.extend(linear.map(|k| Unknown::Linear { effect, k }));
             if !added.law.entry.search.refines() {
                 continue;
             }
             let limits = (added.law.limits)(cover, added.place);
-            let free = (0..added.shape.len()).filter(|k| limits[*k][0] < limits[*k][1]);
+            let open = |k: &usize| limits[*k][0] < limits[*k][1] && !added.held[*k];
+            let free = (0..shapes).filter(open);
             list.extend(free.map(|k| Unknown::Shape { effect, k }));
         }
         let touches = |u: &Unknown, j: usize| match *u {

@@ -12,7 +12,7 @@ use crate::diagnose::problem::data_split::DataSplit;
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::wide_motion::WideMotion;
-use crate::effect::Torques;
+use crate::effect::{Place, Seen, Torques};
 use crate::motion::MotionError;
 
 /// Standard errors by which the error on the veto pieces may grow by chance.
@@ -39,11 +39,12 @@ struct Worth {
 }
 
 /// Decides on all candidates of a round but for chance.
-pub(crate) fn accept(
+pub(crate) fn accept<'a>(
     found: &mut [Candidate],
     limits: &SelectionLimits,
     (at, split): (&FittedModel, &DataSplit),
     baseline: &Baseline,
+    seen: &dyn Fn(Place) -> Seen<'a>,
 ) {
     for candidate in found {
         let removed = candidate.score.as_ref().map_or(0.0, |s| s.gain) * at.square;
@@ -52,7 +53,11 @@ pub(crate) fn accept(
             of_declared: removed / baseline.declared_square(at, place),
             of_noise: removed / baseline.noise_square(at, split, place),
         };
-        decide(candidate, limits, worth);
+        // a size that may be zero is judged with its deviation, after the fit
+        let broken = candidate
+            .effect
+            .broken(&seen(place), &|rule| rule.may_be_zero);
+        decide(candidate, limits, (worth, broken.map(|(_, why)| why)));
     }
 }
 
@@ -67,7 +72,7 @@ pub(crate) fn beyond_chance(
     torques: &[Torques],
     wide: Option<&WideMotion>,
 ) -> Result<(), MotionError> {
-    let left = |c: &Candidate| c.accepted || c.significant;
+    let left = |c: &Candidate| c.accepted || c.significant || c.impossible;
     if !found.candidates.iter().any(left) {
         return Ok(());
     }
@@ -103,8 +108,12 @@ pub(crate) fn beyond_chance(
     Ok(())
 }
 
-/// Puts a candidate to every other test.
-fn decide(candidate: &mut Candidate, limits: &SelectionLimits, worth: Worth) {
+/// Puts a candidate to every other test; `broken` says why its numbers are none that a machine has.
+fn decide(
+    candidate: &mut Candidate,
+    limits: &SelectionLimits,
+    (worth, broken): (Worth, Option<String>),
+) {
     let Some(s) = &candidate.score else { return };
     let refusal = if !s.beta.iter().all(|b| b.is_finite()) {
         Some("its coefficients are not finite".to_owned())
@@ -113,8 +122,6 @@ fn decide(candidate: &mut Candidate, limits: &SelectionLimits, worth: Worth) {
             "the declared parameters explain all but {:.2} % of it",
             100.0 * s.unique_share
         ))
-    } else if !candidate.effect.is_possible() {
-        Some("its coefficient has a sign that the effect cannot have".to_owned())
     } else {
         None
     };
@@ -151,16 +158,19 @@ fn decide(candidate: &mut Candidate, limits: &SelectionLimits, worth: Worth) {
     } else {
         None
     };
-    candidate.significant = refusal.is_none() && doubt.is_none();
-    candidate.accepted = candidate.significant && small.is_none();
-    candidate.reason = refusal.or(small).or(doubt).unwrap_or_default();
+    let significant = refusal.is_none() && doubt.is_none();
+    let passed = significant && small.is_none();
+    candidate.impossible = passed && broken.is_some();
+    candidate.significant = significant && broken.is_none();
+    candidate.accepted = passed && broken.is_none();
+    candidate.reason = refusal.or(broken).or(small).or(doubt).unwrap_or_default();
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::diagnose::candidates::score::CandidateScore;
-    use crate::effect::{Added, Place};
+    use crate::effect::Added;
 
     fn decided(change: impl Fn(&mut CandidateScore), worth: Worth) -> Candidate {
         let mut score = CandidateScore {
@@ -180,19 +190,15 @@ mod tests {
         let law = laws.iter().find(|l| l.entry.name == "torque-offset");
         let law = law.unwrap();
         let mut candidate = Candidate {
-            effect: Added {
-                law,
-                place: Place::Joint(0),
-                shape: Vec::new(),
-                linear: vec![1.0],
-            },
+            effect: Added::new(law, Place::Joint(0), Vec::new(), vec![1.0]),
             score: Some(score),
             accepted: false,
             significant: false,
+            impossible: false,
             placebo_p_value: None,
             reason: String::new(),
         };
-        decide(&mut candidate, &SelectionLimits::default(), worth);
+        decide(&mut candidate, &SelectionLimits::default(), (worth, None));
         candidate
     }
 
@@ -214,7 +220,10 @@ mod tests {
         // what fails another test too is no remainder, whichever reason is told
         type ScoreChange = fn(&mut CandidateScore);
         let failures: [(ScoreChange, &str); 5] = [
-            (|s| s.unique_share = 1e-4, "only 0.01 %"),
+            (
+                |s| s.unique_share = 1e-4,
+                "the declared parameters explain all but 0.01 %",
+            ),
             (|s| s.delta_bic = -1.0, "not worth"),
             (|s| s.cv_gain = 0.001, "cross-validation:"),
             (|s| s.cv_std = 0.3, "cross-validation is not"),

@@ -2,5 +2,8 @@
 
 pub mod accept;
 pub mod choose;
+mod dissipation;
+pub mod physics;
 pub mod reconsider;
 pub mod removal;
+pub mod stand_in;

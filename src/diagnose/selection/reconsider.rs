@@ -5,6 +5,7 @@
 //! so take two names, and two places of one kind, neither of which explains anything without the other, the name of
 //! something larger.
 
+use super::physics::possible;
 use crate::diagnose::candidates::baseline::Baseline;
 use crate::diagnose::candidates::candidate::Candidate;
 use crate::diagnose::candidates::columns::{CandidateColumns, columns};
@@ -13,7 +14,7 @@ use crate::diagnose::candidates::search::search;
 use crate::diagnose::problem::case::{Case, SelectionLimits};
 use crate::diagnose::problem::fit::{FittedModel, fit};
 use crate::diagnose::problem::fit_problem::FitProblem;
-use crate::effect::{Added, LAWS, Law, Place, Role, Search, Torques};
+use crate::effect::{Added, AugmentedModel, LAWS, Law, Place, Role, Search, Torques};
 use crate::motion::MotionError;
 
 /// Other effects in place of some.
@@ -68,7 +69,11 @@ pub(crate) fn replacement(
                 continue;
             }
             let fitted = fit(&model, problem)?;
-            if fitted.model.effects.iter().all(Added::is_possible)
+            if fitted
+                .model
+                .effects
+                .iter()
+                .all(|e| possible(e, &fitted, problem, case))
                 && preferred(&Errors::of(&fitted, at, problem)?, &present, &case.limits)
             {
                 return Ok(Some(Replacement { gone, come, fitted }));
@@ -76,6 +81,23 @@ pub(crate) fn replacement(
         }
     }
     Ok(None)
+}
+
+/// Effects of a model by their titles, in one order; waves with their orders, to two digits.
+pub(crate) fn titles(model: &AugmentedModel, effects: &[Added]) -> Vec<String> {
+    let title = |e: &Added| {
+        let order = match e.law.entry.search {
+            Search::Orders => e
+                .shape
+                .first()
+                .map_or(String::new(), |o| format!(" {o:.1e}")),
+            _ => String::new(),
+        };
+        e.title(&model.model.robot) + &order
+    };
+    let mut titles: Vec<String> = effects.iter().map(title).collect();
+    titles.sort();
+    titles
 }
 
 /// Effects that may be one: those with three numbers or more, delays of all joints, and every two that move a joint
@@ -129,7 +151,7 @@ fn instead(
         if let Some(score) = candidate
             .score
             .as_ref()
-            .filter(|_| candidate.effect.is_possible())
+            .filter(|_| possible(&candidate.effect, without, problem, case))
         {
             sets.push((score.cv_gain, vec![candidate]));
         }
@@ -138,6 +160,9 @@ fn instead(
         if moved(pair[0].place)
             && moved(pair[1].place)
             && let Some((gain, pair)) = tried(&found.test, without, problem, &torques, pair)?
+            && pair
+                .iter()
+                .all(|c| possible(&c.effect, without, problem, case))
         {
             sets.push((gain, pair));
         }
@@ -154,12 +179,7 @@ fn instead(
 }
 
 fn plain(law: &'static Law, place: Place) -> Added {
-    Added {
-        law,
-        place,
-        shape: Vec::new(),
-        linear: vec![0.0; law.linear.len()],
-    }
+    Added::new(law, place, Vec::new(), vec![0.0; law.linear.len()])
 }
 
 /// Pairs of one kind: both motors of the pantograph, and joints that follow each other, with fewer numbers than
@@ -223,9 +243,6 @@ fn tried(
     let (first, second) = score.beta.split_at(k);
     pair[0].linear = first.to_vec();
     pair[1].linear = second.to_vec();
-    if !pair.iter().all(Added::is_possible) {
-        return Ok(None);
-    }
     let gain = score.cv_gain;
     let candidates = pair
         .into_iter()

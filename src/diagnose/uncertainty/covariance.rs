@@ -10,6 +10,8 @@ use crate::diagnose::problem::data_split::{Piece, RowRole};
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::normal_equations::{NormalEquations, PieceSums};
+use crate::diagnose::problem::unknowns::Unknown;
+use crate::effect::AugmentedModel;
 use crate::math::long_run::long_run;
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::MotionError;
@@ -31,7 +33,50 @@ pub fn covariance(
     ] {
         covariance += &bias * bias.transpose();
     }
-    profile::widen(at, problem, &mut covariance)?;
+    profile::widen(at, problem, &|_| true, &mut covariance)?;
+    Ok(covariance)
+}
+
+/// Covariance of (shape, linear) of one effect, row-major, by that of all unknowns; zeros for what is held or chosen
+/// from a few.
+pub fn of_effect(
+    unknowns: &[Unknown],
+    covariance: &DMatrix<f64>,
+    model: &AugmentedModel,
+    effect: usize,
+) -> Vec<f64> {
+    let added = &model.effects[effect];
+    let (count, shapes) = (added.parameters(), added.shape.len());
+    let wanted = |i: usize| match i.checked_sub(shapes) {
+        None => Unknown::Shape { effect, k: i },
+        Some(k) => Unknown::Linear { effect, k },
+    };
+    let place = |i: usize| unknowns.iter().position(|u| *u == wanted(i));
+    let places: Vec<Option<usize>> = (0..count).map(place).collect();
+    let mut out = vec![0.0; count * count];
+    for (a, pa) in places.iter().enumerate() {
+        for (b, pb) in places.iter().enumerate() {
+            if let (Some(pa), Some(pb)) = (pa, pb) {
+                out[a * count + b] = covariance[(*pa, *pb)];
+            }
+        }
+    }
+    out
+}
+
+/// Covariance of all unknowns without the bias of the positions, which takes fits of its own, and with the profile of
+/// one effect's shapes.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub(crate) fn without_bias(
+    at: &FittedModel,
+    problem: &FitProblem,
+    effect: usize,
+) -> Result<DMatrix<f64>, MotionError> {
+    let mut covariance = of_residual(at, problem);
+    let own = |u: &Unknown| matches!(u, Unknown::Shape { effect: e, .. } if *e == effect);
+    profile::widen(at, problem, &own, &mut covariance)?;
     Ok(covariance)
 }
 

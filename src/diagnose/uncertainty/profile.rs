@@ -23,7 +23,7 @@ const DOUBLINGS: usize = 12;
 /// First distance from a shape that the linearisation says nothing of, over its value.
 const FIRST: f64 = 1e-4;
 
-/// Widens rows and columns of shapes in a covariance of the unknowns; a shape whose derivative is zero where it
+/// Widens rows and columns of the `wanted` shapes in a covariance of the unknowns; a shape whose derivative is zero where it
 /// stands, as that of a gap may be between two samples, gets a variance of its own.
 ///
 /// # Errors
@@ -31,6 +31,7 @@ const FIRST: f64 = 1e-4;
 pub fn widen(
     at: &FittedModel,
     problem: &FitProblem,
+    wanted: &dyn Fn(&Unknown) -> bool,
     covariance: &mut DMatrix<f64>,
 ) -> Result<(), MotionError> {
     let least = RankRevealingInverse::of(&at.normal);
@@ -48,6 +49,9 @@ pub fn widen(
         let Unknown::Shape { effect, k } = *unknown else {
             continue;
         };
+        if !wanted(unknown) {
+            continue;
+        }
         let added = &at.model.effects[effect];
         let value = added.shape[k];
         let [low, high] = (added.law.limits)(&problem.cover, added.place)[k];

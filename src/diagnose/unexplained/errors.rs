@@ -51,9 +51,31 @@ pub struct Errors {
     pub overall: OverallErrors,
 }
 
+/// Relative error of one joint before and after a change of the model, over the same rows.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct JointChange {
+    pub joint: String,
+    pub before: f64,
+    pub after: f64,
+    /// 95 % CI of after less before, by a bootstrap over blocks of both.
+    pub interval_95: [f64; 2],
+    /// The interval lies above zero.
+    pub worsened: bool,
+}
+
+impl JointChange {
+    /// Whether the interval lies below zero.
+    pub fn improved(&self) -> bool {
+        self.interval_95[1] < 0.0
+    }
+}
+
+/// Errors of every joint over pieces, `[piece][joint]`.
+pub type Pieces = Vec<Vec<PieceErrors>>;
+
 /// Sums of one joint over one piece.
 #[derive(Debug, Clone, Copy, Default)]
-struct PieceErrors {
+pub struct PieceErrors {
     error: f64,
     torque: f64,
     mean: f64,
@@ -77,20 +99,19 @@ pub enum Counted {
     Moving,
 }
 
-/// Errors of a model over the pieces whose role is wanted; none where there is no such piece.
+/// Errors of a model over the pieces whose role is wanted.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
-pub fn errors(
+pub fn pieces(
     model: &AugmentedModel,
-    units: &[String],
     stretches: &[Stretch],
     (filters, rest_speed): (&ParallelFilters, &[f64]),
     split: &DataSplit,
     (wanted, counted): (&dyn Fn(RowRole) -> bool, Counted),
-) -> Result<Option<Errors>, MotionError> {
+) -> Result<Pieces, MotionError> {
     let n = model.model.robot.joints();
-    let mut pieces: Vec<Vec<PieceErrors>> = Vec::new();
+    let mut pieces = Pieces::new();
     for (index, stretch) in stretches.iter().enumerate() {
         let own = split
             .pieces
@@ -143,35 +164,79 @@ pub fn errors(
             pieces.push((0..n).map(joint).collect());
         }
     }
-    if pieces.is_empty() {
-        return Ok(None);
-    }
-    Ok(Some(summed(model, units, &pieces)))
+    Ok(pieces)
 }
 
-fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>]) -> Errors {
-    let n = units.len();
-    let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).sqrt() } else { f64::NAN };
-    let relative = |picked: &[usize]| -> Vec<f64> {
-        (0..n)
-            .map(|j| {
-                let sum =
-                    |of: fn(&PieceErrors) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
-                ratio(sum(|s| s.error), sum(|s| s.torque))
-            })
-            .collect()
-    };
-    let mean = |errors: &[f64]| {
-        let known = || errors.iter().filter(|e| e.is_finite());
-        (known().map(|e| e * e).sum::<f64>() / known().count() as f64).sqrt()
-    };
-    let all: Vec<usize> = (0..pieces.len()).collect();
-    let found = relative(&all);
+fn ratio(a: f64, b: f64) -> f64 {
+    if b > 0.0 { (a / b).sqrt() } else { f64::NAN }
+}
 
-    // neighbours together: the residual's slow part reaches over some pieces
-    let block = (pieces.len() / 20).clamp(1, 4);
-    let intervals = intervals_95(pieces.len(), block, SEED, &mut |picked| {
-        let mut errors = relative(picked);
+/// Relative error of every joint over those of the pieces that were picked.
+fn relative(pieces: &[Vec<PieceErrors>], picked: &[usize]) -> Vec<f64> {
+    let joints = 0..pieces.first().map_or(0, Vec::len);
+    let of_joint = |j: usize| {
+        let sum = |of: fn(&PieceErrors) -> f64| picked.iter().map(|p| of(&pieces[*p][j])).sum();
+        ratio(sum(|s| s.error), sum(|s| s.torque))
+    };
+    joints.map(of_joint).collect()
+}
+
+/// Root mean square over joints of their relative errors.
+fn mean(errors: &[f64]) -> f64 {
+    let known = || errors.iter().filter(|e| e.is_finite());
+    (known().map(|e| e * e).sum::<f64>() / known().count() as f64).sqrt()
+}
+
+/// The same over all pieces; none where there is none.
+pub fn mean_relative_error(pieces: &Pieces) -> Option<f64> {
+    let all: Vec<usize> = (0..pieces.len()).collect();
+    (!all.is_empty()).then(|| mean(&relative(pieces, &all)))
+}
+
+/// Pieces that a bootstrap draws together, of so many: the residual's slow part reaches over some.
+fn block_of(pieces: usize) -> usize {
+    (pieces / 20).clamp(1, 4)
+}
+
+/// What a change of the model does to the errors over the same pieces, joint by joint; nothing of joints that have
+/// no error there.
+pub fn changes(joints: &[String], before: &Pieces, after: &Pieces) -> Vec<JointChange> {
+    let count = before.len();
+    if count == 0 {
+        return Vec::new();
+    }
+    let of = |picked: &[usize]| [relative(before, picked), relative(after, picked)];
+    let all: Vec<usize> = (0..count).collect();
+    let [had, has] = of(&all);
+    let intervals = intervals_95(count, block_of(count), SEED, &mut |picked| {
+        let [before, after] = of(picked);
+        after.iter().zip(before).map(|(a, b)| a - b).collect()
+    });
+    let named = joints.iter().zip(had.into_iter().zip(has)).zip(intervals);
+    let change = named.map(|((joint, (before, after)), interval_95)| JointChange {
+        joint: joint.clone(),
+        before,
+        after,
+        interval_95,
+        worsened: interval_95[0] > 0.0,
+    });
+    change.filter(|c| c.before.is_finite()).collect()
+}
+
+/// Errors over pieces; none where there is none. `units` are those of the joints' torques.
+pub fn summed(
+    model: &AugmentedModel,
+    units: &[String],
+    pieces: &[Vec<PieceErrors>],
+) -> Option<Errors> {
+    let n = units.len();
+    if pieces.is_empty() {
+        return None;
+    }
+    let all: Vec<usize> = (0..pieces.len()).collect();
+    let found = relative(pieces, &all);
+    let intervals = intervals_95(pieces.len(), block_of(pieces.len()), SEED, &mut |picked| {
+        let mut errors = relative(pieces, picked);
         errors.push(mean(&errors));
         errors
     });
@@ -214,7 +279,7 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
         one_unit.then(|| part(all)).flatten()
     };
     let total = |of: fn(&PieceErrors) -> f64| pieces.iter().flatten().map(of).sum::<f64>();
-    Errors {
+    Some(Errors {
         overall: OverallErrors {
             relative_error: one_unit.then(|| ratio(total(|s| s.error), total(|s| s.torque))),
             relative_error_moving: pooled(0),
@@ -223,5 +288,5 @@ fn summed(model: &AugmentedModel, units: &[String], pieces: &[Vec<PieceErrors>])
             interval_95: intervals[n],
         },
         joints,
-    }
+    })
 }

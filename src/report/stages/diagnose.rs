@@ -1,6 +1,7 @@
 //! The report of `diagnose`.
 
 use super::first_screen;
+use super::step_words::{in_words, tentative, titled, worsened};
 use crate::config::ModelFile;
 use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, Turn};
 use crate::identify::{
@@ -132,12 +133,15 @@ fn step_told(
     (number, step): (usize, &AcceptedEffect),
 ) {
     let effect = &found.diagnosis.model.effects[step.effect];
-    let what = format!(
-        "{} ({}): {}",
-        effect.title(&machine.robot),
-        effect.family().name(),
-        in_words(machine, found, step.effect)
-    );
+    let what = match effect.curve() {
+        Some((signal, _)) => format!("{}; {}", titled(machine, effect), signal.words()[1]),
+        None => format!(
+            "{} ({}): {}",
+            effect.title(&machine.robot),
+            effect.family().name(),
+            in_words(machine, found, step.effect)
+        ),
+    };
     terminal.note(&format!("{number:>3}. "), &what, 7);
     if let Some(s) = &step.candidate.score {
         let told = format!(
@@ -150,16 +154,16 @@ fn step_told(
         terminal.note(MARGIN, &told, 7);
     }
     if let Some([before, after]) = step.holdout {
-        let worse = if after > before {
-            ": it worsens them"
-        } else {
-            ""
-        };
-        terminal.line(&format!(
-            "{MARGIN}data that decided nothing: {} before, {} after{worse}",
+        let told = format!(
+            "held-out data: {} before, {} after{}",
             number::percent(before),
-            number::percent(after)
-        ));
+            number::percent(after),
+            worsened(step)
+        );
+        terminal.note(MARGIN, &told, 7);
+    }
+    if let Some(why) = tentative(&found.diagnosis, step) {
+        terminal.note(MARGIN, &format!("tentative: {why}"), 7);
     }
     if step.alternatives.is_empty() {
         return;
@@ -308,26 +312,14 @@ fn path(found: &Diagnosed) -> Option<String> {
     ))
 }
 
-/// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
-fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) -> String {
-    let words = found.told(machine, effect).into_iter().map(|t| {
-        let value = match t.std {
-            Some(std) if std > 0.0 => number::plus_minus(t.value, std),
-            _ => number::significant(t.value, 4),
-        };
-        format!("{} = {value} {}", t.key, t.unit)
-            .trim_end()
-            .to_owned()
-    });
-    words.collect::<Vec<_>>().join(", ")
-}
-
 /// The residual before and after, over the logs that were fitted.
 pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure, MotionError> {
     let look = look(machine, found)?;
     let fitted = found.diagnosis.fitted_logs;
-    let after = &found.diagnosis.model;
-    residual::figure(&look, &|log| log < fitted, &found.given, Some(after))
+    let d = &found.diagnosis;
+    // without an effect the given model stands
+    let after = (!d.steps.is_empty()).then_some(&d.model);
+    residual::figure(&look, &|log| log < fitted, &found.given, after)
 }
 
 fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, MotionError> {
@@ -340,7 +332,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let titles: Vec<String> = d
         .steps
         .iter()
-        .map(|s| d.model.effects[s.effect].title(&machine.robot))
+        .map(|s| titled(machine, &d.model.effects[s.effect]))
         .collect();
     match found.verdict() {
         DiagnosisVerdict::EffectsFound => {
@@ -524,7 +516,12 @@ fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
     for step in &d.steps {
         let effect = &d.model.effects[step.effect];
         let unseen = step.holdout.map_or("-".to_owned(), |[before, after]| {
-            format!("{} to {}", number::percent(before), number::percent(after))
+            let worse = worsened(step);
+            format!(
+                "{} to {}{worse}",
+                number::percent(before),
+                number::percent(after)
+            )
         });
         let alike: Vec<String> = step
             .alternatives
@@ -532,12 +529,11 @@ fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             .map(|c| c.effect.title(&machine.robot))
             .collect();
         let score = step.candidate.score.as_ref();
-        let title = effect.title(&machine.robot);
+        let title = titled(machine, effect);
         rows.push(vec![
-            if d.assured() {
-                title
-            } else {
-                format!("{title}, or what it stands in for")
+            match tentative(d, step) {
+                None => title,
+                Some(why) => format!("{title} (tentative: {why})"),
             },
             in_words(machine, found, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),

@@ -11,5 +11,6 @@ pub mod identify;
 pub mod inspect;
 pub mod lsq;
 pub mod setup;
+mod step_words;
 pub mod track;
 pub mod validate;

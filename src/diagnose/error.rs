@@ -1,0 +1,26 @@
+//! Why no diagnosis comes out.
+
+use super::faults::channels::Suspicion;
+use crate::motion::MotionError;
+
+/// Why no diagnosis came out.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnoseError {
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    #[error(
+        "{rows} rows are left to fit after filtering and what is set aside, too few for {unknowns} \
+         unknowns; give a longer log, or logs of their own by --veto and --holdout"
+    )]
+    TooFewRows { rows: usize, unknowns: usize },
+    #[error(
+        "these logs determine none of the {unknowns} unknowns of the model; log a motion of every joint"
+    )]
+    NothingDetermined { unknowns: usize },
+    #[error("the torque of joint {joint} is zero throughout; check its channel")]
+    NoTorque { joint: String },
+    #[error("a torque channel looks sign-flipped or swapped")]
+    Channels(Suspicion),
+    #[error("interrupted")]
+    Interrupted,
+}

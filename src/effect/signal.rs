@@ -1,0 +1,71 @@
+//! Signals of a joint that a curve is drawn over.
+
+/// What the curve is drawn over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// A torque over the position.
+    Position,
+    /// Friction over the position: it flips with the direction.
+    Friction,
+    /// A torque over the speed.
+    Speed,
+    /// Friction over the load torque.
+    Load,
+    /// Friction over the way since the joint last reversed.
+    Way,
+}
+
+/// In the order of their numbers in files, from 1.
+const ALL: [Signal; 5] = [
+    Signal::Position,
+    Signal::Friction,
+    Signal::Speed,
+    Signal::Load,
+    Signal::Way,
+];
+
+/// How many there are.
+pub(super) const SIGNALS: usize = ALL.len();
+
+impl Signal {
+    pub(super) fn of(number: f64) -> Signal {
+        let index = (number.round() as usize).clamp(1, ALL.len());
+        ALL[index - 1]
+    }
+
+    pub(super) fn number(self) -> f64 {
+        let index = ALL.iter().position(|s| *s == self);
+        index.map_or(1.0, |i| (i + 1) as f64)
+    }
+
+    /// What it is and what to look at: `torque that depends on its position`, `a cable, a hose or the sensor`.
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Signal::Position => [
+                "torque that depends on its position",
+                "a cable, a hose or the sensor",
+            ],
+            Signal::Friction => [
+                "friction that depends on its position",
+                "a bent screw, an eccentric gear or a seal",
+            ],
+            Signal::Speed => [
+                "torque that depends on its speed",
+                "a lubricant, or a law of friction that is none of the named ones",
+            ],
+            Signal::Load => [
+                "friction that depends on its load",
+                "gear teeth, bearings or the torque sensor",
+            ],
+            Signal::Way => [
+                "friction that depends on the way since it last reversed",
+                "play, presliding or a shaft that twists",
+            ],
+        }
+    }
+
+    /// The shape of the law over it.
+    pub fn shape(self, [from, to]: [f64; 2]) -> Vec<f64> {
+        vec![self.number(), from, to]
+    }
+}

@@ -1,0 +1,65 @@
+//! `smooth-coulomb`: friction that does not jump at rest. In place of the declared fc sgn(v) stands
+//! fc tanh(v/vs) (Andersson, Soderberg and Bjorklund 2007, eq. 2).
+
+use super::entry::{Entry, Family, Key, Ladder, Search};
+use super::law::Law;
+use super::physics::{Limit, Number, Rule};
+use super::signal::Signal;
+use super::unit::Unit;
+use crate::robot::friction::sign;
+use crate::robot::model::JointFriction;
+
+pub static ENTRY: Entry = Entry {
+    name: "smooth-coulomb",
+    families: &[Family::Velocity],
+    keys: &[
+        Key::shape("vs", Unit::Speed).above_zero("must be above 0"),
+        Key::size("fc", Unit::Torque),
+    ],
+    search: Search::Refined,
+    friction: true,
+    must: &[
+        Rule::not_negative("fc", "friction acts against the motion"),
+        Rule::at_most(
+            Number::Key("vs"),
+            Limit::TopSpeed(0.3),
+            "Coulomb friction is reached well below the top speed",
+        ),
+    ],
+    otherwise: Some(Signal::Speed),
+    ladder: Some(Ladder::NARROW),
+    separate_by: "slow reversals with a ladder of amplitudes: a law of speed is the same at each, a \
+                  presliding loop shrinks with the amplitude",
+    formula: "fc tanh(v/vs) for F - viscous v",
+    source: "lubricated contacts and elastic seals, which creep before they slip (Andersson, Soderberg \
+             and Bjorklund 2007)",
+    ..Entry::USUAL
+};
+
+pub static LAW: Law = Law {
+    shape: &["vs"],
+    // a law that is smooth has slopes of its own
+    fits: |_, laws, place| {
+        let law = place.joint().map(|j| laws[j]);
+        !matches!(law, Some(JointFriction::DoubleTanh(_)))
+    },
+    starts: |cover, place| {
+        let joint = cover.at(place);
+        if joint.reversals < 2 {
+            return Err("fewer than two reversals: low speeds are passed too rarely".into());
+        }
+        let shares = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005];
+        Ok(shares.map(|s| vec![s * joint.fastest()]).to_vec())
+    },
+    limits: |cover, place| {
+        let top = cover.at(place).fastest();
+        vec![[1e-3 * top, 0.5 * top]]
+    },
+    direction: Some(|shape, v| (v / shape[0]).tanh()),
+    ..Law::linear(&ENTRY, &["fc"], |scene, place, shape, _, out| {
+        let Some(j) = place.joint() else { return };
+        for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {
+            *x = (v / shape[0]).tanh() - sign(*v);
+        }
+    })
+};

@@ -1,0 +1,75 @@
+//! What is said of one effect that was added.
+
+use crate::diagnose::{AcceptedEffect, Diagnosis, StepStatus};
+use crate::effect::Added;
+use crate::identify::{Diagnosed, LoggedRobot};
+use crate::number;
+
+/// The joints that a step makes worse on held-out data, with the change of their errors; nothing where there is none.
+pub(super) fn worsened(step: &AcceptedEffect) -> String {
+    let joints = step.joints.iter().filter(|j| j.worsened).map(|j| {
+        let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
+        format!(
+            "{} from {} to {} (95 % CI of the change {low}..{high} points)",
+            j.joint,
+            number::percent(j.before),
+            number::percent(j.after)
+        )
+    });
+    let joints: Vec<String> = joints.collect();
+    match joints.is_empty() {
+        true if step.worsens() => ": worse".to_owned(),
+        true => String::new(),
+        false => format!("; worse on {}", joints.join(", ")),
+    }
+}
+
+/// Why the name of a step's effect is tentative; none where it is not.
+pub(super) fn tentative(d: &Diagnosis, step: &AcceptedEffect) -> Option<String> {
+    if d.status(step) != StepStatus::Tentative {
+        return None;
+    }
+    let mut why = Vec::new();
+    if !step.alternatives.is_empty() {
+        why.push("these data do not separate it from others");
+    }
+    if step.joints.is_empty() {
+        why.push("there are no held-out data");
+    } else if !step.confirmed() {
+        why.push("held-out data do not confirm it");
+    }
+    if !d.assured() {
+        why.push("what is left is more than noise");
+    }
+    Some(why.join("; "))
+}
+
+/// An effect by its name and place; a curve that stands in for one by what it depends on, and its peak.
+pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
+    let Some((signal, peak)) = effect.curve() else {
+        return effect.title(&machine.robot);
+    };
+    let words = signal.words()[0];
+    let what = match effect.place.name(&machine.robot) {
+        Some(joint) => words.replacen(' ', &format!(" of {joint} "), 1),
+        None => words.to_owned(),
+    };
+    let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+    format!("{what}: peak {} {unit}", number::significant(peak, 2))
+}
+
+/// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
+pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) -> String {
+    let words = found.told(machine, effect).into_iter().map(|t| {
+        let value = match t.std {
+            Some(std) if std > 0.0 => number::plus_minus(t.value, std),
+            _ => number::significant(t.value, 4),
+        };
+        let told = format!("{} = {value} {}", t.key, t.unit);
+        match t.bound {
+            true => format!("{} (held at a bound)", told.trim_end()),
+            false => told.trim_end().to_owned(),
+        }
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
