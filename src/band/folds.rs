@@ -234,6 +234,7 @@ fn add(
         stretch,
         hat: &plain.hat,
         load: &plain.load,
+        direction: &torques.direction,
     };
     let mut gradient = vec![0.0; model.model.parameters()];
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
