@@ -124,7 +124,7 @@ fn simulated(seed: u64, joint: usize, change: &dyn Fn(usize) -> f64) -> Vec<Vec<
         .map(|_| 5.0 * (0.5 * draw()).exp())
         .collect();
     let mut warm = 0.0;
-    let mut out = vec![Vec::with_capacity(LOGS); PARAMETERS];
+    let mut out: Vec<Vec<_>> = (0..PARAMETERS).map(|_| Vec::with_capacity(LOGS)).collect();
     for log in 0..LOGS {
         // the temperature of a day is partly that of the day before; a degree is 1 %
         warm = 0.7 * warm + 0.7 * draw();

@@ -102,6 +102,7 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "validate no.csv -m no.toml",
         "reduce no.csv -r configs/emps.toml -o a.cfi",
         "track no.cfi",
+        "watch no.csv -m no.toml",
         "diagnose no.csv -m no.toml",
         "compare no.toml no.toml",
         "torque no.csv -m no.toml -o t.csv",

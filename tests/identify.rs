@@ -106,7 +106,7 @@ fn a_callback_stops_a_stage_and_hears_of_its_progress() {
         }
     });
     lsq(&robot(), &log, &LsqSettings::default(), &control).unwrap();
-    assert_eq!(*said.lock().unwrap(), ["least squares"]);
+    assert_eq!(*said.lock().unwrap(), ["least squares", "held-out data"]);
     let stopped = Control::default().stopped_by(|| true);
     let error = lsq(&robot(), &log, &LsqSettings::default(), &stopped)
         .err()

@@ -398,7 +398,12 @@ fn the_document_of_a_part_is_that_of_its_log() {
         folder.path(),
         &["lsq", "emps.cfi", "-r", robot, "-o", "b.toml"],
     );
-    for key in ["condition", "rank", "joints", "position_cutoffs", "inputs"] {
+    for key in ["rank", "joints", "position_cutoffs", "inputs"] {
         assert_eq!(of_part[key], of_log[key], "{key}");
+    }
+    for kind in ["raw", "normalised"] {
+        let of = |document: &serde_json::Value| document["condition"][kind].as_f64().unwrap();
+        let ratio = of(&of_part) / of(&of_log);
+        assert!((ratio - 1.0).abs() < 1e-12, "{kind}: {ratio}");
     }
 }

@@ -139,18 +139,16 @@ struct Format<'a> {
     /// The list beside it.
     side: PathBuf,
     says: Says,
-    text: fn(&Arm, &[String]) -> String,
+    text: Text,
 }
+
+/// The text of a format, of an arm and the lines at its head.
+type Text = fn(&Arm, &[String]) -> String;
 
 /// Those of the command line.
 fn formats(args: &Args) -> Vec<Format<'_>> {
     use export::{mjcf, sdf, usd};
-    let all: [(
-        &Option<PathBuf>,
-        &'static str,
-        Says,
-        fn(&Arm, &[String]) -> String,
-    ); 3] = [
+    let all: [(&Option<PathBuf>, &'static str, Says, Text); 3] = [
         (&args.mjcf, "MJCF", mjcf::SAYS, mjcf::mjcf),
         (&args.sdf, "SDF", sdf::SAYS, sdf::sdf),
         (&args.usd, "USD", usd::SAYS, usd::usd),

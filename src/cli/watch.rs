@@ -15,8 +15,7 @@ use crate::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident watch unseen.csv -m model.toml --false-alarms 10 -o external.csv
-  robot-driver | cft-ident watch - -m model.toml | jq -c 'select(.alarm)'";
+  cft-ident watch unseen.csv -m model.toml --false-alarms 10 -o external.csv";
 
 /// External torque of every joint row by row, with alarms, from a log or from rows as they come.
 ///

@@ -1,10 +1,10 @@
-//! Which rows of the logs do what, and whether they can be fitted at all.
+//! Which rows of the logs do what, whether they can be fitted at all, and what a model leaves in them.
 
 use super::error::DiagnoseError;
 use super::faults::channels::suspicion;
 use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole};
-use crate::effect::stationary_joints;
+use crate::effect::{AugmentedModel, Torques, stationary_joints};
 use crate::motion::Stretch;
 
 /// Which rows do what. Of a log that is fitted or may veto those of stationary joints count for nothing; along the
@@ -46,4 +46,18 @@ pub(super) fn check(case: &Case, split: &DataSplit, unknowns: usize) -> Result<(
         Some(found) => Err(DiagnoseError::Channels(found)),
         None => Ok(()),
     }
+}
+
+/// Raw residuals along stretches, `[stretch][joint][sample]`.
+pub(super) fn residuals<'a>(
+    model: &AugmentedModel,
+    stretches: &[Stretch],
+    torques: impl Iterator<Item = &'a Torques>,
+) -> Vec<Vec<Vec<f64>>> {
+    let of = |(stretch, torques): (&Stretch, &Torques)| match torques.hat.is_empty() {
+        // along a log in which nothing moves
+        true => model.residual(stretch, &model.torques(stretch)),
+        false => model.residual(stretch, torques),
+    };
+    stretches.iter().zip(torques).map(of).collect()
 }

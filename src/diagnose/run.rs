@@ -11,7 +11,7 @@ use super::candidates::search::search;
 use super::error::DiagnoseError;
 use super::faults::disturbance::{self, CutDisturbance};
 use super::outcome::{AcceptedEffect, Diagnosis, SplitErrors, Turn};
-use super::prepare::{check, data_split};
+use super::prepare::{check, data_split, residuals};
 use super::problem::case::Case;
 use super::problem::data_split::{LogRole, RowRole};
 use super::problem::fit::{FittedModel, fit};
@@ -34,7 +34,7 @@ use crate::motion::{MotionError, Stretch};
 use crate::robot::model::JointFriction;
 
 /// Most times that effects take the place of others.
-const MOST_REPLACEMENTS: usize = 3;
+const MOST_REPLACEMENTS: usize = 2;
 
 /// Most disturbances that are cut out.
 const MOST_DISTURBANCES: usize = 8;
@@ -587,18 +587,4 @@ impl<'a> Diagnosing<'a> {
 
 fn is_holdout(role: RowRole) -> bool {
     role == RowRole::Holdout
-}
-
-/// Raw residuals along stretches, `[stretch][joint][sample]`.
-fn residuals<'a>(
-    model: &AugmentedModel,
-    stretches: &[Stretch],
-    torques: impl Iterator<Item = &'a Torques>,
-) -> Vec<Vec<Vec<f64>>> {
-    let of = |(stretch, torques): (&Stretch, &Torques)| match torques.hat.is_empty() {
-        // along a log in which nothing moves
-        true => model.residual(stretch, &model.torques(stretch)),
-        false => model.residual(stretch, torques),
-    };
-    stretches.iter().zip(torques).map(of).collect()
 }

@@ -438,21 +438,21 @@ fn direction(refined: &AugmentedModel, j: usize, v: &str) -> String {
 
 /// The curve of an effect over a signal, as a sum of cubes that begin at its knots.
 fn curve_text(effect: &Added, signal: &str) -> String {
-    let above = |x: &str| format!("0.5 * ({x} + fabs({x}))");
+    let above = |x: &str| format!("0.5 * (({x}) + fabs({x}))");
     let (from, to) = (effect.shape[1], effect.shape[2]);
     let cubes = cubes(&effect.linear);
     let (steps, terms) = cubes.split_at(2);
     let per_step = terms.len() as f64 / (to - from);
     let x = above(&format!(
-        "(({signal} - {}) * {})",
+        "({signal} - {}) * {}",
         exact(from),
         exact(per_step)
     ));
-    let beyond = above(&format!("({x} - {})", exact(terms.len() as f64)));
+    let beyond = above(&format!("{x} - {}", exact(terms.len() as f64)));
     let x = format!("({x} - {beyond})");
     let mut out = format!("{} + {} * {x}", exact(steps[0]), exact(steps[1]));
     for (k, cube) in terms.iter().enumerate() {
-        let part = above(&format!("({x} - {})", exact(k as f64)));
+        let part = above(&format!("{x} - {}", exact(k as f64)));
         out += &format!(" + {} * pow({part}, 3.0)", exact(*cube));
     }
     out

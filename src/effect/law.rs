@@ -69,7 +69,7 @@ pub struct Law {
     /// Direction of the joint's friction at a speed, where the effect makes it smooth: shape, speed.
     pub direction: Option<fn(&[f64], f64) -> f64>,
     /// Family and whether it is the same torque at rest, where these hang on the shape.
-    pub varied: Option<fn(&[f64]) -> (Family, bool)>,
+    pub varied: Option<Varied>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
 }
@@ -79,8 +79,14 @@ pub struct Memory {
     /// How many numbers it keeps; NaN at the begin of a stretch.
     pub size: usize,
     /// Place, shape, joint, what it keeps, and one number for each linear coefficient, 0 before.
-    pub step: fn(&Scene, Place, &[f64], usize, &mut [f64], &mut [f64]),
+    pub step: Step,
 }
+
+/// Family and whether it is the same torque at rest, by the shape.
+pub type Varied = fn(&[f64]) -> (Family, bool);
+
+/// One sample of a law that remembers, see [`Memory::step`].
+pub type Step = fn(&Scene, Place, &[f64], usize, &mut [f64], &mut [f64]);
 
 /// Two ways to say the numbers of one effect.
 pub struct Reparametrisation {

@@ -254,7 +254,7 @@ pub(super) fn in_c(statements: &[&[String]]) -> String {
     let called = FUNCTIONS.iter().filter(|f| calls(statements, f.name));
     let mut out = String::new();
     for function in called {
-        let _ = write!(out, "{}\n", function.c);
+        let _ = writeln!(out, "{}", function.c);
     }
     out
 }

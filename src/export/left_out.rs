@@ -27,8 +27,11 @@ pub struct LeftOut {
 /// One of them, with the torque of every joint along a stretch.
 struct Part<'a> {
     what: String,
-    torque: Box<dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a>,
+    torque: Box<Torque<'a>>,
 }
+
+/// Torque of every joint along a stretch.
+type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
 
 /// What a format cannot say, with its size along the stretches given, of which there may be none.
 pub fn left_out(
@@ -116,11 +119,10 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
                 what: format!("gear train of {} that {} turns too", names[m], names[o]),
                 torque: Box::new(move |s, _| {
                     let mut all = vec![vec![0.0; s.len()]; n];
-                    for k in 0..s.len() {
-                        let turning = coulomb * sign(s.v[m][k] + r * s.v[o][k]);
-                        all[m][k] = r * (inertia * s.a[o][k] + viscous * s.v[o][k]) + turning;
-                        all[o][k] = r * (inertia * s.a[m][k] + viscous * s.v[m][k] + turning);
-                    }
+                    let turning = |k: usize| coulomb * sign(s.v[m][k] + r * s.v[o][k]);
+                    let of = |k: usize, j: usize| inertia * s.a[j][k] + viscous * s.v[j][k];
+                    all[m] = (0..s.len()).map(|k| r * of(k, o) + turning(k)).collect();
+                    all[o] = (0..s.len()).map(|k| r * (of(k, m) + turning(k))).collect();
                     all
                 }),
             });

@@ -57,7 +57,7 @@ pub fn module(program: &Program, note: &Note) -> String {
             None => ("f64".to_owned(), first.clone()),
             Some(n) => (format!("[f64; {n}]"), format!("[{first}; {n}]")),
         };
-        let _ = write!(fields, "    pub {name}: {kind},\n");
+        let _ = writeln!(fields, "    pub {name}: {kind},");
         let _ = writeln!(init, "        {name}: {first},");
     }
     let about = about(effects);

@@ -203,7 +203,8 @@ fn wide_motion(
     stretches: &[Stretch],
     wide: Vec<Stretch>,
 ) -> Result<Option<WideMotion>, MotionError> {
-    let Some(dt) = wide.first().map(|s| s.dt) else {
+    // the slowest log carries the lowest cut-off
+    let Some(dt) = wide.iter().map(|s| s.dt).max_by(f64::total_cmp) else {
         return Ok(None);
     };
     let settings = machine.settings().widened(WIDE_TIMES, 1.0 / dt);

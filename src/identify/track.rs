@@ -212,7 +212,7 @@ fn ordered(
     };
     let mut by_hash: Vec<&TrackSource> = given.iter().collect();
     by_hash.sort_by(|a, b| a.provenance().sha256.cmp(&b.provenance().sha256));
-    for pair in by_hash.windows(2).filter(|pair| twice(pair[0], pair[1])) {
+    if let Some(pair) = by_hash.windows(2).find(|pair| twice(pair[0], pair[1])) {
         return Err(TrackError::Twice {
             robot: name(),
             first: pair[0].name().to_owned(),

@@ -145,8 +145,8 @@ fn clearest(
             ChangeKind::Step => LEAST,
             ChangeKind::Ramp => RAMP,
         };
-        for place in LEAST..(n + 1).saturating_sub(least) {
-            let at = told[place];
+        let places = LEAST..(n + 1).saturating_sub(least).max(LEAST);
+        for at in told.get(places).into_iter().flatten().copied() {
             tried += 1;
             let column = without(&whitener.apply(&shape(kind, at, times)), &known);
             let norm = column.iter().map(|x| x * x).sum::<f64>();

@@ -98,7 +98,7 @@ fn spacings(times: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Estimates that stand alone: far from the median of those around them. So is a log in which the robot carried
+/// Estimates that stand alone: far from the median of those before them and of those after them. So is a log in which the robot carried
 /// something; a change is one when as many logs show it as do not.
 fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
     let told: Vec<usize> = (0..signal.len())
@@ -107,15 +107,31 @@ fn alone(signal: &[f64], variances: &[f64]) -> Vec<usize> {
     if told.len() < 2 * NEIGHBOURS + 1 {
         return Vec::new();
     }
-    let around = |place: usize| {
-        let from = place.saturating_sub(NEIGHBOURS);
-        let to = (place + NEIGHBOURS + 1).min(told.len());
-        let others = (from..to).filter(move |p| *p != place);
-        others.map(|p| signal[told[p]])
+    let middle = |places: std::ops::Range<usize>, but: usize| {
+        let others = places.filter(|p| *p != but);
+        median(others.map(|p| signal[told[p]])).unwrap_or_default()
     };
-    let off: Vec<f64> = (0..told.len())
-        .map(|p| signal[told[p]] - median(around(p)).unwrap_or_default())
-        .collect();
+    // Beside a step those before and those after differ: what is like either does not stand alone.
+    let off = |place: usize| {
+        let (from, to) = (
+            place.saturating_sub(NEIGHBOURS),
+            (place + NEIGHBOURS + 1).min(told.len()),
+        );
+        let x = signal[told[place]];
+        match place - from < 2 || to - place < 3 {
+            true => x - middle(from..to, place),
+            false => {
+                let sides = [from..place, place + 1..to].map(|side| x - middle(side, place));
+                let [before, after] = sides;
+                if before.abs() < after.abs() {
+                    before
+                } else {
+                    after
+                }
+            }
+        }
+    };
+    let off: Vec<f64> = (0..told.len()).map(off).collect();
     let Some(scale) = median(off.iter().map(|x| x.abs())) else {
         return Vec::new();
     };

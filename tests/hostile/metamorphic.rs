@@ -110,9 +110,7 @@ fn a_log_that_is_written_otherwise_gives_the_same_parameters() {
         let bench = Bench::new();
         bench.file(
             "robot.toml",
-            cft_ident::config::embedded(robot.as_ref())
-                .unwrap()
-                .to_owned(),
+            cft_ident::config::embedded(robot.as_ref()).unwrap(),
         );
         let table = Table::read(&path);
         bench.file("log.csv", table.text());

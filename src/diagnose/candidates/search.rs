@@ -32,6 +32,9 @@ pub struct Found<'a> {
     pub test: CandidateTest<'a>,
 }
 
+/// Whether a law is looked for at a place.
+pub(crate) type Wanted<'w> = dyn Fn(&Law, Place) -> bool + Sync + 'w;
+
 /// Tries once everything that is `wanted`, and goes into what removes at least the fraction `needed` of the weighted
 /// squares.
 ///
@@ -43,7 +46,7 @@ pub fn search<'a>(
     case: &Case,
     baseline: &Baseline,
     torques: &'a [Torques],
-    (wanted, needed): (&(dyn Fn(&Law, Place) -> bool + Sync), f64),
+    (wanted, needed): (&Wanted<'_>, f64),
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Found<'a>, MotionError> {
     let round = SearchRound {

@@ -168,8 +168,9 @@ fn judged_by(added: &Added, seen: &Seen, covariance: &[f64], limits: &[[f64; 2]]
     let unknown = |k: &usize| {
         let [low, high] = limits[*k];
         let open = low < high && low > 0.0 && !added.held[*k];
+        let known = deviation(*k) <= KNOWN * added.shape[*k].abs();
         // what is not a number is not known either
-        open && !(deviation(*k) <= KNOWN * added.shape[*k].abs())
+        open && !known
     };
     match (0..limits.len()).find(unknown) {
         Some(k) => Judged::Bound(k),

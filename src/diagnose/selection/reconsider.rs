@@ -26,10 +26,13 @@ pub(crate) struct Replacement {
     pub fitted: FittedModel,
 }
 
+/// Whether a set of effects has been tried.
+type Known<'a> = dyn Fn(&[Added]) -> bool + 'a;
+
 /// Most single effects and pairs that others are looked for in the place of.
-const GROUPS: usize = 8;
+const GROUPS: usize = 4;
 /// Sets that are fitted jointly, the likeliest, in the place of one effect or two.
-const FITTED: usize = 3;
+const FITTED: usize = 2;
 /// Least part of what the effects removed that another must remove with the shape that its search begins from.
 const NEEDED: f64 = 0.3;
 
@@ -44,7 +47,7 @@ pub(crate) fn replacement(
     case: &Case,
     baseline: &Baseline,
     found: &[usize],
-    (known, stop): (&dyn Fn(&[Added]) -> bool, &(dyn Fn() -> bool + Sync)),
+    (known, stop): (&Known, &(dyn Fn() -> bool + Sync)),
 ) -> Result<Option<Replacement>, MotionError> {
     let present = Errors::of(at, at, problem)?;
     let mut groups = groups(&at.model.effects, at.weights.len());

@@ -3,7 +3,7 @@
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::identify::{LoggedRobot, Validated};
-use crate::log::{Provenance, escape};
+use crate::log::{DataRole, Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
 use crate::report::figure::{JointTorque, TorqueFigure};
@@ -238,7 +238,9 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
 /// Logs that the model was made from are no test of it.
 fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
     let made_from = &file.provenance.inputs;
-    let known = |i: &&Provenance| made_from.iter().any(|m| m.made() && m.shares_rows(i));
+    // a file of 0.1, or one that is cut off, may not say what a log was used for
+    let used = |m: &&Provenance| m.role != Some(DataRole::HeldOut);
+    let known = |i: &&Provenance| made_from.iter().filter(used).any(|m| m.shares_rows(i));
     let names: Vec<String> = inputs
         .iter()
         .filter(known)
