@@ -126,7 +126,8 @@ fn what_the_diagnosis_adds_to_panda_and_ur10_does_not_worsen_what_it_never_saw()
 fn what_the_diagnosis_adds_to_the_ur10_is_known_as_well_as_58_parameters_let_it() {
     let found = committed("ur10_diagnosis");
     let steps = found["steps"].as_array().unwrap();
-    assert!(steps.len() > 4);
+    // a Stribeck effect below the Coulomb level and load friction that was not determined are named no more
+    assert!(steps.len() >= 3);
     for step in steps {
         for (key, number) in step["parameters"].as_object().unwrap() {
             let (value, std) = (&number["value"], &number["std"]);
@@ -134,8 +135,8 @@ fn what_the_diagnosis_adds_to_the_ur10_is_known_as_well_as_58_parameters_let_it(
             assert!(over < 20.0, "{} {key} {number}", step["effect"]);
         }
     }
-    let first = &steps[0]["parameters"]["c"];
+    assert_eq!(steps[0]["effect"], "smooth-coulomb");
+    let first = &steps[0]["parameters"]["fc"];
     let over = first["std"].as_f64().unwrap() / first["value"].as_f64().unwrap().abs();
-    assert_eq!(steps[0]["effect"], "stribeck");
     assert!(over < 0.1, "{first}");
 }
