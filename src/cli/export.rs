@@ -27,7 +27,7 @@ Example:
   cft-ident export -m model.toml --c feedforward.h
   cft-ident export -m model.toml --rust feedforward.rs
   cft-ident export -m myarm-model.toml --urdf myarm-identified.urdf
-  cft-ident export -m myarm-model.toml --mjcf myarm.xml --usd myarm.usda unseen.csv";
+  cft-ident export -m myarm-model.toml --mjcf myarm.xml unseen.csv";
 
 /// Write a model for other programs: a C header, a Rust module, a URDF, files of simulators.
 ///
