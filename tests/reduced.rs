@@ -154,6 +154,8 @@ fn the_number_of_threads_changes_no_byte_and_merging_is_associative() {
     let right = ReducedLogs::merge([right, a]).unwrap();
     assert_eq!(left.to_bytes().unwrap(), bytes);
     assert_eq!(right.to_bytes().unwrap(), bytes);
+    let twice = ReducedLogs::merge([left.clone(), right.clone()]).unwrap_err();
+    assert!(twice.to_string().contains("given twice"), "{twice}");
     let read = ReducedLogs::from_bytes("part.cfi", &bytes).unwrap();
     assert_eq!(read.to_bytes().unwrap(), bytes);
 }

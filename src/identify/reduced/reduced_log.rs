@@ -296,15 +296,15 @@ impl ReducedLogs {
         for log in &logs {
             log.belongs_to(&first.made_with)?;
         }
-        for pair in logs.windows(2) {
-            let same = logs.iter().filter(|l| l.key().0 == pair[0].key().0);
-            let twice = same
-                .filter(|l| !Arc::ptr_eq(l, &pair[0]))
-                .any(|l| l.shares_rows(&pair[0]));
-            if pair[0].key().0 == pair[1].key().0 && twice {
+        for (k, log) in logs.iter().enumerate() {
+            // those of one checksum stand together
+            let mut spans = logs[k + 1..]
+                .iter()
+                .take_while(|other| other.key().0 == log.key().0);
+            if let Some(other) = spans.find(|other| other.shares_rows(log)) {
                 return Err(ReducedError::Twice {
-                    first: pair[0].name().to_owned(),
-                    second: pair[1].name().to_owned(),
+                    first: log.name().to_owned(),
+                    second: other.name().to_owned(),
                 });
             }
         }
