@@ -16,10 +16,8 @@ pub static ENTRY: Entry = Entry {
         Key::shape("w", Unit::Slope),
     ],
     search: Search::Refined,
-    must: &[
-        Rule::not_negative("mu_c", LOADED).or_zero(),
-        Rule::not_negative("mu_v", LOADED).or_zero(),
-    ],
+    // mu_v may be negative: what it takes at speed is bounded by the power of all friction of the joint
+    must: &[Rule::not_negative("mu_c", LOADED).or_zero()],
     otherwise: Some(Signal::Load),
     friction: true,
     separate_by: "the same path at the same speed with and without a known payload",

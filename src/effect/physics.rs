@@ -243,7 +243,7 @@ mod tests {
             (
                 "load-friction",
                 &[("mu_c", 0.05), ("mu_v", -0.01), ("w", 50.0)],
-                false,
+                true,
             ),
             ("drive-efficiency", &[("k", 0.2)], true),
             ("drive-efficiency", &[("k", 0.9)], false),
