@@ -8,128 +8,46 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Rooms in pipeline order, each with the rooms that it may import. A new room gets a line here.
-const ROOMS: &[(&str, &[&str])] = &[
-    ("math", &[]),
-    ("verdict", &[]),
-    ("number", &[]),
-    ("robot", &["math"]),
-    ("log", &["math", "number", "robot"]),
-    ("config", &["number", "robot", "log", "verdict"]),
-    ("output", &["log"]),
-    ("motion", &["math", "robot", "log"]),
-    ("effect", &["math", "robot", "motion"]),
-    ("export", &["number", "robot", "config", "motion", "effect"]),
-    (
-        "band",
-        &["math", "number", "robot", "config", "motion", "effect"],
-    ),
-    (
-        "observe",
-        &["math", "robot", "log", "config", "motion", "effect", "band"],
-    ),
-    ("open_loop", &["robot", "motion", "effect"]),
-    ("friction", &["math", "robot", "log", "motion", "verdict"]),
-    ("inertia", &["math", "robot", "log", "motion", "verdict"]),
-    ("diagnose", &["math", "robot", "log", "motion", "effect"]),
-    ("validate", &["math", "robot", "log", "motion", "verdict"]),
-    ("inspect", &["math", "number", "log"]),
-    ("setup", &["math", "robot", "motion", "inertia"]),
-    ("mapping", &["robot", "log", "inspect"]),
-    (
-        "simulate",
-        &["math", "number", "robot", "log", "config", "effect"],
-    ),
-    (
-        "excite",
-        &[
-            "math", "number", "robot", "log", "config", "inertia", "simulate",
-        ],
-    ),
-    (
-        "compare",
-        &["math", "robot", "config", "motion", "effect", "verdict"],
-    ),
-    ("track", &[]),
+const ROOMS: &[(&str, &str)] = &[
+    ("math", ""),
+    ("verdict", ""),
+    ("number", ""),
+    ("robot", "math"),
+    ("log", "math number robot"),
+    ("config", "number robot log verdict"),
+    ("output", "log"),
+    ("motion", "math robot log"),
+    ("effect", "math robot motion"),
+    ("export", "number robot config motion effect"),
+    ("band", "math number robot config motion effect"),
+    ("observe", "math robot log config motion effect band"),
+    ("open_loop", "robot motion effect"),
+    ("friction", "math robot log motion verdict"),
+    ("inertia", "math robot log motion verdict"),
+    ("diagnose", "math robot log motion effect"),
+    ("validate", "math robot log motion verdict"),
+    ("inspect", "math number log"),
+    ("setup", "math robot motion inertia"),
+    ("mapping", "robot log inspect"),
+    ("simulate", "math number robot log config effect"),
+    ("excite", "math number robot log config inertia simulate"),
+    ("compare", "math robot config motion effect verdict"),
+    ("track", ""),
     (
         "identify",
-        &[
-            "math",
-            "verdict",
-            "number",
-            "robot",
-            "log",
-            "config",
-            "motion",
-            "effect",
-            "friction",
-            "inertia",
-            "diagnose",
-            "validate",
-            "inspect",
-            "setup",
-            "compare",
-            "band",
-            "observe",
-            "open_loop",
-            "track",
-        ],
+        "math verdict number robot log config motion effect friction inertia diagnose validate \
+         inspect setup compare band observe open_loop track",
     ),
     (
         "report",
-        &[
-            "math",
-            "verdict",
-            "number",
-            "robot",
-            "log",
-            "config",
-            "motion",
-            "effect",
-            "friction",
-            "inertia",
-            "diagnose",
-            "validate",
-            "inspect",
-            "setup",
-            "excite",
-            "compare",
-            "identify",
-            "band",
-            "observe",
-            "open_loop",
-            "track",
-        ],
+        "math verdict number robot log config motion effect friction inertia diagnose validate \
+         inspect setup excite compare identify band observe open_loop track",
     ),
     (
         "cli",
-        &[
-            "math",
-            "verdict",
-            "number",
-            "robot",
-            "log",
-            "config",
-            "output",
-            "motion",
-            "effect",
-            "friction",
-            "inertia",
-            "diagnose",
-            "validate",
-            "inspect",
-            "mapping",
-            "setup",
-            "simulate",
-            "excite",
-            "compare",
-            "identify",
-            "report",
-            "export",
-            "band",
-            "observe",
-            "open_loop",
-            "track",
-        ],
+        "math verdict number robot log config output motion effect friction inertia diagnose \
+         validate inspect mapping setup simulate excite compare identify report export band \
+         observe open_loop track",
     ),
 ];
 
@@ -156,7 +74,9 @@ const DOORS: &[(&str, &str)] = &[
 
 #[test]
 fn imports_run_one_way() {
-    let allowed: BTreeMap<&str, &[&str]> = ROOMS.iter().copied().collect();
+    let allowed: BTreeMap<&str, Vec<&str>> = (ROOMS.iter())
+        .map(|(room, may)| (*room, may.split_whitespace().collect()))
+        .collect();
     let sources = sources();
     let mut wrong = Vec::new();
     for (from, to) in Imports::read(&sources, code).between_files() {
@@ -196,8 +116,8 @@ fn no_imports_go_in_a_circle() {
 #[test]
 fn the_plan_itself_has_no_way_back() {
     for (at, (room, may)) in ROOMS.iter().enumerate() {
-        for import in *may {
-            let earlier = ROOMS[..at].iter().any(|(name, _)| name == import);
+        for import in may.split_whitespace() {
+            let earlier = ROOMS[..at].iter().any(|(name, _)| *name == import);
             assert!(earlier, "`{room}` imports `{import}`, which comes later");
         }
     }
@@ -220,7 +140,8 @@ fn estimators_know_nothing_of_the_simulator() {
         "open_loop",
     ] {
         let (_, may) = ROOMS.iter().find(|(name, _)| *name == room).unwrap();
-        assert!(!may.contains(&"simulate"), "{room}");
+        let simulates = may.split_whitespace().any(|import| import == "simulate");
+        assert!(!simulates, "{room}");
     }
 }
 

@@ -235,6 +235,7 @@ fn add(
         hat: &plain.hat,
         load: &plain.load,
         direction: &torques.direction,
+        tilt: Some(&torques.tilt),
     };
     let mut gradient = vec![0.0; model.model.parameters()];
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);

@@ -16,6 +16,7 @@ use super::problem::case::Case;
 use super::problem::data_split::{LogRole, RowRole};
 use super::problem::fit::{FittedModel, fit};
 use super::problem::fit_problem::{FitProblem, inertial_of};
+use super::problem::normal_equations::InertialSums;
 use super::problem::rests::rest_weight;
 use super::problem::unknowns::Unknowns;
 use super::selection::accept::{accept, beyond_chance};
@@ -110,6 +111,7 @@ impl<'a> Diagnosing<'a> {
         let joints = robot.joints();
         let mut problem = FitProblem {
             inertial: inertial_of(robot, &case.stretches, &case.filters, &split)?,
+            inertial_sums: InertialSums::new(),
             stretches: &case.stretches,
             filters: &case.filters,
             split,
@@ -123,6 +125,7 @@ impl<'a> Diagnosing<'a> {
         let noise = at.base.residual_rms(&problem.split);
         problem.rest_weight = rest_weight(&at.model, &case.stretches, &case.filters, &noise);
         if problem.rest_weight.iter().any(|weight| *weight > 0.0) {
+            problem.inertial_sums = InertialSums::new();
             at = fit(&case.given, &problem)?;
         }
         let inverse = RankRevealingInverse::of(&at.normal);
@@ -174,6 +177,7 @@ impl<'a> Diagnosing<'a> {
             (self.progress)(&said);
         }
         self.disturbances.extend(cut);
+        self.problem.inertial_sums = InertialSums::new();
         self.at = fit(&self.at.model, &self.problem)?;
         Ok(true)
     }

@@ -1,7 +1,7 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
 use super::added::Added;
-use super::law::Scene;
+use super::law::{Scene, TiltTorques};
 use super::place::Place;
 use crate::motion::Stretch;
 use crate::robot::model::Model;
@@ -22,6 +22,8 @@ pub struct Torques {
     pub load: Vec<Vec<f64>>,
     /// Direction of each joint's friction where an effect makes it smooth; else empty.
     pub direction: Vec<Vec<f64>>,
+    /// What effects have asked of these inertial parameters already.
+    pub(crate) tilt: TiltTorques,
 }
 
 impl AugmentedModel {
@@ -39,22 +41,21 @@ impl AugmentedModel {
         let samples = stretch.len();
         let mut load = vec![vec![0.0; samples]; n];
         let mut hat = vec![vec![0.0; samples]; n];
-        let p = self.model.theta.len();
-        let mut y = vec![0.0; n * p];
+        let (robot, theta) = (&self.model.robot, &self.model.theta);
+        let mut inertial = vec![0.0; n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for k in 0..samples {
             stretch.at(k, &mut q, &mut v, &mut a);
-            self.model.robot.regressor(&q, &v, &a, &mut y);
-            for j in 0..n {
-                let row = &y[j * p..(j + 1) * p];
-                let inertial: f64 = row.iter().zip(&self.model.theta).map(|(y, t)| y * t).sum();
-                load[j][k] = inertial;
+            robot.torque(theta, &q, &v, &a, &mut inertial);
+            for (j, inertial) in inertial.iter().enumerate() {
+                load[j][k] = *inertial;
                 hat[j][k] = inertial + self.model.friction[j].torque(v[j]) + self.model.offset[j];
             }
         }
         // a gain multiplies what the plain model gives: effects see that, and not one another
         let plain = hat.clone();
         let direction: Vec<Vec<f64>> = (0..n).map(|j| self.direction(stretch, j)).collect();
+        let tilt = TiltTorques::new();
         let scene = Scene {
             robot: &self.model.robot,
             theta: &self.model.theta,
@@ -63,6 +64,7 @@ impl AugmentedModel {
             hat: &plain,
             load: &load,
             direction: &direction,
+            tilt: Some(&tilt),
         };
         let mut extra = vec![0.0; samples];
         for effect in &self.effects {
@@ -79,6 +81,7 @@ impl AugmentedModel {
             hat,
             load,
             direction,
+            tilt,
         }
     }
 

@@ -30,12 +30,43 @@ pub static LAW: Law = Law {
 };
 
 fn columns(scene: &Scene, _: Place, _: &[f64], joint: usize, out: &mut [Vec<f64>]) {
-    let [gx, gy] = out else { return };
+    if let Some(known) = scene.tilt {
+        let known = known.get_or_init(|| all_joints(scene));
+        for (out, known) in out.iter_mut().zip(known) {
+            out.copy_from_slice(&known[joint]);
+        }
+        return;
+    }
+    along(scene, |k, torques| {
+        for (out, x) in out.iter_mut().zip(torques[joint]) {
+            out[k] = x;
+        }
+    });
+}
+
+/// Torques on all joints, `[direction][joint][sample]`: a walk over the links gives them together.
+fn all_joints(scene: &Scene) -> [Vec<Vec<f64>>; 2] {
+    let none = || vec![vec![0.0; scene.len()]; scene.robot.joints()];
+    let mut out = [none(), none()];
+    along(scene, |k, torques| {
+        for (direction, out) in out.iter_mut().enumerate() {
+            for (out, torque) in out.iter_mut().zip(torques) {
+                out[k] = torque[direction];
+            }
+        }
+    });
+    out
+}
+
+/// Calls `take` with every sample and its torques, those of a joint by gravity along x and along y.
+fn along(scene: &Scene, mut take: impl FnMut(usize, &[[f64; 2]])) {
     let (n, tilt) = (scene.robot.joints(), scene.robot.tilt(scene.theta));
     let mut state = [[0.0; MOST_JOINTS]; 3];
-    for (k, (gx, gy)) in gx.iter_mut().zip(gy).enumerate() {
+    let mut torques = [[0.0; 2]; MOST_JOINTS];
+    for k in 0..scene.len() {
         let [q, v, a] = &mut state;
         scene.stretch.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
-        [*gx, *gy] = tilt.torque(joint, &q[..n]);
+        tilt.torques(&q[..n], &mut torques[..n]);
+        take(k, &torques[..n]);
     }
 }

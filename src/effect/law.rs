@@ -1,6 +1,8 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
+use std::sync::OnceLock;
+
 use super::cover::Cover;
 use super::entry::{Entry, Family};
 use super::place::Place;
@@ -21,7 +23,14 @@ pub struct Scene<'a> {
     pub load: &'a [Vec<f64>],
     /// Direction of each joint's friction; empty where it is that of its law.
     pub direction: &'a [Vec<f64>],
+    /// Keeps what gravity along the base's x and y does on all joints, once an effect asks for it; none where
+    /// samples come one by one.
+    pub tilt: Option<&'a TiltTorques>,
 }
+
+/// Torques of a gravity of one along the base's x and along its y, `[direction][joint][sample]`
+/// \[N or N m per m/s^2\].
+pub type TiltTorques = OnceLock<[Vec<Vec<f64>>; 2]>;
 
 impl Scene<'_> {
     /// Number of samples.
@@ -167,6 +176,13 @@ impl Law {
             Some(_) => self.entry.keys.iter().map(|key| key.name).collect(),
         }
     }
+}
+
+/// Whether a joint's declared friction jumps at rest, or there is none: a law that is smooth has slopes and a fall at
+/// low speed of its own.
+pub(super) fn jumps_or_is_none(_: &Robot, laws: &[JointFriction], place: Place) -> bool {
+    let law = place.joint().map(|j| laws[j]);
+    !matches!(law, Some(JointFriction::DoubleTanh(_)))
 }
 
 impl KeyValue {

@@ -92,6 +92,7 @@ impl Sampled {
             hat: &self.hat,
             load: &self.load,
             direction: &self.direction,
+            tilt: None,
         };
         for (i, effect) in self.model.effects.iter().enumerate() {
             if effect.law.entry.role == Role::Shift {

@@ -2,12 +2,11 @@
 //! Dupont and Canudas de Wit 1994), where the declared law has no such term.
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
-use super::law::Law;
+use super::law::{self, Law};
 use super::physics::{Limit, Number, Rule};
 use super::signal::Signal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
-use crate::robot::model::JointFriction;
 
 pub static ENTRY: Entry = Entry {
     name: "stribeck",
@@ -40,10 +39,7 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     shape: &["vs"],
-    fits: |_, laws, place| {
-        let law = place.joint().map(|j| laws[j]);
-        !matches!(law, Some(JointFriction::DoubleTanh(_)))
-    },
+    fits: law::jumps_or_is_none,
     starts: |cover, place| {
         let joint = cover.at(place);
         if joint.reversals < 2 {

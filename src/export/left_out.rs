@@ -154,6 +154,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
                     hat: &plain.hat,
                     load: &plain.load,
                     direction: &plain.direction,
+                    tilt: Some(&plain.tilt),
                 };
                 let mut all = vec![vec![0.0; s.len()]; n];
                 for (j, out) in all.iter_mut().enumerate() {

@@ -8,7 +8,7 @@ use super::cft::links::{PseudoInertia, base_parameters};
 use super::cft::regressor::regressor22;
 use super::cft::{PRINTED, Structure, UNPRINTED};
 use super::standard::{Body, STANDARD};
-use super::tree::newton_euler::walk;
+use super::tree::newton_euler::{torques, walk};
 use super::tree::{MOST_JOINTS, Tree};
 use super::{Form, Robot, four};
 
@@ -154,23 +154,26 @@ impl Robot {
 }
 
 impl Tilt {
-    /// Torque of joint `joint` at the pose q \[N or N m per m/s^2\].
-    pub fn torque(&self, joint: usize, q: &[f64]) -> [f64; 2] {
+    /// Torques at the pose q, those of each joint by the two gravities \[N or N m per m/s^2\].
+    pub fn torques(&self, q: &[f64], out: &mut [[f64; 2]]) {
+        out.fill([0.0; 2]);
         match &self.0 {
-            Moments::Unknown => [0.0; 2],
-            Moments::Report(chain) => of_report(chain, joint, four(q)),
+            Moments::Unknown => {}
+            Moments::Report(chain) => {
+                for (joint, out) in out.iter_mut().enumerate() {
+                    *out = of_report(chain, joint, four(q));
+                }
+            }
             Moments::Links(trees, bodies) => {
                 let still = [0.0; MOST_JOINTS];
-                trees.each_ref().map(|tree| {
-                    let mut torque = 0.0;
-                    walk(tree, q, &still, &still, |link, on, row| {
-                        if on == joint {
-                            let own = row.iter().zip(&bodies[link]);
-                            torque += own.map(|(y, x)| y * x).sum::<f64>();
-                        }
-                    });
-                    torque
-                })
+                for (direction, tree) in trees.iter().enumerate() {
+                    let mut of_joints = [0.0; MOST_JOINTS];
+                    let state = [q, &still[..], &still[..]];
+                    torques(tree, state, |link| bodies[link], &mut of_joints);
+                    for (out, torque) in out.iter_mut().zip(of_joints) {
+                        out[direction] = torque;
+                    }
+                }
             }
         }
     }

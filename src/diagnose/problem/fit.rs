@@ -98,13 +98,13 @@ fn evaluate(
         unknowns,
         (problem.stretches, &problem.inertial),
         (problem.filters, &problem.rest_weight),
-        &problem.split,
+        (&problem.split, &problem.inertial_sums),
     )?;
     let weights = match weights {
         Some(w) => w.to_vec(),
         None => weights_of(&base, problem),
     };
-    Ok(FittedModel::of(model, base, weights, problem))
+    Ok(FittedModel::of_sums(model, base, weights, problem))
 }
 
 fn weights_of(base: &Base, problem: &FitProblem) -> Vec<f64> {
@@ -113,7 +113,13 @@ fn weights_of(base: &Base, problem: &FitProblem) -> Vec<f64> {
 }
 
 impl FittedModel {
-    fn of(model: AugmentedModel, base: Base, weights: Vec<f64>, problem: &FitProblem) -> Self {
+    /// A model whose rows are summed.
+    pub(crate) fn of_sums(
+        model: AugmentedModel,
+        base: Base,
+        weights: Vec<f64>,
+        problem: &FitProblem,
+    ) -> Self {
         let total = base.total(&problem.split, &weights, &RowRole::fitted);
         let (information, pull) = problem.prior.over(&base.unknowns, &model);
         FittedModel {
@@ -141,7 +147,7 @@ impl FittedModel {
 
     fn reweighted(self, problem: &FitProblem) -> Self {
         let weights = weights_of(&self.base, problem);
-        FittedModel::of(self.model, self.base, weights, problem)
+        FittedModel::of_sums(self.model, self.base, weights, problem)
     }
 
     /// Weighted squares and the prior's share.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::data_split::DataSplit;
+use super::normal_equations::InertialSums;
 use super::prior::ParameterPrior;
 use super::rows::{Inertial, inertial};
 use super::unknowns::FreeParameters;
@@ -15,6 +16,8 @@ pub struct FitProblem<'a> {
     pub stretches: &'a [Stretch],
     /// What the inertial parameters do along each of them.
     pub inertial: Vec<Inertial>,
+    /// Their sums, of the pieces and the weights at rest as they are: to be emptied where these change.
+    pub inertial_sums: InertialSums,
     pub filters: &'a ParallelFilters,
     pub split: DataSplit,
     pub open: &'a FreeParameters,
@@ -50,6 +53,7 @@ impl<'a> FitProblem<'a> {
     pub fn along(&self, robot: &Robot, stretches: &'a [Stretch]) -> Result<Self, MotionError> {
         Ok(FitProblem {
             inertial: inertial_of(robot, stretches, self.filters, &self.split)?,
+            inertial_sums: InertialSums::new(),
             stretches,
             split: self.split.clone(),
             cover: self.cover.clone(),

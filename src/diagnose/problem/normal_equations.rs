@@ -1,13 +1,14 @@
 //! Normal equations over pieces of time, summed from filtered rows.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::data_split::{DataSplit, Piece, RowRole};
-use super::rows::{Filtered, Inertial, filtered};
-use super::unknowns::Unknowns;
+use super::rows::{Column, Filtered, Inertial, filtered};
+use super::unknowns::{Unknown, Unknowns};
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 
@@ -31,22 +32,40 @@ impl PieceSums {
         }
     }
 
-    fn of(columns: &[Vec<f64>], residual: &[f64], rows: Range<usize>) -> Self {
+    /// `known` is X'X of the first columns, where it has been summed before.
+    fn of(
+        columns: &[Column],
+        residual: &[f64],
+        rows: Range<usize>,
+        known: Option<&DMatrix<f64>>,
+    ) -> Self {
         let e = &residual[rows.clone()];
         let mut sums = PieceSums::none(columns.len());
+        let first = known.map_or(0, DMatrix::nrows);
+        if let Some(known) = known {
+            let block = &mut sums.normal.view_mut((0, 0), (first, first));
+            block.copy_from(known);
+        }
         for (a, x) in columns.iter().enumerate() {
             let x = &x[rows.clone()];
+            sums.score[a] = dot(x, e);
+            if a < first {
+                continue;
+            }
             for (b, y) in columns[..=a].iter().enumerate() {
                 let product = dot(x, &y[rows.clone()]);
                 sums.normal[(a, b)] = product;
                 sums.normal[(b, a)] = product;
             }
-            sums.score[a] = dot(x, e);
         }
         sums.square = dot(e, e);
         sums
     }
 }
+
+/// X'X of the inertial parameters' columns, `[piece][joint]`, once it has been summed; none of joints that were late
+/// then. It is that of every model on the same rows.
+pub type InertialSums = OnceLock<Vec<Vec<Option<DMatrix<f64>>>>>;
 
 /// All rows of the base model, reduced to pieces; the rows themselves stay for candidates.
 pub struct Base {
@@ -66,7 +85,7 @@ impl Base {
         unknowns: Unknowns,
         (stretches, inertial): (&[Stretch], &[Inertial]),
         (filters, rest_weight): (&ParallelFilters, &[f64]),
-        split: &DataSplit,
+        (split, known): (&DataSplit, &InertialSums),
     ) -> Result<Self, MotionError> {
         let filtered = stretches
             .par_iter()
@@ -79,16 +98,40 @@ impl Base {
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let of_piece = |piece: &Piece| {
+        let late = |j: usize| model.shift(j) != 0.0;
+        let of_piece = |(i, piece): (usize, &Piece)| {
             let rows = &filtered[piece.stretch];
             let joints = 0..rows.columns.len();
-            let of_joint = |j| match split.ignores(piece.stretch, j) {
-                true => PieceSums::none(rows.columns[j].len()),
-                false => PieceSums::of(&rows.columns[j], &rows.residual[j], piece.rows.clone()),
+            let of_joint = |j: usize| {
+                let (columns, range) = (&rows.columns[j], piece.rows.clone());
+                let known = known.get().filter(|_| !late(j));
+                match split.ignores(piece.stretch, j) {
+                    true => PieceSums::none(columns.len()),
+                    false => PieceSums::of(
+                        columns,
+                        &rows.residual[j],
+                        range,
+                        known.and_then(|k| k[i][j].as_ref()),
+                    ),
+                }
             };
             joints.map(of_joint).collect()
         };
-        let sums = split.pieces.par_iter().map(of_piece).collect();
+        let pieces = split.pieces.par_iter().enumerate();
+        let sums: Vec<Vec<PieceSums>> = pieces.map(of_piece).collect();
+        known.get_or_init(|| {
+            let own = |j: usize| {
+                let list = unknowns.columns[j].iter();
+                let theta = |i: &&usize| matches!(unknowns.list[**i], Unknown::Theta(_));
+                list.take_while(theta).count()
+            };
+            let of_joint = |(j, sums): (usize, &PieceSums)| {
+                let block = || sums.normal.view((0, 0), (own(j), own(j))).into_owned();
+                (!late(j)).then(block)
+            };
+            let of_piece = |sums: &Vec<PieceSums>| sums.iter().enumerate().map(of_joint).collect();
+            sums.iter().map(of_piece).collect()
+        });
         Ok(Base {
             unknowns,
             stretches: filtered,

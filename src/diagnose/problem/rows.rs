@@ -1,5 +1,7 @@
 //! Filtered, decimated rows of every joint.
 
+use std::sync::Arc;
+
 use super::rests::{standing, weigh};
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{AugmentedModel, Scene, Torques, shifted};
@@ -7,16 +9,19 @@ use crate::motion::{MotionError, Parallel, Stretch};
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
+/// A column of filtered rows; those of the inertial parameters are shared by the models of a diagnosis.
+pub type Column = Arc<Vec<f64>>;
+
 /// Derivative columns and residual of one stretch, `[joint][column][row]`.
 pub struct Filtered {
-    pub columns: Vec<Vec<Vec<f64>>>,
+    pub columns: Vec<Vec<Column>>,
     pub residual: Vec<Vec<f64>>,
 }
 
 /// Filtered regressor of the inertial parameters along one stretch, `[joint][parameter][row]`; nothing of
 /// joints whose rows are ignored. It is the same for every model that is tried on the motion, but for one that is
 /// late.
-pub type Inertial = Vec<Vec<Vec<f64>>>;
+pub type Inertial = Vec<Vec<Column>>;
 
 /// The filtered regressor of a robot along one stretch.
 ///
@@ -36,7 +41,7 @@ pub fn inertial(
     let raw = regressor(robot, stretch);
     for (j, out) in out.iter_mut().enumerate().filter(|(j, _)| !ignored(*j)) {
         let channels: Vec<&[f64]> = raw[j].iter().map(Vec::as_slice).collect();
-        *out = parallel.run(&channels)?;
+        *out = parallel.run(&channels)?.into_iter().map(Arc::new).collect();
     }
     Ok(out)
 }
@@ -74,8 +79,9 @@ pub fn filtered(
 ) -> Result<Filtered, MotionError> {
     let n = model.model.robot.joints();
     let rows = parallel.rows(stretch.len());
+    let nothing: Column = Arc::new(vec![0.0; rows]);
     let zeros = |(j, own): (usize, &Vec<usize>)| match ignored(j) {
-        true => vec![vec![0.0; rows]; own.len()],
+        true => own.iter().map(|_| Arc::clone(&nothing)).collect(),
         false => Vec::new(),
     };
     let mut out = Filtered {
@@ -104,21 +110,24 @@ pub fn filtered(
         let channels: Vec<&[f64]> = raw.iter().map(Vec::as_slice).collect();
         let mut rows = parallel.run(&channels)?.into_iter();
         let known = |i: usize| match unknowns.list[i] {
-            Unknown::Theta(c) if late == 0.0 => Some(inertial[j][c].clone()),
+            Unknown::Theta(c) if late == 0.0 => Some(Arc::clone(&inertial[j][c])),
             _ => None,
         };
         let of = unknowns.columns[j].iter();
-        let mut columns: Vec<Vec<f64>> = of
-            .filter_map(|&i| known(i).or_else(|| rows.next()))
+        let mut columns: Vec<Column> = of
+            .filter_map(|&i| known(i).or_else(|| rows.next().map(Arc::new)))
             .collect();
-        columns.extend(rows);
+        let mut residual = rows.next().unwrap_or_default();
         let still = standing(model, stretch, parallel, j);
-        let at_rest = own_at_rest(model, unknowns, j);
-        for (column, at_rest) in columns.iter_mut().zip(at_rest.chain([true])) {
-            let weight = if at_rest { rest_weight[j] } else { 0.0 };
-            weigh(column, &still, weight);
+        if !still.is_empty() {
+            let at_rest = own_at_rest(model, unknowns, j);
+            for (column, at_rest) in columns.iter_mut().zip(at_rest) {
+                let weight = if at_rest { rest_weight[j] } else { 0.0 };
+                weigh(Arc::make_mut(column).as_mut_slice(), &still, weight);
+            }
+            weigh(&mut residual, &still, rest_weight[j]);
         }
-        out.residual[j] = columns.pop().unwrap_or_default();
+        out.residual[j] = residual;
         out.columns[j] = columns;
     }
     Ok(out)
@@ -199,6 +208,7 @@ pub fn scene<'a>(
         hat: &torques.hat,
         load: &torques.load,
         direction: &torques.direction,
+        tilt: Some(&torques.tilt),
     }
 }
 
@@ -295,14 +305,27 @@ mod tests {
         for j in 0..4 {
             assert_eq!(now.columns[j].len(), late.columns[j].len());
             let largest = |x: &[f64]| x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-            let all = late.columns[j].iter().chain([&late.residual[j]]);
-            let own = now.columns[j].iter().chain([&now.residual[j]]);
-            for (c, (a, b)) in own.zip(all).enumerate() {
+            let rows = |of: &Filtered| -> Vec<Vec<f64>> {
+                let columns = of.columns[j].iter().map(|c| c.to_vec());
+                columns.chain([of.residual[j].clone()]).collect()
+            };
+            let (own, all) = (rows(&now), rows(&late));
+            for (c, (a, b)) in own.iter().zip(&all).enumerate() {
                 let off: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
                 assert!(largest(&off) <= 1e-9 * (1.0 + largest(b)), "{j} {c}");
             }
         }
-        assert!(now.columns[1].iter().flatten().all(|x| *x == 0.0));
-        assert!(now.columns[2][..12].iter().flatten().any(|x| *x != 0.0));
+        assert!(
+            now.columns[1]
+                .iter()
+                .flat_map(|c| c.iter())
+                .all(|x| *x == 0.0)
+        );
+        assert!(
+            now.columns[2]
+                .iter()
+                .flat_map(|c| c.iter())
+                .any(|x| *x != 0.0)
+        );
     }
 }

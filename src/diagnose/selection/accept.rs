@@ -125,15 +125,19 @@ fn decide(
     } else {
         None
     };
-    let small =
-        (worth.of_declared < limits.worth || worth.of_noise < limits.over_noise).then(|| {
-            format!(
-                "too small to matter: {:.2} % of the declared model's squared residual, {:.2} of \
-                 the noise's power",
-                100.0 * worth.of_declared,
-                worth.of_noise
-            )
-        });
+    let small = if worth.of_declared < limits.worth {
+        let percent = 100.0 * worth.of_declared;
+        Some(format!(
+            "too small to matter: {percent:.2} % of the declared model's squared residual"
+        ))
+    } else if worth.of_noise < limits.over_noise {
+        let times = worth.of_noise;
+        Some(format!(
+            "too small to matter: {times:.2} of the noise's power"
+        ))
+    } else {
+        None
+    };
     let doubt = if s.delta_bic <= 0.0 {
         Some(format!(
             "not worth its parameters: BIC changes by {:.1} with {:.0} effective rows",

@@ -109,6 +109,7 @@ mod tests {
     use crate::diagnose::problem::data_split::{DataSplit, LogRole};
     use crate::diagnose::problem::fit::fit;
     use crate::diagnose::problem::fit_problem::inertial_of;
+    use crate::diagnose::problem::normal_equations::InertialSums;
     use crate::diagnose::problem::prior::ParameterPrior;
     use crate::diagnose::problem::unknowns::FreeParameters;
     use crate::effect::{AugmentedModel, Cover};
@@ -189,6 +190,7 @@ mod tests {
         };
         let problem = FitProblem {
             inertial: inertial_of(&robot, &stretches, &filters, &split).unwrap(),
+            inertial_sums: InertialSums::new(),
             cover: Cover::of(&robot, &stretches, 30.0),
             stretches: &stretches,
             filters: &filters,

@@ -54,6 +54,108 @@ pub fn walk(
     a: &[f64],
     visit: impl FnMut(usize, usize, &[f64; STANDARD]),
 ) {
+    walk_with(tree, [q, v, a], Rows(visit));
+}
+
+/// Adds to `tau` what links whose standard parameters `body` gives ask of every independent joint: their forces and
+/// moments once a link, in place of ten columns for each joint that moves it.
+///
+/// # Panics
+/// As [`walk`].
+#[inline]
+pub(crate) fn torques(
+    tree: &Tree,
+    state: [&[f64]; 3],
+    body: impl Fn(usize) -> [f64; STANDARD],
+    tau: &mut [f64],
+) {
+    let [force, moment] = [[0.0; 3]; 2];
+    walk_with(
+        tree,
+        state,
+        Forces {
+            body,
+            tau,
+            force,
+            moment,
+        },
+    );
+}
+
+/// What is done with the motion of links, one after the other outward.
+trait Visit {
+    /// Link i has this motion.
+    fn link<const DEPTH: usize>(&mut self, i: usize, state: &State<DEPTH>);
+    /// Joint k moves it by w_k and l_k.
+    fn joint<const DEPTH: usize>(
+        &mut self,
+        i: usize,
+        k: usize,
+        state: &State<DEPTH>,
+        slopes: [&Vector; 2],
+    );
+}
+
+/// Hands on the derivatives by the standard parameters.
+struct Rows<F>(F);
+
+impl<F: FnMut(usize, usize, &[f64; STANDARD])> Visit for Rows<F> {
+    #[inline(always)]
+    fn link<const DEPTH: usize>(&mut self, _: usize, _: &State<DEPTH>) {}
+
+    #[inline(always)]
+    fn joint<const DEPTH: usize>(
+        &mut self,
+        i: usize,
+        k: usize,
+        state: &State<DEPTH>,
+        [wk, lk]: [&Vector; 2],
+    ) {
+        (self.0)(i, k, &row(state, wk, lk));
+    }
+}
+
+/// Sums the torques of links with known parameters.
+struct Forces<'a, F> {
+    body: F,
+    tau: &'a mut [f64],
+    /// Of the link that is visited.
+    force: Vector,
+    moment: Vector,
+}
+
+impl<F: Fn(usize) -> [f64; STANDARD]> Visit for Forces<'_, F> {
+    #[inline(always)]
+    fn link<const DEPTH: usize>(&mut self, i: usize, state: &State<DEPTH>) {
+        let State { w, dw, a, .. } = state;
+        let [xx, xy, xz, yy, yz, zz, mx, my, mz, m] = (self.body)(i);
+        let inertia = |x: &Vector| {
+            [
+                xx * x[0] + xy * x[1] + xz * x[2],
+                xy * x[0] + yy * x[1] + yz * x[2],
+                xz * x[0] + yz * x[1] + zz * x[2],
+            ]
+        };
+        let first = [mx, my, mz];
+        let swept = add(&cross(dw, &first), &cross(w, &cross(w, &first)));
+        self.force = add(&times(m, a), &swept);
+        let turned = add(&inertia(dw), &cross(w, &inertia(w)));
+        self.moment = add(&turned, &cross(&first, a));
+    }
+
+    #[inline(always)]
+    fn joint<const DEPTH: usize>(
+        &mut self,
+        _: usize,
+        k: usize,
+        _: &State<DEPTH>,
+        [wk, lk]: [&Vector; 2],
+    ) {
+        self.tau[k] += dot(lk, &self.force) + dot(wk, &self.moment);
+    }
+}
+
+fn walk_with(tree: &Tree, [q, v, a]: [&[f64]; 3], visit: impl Visit) {
     let n = tree.joints();
     assert!(
         q.len() >= n && v.len() >= n && a.len() >= n,
@@ -80,7 +182,7 @@ fn walk_within<const STATES: usize, const DEPTH: usize>(
     q: &[f64],
     v: &[f64],
     a: &[f64],
-    mut visit: impl FnMut(usize, usize, &[f64; STANDARD]),
+    mut visit: impl Visit,
 ) {
     let mut states = [State::<DEPTH>::AT_REST; STATES];
     let base = State {
@@ -129,6 +231,7 @@ fn walk_within<const STATES: usize, const DEPTH: usize>(
                 state.a = add(&state.a, &add(&pushed, &coriolis));
             }
         }
+        visit.link(i, state);
         for (place, &k) in step.upstream.iter().enumerate() {
             // a joint's first link has nothing of it from the link before
             let (mut wk_here, mut lk_here) = ([0.0; 3], [0.0; 3]);
@@ -149,7 +252,7 @@ fn walk_within<const STATES: usize, const DEPTH: usize>(
                 }
             }
             state.jacobian[place] = [wk_here, lk_here];
-            visit(i, k, &row(state, &wk_here, &lk_here));
+            visit.joint(i, k, state, [&wk_here, &lk_here]);
         }
     }
 }

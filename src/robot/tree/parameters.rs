@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 use super::base::{self, Grouping};
 use super::links::Tree;
-use super::newton_euler::walk;
+use super::newton_euler::{torques, walk};
 use crate::robot::friction::sign;
 use crate::robot::joint::{JointKind, ParameterInfo};
 use crate::robot::standard::{STANDARD, STANDARD_NAMES};
@@ -131,11 +131,14 @@ impl Parameters {
     #[inline]
     pub fn torque(&self, tree: &Tree, theta: &[f64], [q, v, a]: [&[f64]; 3], tau: &mut [f64]) {
         tau.fill(0.0);
-        walk(tree, q, v, a, |link, joint, row| {
+        let body = |link: usize| {
+            let mut body = [0.0; STANDARD];
             for &(c, at) in &self.kept[link] {
-                tau[joint] += row[c] * theta[at];
+                body[c] = theta[at];
             }
-        });
+            body
+        };
+        torques(tree, [q, v, a], body, tau);
         self.of_drives(v, a, |joint, at, x| tau[joint] += x * theta[at]);
     }
 
