@@ -64,6 +64,7 @@ fn model(values: &[f64]) -> ModelFile {
         robot: robot.clone(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
+        candidates: Vec::new(),
         parameters,
         covariance: Some(Covariance {
             names,

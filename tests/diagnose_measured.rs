@@ -121,7 +121,7 @@ fn assert_names(found: &Value) {
         let holds = match step["effect"].as_str().unwrap() {
             "stribeck" => value("c") >= 0.0 && known("vs"),
             "smooth-coulomb" => value("fc") >= 0.0 && known("vs"),
-            "load-friction" => value("mu_c") >= 0.0 && value("mu_v") >= 0.0 && known("w"),
+            "load-friction" => value("mu_c") >= 0.0 && known("w"),
             "drive-efficiency" => (0.0..=0.6).contains(&value("k")),
             "backlash" => value("gap") <= if turns { 0.03 } else { 2e-3 },
             "presliding" => value("sigma0") > 0.0 && known("sigma0"),

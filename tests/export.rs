@@ -343,6 +343,7 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
+        candidates: Vec::new(),
         provenance: ModelProvenance::default(),
     }
 }
@@ -403,6 +404,7 @@ fn feasible(robot: RobotFile) -> ModelFile {
     ModelFile {
         links,
         drive_inertia: drives,
+        candidates: Vec::new(),
         ..file_of(robot, &model)
     }
 }

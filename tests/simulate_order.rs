@@ -263,6 +263,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
+        candidates: Vec::new(),
         provenance: Default::default(),
     };
     let heavy = simulate(&Order {
@@ -334,6 +335,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
+        candidates: Vec::new(),
         provenance: Default::default(),
     };
     let ordered = Order {

@@ -618,6 +618,7 @@ impl Campaign {
             averaged: true,
             keep: self.keep,
             without,
+            own: Vec::new(),
             limits,
         }
     }

@@ -35,6 +35,9 @@ pub struct Args {
     /// Log that is evaluated once, after everything is decided; may be given more than once
     #[arg(long, value_name = "LOG")]
     pub holdout: Vec<LogSpec>,
+    /// Effects of your own to try beside the known ones: [[candidate]] tables with formulas in q, v, a, load and t
+    #[arg(long, value_name = "FILE.toml")]
+    pub candidates: Option<PathBuf>,
     /// Hold the given model within its covariance: finds payload, gain and tilt
     #[arg(long)]
     pub keep: bool,
@@ -58,6 +61,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = logs
         .map(|l| l.path.as_path())
         .chain([args.model.as_path()])
+        .chain(args.candidates.as_deref())
         .collect();
     let outputs = outputs::listed(args.output.as_deref(), &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
@@ -70,8 +74,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         veto: &veto,
         holdout: &logs_of(&args.holdout),
     };
+    let own = args
+        .candidates
+        .as_deref()
+        .map(files::candidates)
+        .transpose()?;
     let settings = DiagnoseSettings {
         keep: args.keep,
+        candidates: own.map(|given| given.value).unwrap_or_default(),
         ..DiagnoseSettings::default()
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Context;
 use super::error::CliError;
+use crate::config::candidates::{self, Candidate};
 use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
 use crate::log::{Provenance, escape};
 
@@ -64,6 +65,11 @@ pub(crate) fn model_of(
     let model = model(path, context)?;
     model.value.belongs_to(&model.name, robot)?;
     Ok(model)
+}
+
+/// A file of effects of the user's own.
+pub fn candidates(path: &Path) -> Result<Given<Vec<Candidate>>, CliError> {
+    read(path, Wanted::Own, candidates::parse)
 }
 
 /// A trajectory file, or one that comes with the tool.

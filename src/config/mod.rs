@@ -5,6 +5,7 @@
 
 mod angles;
 pub mod campaign;
+pub mod candidates;
 mod channels;
 mod check;
 mod check_log;

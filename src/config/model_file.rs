@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
+use super::candidates::Candidate;
 use super::held_out::{Excesses, HeldOut};
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{Provenance, escape};
@@ -176,6 +177,8 @@ pub struct ModelFile {
     pub held_out: Vec<HeldOut>,
     /// How often external torques that are none go beyond a level.
     pub excesses: Option<Excesses>,
+    /// Formulas of those effects that are the user's own.
+    pub candidates: Vec<Candidate>,
     /// Effects added to the declared model.
     pub effects: Vec<Effect>,
     /// Physically consistent links that give these parameters, where they were asked for.

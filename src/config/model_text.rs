@@ -7,6 +7,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::candidates::{self, Candidate};
 use super::contents::{self, Contents};
 use super::document::Document;
 use super::embedded::other_kind;
@@ -55,6 +56,8 @@ pub(super) struct ModelToml {
     #[serde(default)]
     held_out: Vec<HeldOut>,
     excesses: Option<Excesses>,
+    #[serde(default)]
+    candidate: Vec<Candidate>,
     #[serde(default)]
     effect: Vec<Effect>,
     #[serde(default)]
@@ -115,6 +118,7 @@ impl ModelFile {
             friction_prior: raw.friction_prior,
             held_out: raw.held_out,
             excesses: raw.excesses,
+            candidates: raw.candidate,
             effects: raw.effect,
             links: raw.link,
             drive_inertia: raw.drive_inertia,
@@ -129,6 +133,7 @@ impl ModelFile {
             }
         }
         model.check_covariance(&document)?;
+        candidates::check(&model.candidates, &document)?;
         model.check_rest(&document)?;
         Ok(model)
     }
@@ -200,6 +205,11 @@ impl ModelFile {
             let excesses = BTreeMap::from([("excesses", excesses)]);
             text.push('\n');
             text.push_str(&toml::to_string(&excesses).map_err(unwritable)?);
+        }
+        if !self.candidates.is_empty() {
+            text.push_str("\n# Formulas of effects that are the user's own.\n");
+            let own = BTreeMap::from([("candidate", &self.candidates)]);
+            text.push_str(&toml::to_string(&own).map_err(unwritable)?);
         }
         if !self.effects.is_empty() {
             text.push_str("\n# Effects added to the declared model.\n");

@@ -1,9 +1,10 @@
 //! An effect with its numbers, as it stands in a model.
 
 use super::entry::{Family, Role};
-use super::law::{KeyValue, Law, Scene};
+use super::law::{KeyValue, Law};
 use super::physics::{Rule, Seen};
 use super::place::Place;
+use super::scene::Scene;
 use super::unit::Unit;
 use super::values::{EffectError, Values};
 use crate::robot::Robot;
@@ -140,7 +141,8 @@ impl Added {
     pub fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
         let mut out = vec![vec![0.0; scene.len()]; self.law.linear.len()];
         if self.place.touches(joint) {
-            (self.law.columns)(scene, self.place, &self.shape, joint, &mut out);
+            self.law
+                .fill(scene, self.place, (&self.shape, joint), &mut out);
         }
         out
     }

@@ -1,8 +1,8 @@
 //! A model with effects: what torque it reconstructs along whole stretches.
 
 use super::added::Added;
-use super::law::{Scene, TiltTorques};
 use super::place::Place;
+use super::scene::{Scene, TiltTorques};
 use crate::motion::Stretch;
 use crate::robot::model::Model;
 

@@ -3,7 +3,8 @@
 
 use super::added::Added;
 use super::entry::{Entry, Family, Key, Role, Search};
-use super::law::{Law, Memory, Scene};
+use super::law::{Law, Memory};
+use super::scene::Scene;
 use super::signal::{SIGNALS, Signal};
 use super::unit::Unit;
 

@@ -20,6 +20,8 @@ pub enum Family {
     Slow,
     Event,
     Data,
+    /// A formula of the user's own.
+    Own,
 }
 
 impl Family {
@@ -37,6 +39,7 @@ impl Family {
             Family::Slow => "slow",
             Family::Event => "event",
             Family::Data => "data",
+            Family::Own => "own",
         }
     }
 }

@@ -3,7 +3,8 @@
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
 use super::entry::{Entry, Family, Key};
-use super::law::{Law, Scene};
+use super::law::Law;
+use super::scene::Scene;
 use super::place::{Place, Places};
 use super::unit::Unit;
 use crate::robot::tree::MOST_JOINTS;

@@ -1,56 +1,14 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
-use std::sync::OnceLock;
-
 use super::cover::Cover;
 use super::entry::{Entry, Family};
+use super::formula::Formula;
 use super::place::Place;
+use super::scene::Scene;
 use super::values::{EffectError, Values};
-use crate::motion::Stretch;
 use crate::robot::Robot;
 use crate::robot::model::JointFriction;
-
-/// Along one stretch: the motion, and what the model as it stands makes of it.
-pub struct Scene<'a> {
-    pub robot: &'a Robot,
-    pub theta: &'a [f64],
-    pub laws: &'a [JointFriction],
-    pub stretch: &'a Stretch,
-    /// Reconstructed torque per joint, effects included, timing effects not [N or Nm].
-    pub hat: &'a [Vec<f64>],
-    /// Load torque per joint: the reconstructed torque less friction and offset.
-    pub load: &'a [Vec<f64>],
-    /// Direction of each joint's friction; empty where it is that of its law.
-    pub direction: &'a [Vec<f64>],
-    /// Keeps what gravity along the base's x and y does on all joints, once an effect asks for it; none where
-    /// samples come one by one.
-    pub tilt: Option<&'a TiltTorques>,
-}
-
-/// Torques of a gravity of one along the base's x and along its y, `[direction][joint][sample]`
-/// \[N or N m per m/s^2\].
-pub type TiltTorques = OnceLock<[Vec<Vec<f64>>; 2]>;
-
-impl Scene<'_> {
-    /// Number of samples.
-    pub fn len(&self) -> usize {
-        self.stretch.len()
-    }
-
-    /// Whether the stretch holds no sample.
-    pub fn is_empty(&self) -> bool {
-        self.stretch.is_empty()
-    }
-
-    /// Saturating part of a joint's friction over its level at sample k: -1 and 1 at speed, between them as smooth
-    /// as the declared law, or as what was added to make it smooth.
-    #[inline]
-    pub fn direction(&self, j: usize, k: usize) -> f64 {
-        let known = self.direction.get(j).and_then(|d| d.get(k)).copied();
-        known.unwrap_or_else(|| self.laws[j].direction(self.stretch.v[j][k]))
-    }
-}
 
 /// Shapes to begin the search from, or what the data lack for the effect.
 pub type Starts = Result<Vec<Vec<f64>>, String>;
@@ -79,6 +37,8 @@ pub struct Law {
     pub direction: Option<fn(&[f64], f64) -> f64>,
     /// Family and whether it is the same torque at rest, where these hang on the shape.
     pub varied: Option<Varied>,
+    /// Formulas of a user's own, in place of the functions above.
+    pub formula: Option<&'static Formula>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
 }
@@ -132,6 +92,7 @@ impl Law {
             memory: None,
             direction: None,
             varied: None,
+            formula: None,
             reparametrised: None,
         }
     }
@@ -139,7 +100,11 @@ impl Law {
     /// Where on this robot it can sit.
     pub fn places(&self, robot: &Robot, laws: &[JointFriction]) -> Vec<Place> {
         let mut places = self.entry.places.on(robot);
-        places.retain(|place| (self.fits)(robot, laws, *place));
+        let fits = |place: Place| match self.formula {
+            Some(formula) => formula.fits(place),
+            None => (self.fits)(robot, laws, place),
+        };
+        places.retain(|place| fits(*place));
         places
     }
 

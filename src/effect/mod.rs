@@ -10,12 +10,15 @@ pub mod as_code;
 mod augmented_model;
 mod cover;
 pub(crate) mod entry;
+pub mod formula;
 mod law;
 pub(crate) mod law_text;
 mod order;
+pub mod own;
 pub(crate) mod physics;
 pub(crate) mod place;
 mod sampled;
+mod scene;
 mod signal;
 pub(crate) mod unit;
 mod values;
@@ -26,11 +29,12 @@ pub use added::{Added, EffectNumber};
 pub use augmented_model::{AugmentedModel, Torques, shifted};
 pub use cover::{Cover, JointCover, stationary_joints};
 pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
-pub use law::{Law, Scene};
+pub use law::Law;
 pub use order::is_whole as order_is_whole;
 pub use physics::{Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
+pub use scene::Scene;
 pub use signal::Signal;
 pub use unit::Unit;
 pub use values::{EffectError, Values};
@@ -126,8 +130,21 @@ pub fn read(
         name: name.to_owned(),
         known: names().collect::<Vec<_>>().join(", "),
     })?;
+    read_as(law, robot, joint, given)
+}
+
+/// The effect of a model file whose law is known.
+///
+/// # Errors
+/// [`EffectError`] for a joint or key that does not fit.
+pub fn read_as(
+    law: &'static Law,
+    robot: &Robot,
+    joint: Option<&str>,
+    given: &BTreeMap<String, f64>,
+) -> Result<Added, EffectError> {
     let values = Values {
-        effect: name,
+        effect: law.entry.name,
         known: &law.key_names(),
         given,
     };

@@ -2,7 +2,7 @@
 
 use super::augmented_model::AugmentedModel;
 use super::entry::Role;
-use super::law::Scene;
+use super::scene::Scene;
 use crate::motion::Stretch;
 
 /// A model, and what its effects keep from sample to sample.
@@ -110,7 +110,8 @@ impl Sampled {
                 } else {
                     let columns = &mut self.columns[i];
                     columns.iter_mut().for_each(|column| column[0] = 0.0);
-                    (effect.law.columns)(&scene, effect.place, &effect.shape, j, columns);
+                    let law = effect.law;
+                    law.fill(&scene, effect.place, (&effect.shape, j), columns);
                     for (x, column) in out.iter_mut().zip(columns) {
                         *x = column[0];
                     }

@@ -28,7 +28,7 @@ pub struct RoleLogs {
 }
 
 /// How a campaign is run.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct IdentifySettings {
     /// Estimator of the inertial parameters.
     pub estimator: EstimatorKind,

@@ -10,11 +10,12 @@ use super::in_memory::{InMemory, read_each, read_wider};
 use super::known_friction::before_these;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::model::{in_file, new_model, refined};
+use super::model::{in_file, new_model, own_laws, refined};
 use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
 use crate::config::ModelFile;
+use crate::config::candidates::Candidate;
 use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
     self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion,
@@ -41,12 +42,14 @@ pub struct DiagnoseLogs<'a> {
 }
 
 /// How effects are looked for.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct DiagnoseSettings {
     /// The given model stays within its covariance: finds payload, gain and tilt.
     pub keep: bool,
     /// What an effect must keep to be accepted.
     pub limits: SelectionLimits,
+    /// Effects of the user's own, tried beside those that are known.
+    pub candidates: Vec<Candidate>,
 }
 
 /// What the stage ends with.
@@ -70,6 +73,8 @@ pub struct Diagnosed {
     pub held: Held,
     /// What a refined model keeps of the friction before these logs.
     friction_prior: Vec<FrictionPrior>,
+    /// Effects of the user's own that were tried.
+    candidates: Vec<Candidate>,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
@@ -183,6 +188,7 @@ pub fn diagnose(
         given: case.given,
         held: Held::default(),
         friction_prior,
+        candidates: settings.candidates.clone(),
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     };
@@ -279,6 +285,7 @@ fn case(
         averaged: in_memory.averaged,
         keep: settings.keep,
         without: Vec::new(),
+        own: own_laws(&settings.candidates, &machine.robot)?,
         limits: settings.limits,
     })
 }
@@ -374,6 +381,13 @@ impl Diagnosed {
         model.effects = effects
             .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
             .collect();
+        let of_model = |c: &&Candidate| model.effects.iter().any(|e| e.name == c.name);
+        let known = file.candidates.iter().chain(&self.candidates);
+        for candidate in known.filter(of_model) {
+            if !model.candidates.contains(candidate) {
+                model.candidates.push(candidate.clone());
+            }
+        }
         self.held.write_into(&mut model);
         model
     }

@@ -7,6 +7,7 @@ use super::track_error::TrackError;
 use crate::config::ConfigError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
+use crate::effect::formula::FormulaError;
 use crate::friction::excitation::FrictionError;
 use crate::inertia::solution::FitError;
 use crate::inspect::LogFault;
@@ -85,6 +86,9 @@ pub enum IdentifyError {
     Gains(#[from] GainError),
     #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
     Effect { model: String, error: EffectError },
+    /// A formula of the user's own that is none on this robot.
+    #[error("{0}; correct the [[candidate]] table")]
+    Formula(FormulaError),
     /// A model that nothing was set aside for.
     #[error(
         "{model}: holds no [[held_out]] and [excesses], so that nothing tells how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
@@ -137,6 +141,7 @@ impl IdentifyError {
             | Self::TooManyRows { .. }
             | Self::TooManySamples { .. }
             | Self::Effect { .. }
+            | Self::Formula(_)
             | Self::NothingHeldOut { .. }
             | Self::OtherRobot { .. } => ErrorKind::Input,
         }

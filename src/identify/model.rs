@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
+use crate::config::candidates::Candidate;
 use crate::config::model_file::{Effect, EffectParameter, ModelProvenance};
-use crate::effect::{self, Added, AugmentedModel, EffectNumber};
+use crate::effect::{self, Added, AugmentedModel, EffectNumber, Law, formula, own};
 use crate::log::{DataRole, Provenance};
+use crate::robot::Robot;
 use crate::robot::model::Model;
 
 /// The model of a file with its effects; `name` names the file in errors.
@@ -31,17 +33,53 @@ fn with_effects(
     name: &str,
     model: Model,
 ) -> Result<AugmentedModel, IdentifyError> {
+    let own = own_laws(&file.candidates, &model.robot)?;
     let effects = file.effects.iter().map(|e| {
         let values = e.parameters.iter().map(|(k, p)| (k.clone(), p.value));
-        effect::read(&model.robot, &e.name, e.joint.as_deref(), &values.collect()).map_err(
-            |error| IdentifyError::Effect {
-                model: name.to_owned(),
-                error,
-            },
-        )
+        let (joint, values) = (e.joint.as_deref(), values.collect());
+        let read = match own.iter().find(|law| law.entry.name == e.name) {
+            Some(law) => effect::read_as(law, &model.robot, joint, &values),
+            None => effect::read(&model.robot, &e.name, joint, &values),
+        };
+        read.map_err(|error| IdentifyError::Effect {
+            model: name.to_owned(),
+            error,
+        })
     });
     let effects = effects.collect::<Result<_, _>>()?;
     Ok(AugmentedModel { model, effects })
+}
+
+/// The laws of a user's own effects on a robot.
+///
+/// # Errors
+/// [`IdentifyError::Formula`] for a formula that is none on this robot.
+pub(super) fn own_laws(
+    candidates: &[Candidate],
+    robot: &Robot,
+) -> Result<Vec<&'static Law>, IdentifyError> {
+    let of = |candidate: &Candidate| {
+        let unit = |name: &String| candidate.units.get(name).cloned().unwrap_or_default();
+        let coefficients = candidate.formulas.iter();
+        let shapes = candidate.shapes.iter().map(|(name, range)| formula::Shape {
+            name: name.clone(),
+            unit: range.unit.clone(),
+            range: [range.from, range.to],
+        });
+        let definition = formula::Definition {
+            name: candidate.name.clone(),
+            joints: candidate.joints.clone(),
+            coefficients: coefficients
+                .map(|(name, formula)| [name.clone(), unit(name), formula.clone()])
+                .collect(),
+            shapes: shapes.collect(),
+            friction: candidate.friction,
+            at_rest: candidate.at_rest,
+            meaning: candidate.meaning.clone(),
+        };
+        own::law(&definition, robot).map_err(IdentifyError::Formula)
+    };
+    candidates.iter().map(of).collect()
 }
 
 /// An effect as a model file holds it.
@@ -73,6 +111,7 @@ pub fn new_model(machine: &LoggedRobot, command: &str, inputs: &[Provenance]) ->
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,
+        candidates: Vec::new(),
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),

@@ -40,7 +40,7 @@ use cft::{Setup, Structure};
 use tree::{Coordinate, Coupling, Grouping, Link, Parameters, Tree};
 
 pub use error::RobotError;
-pub use joint::{JointKind, ParameterInfo};
+pub use joint::{FORMULA_SIGNALS, JointKind, ParameterInfo};
 use practice::{Nominal, Practice};
 pub use transmission::Transmission;
 

@@ -124,6 +124,7 @@ pub fn write_model(path: &Path) {
         effects: Vec::new(),
         links: Vec::new(),
         drive_inertia: Default::default(),
+        candidates: Vec::new(),
         provenance: ModelProvenance::default(),
     };
     std::fs::write(path, model.to_toml().unwrap()).unwrap();

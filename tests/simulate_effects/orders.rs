@@ -236,6 +236,7 @@ fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
         effects,
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
+        candidates: Vec::new(),
         provenance: Default::default(),
     }
 }

@@ -61,6 +61,7 @@ pub fn search<'a>(
     let laws = &at.model.model.friction;
     let places: Vec<(&'static Law, Place)> = LAWS
         .iter()
+        .chain(&case.own)
         .filter(|law| law.entry.role != Role::StandIn)
         .filter(|law| !case.without.iter().any(|name| name == law.entry.name))
         .flat_map(|law| law.places(robot, laws).into_iter().map(|p| (*law, p)))
@@ -118,13 +119,19 @@ impl SearchRound<'_> {
         if let Some(reason) = self.refusal(law, place) {
             return refused(reason, tried);
         }
-        let starts = match (law.starts)(&self.problem.cover, place) {
+        let starts = match law.starts_on(&self.problem.cover, place) {
             Ok(starts) => starts,
             Err(lacking) => return refused(&lacking, tried),
         };
         if law.entry.search == Search::Orders {
             // a peak was picked out of all orders that were looked at
             tried.picked_from = SCANNED;
+        }
+        if law.formula.is_some() && !self.is_finite(law, place, &starts)? {
+            return refused(
+                "its formula gives no number somewhere along these logs",
+                tried,
+            );
         }
         let open = vec![f64::NAN; law.shape.len()];
         let mut effect = Added::new(law, place, open, vec![0.0; law.linear.len()]);
@@ -196,6 +203,24 @@ impl SearchRound<'_> {
         columns(&self.at.model, self.problem, self.torques, effect)
     }
 
+    /// Whether the columns of a law are numbers everywhere, for the shapes to begin from.
+    fn is_finite(
+        &self,
+        law: &'static Law,
+        place: Place,
+        starts: &[Vec<f64>],
+    ) -> Result<bool, MotionError> {
+        for shape in starts {
+            let effect = Added::new(law, place, shape.clone(), vec![0.0; law.linear.len()]);
+            let columns = self.columns(&effect)?;
+            let all = columns.iter().flatten().flatten();
+            if !all.flatten().all(|x| x.is_finite()) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// What an effect removes with its shape.
     fn gain(&self, effect: &Added) -> Result<f64, MotionError> {
         let columns = self.columns(effect)?;
@@ -245,7 +270,7 @@ impl SearchRound<'_> {
     /// Refines a shape that is free, in ratios to where it starts; whether there is one.
     fn refine(&self, effect: &mut Added) -> Result<bool, MotionError> {
         let (law, cover) = (effect.law, &self.problem.cover);
-        let limits = (law.limits)(cover, effect.place);
+        let limits = law.limits_on(cover, effect.place);
         let free = limits.iter().all(|[low, high]| low < high);
         if effect.shape.is_empty() || !law.entry.search.refines() || !free {
             return Ok(false);
@@ -275,7 +300,8 @@ impl SearchRound<'_> {
                     failed = Some(error);
                     f64::INFINITY
                 },
-                |gain| -gain,
+                // a formula may have holes between the shapes that were tried
+                |gain| if gain.is_nan() { f64::INFINITY } else { -gain },
             )
         };
         let budget = REFINEMENTS * centre.len() as u64;

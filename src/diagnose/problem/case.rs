@@ -4,7 +4,7 @@ use super::data_split::LogRole;
 use super::prior::ParameterPrior;
 use super::unknowns::FreeParameters;
 use super::wide_motion::WideMotion;
-use crate::effect::{AugmentedModel, Torques};
+use crate::effect::{AugmentedModel, Law, Torques};
 use crate::motion::{ParallelFilters, Stretch};
 use crate::robot::drive::Drive;
 
@@ -34,6 +34,8 @@ pub struct Case {
     pub keep: bool,
     /// Names of effects that are not tried.
     pub without: Vec<String>,
+    /// Effects of the user's own, tried beside those that are known.
+    pub own: Vec<&'static Law>,
     pub limits: SelectionLimits,
 }
 

@@ -55,7 +55,7 @@ impl Unknowns {
             if !added.law.entry.search.refines() {
                 continue;
             }
-            let limits = (added.law.limits)(cover, added.place);
+            let limits = added.law.limits_on(cover, added.place);
             let open = |k: &usize| limits[*k][0] < limits[*k][1] && !added.held[*k];
             let free = (0..shapes).filter(open);
             list.extend(free.map(|k| Unknown::Shape { effect, k }));
@@ -126,7 +126,7 @@ pub fn step(model: &mut AugmentedModel, unknowns: &Unknowns, delta: &[f64], cove
             }
             Unknown::Shape { effect, k } => {
                 let added = &mut model.effects[effect];
-                let [low, high] = (added.law.limits)(cover, added.place)[k];
+                let [low, high] = added.law.limits_on(cover, added.place)[k];
                 // half of the way at most: a derivative by a shape holds near by
                 let most = 0.5 * added.shape[k].abs().max(1e-3 * (high - low));
                 let next = added.shape[k] + d.clamp(-most, most);

@@ -125,7 +125,7 @@ fn judged(
     let own = covariance::of_effect(&at.base.unknowns.list, covariance, &at.model, effect);
     let seen = seen(&at.model, &problem.cover, &case.drives, added.place);
     let limits = match added.law.entry.search.refines() {
-        true => (added.law.limits)(&problem.cover, added.place),
+        true => added.law.limits_on(&problem.cover, added.place),
         false => Vec::new(),
     };
     match judged_by(added, &seen, &own, &limits) {
@@ -212,7 +212,7 @@ fn bound(
     k: usize,
 ) -> Result<f64, MotionError> {
     let added = &at.model.effects[effect];
-    let limits = (added.law.limits)(&problem.cover, added.place)[k];
+    let limits = added.law.limits_on(&problem.cover, added.place)[k];
     let mut list = at.base.unknowns.list.iter();
     let own = list.position(|u| *u == Unknown::Shape { effect, k });
     let least = |x: f64| -> Result<f64, MotionError> {

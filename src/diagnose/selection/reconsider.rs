@@ -207,7 +207,7 @@ fn pairs(
             effects.any(|e| e.name() == law.entry.name && e.place == *place)
         };
         let possible =
-            |place: &Place| !present(place) && (law.starts)(&problem.cover, *place).is_ok();
+            |place: &Place| !present(place) && law.starts_on(&problem.cover, *place).is_ok();
         let places: Vec<Place> = law
             .places(robot, laws)
             .into_iter()

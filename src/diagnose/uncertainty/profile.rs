@@ -54,7 +54,7 @@ pub fn widen(
         }
         let added = &at.model.effects[effect];
         let value = added.shape[k];
-        let [low, high] = (added.law.limits)(&problem.cover, added.place)[k];
+        let [low, high] = added.law.limits_on(&problem.cover, added.place)[k];
         let std = before[(i, i)].sqrt();
         let linear = std.is_finite() && std > 0.0 && !least.redundant(i);
         let (first, inflation) = match linear {

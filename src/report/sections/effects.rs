@@ -133,7 +133,7 @@ fn signal(look: &Look, effect: &Added, joint: usize) -> ((String, String), Signa
             let unit = format!("{}/s\u{b2}", unit(joint));
             ((name("acceleration", joint), unit), of)
         }
-        Family::Offset | Family::Slow | Family::Event | Family::Data => {
+        Family::Offset | Family::Slow | Family::Event | Family::Data | Family::Own => {
             let of: Signal = Box::new(|s, k| s.t[k]);
             (("time".to_owned(), "s".to_owned()), of)
         }

@@ -1,0 +1,242 @@
+//! The law of an effect of the user's own, beside those of the catalogue.
+
+use std::sync::Mutex;
+
+use super::cover::Cover;
+use super::entry::{Entry, Family, Key, Search};
+use super::formula::{Definition, Formula, FormulaError};
+use super::law::{Law, Starts};
+use super::place::Place;
+use super::scene::Scene;
+use super::unit::Unit;
+use crate::robot::Robot;
+
+/// Laws that have been made: a definition is read for every command and every file, and is the same law.
+static MADE: Mutex<Vec<(Definition, Vec<String>, &'static Law)>> = Mutex::new(Vec::new());
+
+/// The law of a definition on a robot. It lives as long as the program: the same definition gives the same law.
+///
+/// # Errors
+/// [`FormulaError`].
+pub fn law(definition: &Definition, robot: &Robot) -> Result<&'static Law, FormulaError> {
+    let mut made = MADE.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let same = |(d, joints, _): &&(Definition, Vec<String>, &'static Law)| {
+        d == definition && joints == robot.joint_names()
+    };
+    if let Some((.., law)) = made.iter().find(same) {
+        return Ok(law);
+    }
+    if super::entry(&definition.name).is_some() {
+        return Err(FormulaError::Known {
+            name: definition.name.clone(),
+        });
+    }
+    let formula = Formula::of(definition, robot)?;
+    let law = leaked(definition, formula);
+    made.push((definition.clone(), robot.joint_names().to_vec(), law));
+    Ok(law)
+}
+
+fn text(text: &str) -> &'static str {
+    Box::leak(text.to_owned().into_boxed_str())
+}
+
+fn leaked(definition: &Definition, formula: Formula) -> &'static Law {
+    let unit = |unit: &str| Unit::Fixed(text(unit));
+    let shapes = definition.shapes.iter().map(|s| {
+        let [least, most] = s.range;
+        let rule = format!("must be from {least} to {most}");
+        Key::shape(text(&s.name), unit(&s.unit)).within(least, most, text(&rule))
+    });
+    let sizes = definition.coefficients.iter();
+    let sizes = sizes.map(|[name, of, _]| Key::size(text(name), unit(of)));
+    let keys: Vec<Key> = shapes.chain(sizes).collect();
+    let (shape, linear): (Vec<&Key>, Vec<&Key>) = keys.iter().partition(|key| !key.size);
+    let names = |keys: Vec<&Key>| -> &'static [&'static str] {
+        let names: Vec<&'static str> = keys.iter().map(|key| key.name).collect();
+        Box::leak(names.into_boxed_slice())
+    };
+    let (shape, linear) = (names(shape), names(linear));
+    let formulas: Vec<String> = definition
+        .coefficients
+        .iter()
+        .map(|[name, _, formula]| format!("{name} ({formula})"))
+        .collect();
+    let entry: &'static Entry = Box::leak(Box::new(Entry {
+        name: text(&definition.name),
+        families: &[Family::Own],
+        keys: Box::leak(keys.into_boxed_slice()),
+        search: match shape.is_empty() {
+            true => Search::Linear,
+            false => Search::Refined,
+        },
+        at_rest: definition.at_rest,
+        friction: definition.friction,
+        separate_by: "a motion along which its formula changes while position, speed and load stay as they are",
+        formula: text(&formulas.join(" + ")),
+        source: match definition.meaning.is_empty() {
+            true => "a formula of the user's own",
+            false => text(&definition.meaning),
+        },
+        ..Entry::USUAL
+    }));
+    let nothing = |_: &Scene, _: Place, _: &[f64], _: usize, _: &mut [Vec<f64>]| {};
+    Box::leak(Box::new(Law {
+        shape,
+        formula: Some(Box::leak(Box::new(formula))),
+        ..Law::linear(entry, linear, nothing)
+    }))
+}
+
+impl Law {
+    /// Shapes to begin the search from on these data, or what they lack.
+    pub fn starts_on(&self, cover: &Cover, place: Place) -> Starts {
+        match &self.formula {
+            Some(formula) => Ok(formula.starts()),
+            None => (self.starts)(cover, place),
+        }
+    }
+
+    /// Limits of each shape parameter that is refined, on these data.
+    pub fn limits_on(&self, cover: &Cover, place: Place) -> Vec<[f64; 2]> {
+        match &self.formula {
+            Some(formula) => formula.limits(),
+            None => (self.limits)(cover, place),
+        }
+    }
+
+    /// Adds the columns of joint `joint`, one for each linear coefficient, zero before.
+    pub fn fill(
+        &self,
+        scene: &Scene,
+        place: Place,
+        (shape, joint): (&[f64], usize),
+        out: &mut [Vec<f64>],
+    ) {
+        match &self.formula {
+            Some(formula) => formula.fill(scene, shape, joint, out),
+            None => (self.columns)(scene, place, shape, joint, out),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::formula::Shape;
+    use super::*;
+    use crate::motion::Stretch;
+    use crate::robot::JointKind;
+    use crate::robot::model::JointFriction;
+
+    fn robot() -> Robot {
+        Robot::single_joint("q1", JointKind::Revolute)
+    }
+
+    fn definition(formula: &str) -> Definition {
+        Definition {
+            name: "own".into(),
+            coefficients: vec![["c".into(), "Nm".into(), formula.into()]],
+            shapes: vec![Shape {
+                name: "w".into(),
+                unit: "1".into(),
+                range: [1.0, 16.0],
+            }],
+            ..Definition::default()
+        }
+    }
+
+    #[test]
+    fn a_formula_is_its_column_along_the_motion() {
+        let robot = robot();
+        let law = law(&definition("cos(q) * tanh(w * v_q1) + a^2 - t"), &robot).unwrap();
+        let wave = |f: fn(f64) -> f64| vec![(0..20).map(|k| f(0.1 * f64::from(k))).collect()];
+        let stretch = Stretch {
+            dt: 0.1,
+            t: (0..20).map(|k| 0.1 * f64::from(k)).collect(),
+            q: wave(f64::sin),
+            v: wave(f64::cos),
+            a: wave(|t| -t.sin()),
+            tau: wave(|_| 0.0),
+            ..Stretch::default()
+        };
+        let load = vec![vec![0.0; 20]];
+        let scene = Scene {
+            robot: &robot,
+            theta: &[1.0],
+            laws: &[JointFriction::None],
+            stretch: &stretch,
+            hat: &load,
+            load: &load,
+            direction: &[Vec::new()],
+            tilt: None,
+        };
+        let mut out = vec![vec![0.0; 20]];
+        law.fill(&scene, Place::Joint(0), (&[3.0], 0), &mut out);
+        for (k, x) in out[0].iter().enumerate() {
+            let t = 0.1 * k as f64;
+            let wanted = t.sin().cos() * (3.0 * t.cos()).tanh() + t.sin().powi(2) - t;
+            assert!((x - wanted).abs() < 1e-12, "{k}: {x} {wanted}");
+        }
+        let Ok(starts) = law.starts_on(&Cover::default(), Place::Joint(0)) else {
+            panic!("a formula has shapes to begin from")
+        };
+        assert_eq!(starts.len(), 8);
+        assert!(starts.iter().all(|s| (1.0..16.0).contains(&s[0])));
+    }
+
+    #[test]
+    fn the_same_definition_is_the_same_law() {
+        let made = || law(&definition("q"), &robot()).unwrap();
+        assert!(std::ptr::eq(made(), made()));
+    }
+
+    #[test]
+    fn what_is_no_formula_of_this_robot_is_told() {
+        let told = |formula: &str| {
+            law(&definition(formula), &robot())
+                .err()
+                .map(|e| e.to_string())
+        };
+        for (formula, says) in [
+            ("cos(", "no formula"),
+            ("2 q", "no formula"),
+            ("cos(q_q2)", "`q_q2` is not known"),
+            ("t_q1", "`t_q1` is not known"),
+            ("temperature", "`temperature` is not known"),
+            ("", "no formula"),
+        ] {
+            let error = told(formula).unwrap();
+            assert!(error.contains("own") && error.contains(says), "{error}");
+        }
+        let named = Definition {
+            name: "spring".into(),
+            ..definition("q")
+        };
+        let error = law(&named, &robot()).err().unwrap();
+        assert!(matches!(error, FormulaError::Known { .. }));
+        let elsewhere = Definition {
+            joints: Some(vec!["q9".into()]),
+            ..definition("q")
+        };
+        assert!(law(&elsewhere, &robot()).is_err());
+    }
+
+    #[test]
+    fn no_change_of_a_formula_panics() {
+        use rand::{RngExt, SeedableRng};
+        let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let marks: Vec<char> = "()+-*/^.,{}eE0123qvwat_ <>=!&|%\u{3c0}".chars().collect();
+        let robot = robot();
+        for _ in 0..3000 {
+            let mut formula: Vec<char> =
+                "cos(q+w)*v_q1-abs(a)^2.5e-3/min(load,t)".chars().collect();
+            for _ in 0..4 {
+                let at = chance.random_range(0..formula.len());
+                formula[at] = marks[chance.random_range(0..marks.len())];
+            }
+            let formula: String = formula.into_iter().collect();
+            // what is read is not kept: a law would stay for good
+            let _ = Formula::of(&definition(&formula), &robot);
+        }
+    }
+}
