@@ -9,8 +9,8 @@ use nalgebra::Matrix4;
 
 use super::entry::{Entry, Family, Key, Search};
 use super::law::{KeyValue, Law, Memory, Reparametrisation};
-use super::scene::Scene;
 use super::physics::{Limit, Number, Rule};
+use super::scene::Scene;
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {

@@ -4,8 +4,8 @@
 
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
-use super::scene::Scene;
 use super::place::{Place, Places};
+use super::scene::Scene;
 use super::unit::Unit;
 use crate::robot::tree::MOST_JOINTS;
 
