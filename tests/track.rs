@@ -152,6 +152,63 @@ fn clocks_that_overlap_or_jump_and_single_logs_are_told() {
     assert!(error.to_string().contains("same rows"), "{error}");
 }
 
+#[test]
+fn spans_of_one_log_that_meet_and_a_log_under_two_names_are_told() {
+    let Some(emps) = shared("emps/emps_id.csv") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::copy(&emps, at.join("a.csv")).unwrap();
+    std::fs::copy(&emps, at.join("b.csv")).unwrap();
+    let reduced = |log: &str, part: &str| {
+        let robot = ["-r", "configs/emps.toml", "--as-declared", "-o", part];
+        run(at, &[&["reduce", log], robot.as_slice()].concat());
+    };
+    // the first and the last meet, and others stand between them
+    let spans = [
+        "0..20%", "20..40%", "40..60%", "60..80%", "10..20%", "80..100%",
+    ];
+    for (k, span) in spans.iter().enumerate() {
+        reduced(&format!("a.csv@{span}"), &format!("{k}.cfi"));
+    }
+    reduced("b.csv@45..50%", "b.cfi");
+    let parts = |names: &[&str]| refused(at, &[&["track"], names].concat());
+    let message = parts(&["0.cfi", "1.cfi", "2.cfi", "3.cfi", "4.cfi"]);
+    assert!(
+        message.contains("a.csv@0..20% and a.csv@10..20% hold the same rows"),
+        "{message}"
+    );
+    let message = parts(&["2.cfi", "1.cfi", "b.cfi"]);
+    assert!(
+        message.contains("a.csv@40..60% and b.csv@45..50% hold the same rows"),
+        "{message}"
+    );
+    let line = ["track", "0.cfi", "1.cfi", "2.cfi", "3.cfi", "5.cfi"];
+    assert_eq!(
+        run(at, &line)["robots"][0]["logs"]
+            .as_array()
+            .unwrap()
+            .len(),
+        5
+    );
+    // models of the same rows by two estimators
+    for how in ["wls", "ols"] {
+        let name = format!("{how}.toml");
+        let line = [
+            "lsq",
+            "a.csv",
+            "-r",
+            "configs/emps.toml",
+            "--estimator",
+            how,
+            "-o",
+        ];
+        run(at, &[line.as_slice(), &[&name]].concat());
+    }
+    assert!(parts(&["wls.toml", "ols.toml"]).contains("hold the same rows"));
+}
+
 fn refused(folder: &Path, line: &[&str]) -> String {
     let output = Command::cargo_bin("cft-ident")
         .unwrap()

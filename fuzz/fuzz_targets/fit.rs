@@ -44,7 +44,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok(model) = refined(&file, "m.toml") else {
         return;
     };
-    let _ = validate(&machine, &model, logs, &control, &mut |_, _| {});
+    let _ = validate(&machine, (&model, Some(&file)), logs, &control, &mut |_, _| {});
     let roles = DiagnoseLogs { train: logs, veto: &[], holdout: &[] };
     let settings = DiagnoseSettings::default();
     let _ = diagnose(&machine, ("m.toml", &file), &roles, &settings, &control);

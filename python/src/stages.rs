@@ -8,7 +8,7 @@ use cft_ident::cli;
 use cft_ident::config::campaign::EstimatorKind;
 use cft_ident::identify::{
     self, Control, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, FrictionSettings, LoggedRobot,
-    LsqSettings, ReducedLogs, RobotSources, TrackSource, check_setup, new_model, refined,
+    LsqSettings, ReducedLogs, RobotSources, TrackSource, check_setup, refined,
 };
 use cft_ident::report::json::Document;
 use cft_ident::report::{Report, stages};
@@ -43,12 +43,8 @@ fn checked(
     friction: Option<(&str, &cft_ident::config::ModelFile)>,
     control: &Control,
 ) -> PyResult<Checked> {
-    let whole = logs
-        .iter()
-        .filter(|log| !matches!(log, identify::Log::Reduced(_)));
-    let whole: Vec<identify::Log> = whole.cloned().collect();
     // logs that cannot be checked are told by the fit itself
-    let report = check_setup(machine, &whole, friction, control)
+    let report = check_setup(machine, logs, friction, control)
         .unwrap_or_default()
         .report;
     control.check().map_err(of_stage)?;
@@ -116,14 +112,7 @@ pub fn friction(
             identify::friction(&machine, &logs, &settings, control).map_err(of_stage)?;
         found.setup = setup.findings;
         found.warnings.splice(0..0, setup.warnings);
-        let mut model = new_model(&machine, "friction", &found.inputs);
-        if let Some(old) = old {
-            model.parameters = old.parameters;
-            model.covariance = old.covariance;
-            model.residual_std = old.residual_std;
-            model.effects = old.effects;
-        }
-        found.write_into(&mut model);
+        let model = found.model(&machine, old.as_ref());
         let document = Document::new("friction", &found.inputs, &found.warnings, &found);
         let names: Vec<String> = logs.iter().map(identify::Log::name).collect();
         let report = stages::friction::friction(&stages::friction::Friction {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
 };
-use crate::identify::{self, FrictionSettings, LoggedRobot, new_model};
+use crate::identify::{self, FrictionSettings, LoggedRobot};
 use crate::log::LogSpec;
 use crate::report::json::Document;
 use crate::report::stages;
@@ -82,14 +82,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     found
         .warnings
         .splice(0..0, checked.warnings.iter().cloned());
-    let mut model = new_model(machine, "friction", &found.inputs);
-    if let Some(old) = old {
-        model.parameters = old.parameters;
-        model.covariance = old.covariance;
-        model.residual_std = old.residual_std;
-        model.effects = old.effects;
-    }
-    found.write_into(&mut model);
+    let model = found.model(machine, old.as_ref());
     let document = Document::new("friction", &found.inputs, &found.warnings, &found)?;
     let of = stages::friction::Friction {
         machine,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::known_payload::KnownPayload;
 use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup};
 use crate::config::campaign::EstimatorKind;
-use crate::identify::{self, Log, LoggedRobot, LsqSettings, refined};
+use crate::identify::{self, LoggedRobot, LsqSettings, refined};
 use crate::log::LogSpec;
 use crate::report::json::Document;
 use crate::report::stages;
@@ -91,10 +91,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
     let logs = logs(&args.logs)?;
-    let whole: Vec<Log> = (logs.iter())
-        .filter(|log| !matches!(log, Log::Reduced(_)))
-        .cloned()
-        .collect();
     let fitted = match &args.fit_gains {
         None => None,
         Some(payload) => {
@@ -120,14 +116,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         gains: gains.as_ref(),
     };
     let robot = Path::new(&args.robot);
-    let checked = setup::checked(
-        machine,
-        (robot, &edits),
-        &whole,
-        known,
-        &args.setup,
-        context,
-    )?;
+    let checked = setup::checked(machine, (robot, &edits), &logs, known, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
     found
@@ -147,8 +136,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
-        let in_memory = pictures::in_memory(machine, &whole, context)?;
-        let in_memory = in_memory.filter(|_| whole.len() == logs.len());
+        let in_memory = match logs.iter().any(|log| log.reduced().is_some()) {
+            true => None,
+            false => pictures::in_memory(machine, &logs, context)?,
+        };
         let look = pictures::look(machine, in_memory.as_ref(), &names)?;
         let numbers = refined(&model, &args.output.to_string_lossy())?;
         let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, files, logs, setup};
-use crate::identify::{self, FORMAT, Log, LoggedRobot, MadeWith, ReducedLogs};
+use crate::identify::{self, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
 use crate::log::{LogSpec, Provenance, escape};
 use crate::report::Report;
 use crate::report::json::Document;
@@ -101,14 +101,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
     let logs = logs(&args.logs)?;
-    let whole: Vec<Log> = (logs.iter())
-        .filter(|log| !matches!(log, Log::Reduced(_)))
-        .cloned()
-        .collect();
     let checked = setup::checked(
         machine,
         (Path::new(&args.robot), &[]),
-        &whole,
+        &logs,
         known,
         &args.setup,
         context,

@@ -10,6 +10,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::model::new_model;
 use super::one_joint::{self, OneJointLog};
 use super::repeated::each_row_once;
 use crate::config::ModelFile;
@@ -415,6 +416,20 @@ fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
 }
 
 impl IdentifiedFriction {
+    /// The model of these joints, with all that `old` has of the others and their inertias, where there is one.
+    pub fn model(&self, machine: &LoggedRobot, old: Option<&ModelFile>) -> ModelFile {
+        let mut model = new_model(machine, "friction", &self.inputs);
+        if let Some(old) = old {
+            model.parameters.clone_from(&old.parameters);
+            model.covariance.clone_from(&old.covariance);
+            model.residual_std.clone_from(&old.residual_std);
+            model.friction_prior.clone_from(&old.friction_prior);
+            model.effects.clone_from(&old.effects);
+        }
+        self.write_into(&mut model);
+        model
+    }
+
     /// Writes the estimates into a model, in place of what it has of these joints.
     pub fn write_into(&self, model: &mut ModelFile) {
         for found in &self.joints {

@@ -61,7 +61,7 @@ impl Log {
     }
 
     /// The log, where it is reduced.
-    pub(super) fn reduced(&self) -> Option<&ReducedLog> {
+    pub fn reduced(&self) -> Option<&ReducedLog> {
         match self {
             Self::Reduced(part) => Some(part),
             _ => None,

@@ -293,8 +293,13 @@ impl LoggedRobot {
             0 => Vec::new(),
             _ => candidates(&settings, rate),
         };
+        // Viscous friction is linear in the velocity and chooses nothing: a model finds the cut-offs of its own fit, where
+        // the Coulomb level was not known yet.
         let friction = |j: usize, v: f64| match laws.get(j) {
-            Some(Some(law)) => law.torque(v),
+            Some(Some(JointFriction::ViscousCoulomb(law))) if law.coulomb != 0.0 => {
+                law.coulomb * sign(v)
+            }
+            Some(Some(JointFriction::DoubleTanh(law))) => law.torque(v),
             _ => sign(v),
         };
         let mut trial = CutoffTrial::new(&settings, tried, &friction, rest_speed);

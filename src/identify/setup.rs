@@ -32,7 +32,8 @@ pub struct CheckedSetup {
 }
 
 /// Checks the set-up by logs of several joints or of one. `friction` is a model with the friction of every
-/// joint and its name, where there is one.
+/// joint and its name, where there is one. Reduced logs are passed over: they hold no rows to look at, and were
+/// checked when they were made.
 ///
 /// # Errors
 /// Logs that cannot be read or are refused, and interruption.
@@ -94,7 +95,8 @@ fn sampled(
     let _work = control.begin("checking the set-up", None);
     let mut thinner = Thinner::new(n, settings.cutoff_hz);
     let mut channels = None;
-    for (index, log) in logs.iter().enumerate() {
+    let whole = logs.iter().filter(|log| log.reduced().is_none());
+    for (index, log) in whole.enumerate() {
         let mut open = machine.open(log, control)?;
         if channels.is_none() {
             channels = Some(channels_of(machine, log, open.layout()));

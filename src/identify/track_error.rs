@@ -11,7 +11,9 @@ pub enum TrackError {
         first: String,
         second: String,
     },
-    #[error("{robot}: {first} and {second} hold the same rows; give each log once")]
+    #[error(
+        "{robot}: {first} and {second} hold the same rows, under two names perhaps; give each log once, and spans of one that do not meet"
+    )]
     Twice {
         robot: String,
         first: String,

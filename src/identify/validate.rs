@@ -18,6 +18,7 @@ use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::inertia::columns::Own;
 use crate::log::{Instant, Provenance};
+use crate::number;
 use crate::open_loop::OpenLoop;
 use crate::robot::model::JointFriction;
 use crate::validate::{HalfWidths, Reconstructed, Reconstruction, SummedRows, Validation};
@@ -56,6 +57,7 @@ pub fn validate(
         true => machine.clone(),
         false => machine.with_position_cutoffs(&whole, &known(&refined.model), control)?,
     };
+    smoothed_alike(&machine, logs)?;
     // a band is of single rows, which a reduced log has not
     let file = file.filter(|_| whole.len() == logs.len());
     let band = file.and_then(|file| Band::new(file, &refined.model));
@@ -86,6 +88,40 @@ pub fn validate(
         None => {}
     }
     Ok(found)
+}
+
+/// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.
+///
+/// # Errors
+/// [`ReducedError::NeedsLog`] with the joint and both cut-offs.
+fn smoothed_alike(machine: &LoggedRobot, logs: &[Log]) -> Result<(), IdentifyError> {
+    let parts: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+    let Some(first) = parts.first().filter(|_| machine.finds_cutoffs()) else {
+        return Ok(());
+    };
+    let together = match parts.len() == logs.len() {
+        true => &first.own.cutoffs_hz,
+        false => &*machine.position_cutoffs_hz,
+    };
+    for part in &parts {
+        let own = &part.own.cutoffs_hz;
+        let differs = |(_, (a, b)): &(usize, (&f64, &f64))| a != b;
+        let joint = own.iter().zip(together).enumerate().find(differs);
+        if let Some((j, (own, other))) = joint {
+            return Err(ReducedError::NeedsLog {
+                log: part.name().to_owned(),
+                what: format!(
+                    "{} as smoothed as the other logs (by {} Hz, and they by {} Hz): its own rows chose it",
+                    machine.robot.joint_names()[j],
+                    number::significant(*own, 3),
+                    number::significant(*other, 3),
+                ),
+                remedy: "declare `position_cutoff_hz` in [filter] and reduce again, validate them one by one, or give the logs themselves",
+            }
+            .into());
+        }
+    }
+    Ok(())
 }
 
 /// The logs whose rows are there.
