@@ -5,7 +5,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::local_level::Whitener;
-use super::walk::{Sizes, sizes};
+use super::walk::{Likeliest, Sizes, sizes, still};
 
 /// How a parameter changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -33,10 +33,12 @@ pub struct Change {
 
 /// Most changes of one course.
 const MOST: usize = 3;
-/// Least number of logs before and after a change: a log or two may have carried a payload.
-const LEAST: usize = 4;
-/// Ramps are sought where at least this many logs lie in them.
-const RAMP: usize = 5;
+/// Least number of logs before a change.
+const BEFORE: usize = 6;
+/// Least number of logs from a change on: one log in ten may carry a payload, and some of these follow each other.
+const AFTER: usize = 6;
+/// Largest share of the logs from a change on that stand alone: where more do, the robot carries something now and then.
+const ALONE: f64 = 0.2;
 /// Most times that walk and scatter are sized anew with a change taken out.
 const REFINED: usize = 3;
 /// What is estimated besides the changes: level, walk and scatter.
@@ -54,8 +56,28 @@ fn shape(kind: ChangeKind, at: usize, times: &[f64]) -> Vec<f64> {
     times.iter().enumerate().map(of).collect()
 }
 
-/// Estimates of a course: their variances, spacings over the usual one, and times.
-type About<'a> = (&'a [f64], &'a [f64], &'a [f64]);
+/// What is known of the estimates of a course besides their values.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct About<'a> {
+    /// Variances; infinite where a log tells nothing, or stands alone.
+    pub estimate: &'a [f64],
+    /// Spacings over the usual one.
+    pub spacings: &'a [f64],
+    pub times: &'a [f64],
+    /// Logs that stand alone.
+    pub alone: &'a [usize],
+}
+
+impl About<'_> {
+    /// Whether so many logs before or from `at` on stand alone that the robot carries something now and then: that
+    /// some of these follow each other is no change.
+    fn varies_beside(&self, at: usize) -> bool {
+        let before = self.alone.iter().filter(|k| **k < at).count();
+        let since = self.alone.len() - before;
+        let often = |alone: usize, logs: usize| alone as f64 > ALONE * logs as f64;
+        often(before, at) || often(since, self.times.len() - at)
+    }
+}
 
 /// A change that is the clearest of those tried.
 struct Clearest {
@@ -70,31 +92,29 @@ struct Clearest {
 /// out, for a change that is left in makes a walk. The deviation is scaled by the residual where that is larger than
 /// the variances say.
 pub(super) fn seek(signal: &[f64], about: About, level: f64) -> (Sizes, Vec<Change>) {
-    let (estimate, spacings, times) = about;
+    let About {
+        estimate,
+        spacings,
+        times,
+        ..
+    } = about;
     let n = estimate.iter().filter(|r| r.is_finite()).count();
     let mut found: Vec<Change> = Vec::new();
-    let mut sizes = self::sizes(signal, estimate, spacings);
+    let mut sizes = self::sizes(signal, estimate, spacings).sizes;
     while found.len() < MOST && n > OTHERS + found.len() + 2 {
         let freedom = (n - OTHERS - found.len() - 1) as f64;
         let Ok(law) = StudentsT::new(0.0, 1.0, freedom) else {
             break;
         };
-        let Some(mut next) = clearest(signal, about, &sizes, &found) else {
+        // a walk that is large enough hides a change, and a change that is left in makes a walk: both starts are tried
+        let known = rest_of(signal, times, &found);
+        let starts = [sizes, still(&known, estimate, spacings).sizes];
+        let tried = starts.map(|start| settled(signal, about, start, &found));
+        let tried = tried.into_iter().flatten();
+        let best = tried.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        let Some((mut next, Likeliest { sizes: anew, .. })) = best else {
             break;
         };
-        let mut anew = sizes;
-        for _ in 0..REFINED {
-            let all = [found.as_slice(), &[next.change]].concat();
-            anew = self::sizes(&rest_of(signal, times, &all), estimate, spacings);
-            let Some(again) = clearest(signal, about, &anew, &found) else {
-                break;
-            };
-            let same = (again.change.kind, again.change.at) == (next.change.kind, next.change.at);
-            next = again;
-            if same {
-                break;
-            }
-        }
         next.change.p_value = (f64::from(next.tried) * 2.0 * law.sf(next.clear)).min(1.0);
         if next.change.p_value > level {
             break;
@@ -106,6 +126,34 @@ pub(super) fn seek(signal: &[f64], about: About, level: f64) -> (Sizes, Vec<Chan
     }
     found.sort_by_key(|c| c.at);
     (sizes, found)
+}
+
+/// The clearest change and the sizes with it taken out, each found anew by the other from `sizes` on.
+fn settled(
+    signal: &[f64],
+    about: About,
+    sizes: Sizes,
+    found: &[Change],
+) -> Option<(Clearest, Likeliest)> {
+    let About {
+        estimate,
+        spacings,
+        times,
+        ..
+    } = about;
+    let mut next = clearest(signal, about, &sizes, found)?;
+    let mut anew = self::sizes(signal, estimate, spacings);
+    for _ in 0..REFINED {
+        let all = [found, &[next.change]].concat();
+        anew = self::sizes(&rest_of(signal, times, &all), estimate, spacings);
+        let again = clearest(signal, about, &anew.sizes, found)?;
+        let same = (again.change.kind, again.change.at) == (next.change.kind, next.change.at);
+        next = again;
+        if same {
+            break;
+        }
+    }
+    Some((next, anew))
 }
 
 /// The signal without changes.
@@ -120,12 +168,13 @@ fn rest_of(signal: &[f64], times: &[f64], changes: &[Change]) -> Vec<f64> {
 }
 
 /// The clearest change besides those that are known.
-fn clearest(
-    signal: &[f64],
-    (estimate, spacings, times): About,
-    sizes: &Sizes,
-    found: &[Change],
-) -> Option<Clearest> {
+fn clearest(signal: &[f64], about: About, sizes: &Sizes, found: &[Change]) -> Option<Clearest> {
+    let About {
+        estimate,
+        spacings,
+        times,
+        ..
+    } = about;
     let told: Vec<usize> = (0..signal.len())
         .filter(|k| estimate[*k].is_finite())
         .collect();
@@ -141,13 +190,12 @@ fn clearest(
     let mut best: Option<Clearest> = None;
     let mut tried = 0_u32;
     for kind in [ChangeKind::Step, ChangeKind::Ramp] {
-        let least = match kind {
-            ChangeKind::Step => LEAST,
-            ChangeKind::Ramp => RAMP,
-        };
-        let places = LEAST..(n + 1).saturating_sub(least).max(LEAST);
+        let places = BEFORE..(n + 1).saturating_sub(AFTER).max(BEFORE);
         for at in told.get(places).into_iter().flatten().copied() {
             tried += 1;
+            if about.varies_beside(at) {
+                continue;
+            }
             let column = without(&whitener.apply(&shape(kind, at, times)), &known);
             let norm = column.iter().map(|x| x * x).sum::<f64>();
             if norm <= 1e-12 {

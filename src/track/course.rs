@@ -1,6 +1,6 @@
 //! One parameter of one robot over its logs.
 
-use super::changes::{Change, ChangeKind, seek};
+use super::changes::{About, Change, ChangeKind, seek};
 use super::local_level::{Variances, smooth};
 use super::walk::median;
 
@@ -55,7 +55,13 @@ pub fn follow(estimates: &[Estimate], level: f64) -> Course {
     for k in &outliers {
         variances[*k] = f64::INFINITY;
     }
-    let (sizes, changes) = seek(&signal, (&variances, &spacings, &times), level);
+    let about = About {
+        estimate: &variances,
+        spacings: &spacings,
+        times: &times,
+        alone: &outliers,
+    };
+    let (sizes, changes) = seek(&signal, about, level);
     let mut all: Variances = sizes.variances(&variances, &spacings);
     let mut rest = signal.clone();
     for change in &changes {

@@ -38,14 +38,34 @@ pub(super) fn median(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
+/// Sizes, and how unlikely the innovations are under them: half of minus twice the logarithm of their likelihood, but
+/// for a constant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Likeliest {
+    pub sizes: Sizes,
+    pub cost: f64,
+}
+
 /// The sizes under which the innovations are likeliest, by Student's law with 4 degrees of freedom: what moves once
 /// is sought as a change, and must not pass for a walk (Lange, Little and Taylor 1989).
-pub(super) fn sizes(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Sizes {
-    let Some(unit) = median(estimate.iter().copied()) else {
-        return Sizes::default();
+pub(super) fn sizes(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
+    among(&TRIED, signal, estimate, spacings)
+}
+
+/// The same of a parameter that does not walk.
+pub(super) fn still(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
+    among(&TRIED[..1], signal, estimate, spacings)
+}
+
+fn among(walks: &[f64], signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Likeliest {
+    let mut best = Likeliest {
+        sizes: Sizes::default(),
+        cost: f64::INFINITY,
     };
-    let mut best = (f64::INFINITY, Sizes::default());
-    for walk in TRIED {
+    let Some(unit) = median(estimate.iter().copied()) else {
+        return best;
+    };
+    for walk in walks {
         for scatter in TRIED {
             let sizes = Sizes {
                 walk: walk * unit,
@@ -55,12 +75,12 @@ pub(super) fn sizes(signal: &[f64], estimate: &[f64], spacings: &[f64]) -> Sizes
             let unlikely = |x: f64| 0.5 * (FREEDOM + 1.0) * (1.0 + x * x / (FREEDOM - 2.0)).ln();
             let innovations = whitener.apply(signal).into_iter();
             let cost = whitener.log_std() + innovations.map(unlikely).sum::<f64>();
-            if cost < best.0 - 1e-9 {
-                best = (cost, sizes);
+            if cost < best.cost - 1e-9 {
+                best = Likeliest { sizes, cost };
             }
         }
     }
-    best.1
+    best
 }
 
 #[cfg(test)]
@@ -82,9 +102,9 @@ mod tests {
             scattered.push(3.0 * draw());
             walked.push(level + draw());
         }
-        let found = sizes(&scattered, &estimate, &spacings);
+        let found = sizes(&scattered, &estimate, &spacings).sizes;
         assert!(found.scatter >= 3.0 && found.walk <= 0.1, "{found:?}");
-        let found = sizes(&walked, &estimate, &spacings);
+        let found = sizes(&walked, &estimate, &spacings).sizes;
         assert!(found.walk >= 0.3 && found.scatter <= 1.0, "{found:?}");
     }
 }
