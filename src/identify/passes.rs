@@ -13,7 +13,7 @@ use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
 use crate::inertia::closed_loop::Gains;
 use crate::inertia::columns::RegressorColumns;
-use crate::inertia::encoder::accumulate_shifted;
+use crate::inertia::encoder::{GRIDS, accumulate_shifted};
 use crate::inertia::instruments::{self, ReferenceSource};
 use crate::inertia::robust::Weigher;
 use crate::log::{Block, Provenance};
@@ -122,11 +122,29 @@ impl<'a> Passes<'a> {
         self.steps.get(log).copied().unwrap_or(1e-3)
     }
 
+    /// Rows as the robot file says, each log by itself as it stands in a file of reduced logs.
+    pub(super) fn read_condensed(
+        &mut self,
+        columns: &RegressorColumns,
+    ) -> Result<BlockFactors, IdentifyError> {
+        self.read_as(PositionFilter::Declared, columns, None, true)
+    }
+
     pub(super) fn read(
         &mut self,
         filter: PositionFilter,
         columns: &RegressorColumns,
+        weigher: Option<&mut Weigher>,
+    ) -> Result<BlockFactors, IdentifyError> {
+        self.read_as(filter, columns, weigher, false)
+    }
+
+    fn read_as(
+        &mut self,
+        filter: PositionFilter,
+        columns: &RegressorColumns,
         mut weigher: Option<&mut Weigher>,
+        condensed: bool,
     ) -> Result<BlockFactors, IdentifyError> {
         let first = self.summary.is_none();
         let mut all = Vec::new();
@@ -153,11 +171,13 @@ impl<'a> Passes<'a> {
                 &mut |block| open.read(block),
             )
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            let samples = open.provenance()?.samples;
             if first {
                 self.warnings.extend(open.told(&summary));
                 self.saw(open.provenance()?, summary);
             }
             all.push(match filter {
+                PositionFilter::Declared if condensed => sums.condensed(samples, self.others()),
                 PositionFilter::Declared => sums,
                 PositionFilter::Narrower => sums.in_one_block(),
             });
@@ -170,6 +190,12 @@ impl<'a> Passes<'a> {
             self.order = order;
         }
         self.together(all)
+    }
+
+    /// Readings of a log besides the first: by a narrower position filter, and on the encoders' grids.
+    fn others(&self) -> u64 {
+        let encoders = self.machine.robot.transmission().encoder_steps();
+        1 + encoders.map_or(0, |_| u64::from(GRIDS))
     }
 
     /// Remembers what the first reading of a log found.

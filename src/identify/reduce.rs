@@ -74,7 +74,7 @@ pub fn reduce(
         let own = machine.own_settings(one, &laws, control)?;
         let fastest = machine.fastest(one, control)?;
         let mut passes = Passes::new(machine, one, control).each_by_itself(own.clone());
-        let declared = passes.read(PositionFilter::Declared, &linear, None)?;
+        let declared = passes.read_condensed(&linear)?;
         let narrower = passes.read(PositionFilter::Narrower, &linear, None)?;
         let mut shifted = Vec::new();
         if machine.robot.transmission().encoder_steps().is_some() {
@@ -83,8 +83,6 @@ pub fn reduce(
             }
         }
         let bounds_s = machine.bounds(log, control)?;
-        // by a narrower position filter, and on the encoders' grids
-        let others = 1 + shifted.len() as u64;
         let (Some(own), Some(summary), Some(provenance)) =
             (own.into_iter().next(), passes.summary, passes.inputs.pop())
         else {
@@ -97,11 +95,7 @@ pub fn reduce(
             summary,
             own,
             fastest,
-            readings: Readings::of(
-                declared.in_few_blocks(provenance.samples, others),
-                narrower,
-                shifted,
-            ),
+            readings: Readings::of(declared, narrower, shifted),
             provenance,
         };
         let logs = vec![Arc::new(reduced)];

@@ -2,22 +2,18 @@
 //!
 //! Blocks keep what a covariance under correlated residuals needs, the score of any parameter
 //! vector over a stretch of time, without a second reading. Their number is bounded: when there
-//! are too many, neighbours merge and the block length doubles. In a file there are fewer.
+//! are too many, neighbours merge and the block length doubles. What is kept of a log for a linear fit is
+//! smaller (`condense`).
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::columns::{GRADIENT, RegressorColumns};
+use super::scores::Scores;
 use crate::math::rfactor::RFactor;
 
 /// Most blocks that are kept per joint.
 const MOST_BLOCKS: usize = 512;
-/// Most blocks that are kept of a log in a file: few enough for its size, and as many as deviations need.
-const MOST_IN_FILE: usize = 32;
-/// Bytes of a value in a text log, with what parts it from the next: six digits, a sign, a point and a comma.
-const TEXT_BYTES: u64 = 10;
-/// Bytes that a file of the blocks takes besides, and for each joint.
-const HEAD_BYTES: u64 = 2048;
 
 /// One block of time: the R factor of each joint's rows.
 #[derive(Debug, Clone)]
@@ -29,6 +25,8 @@ pub struct BlockFactor {
     /// Upper triangle per joint, or its rows where they are fewer than the columns, which are those of
     /// [`RegressorColumns::row_width`].
     pub r: Vec<DMatrix<f64>>,
+    /// Where this is a whole log, the scores of its parts in time.
+    pub scores: Option<Scores>,
 }
 
 /// Accumulates filtered, decimated rows.
@@ -143,6 +141,7 @@ impl Accumulator {
             stretch: self.stretch,
             rows: self.open_rows,
             r,
+            scores: None,
         });
         self.open_rows = 0;
         if self.blocks.len() > MOST_BLOCKS {
@@ -250,40 +249,14 @@ pub struct BlockFactors {
 }
 
 impl BlockFactors {
-    /// The factors of one log of `samples` rows in at most 32 blocks, and in so few that they and its factors by
-    /// `others` more processings take less than half of what the log takes as text: a rule that sees this log alone.
-    /// Neighbours of one stretch merge two by two; where stretches are so many that it does not help, those of two.
-    pub fn in_few_blocks(mut self, samples: u64, others: u64) -> BlockFactors {
-        let of_text = samples * (1 + 2 * self.columns.joints as u64) * TEXT_BYTES;
-        let bytes = |factors: &[DMatrix<f64>]| -> u64 {
-            let numbers = factors.iter().flat_map(DMatrix::iter);
-            8 * numbers.filter(|x| **x != 0.0).count() as u64
-        };
-        let head = HEAD_BYTES * (1 + self.columns.joints as u64) + bytes(&self.at_rest);
-        while self.blocks.len() > 1 {
-            let each: Vec<u64> = self.blocks.iter().map(|b| bytes(&b.r)).collect();
-            let largest = each.iter().max().copied().unwrap_or(0);
-            let all = each.iter().sum::<u64>() + others * largest + head;
-            if self.blocks.len() <= MOST_IN_FILE && 2 * all <= of_text {
-                break;
-            }
-            let many = self.blocks.len();
-            merge_pairs(&mut self.blocks, &self.columns, |a, b| {
-                a.stretch == b.stretch
-            });
-            if 4 * self.blocks.len() > 3 * many {
-                merge_pairs(&mut self.blocks, &self.columns, |_, _| true);
-            }
-            self.block_seconds *= 2.0;
-        }
-        self
-    }
-
     /// Joins the block factors of another set of logs with the same columns; stretches stay apart.
     pub fn merge(&mut self, other: BlockFactors) {
         let shift = self.blocks.last().map_or(0, |b| b.stretch + 1);
         self.blocks.extend(other.blocks.into_iter().map(|mut b| {
             b.stretch += shift;
+            for part in b.scores.iter_mut().flat_map(|s| &mut s.blocks) {
+                part.stretch += shift;
+            }
             b
         }));
         for (j, r) in other.at_rest.iter().enumerate() {
@@ -309,6 +282,8 @@ impl BlockFactors {
             self.at_rest[j] = self.at_rest[j].select_columns(&places);
             for block in &mut self.blocks {
                 block.r[j] = block.r[j].select_columns(&places);
+                // they are of other unknowns
+                block.scores = None;
             }
         }
         self.columns = self.columns.with_free_friction();
@@ -335,6 +310,7 @@ impl BlockFactors {
             stretch: b.stretch,
             rows: b.rows,
             r: b.r.iter().enumerate().map(|(j, r)| chosen(r, j)).collect(),
+            scores: None,
         });
         BlockFactors {
             blocks: blocks.collect(),
@@ -361,6 +337,7 @@ impl BlockFactors {
                 stretch: 0,
                 rows: self.rows,
                 r,
+                scores: None,
             }],
             block_seconds: self.block_seconds,
             moving: self.moving.clone(),

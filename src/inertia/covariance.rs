@@ -51,21 +51,7 @@ pub(super) fn covariance(
     let textbook = &solution.inverse * (meat + &known) * &solution.inverse * freedom;
 
     // score of every block, summed over joints: residuals of joints are correlated with one another
-    let scores: Vec<(usize, DVector<f64>)> = factors
-        .blocks
-        .iter()
-        .map(|block| {
-            let mut g = DVector::zeros(u);
-            for j in 0..columns.joints {
-                let theta = factors.own_unknowns(&solution.theta, j);
-                let s = factors.parts(&block.r[j], j).score(&theta);
-                for (c, x) in s.iter().enumerate() {
-                    g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
-                }
-            }
-            (block.stretch, g)
-        })
-        .collect();
+    let scores = scores(factors, &solution.theta, weights);
     let sandwich = &solution.inverse
         * (long_run(&scores, u, bandwidth(&scores, u, factors.block_seconds)) + known)
         * &solution.inverse
@@ -94,6 +80,43 @@ pub(super) fn covariance(
         sensitivity.push(Some(s));
     }
     (Covariances { sandwich, total }, textbook, sensitivity)
+}
+
+/// Score of every block at theta with its stretch, summed over joints.
+fn scores(
+    factors: &BlockFactors,
+    theta: &DVector<f64>,
+    weights: &[f64],
+) -> Vec<(usize, DVector<f64>)> {
+    let columns = &factors.columns;
+    let mut out = Vec::new();
+    for block in &factors.blocks {
+        let first = out.len();
+        let stretches = match &block.scores {
+            None => vec![block.stretch],
+            Some(scores) => scores.blocks.iter().map(|b| b.stretch).collect(),
+        };
+        let none = || DVector::zeros(columns.unknowns());
+        out.extend(stretches.into_iter().map(|stretch| (stretch, none())));
+        for j in 0..columns.joints {
+            let own = factors.own_unknowns(theta, j);
+            let each = match &block.scores {
+                None => vec![factors.parts(&block.r[j], j).score(&own)],
+                Some(scores) => {
+                    let r = &block.r[j];
+                    let x = r.columns(0, columns.unknowns_of(j)).into_owned();
+                    let t = r.column(r.ncols() - 1).into_owned();
+                    scores.at_theta(j, (&x, &t), &own).collect()
+                }
+            };
+            for ((_, g), s) in out[first..].iter_mut().zip(&each) {
+                for (c, x) in s.iter().enumerate() {
+                    g[columns.unknown(j, c)] += weights[j] * weights[j] * x;
+                }
+            }
+        }
+    }
+    out
 }
 
 /// Time over whose sums of scores the correlation from one to the next is taken [s]; filters alone make shorter

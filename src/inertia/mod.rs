@@ -3,12 +3,13 @@
 //! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
 //! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
 //! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
-//! several times; `essential` and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque
-//! channel is at its joint.
+//! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
+//! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
 
 pub mod accumulate;
 pub mod closed_loop;
 pub mod columns;
+mod condense;
 mod covariance;
 pub mod encoder;
 pub mod essential;
@@ -18,6 +19,7 @@ pub mod instruments;
 pub mod law_start;
 pub mod refine;
 pub mod robust;
+pub mod scores;
 pub mod solution;
 pub mod solve;
 mod two_pass;

@@ -19,7 +19,7 @@ use crate::log::{Provenance, REDUCED, escape, sha256_of_bytes};
 use crate::motion::{Skipped, Summary};
 
 /// Number of the format.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
 /// Hexadecimal digits of the checksum.
 const CHECKSUM: usize = 64;
 /// Bytes before the head.
