@@ -1,4 +1,5 @@
-//! Effects of a user's own: formulas that `diagnose --candidates` tries beside those that it knows.
+//! What a user tells `diagnose` beside logs and a model: effects of his own by formulas (`--candidates`), and friction
+//! that stays as it is (`--hold-friction`).
 
 mod serial_arm;
 
@@ -26,8 +27,8 @@ shapes = { w = { from = 1.0, to = 20.0, unit = "1/rad" } }
 /// Size of what is put in \[Nm s/rad\].
 const SIZE: f64 = 1.5;
 
-/// Adds the first formula to the shoulder's torque, its speed from the positions.
-fn with_drag(folder: &Path, from: &str, to: &str) {
+/// Adds the first formula, and `level` times the speed, to the shoulder's torque, its speed from the positions.
+fn with_drag(folder: &Path, from: &str, to: &str, level: f64) {
     let mut reader = csv::Reader::from_path(folder.join(from)).unwrap();
     let header = reader.headers().unwrap().clone();
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
@@ -39,7 +40,7 @@ fn with_drag(folder: &Path, from: &str, to: &str) {
         let (before, after) = (k.saturating_sub(10), (k + 10).min(rows.len() - 1));
         let way = number(after, "q_shoulder") - number(before, "q_shoulder");
         let speed = way / (number(after, "t") - number(before, "t"));
-        let stretched = (number(k, "q_shoulder") + number(k, "q_elbow")).cos();
+        let stretched = level + (number(k, "q_shoulder") + number(k, "q_elbow")).cos();
         let torque = number(k, "tau_shoulder") + SIZE * stretched * speed;
         let fields = rows[k].iter().enumerate().map(|(i, field)| {
             if i == column("tau_shoulder") {
@@ -61,8 +62,8 @@ fn a_formula_that_is_in_the_logs_is_found_kept_in_the_model_and_predicts_unseen_
     fs::write(at.join("own.toml"), OWN).unwrap();
     simulate(at, "plain.csv", &["--seconds", "40"]);
     simulate(at, "plain_2.csv", &["--seconds", "20", "--seed", "5"]);
-    with_drag(at, "plain.csv", "id.csv");
-    with_drag(at, "plain_2.csv", "unseen.csv");
+    with_drag(at, "plain.csv", "id.csv", 0.0);
+    with_drag(at, "plain_2.csv", "unseen.csv", 0.0);
     let common = [
         "diagnose",
         "id.csv",
@@ -196,4 +197,90 @@ fn a_formula_that_is_none_on_this_robot_is_told_with_its_candidate() {
         assert!(message.contains(says), "{message}");
         assert!(!at.join("new.toml").exists());
     }
+}
+
+/// Values and deviations of the parameters of a model file, by name and joint.
+fn parameters(folder: &Path, file: &str) -> Vec<(String, f64, f64)> {
+    let text = fs::read_to_string(folder.join(file)).unwrap();
+    let model: toml::Value = toml::from_str(&text).unwrap();
+    let all = model["parameter"].as_array().unwrap().iter();
+    all.map(|p| {
+        let joint = p.get("joint").and_then(toml::Value::as_str).unwrap_or("");
+        let std = p.get("std").and_then(toml::Value::as_float).unwrap_or(0.0);
+        let key = format!("{} {joint}", p["name"].as_str().unwrap());
+        (key, p["value"].as_float().unwrap(), std)
+    })
+    .collect()
+}
+
+#[test]
+fn friction_that_is_held_stays_to_the_last_bit_and_its_deviation_reaches_what_goes_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    write(at, ASKEW, "");
+    // a formula that goes with the speed as viscous friction does
+    let with_level = OWN.replace(
+        "cos(q_shoulder + q_elbow)",
+        "(1 + cos(q_shoulder + q_elbow))",
+    );
+    fs::write(at.join("own.toml"), with_level).unwrap();
+    simulate(at, "plain.csv", &["--seconds", "40"]);
+    with_drag(at, "plain.csv", "id.csv", 1.0);
+    // the shoulder's viscous friction is 5 % off, as its deviation says
+    let truth = fs::read_to_string(at.join("truth.toml")).unwrap();
+    let viscous = "name = \"viscous\"\njoint = \"shoulder\"\nvalue = 2.0\n";
+    assert!(truth.contains(viscous));
+    let told = |std: f64| {
+        let with = format!("{}std = {std:?}\n", viscous.replace("2.0", "2.1"));
+        truth.replace(viscous, &with)
+    };
+    fs::write(at.join("sure.toml"), told(1e-6)).unwrap();
+    fs::write(at.join("unsure.toml"), told(0.1)).unwrap();
+    let diagnosed = |model: &str, to: &str, more: &[&str]| {
+        let words = [
+            "diagnose",
+            "id.csv",
+            "-m",
+            model,
+            "--candidates",
+            "own.toml",
+            "-o",
+            to,
+        ];
+        let found = done(at, &[&words[..], more].concat());
+        let steps = found["steps"].as_array().unwrap();
+        let drag = steps.iter().find(|s| s["effect"] == "cross-drag").unwrap();
+        let of = &drag["parameters"]["c"];
+        let told = [of["value"].as_f64().unwrap(), of["std"].as_f64().unwrap()];
+        (parameters(at, to), told)
+    };
+    let (sure, [value, small]) = diagnosed("sure.toml", "held_sure.toml", &["--hold-friction"]);
+    let (unsure, [same, large]) =
+        diagnosed("unsure.toml", "held_unsure.toml", &["--hold-friction"]);
+    let (free, [freed, _]) = diagnosed("unsure.toml", "free.toml", &[]);
+    let given = parameters(at, "unsure.toml");
+    let is_friction = |key: &str| !key.ends_with(' ');
+    let mut moved = 0;
+    for ((given, held), (sure, free)) in given.iter().zip(&unsure).zip(sure.iter().zip(&free)) {
+        assert_eq!((&given.0, &given.0), (&held.0, &free.0));
+        if is_friction(&given.0) {
+            assert_eq!((given.1, given.2), (held.1, held.2), "{}", given.0);
+            moved += usize::from(free.1 != given.1);
+        } else {
+            assert!(held.2 > 0.99 * sure.2, "{}: {} {}", given.0, held.2, sure.2);
+        }
+    }
+    assert!(moved >= 1, "{free:?}");
+    // viscous friction that is held too high pulls the formula down, by what its deviation says, and only a deviation
+    // that is carried on covers the truth
+    assert!((value - same).abs() < 1e-3 * SIZE, "{value} {same}");
+    assert!(
+        (freed - SIZE).abs() < 0.3 * (same - SIZE).abs(),
+        "{freed} {same}"
+    );
+    let off = (same - SIZE).abs();
+    assert!(
+        off > 3.0 * small && off < 2.0 * large,
+        "{off} {small} {large}"
+    );
 }

@@ -115,6 +115,7 @@ fn model(values: &[f64]) -> ModelFile {
                         value: at(5),
                         std: Some(0.5),
                         unit: "1/rev".to_owned(),
+                        bound: false,
                     },
                 ),
                 (
@@ -123,6 +124,7 @@ fn model(values: &[f64]) -> ModelFile {
                         value: at(6),
                         std: None,
                         unit: "Nm".to_owned(),
+                        bound: false,
                     },
                 ),
             ]),

@@ -688,6 +688,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
             value,
             std: None,
             unit: String::new(),
+            bound: false,
         };
         let numbers = numbers
             .iter()

@@ -41,6 +41,9 @@ pub struct Args {
     /// Hold the given model within its covariance: finds payload, gain and tilt
     #[arg(long)]
     pub keep: bool,
+    /// Leave the friction of the model file as it is; its covariance stays in the deviations
+    #[arg(long, conflicts_with = "keep")]
+    pub hold_friction: bool,
     /// Refined model file to write
     #[arg(short, long, value_name = "REFINED.toml")]
     pub output: Option<PathBuf>,
@@ -82,6 +85,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let settings = DiagnoseSettings {
         keep: args.keep,
         candidates: own.map(|given| given.value).unwrap_or_default(),
+        hold_friction: args.hold_friction,
         ..DiagnoseSettings::default()
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);

@@ -88,6 +88,9 @@ pub struct EffectParameter {
     /// Unit.
     #[serde(default)]
     pub unit: String,
+    /// It is held at a bound of its search, for the data did not tell it: no fit moves it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub bound: bool,
 }
 
 /// What the one-joint logs of a joint told of its friction, before a fit of other logs refined it.

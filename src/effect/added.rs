@@ -67,6 +67,17 @@ impl Added {
         Ok(Added::new(law, place, shape, linear))
     }
 
+    /// Holds the numbers whose keys are at a bound, as a file says; none of an effect whose keys are not its shape and
+    /// coefficients.
+    pub(crate) fn hold(&mut self, bound: &dyn Fn(&str) -> bool) {
+        if self.law.reparametrised.is_none() {
+            let keys = self.law.key_names();
+            for (held, key) in self.held.iter_mut().zip(keys) {
+                *held = bound(key);
+            }
+        }
+    }
+
     /// Whether its torque is the same while its joint rests.
     pub(crate) fn at_rest(&self) -> bool {
         match self.law.varied {

@@ -50,6 +50,8 @@ pub struct DiagnoseSettings {
     pub limits: SelectionLimits,
     /// Effects of the user's own, tried beside those that are known.
     pub candidates: Vec<Candidate>,
+    /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
+    pub hold_friction: bool,
 }
 
 /// What the stage ends with.
@@ -75,6 +77,8 @@ pub struct Diagnosed {
     friction_prior: Vec<FrictionPrior>,
     /// Effects of the user's own that were tried.
     candidates: Vec<Candidate>,
+    /// The friction was held.
+    hold_friction: bool,
     pub filters: ParallelFilters,
     pub cutoff_hz: f64,
 }
@@ -134,7 +138,10 @@ pub fn diagnose(
         true => &[],
         false => &in_memory.inputs[..logs.train.len()],
     };
-    let (before, friction_prior) = before_these((name, file), fitted)?;
+    let (before, friction_prior) = match settings.hold_friction {
+        true => (file.clone(), file.friction_prior.clone()),
+        false => before_these((name, file), fitted)?,
+    };
     let (fitted, vetoed) = (logs.train.len(), logs.train.len() + logs.veto.len());
     for (at, input) in in_memory.inputs.iter_mut().enumerate() {
         input.role = Some(match at {
@@ -189,6 +196,7 @@ pub fn diagnose(
         held: Held::default(),
         friction_prior,
         candidates: settings.candidates.clone(),
+        hold_friction: settings.hold_friction,
         filters: case.filters,
         cutoff_hz: case.cutoff_hz,
     };
@@ -248,6 +256,9 @@ fn refused(
     Ok(None)
 }
 
+/// How many times as firm as its covariance a friction that is held stands against the data.
+const HELD: f64 = 1e6;
+
 /// What the search is about; it takes the stretches of the logs. `before` is the model `file` with the friction
 /// that is known without these logs.
 fn case(
@@ -260,13 +271,17 @@ fn case(
     let processing = machine.settings();
     let filters = ParallelFilters::design(&processing, &in_memory.stretches)
         .map_err(|error| IdentifyError::motion(name, error))?;
-    let open = open(machine, file, &given);
+    let hold = settings.hold_friction;
+    let open = open(machine, file, &given, hold);
     let rate = filters.row_rate_hz();
     let alone = moved_alone(&given, &in_memory.stretches, &roles);
+    // what is held is known so many times better than these data can say; its own spread, which placebos draw and
+    // deviations hold, stays that of its covariance
+    let firm = if hold { HELD } else { 1.0 };
     let prior = ParameterPrior {
-        information: information(before, &given, &open, settings.keep, &alone),
+        information: information(before, &given, &open, (settings.keep, hold), &alone),
         centre: refined(before, name)?,
-        rows_per_independent: (rate / (2.0 * processing.cutoff_hz)).max(1.0),
+        rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
     };
     Ok(Case {
         given,
@@ -351,6 +366,9 @@ impl Diagnosed {
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();
         for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
+            if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
+                continue;
+            }
             let Some((name, joint, value)) = self.fitted(*unknown) else {
                 continue;
             };

@@ -37,16 +37,19 @@ fn with_effects(
     let effects = file.effects.iter().map(|e| {
         let values = e.parameters.iter().map(|(k, p)| (k.clone(), p.value));
         let (joint, values) = (e.joint.as_deref(), values.collect());
+        let bound = |key: &str| e.parameters.get(key).is_some_and(|p| p.bound);
         let read = match own.iter().find(|law| law.entry.name == e.name) {
             Some(law) => effect::read_as(law, &model.robot, joint, &values),
             None => effect::read(&model.robot, &e.name, joint, &values),
         };
-        read.map_err(|error| IdentifyError::Effect {
+        let mut added = read.map_err(|error| IdentifyError::Effect {
             model: name.to_owned(),
             error,
-        })
+        })?;
+        added.hold(&bound);
+        Ok(added)
     });
-    let effects = effects.collect::<Result<_, _>>()?;
+    let effects = effects.collect::<Result<_, IdentifyError>>()?;
     Ok(AugmentedModel { model, effects })
 }
 
@@ -94,6 +97,7 @@ pub(super) fn in_file(effect: &Added, machine: &LoggedRobot, told: &[EffectNumbe
                     value: t.value,
                     std: t.std,
                     unit: t.unit.clone(),
+                    bound: t.bound,
                 };
                 (t.key.clone(), parameter)
             })

@@ -11,17 +11,24 @@ use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::{JointFriction, Model};
 use crate::verdict::Verdict;
 
-/// Which parameters the fit may move: all but those that the friction stage left open.
+/// Which parameters the fit may move: all but those that the friction stage left open. Friction that is held is an
+/// unknown where its deviation is known, which the prior then keeps in its place.
 pub(super) fn open(
     machine: &LoggedRobot,
     file: &ModelFile,
     given: &AugmentedModel,
+    hold_friction: bool,
 ) -> FreeParameters {
     let joints = machine.robot.joint_names();
     let friction = joints
         .iter()
         .zip(&given.model.friction)
         .map(|(joint, law)| {
+            if hold_friction {
+                let spread = |name: &str| file.find(name, Some(joint)).and_then(|p| p.std);
+                let known = |name: &&str| spread(name).is_some_and(|s| s > 0.0);
+                return names_of(law).iter().map(known).collect();
+            }
             let names: &[&str] = match law {
                 JointFriction::None => &[],
                 JointFriction::ViscousCoulomb(_) => return vec![true; ViscousCoulomb::NAMES.len()],
@@ -55,6 +62,31 @@ pub(super) fn open(
     }
 }
 
+/// Names of a law's parameters.
+fn names_of(law: &JointFriction) -> &'static [&'static str] {
+    match law {
+        JointFriction::None => &[],
+        JointFriction::ViscousCoulomb(_) => &ViscousCoulomb::NAMES,
+        JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
+    }
+}
+
+/// Puts the deviations of friction parameters that a file has no covariance of into it, row-major in the order of
+/// [`Model::gradient`].
+fn with_deviations(file: &ModelFile, model: &Model, covariance: &mut [f64]) {
+    let size = model.parameters();
+    let joints = model.robot.joint_names().iter();
+    let keys = joints
+        .zip(&model.friction)
+        .flat_map(|(joint, law)| names_of(law).iter().map(move |name| (*name, joint)));
+    for (i, (name, joint)) in (model.theta.len()..).zip(keys) {
+        let std = file.find(name, Some(joint)).and_then(|p| p.std);
+        if let Some(std) = std.filter(|_| covariance[i * size + i] <= 0.0) {
+            covariance[i * size + i] = std * std;
+        }
+    }
+}
+
 /// Joints that move in a log in which all others are stationary.
 pub(super) fn moved_alone(
     given: &AugmentedModel,
@@ -85,23 +117,31 @@ pub(super) fn information(
     file: &ModelFile,
     given: &AugmentedModel,
     open: &FreeParameters,
-    keep: bool,
+    (keep, hold_friction): (bool, bool),
     alone: &[bool],
 ) -> DMatrix<f64> {
     let model = &given.model;
     let size = model.parameters();
-    let covariance = file.model_covariance(model);
+    let mut covariance = file.model_covariance(model);
+    if hold_friction {
+        with_deviations(file, model, &mut covariance);
+    }
     let mut wanted = vec![keep; size];
     let mut at = model.theta.len();
     for ((law, open), alone) in model.friction.iter().zip(&open.friction).zip(alone) {
         for (k, open) in open.iter().enumerate() {
-            if matches!(law, JointFriction::DoubleTanh(_)) && (keep || !alone) {
+            let of_stage = matches!(law, JointFriction::DoubleTanh(_)) && (keep || !alone);
+            if of_stage || hold_friction {
                 wanted[at + k] = *open;
             }
         }
         at += law.parameters();
     }
-    let doubt = if keep { 1.0 } else { FRICTION_DOUBT };
+    let doubt = if keep || hold_friction {
+        1.0
+    } else {
+        FRICTION_DOUBT
+    };
     let index: Vec<usize> = (0..size)
         .filter(|i| wanted[*i] && covariance[i * size + i] > 0.0)
         .collect();

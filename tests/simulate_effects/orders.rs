@@ -247,6 +247,7 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> Effect {
             value: *value,
             std: None,
             unit: String::new(),
+            bound: false,
         };
         ((*key).to_owned(), parameter)
     };
