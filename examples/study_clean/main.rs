@@ -23,7 +23,7 @@ mod drive;
 mod study;
 
 use campaign::{Campaign, Lab};
-use cft_ident::diagnose::{Diagnosis, SelectionLimits, diagnose};
+use cft_ident::diagnose::{Diagnosis, SelectionLimits, UNWATCHED, diagnose};
 use cft_ident::motion::Parallel;
 use cft_ident::robot::Robot;
 use cft_ident::robot::cft::{Setup, Structure};
@@ -95,7 +95,7 @@ fn one(kind: &str, seed: u64) -> Value {
         ..SelectionLimits::default()
     };
     let case = campaign.case(&lab, campaign.declared.clone(), limits, Vec::new());
-    match diagnose(&case, &mut |_| {}, &|| false) {
+    match diagnose(&case, UNWATCHED) {
         Ok(found) => told(&lab, &found),
         Err(error) => json!({ "error": error.to_string() }),
     }

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use cft_ident::diagnose::{
-    Candidate, Case, Diagnosis, FreeParameters, LogRole, ParameterPrior, SelectionLimits,
-    WIDE_TIMES, WideMotion, diagnose,
+    Candidate, Case, Diagnosis, FreeParameters, Heard, LogRole, ParameterPrior, SelectionLimits,
+    UNWATCHED, WIDE_TIMES, Watch, WideMotion, diagnose,
 };
 use cft_ident::effect::{self, Added, AugmentedModel};
 use cft_ident::inertia::accumulate;
@@ -64,15 +64,16 @@ pub fn case(setting: &Setting, seed: u64, aloud: bool) -> Value {
     };
     let run = |given: AugmentedModel, limits: SelectionLimits, without: Vec<String>| {
         let case = campaign.case(&lab, given, limits, without);
-        diagnose(
-            &case,
-            &mut |s| {
-                if aloud {
-                    eprintln!("  + {s}")
-                }
-            },
-            &|| false,
-        )
+        let tell = |heard: Heard| {
+            if let (true, Heard::Said(text)) = (aloud, heard) {
+                eprintln!("  {text}");
+            }
+        };
+        let watch = Watch {
+            tell: &tell,
+            ..UNWATCHED
+        };
+        diagnose(&case, watch)
     };
     let result = match run(
         campaign.declared.clone(),

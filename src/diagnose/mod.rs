@@ -33,6 +33,7 @@ mod run;
 mod selection;
 mod uncertainty;
 mod unexplained;
+mod watch;
 
 pub use candidates::candidate::Candidate;
 pub use candidates::score::CandidateScore;
@@ -50,3 +51,4 @@ pub use unexplained::dependence::{Dependence, Signal};
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};
 pub use unexplained::evidence::{JointEvidence, evidence};
 pub use unexplained::{STRUCTURED, Unexplained};
+pub use watch::{Heard, UNWATCHED, Watch};

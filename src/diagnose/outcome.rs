@@ -36,7 +36,7 @@ pub struct AcceptedEffect {
 #[serde(rename_all = "kebab-case")]
 pub enum StepStatus {
     /// These data separate it from all other candidates, nothing else is left that chance does not explain, and
-    /// data that decided nothing confirm it.
+    /// held-out data confirm it.
     Assured,
     /// One of these does not hold.
     Tentative,

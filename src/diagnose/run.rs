@@ -29,6 +29,7 @@ use super::uncertainty::covariance::covariance;
 use super::unexplained::dependence::dependences;
 use super::unexplained::errors::{self, Counted, Errors, Pieces};
 use super::unexplained::{noise, part_unexplained, unexplained};
+use super::watch::Watch;
 use crate::effect::{Added, AugmentedModel, Cover, Law, Place, Torques};
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
@@ -40,16 +41,12 @@ const MOST_REPLACEMENTS: usize = 2;
 /// Most disturbances that are cut out.
 const MOST_DISTURBANCES: usize = 8;
 
-/// Diagnoses. `progress` hears of every step; `stop` is asked now and then.
+/// Diagnoses; `watch` hears of every step and is asked now and then whether to stop.
 ///
 /// # Errors
 /// [`DiagnoseError`].
-pub fn diagnose(
-    case: &Case,
-    progress: &mut dyn FnMut(&str),
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Diagnosis, DiagnoseError> {
-    let mut work = Diagnosing::begin(case, progress, stop)?;
+pub fn diagnose(case: &Case, watch: Watch) -> Result<Diagnosis, DiagnoseError> {
+    let mut work = Diagnosing::begin(case, watch)?;
     loop {
         work.unless_stopped()?;
         if work.cut_disturbances()? {
@@ -70,8 +67,7 @@ pub fn diagnose(
 /// A diagnosis as far as it has come.
 struct Diagnosing<'a> {
     case: &'a Case,
-    progress: &'a mut dyn FnMut(&str),
-    stop: &'a (dyn Fn() -> bool + Sync),
+    watch: Watch<'a>,
     problem: FitProblem<'a>,
     /// The stretches of logs that are fitted.
     stretches: Vec<Stretch>,
@@ -97,11 +93,7 @@ struct Diagnosing<'a> {
 
 impl<'a> Diagnosing<'a> {
     /// Divides the data, refuses what cannot be fitted, and fits the declared model.
-    fn begin(
-        case: &'a Case,
-        progress: &'a mut dyn FnMut(&str),
-        stop: &'a (dyn Fn() -> bool + Sync),
-    ) -> Result<Self, DiagnoseError> {
+    fn begin(case: &'a Case, watch: Watch<'a>) -> Result<Self, DiagnoseError> {
         let robot = &case.given.model.robot;
         let stretches = case.stretches_of(LogRole::Train);
         let split = data_split(case, &stretches);
@@ -134,8 +126,7 @@ impl<'a> Diagnosing<'a> {
         }
         Ok(Diagnosing {
             case,
-            progress,
-            stop,
+            watch,
             problem,
             stretches,
             unknowns,
@@ -153,7 +144,7 @@ impl<'a> Diagnosing<'a> {
     }
 
     fn unless_stopped(&self) -> Result<(), DiagnoseError> {
-        match (self.stop)() {
+        match (self.watch.stop)() {
             true => Err(DiagnoseError::Interrupted),
             false => Ok(()),
         }
@@ -174,7 +165,7 @@ impl<'a> Diagnosing<'a> {
         for e in &cut {
             let joint = &case.given.model.robot.joint_names()[e.joint];
             let said = format!("cut out {:.2}..{:.2} s on {joint}", e.from_s, e.to_s);
-            (self.progress)(&said);
+            self.watch.said(&said);
         }
         self.disturbances.extend(cut);
         self.problem.inertial_sums = InertialSums::new();
@@ -203,7 +194,9 @@ impl<'a> Diagnosing<'a> {
         let (at, problem) = (&self.at, &self.problem);
         let all = |_: &Law, _: Place| true;
         let wanted = (&all as &(dyn Fn(&Law, Place) -> bool + Sync), 0.0);
-        let mut found = search(at, problem, case, &baseline, &torques, wanted, self.stop)?;
+        let named = format!("search for effect {}", self.steps.len() + 1);
+        let watch = (self.watch, named.as_str());
+        let mut found = search(at, problem, case, &baseline, &torques, wanted, watch)?;
         self.judge(&mut found.candidates, &baseline);
         let wide = case.wide.as_ref();
         beyond_chance(&mut found, &case.limits, (at, problem), &torques, wide)?;
@@ -254,8 +247,8 @@ impl<'a> Diagnosing<'a> {
             return Ok(false);
         };
         let robot = &self.case.given.model.robot;
-        (self.progress)(&format!(
-            "{}: {:.1} % of the cross-validated squared error",
+        self.watch.said(&format!(
+            "added {}: {:.1} % of the cross-validated squared error",
             found[chosen].effect.title(robot),
             100.0 * found[chosen].score.as_ref().map_or(0.0, |s| s.cv_gain)
         ));
@@ -322,7 +315,7 @@ impl<'a> Diagnosing<'a> {
         let before = self.at.model.effects.len();
         while let Some(effect) = superfluous(&self.at, &self.problem, &self.case.limits)? {
             let title = self.at.model.effects[effect].title(&self.at.model.model.robot);
-            (self.progress)(&format!("{title} is not needed any more"));
+            self.watch.said(&format!("{title} is not needed any more"));
             self.drop(effect)?;
         }
         Ok(self.at.model.effects.len() < before)
@@ -396,7 +389,14 @@ impl<'a> Diagnosing<'a> {
         let model = &self.at.model;
         let known = |effects: &[Added]| self.known.contains(&titles(model, effects));
         let (at, problem) = (&self.at, &self.problem);
-        let found = replacement(at, problem, self.case, &baseline, &own, (&known, self.stop))?;
+        let found = replacement(
+            at,
+            problem,
+            self.case,
+            &baseline,
+            &own,
+            (&known, self.watch),
+        )?;
         self.unless_stopped()?;
         let Some(mut found) = found else {
             return Ok(false);
@@ -422,7 +422,7 @@ impl<'a> Diagnosing<'a> {
             .collect();
         let come: Vec<Added> = found.come.iter().map(|c| c.effect.clone()).collect();
         let (gone, come) = (named(&before), named(&come));
-        (self.progress)(&format!(
+        self.watch.said(&format!(
             "{} in place of {}",
             come.join(", "),
             gone.join(", ")

@@ -71,7 +71,7 @@ impl Control {
         self.tell(Progress::Note(text));
     }
 
-    fn tell(&self, progress: Progress) {
+    pub(super) fn tell(&self, progress: Progress) {
         if let Some(tell) = &self.tell {
             tell(progress);
         }

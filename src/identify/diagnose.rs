@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::control::Control;
+use super::control::{Control, Progress};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
 use super::in_memory::{InMemory, read_each, read_wider};
@@ -18,8 +18,8 @@ use crate::config::ModelFile;
 use crate::config::candidates::Candidate;
 use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
-    self, Case, DiagnoseError, Diagnosis, LogRole, ParameterPrior, SelectionLimits, Suspicion,
-    Unknown, WIDE_TIMES, WideMotion,
+    self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, SelectionLimits,
+    Suspicion, Unknown, WIDE_TIMES, Watch, WideMotion,
 };
 use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::log::DataRole;
@@ -162,11 +162,19 @@ pub fn diagnose(
     case.wide = wide_motion(machine, &case.stretches, wide)
         .map_err(|error| IdentifyError::motion(name, error))?;
     let work = control.begin("search for effects", None);
-    let found = diagnose::diagnose(
-        &case,
-        &mut |step| control.note(&format!("added {step}")),
-        &|| control.stopped(),
-    );
+    let tell = |heard: Heard| {
+        control.tell(match heard {
+            Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
+            Heard::Step => Progress::Advance(1),
+            Heard::End => Progress::End,
+            Heard::Said(text) => Progress::Note(text),
+        });
+    };
+    let watch = Watch {
+        tell: &tell,
+        stop: &|| control.stopped(),
+    };
+    let found = diagnose::diagnose(&case, watch);
     drop(work);
     let diagnosis = match found {
         Ok(diagnosis) => diagnosis,

@@ -12,6 +12,7 @@ use crate::diagnose::problem::case::Case;
 use crate::diagnose::problem::cross_products::CrossProducts;
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::watch::Watch;
 use crate::effect::{Added, LAWS, Law, Place, Role, Search, Torques, order_is_whole};
 use crate::math::minimise::nelder_mead;
 use crate::motion::MotionError;
@@ -47,7 +48,7 @@ pub fn search<'a>(
     baseline: &Baseline,
     torques: &'a [Torques],
     (wanted, needed): (&Wanted<'_>, f64),
-    stop: &(dyn Fn() -> bool + Sync),
+    (watch, name): (Watch, &str),
 ) -> Result<Found<'a>, MotionError> {
     let round = SearchRound {
         at,
@@ -67,10 +68,11 @@ pub fn search<'a>(
         .flat_map(|law| law.places(robot, laws).into_iter().map(|p| (*law, p)))
         .filter(|(law, place)| wanted(law, *place))
         .collect();
+    let part = watch.part(name, places.len());
     let found: Vec<(Candidate, Tried)> = places
         .par_iter()
         .map(|&(law, place)| {
-            if stop() {
+            if (watch.stop)() {
                 return Ok((
                     Candidate::refused(law, place, "interrupted"),
                     Tried::default(),
@@ -78,7 +80,9 @@ pub fn search<'a>(
             }
             let noise = baseline.noise_square(at, &problem.split, place);
             let least = noise * case.limits.over_noise / at.square;
-            round.tried(law, place, HOPELESS * least)
+            let tried = round.tried(law, place, HOPELESS * least);
+            part.step();
+            tried
         })
         .collect::<Result<_, MotionError>>()?;
     let (candidates, tried) = found.into_iter().unzip();
@@ -141,7 +145,10 @@ impl SearchRound<'_> {
             return refused(reason, tried);
         };
         if gain < self.needed {
-            return refused("it removes less than what it would stand in for", tried);
+            return refused(
+                "it removes less than the effect that it would replace",
+                tried,
+            );
         }
         if gain > least && self.refine(&mut effect)? {
             sums = self.sums(&effect)?;

@@ -150,7 +150,7 @@ fn decide(
         ))
     } else if s.cv_gain < limits.cv_certainty * s.cv_std {
         Some(format!(
-            "cross-validation is not of one mind: {:+.2} +- {:.2} %",
+            "cross-validation is uncertain: {:+.2} +- {:.2} %",
             100.0 * s.cv_gain,
             100.0 * s.cv_std
         ))

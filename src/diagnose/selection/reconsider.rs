@@ -14,6 +14,7 @@ use crate::diagnose::candidates::search::search;
 use crate::diagnose::problem::case::{Case, SelectionLimits};
 use crate::diagnose::problem::fit::{FittedModel, fit};
 use crate::diagnose::problem::fit_problem::FitProblem;
+use crate::diagnose::watch::Watch;
 use crate::effect::{Added, AugmentedModel, LAWS, Law, Place, Role, Search, Torques};
 use crate::motion::MotionError;
 
@@ -47,13 +48,13 @@ pub(crate) fn replacement(
     case: &Case,
     baseline: &Baseline,
     found: &[usize],
-    (known, stop): (&Known, &(dyn Fn() -> bool + Sync)),
+    (known, watch): (&Known, Watch),
 ) -> Result<Option<Replacement>, MotionError> {
     let present = Errors::of(at, at, problem)?;
     let mut groups = groups(&at.model.effects, at.weights.len());
     groups.retain(|gone| gone.iter().all(|i| found.contains(i)));
     for gone in groups.into_iter().take(GROUPS) {
-        if stop() {
+        if (watch.stop)() {
             return Ok(None);
         }
         let mut model = at.model.clone();
@@ -64,7 +65,7 @@ pub(crate) fn replacement(
         let without = fit(&model, problem)?;
         let left = at.square_with(&without.weights, &problem.split) / without.square;
         let of = (of_gone.as_slice(), NEEDED * (1.0 - left).max(0.0));
-        let sets = instead(&without, problem, case, baseline, of, stop)?;
+        let sets = instead(&without, problem, case, baseline, of, watch)?;
         for come in sets {
             let mut model = without.model.clone();
             model.effects.extend(come.iter().map(|c| c.effect.clone()));
@@ -132,7 +133,7 @@ fn instead(
     case: &Case,
     baseline: &Baseline,
     (gone, needed): (&[Added], f64),
-    stop: &(dyn Fn() -> bool + Sync),
+    watch: Watch,
 ) -> Result<Vec<Vec<Candidate>>, MotionError> {
     let torques = problem.torques(&without.model);
     let joints = without.weights.len();
@@ -148,7 +149,8 @@ fn instead(
     let open = |law: &Law| law.entry.search != Search::Orders && fewer(law);
     let wanted = |law: &Law, place: Place| open(law) && moved(place) && !same(law, place);
     let of = (&wanted as &(dyn Fn(&Law, Place) -> bool + Sync), needed);
-    let found = search(without, problem, case, baseline, &torques, of, stop)?;
+    let name = (watch, "effects in place of others");
+    let found = search(without, problem, case, baseline, &torques, of, name)?;
     let mut sets: Vec<(f64, Vec<Candidate>)> = Vec::new();
     for candidate in found.candidates {
         if let Some(score) = candidate

@@ -1,0 +1,79 @@
+//! What a diagnosis tells while it works, and whether it is to end.
+
+/// What a diagnosis tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Heard<'a> {
+    /// A part of the search begins: its name, and how many steps it takes. How many parts will follow is not known
+    /// before the search ends.
+    Begin(&'a str, u64),
+    /// A step of it is done.
+    Step,
+    /// The part that began last ends.
+    End,
+    /// What came of it.
+    Said(&'a str),
+}
+
+/// Who is told, from any thread, and who says whether to end.
+#[derive(Clone, Copy)]
+pub struct Watch<'a> {
+    pub tell: &'a (dyn Fn(Heard) + Sync),
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// Nobody is told, and nothing ends the search.
+pub const UNWATCHED: Watch = Watch {
+    tell: &|_| {},
+    stop: &|| false,
+};
+
+impl<'a> Watch<'a> {
+    /// Begins a part of `steps` steps, which ends when the guard is dropped.
+    pub(crate) fn part(self, name: &str, steps: usize) -> Part<'a> {
+        (self.tell)(Heard::Begin(name, steps as u64));
+        Part(self)
+    }
+
+    pub(crate) fn said(self, text: &str) {
+        (self.tell)(Heard::Said(text));
+    }
+}
+
+/// A part of the search that is under way.
+pub(crate) struct Part<'a>(Watch<'a>);
+
+impl Part<'_> {
+    /// One more of its steps is done.
+    pub(crate) fn step(&self) {
+        (self.0.tell)(Heard::Step);
+    }
+}
+
+impl Drop for Part<'_> {
+    fn drop(&mut self) {
+        (self.0.tell)(Heard::End);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn a_part_is_told_from_its_begin_to_its_end() {
+        let heard = Mutex::new(Vec::new());
+        let tell = |h: Heard| heard.lock().unwrap().push(format!("{h:?}"));
+        let watch = Watch {
+            tell: &tell,
+            ..UNWATCHED
+        };
+        let part = watch.part("round 1", 2);
+        part.step();
+        part.step();
+        drop(part);
+        let heard = heard.lock().unwrap();
+        let expected = ["Begin(\"round 1\", 2)", "Step", "Step", "End"];
+        assert_eq!(*heard, expected);
+    }
+}
