@@ -17,7 +17,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("config", "number robot log verdict"),
     ("output", "log"),
     ("motion", "math robot log"),
-    ("effect", "math robot motion"),
+    ("effect", "math number robot motion"),
     ("export", "number robot config motion effect"),
     ("band", "math number robot config motion effect"),
     ("observe", "math robot log config motion effect band"),

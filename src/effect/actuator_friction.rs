@@ -22,6 +22,8 @@ pub static ENTRY: Entry = Entry {
     separate_by: "move one actuator alone, both ways at several speeds, at three poses of the other",
     formula: "J_a' (viscous v_a + coulomb tanh(slope v_a)), v_a = J_a v",
     source: "seals and nuts of the screws that move two joints",
+    said: |f| format!("friction of screw {}, {}", f.at, f.size("coulomb")),
+    remedy: "use the refined model: the friction of the screw acts on both joints that it moves",
     ..Entry::USUAL
 };
 

@@ -1,6 +1,7 @@
 //! An effect with its numbers, as it stands in a model.
 
 use super::entry::{Family, Role};
+use super::facts::Facts;
 use super::law::{KeyValue, Law};
 use super::physics::{Rule, Seen};
 use super::place::Place;
@@ -184,6 +185,25 @@ impl Added {
             }
             (_, Some(place)) => format!("{name} of {place}"),
             (_, None) => name.to_owned(),
+        }
+    }
+
+    /// What it is called where it was found: `ripple of q1, 2.5 mm pitch, 1.2 N`. `torque` is the torque's unit.
+    pub fn said(&self, robot: &Robot, torque: &str) -> String {
+        let numbers = self.numbers(robot, torque, None).into_iter();
+        let at = self.place.name(robot);
+        let words = (self.law.entry.said)(&Facts {
+            at: at.unwrap_or_else(|| "all joints".to_owned()),
+            with: (self.place.from()).map_or(String::new(), |j| robot.joint_names()[j].clone()),
+            kind: self.place.kind(robot),
+            numbers: numbers.map(|n| (n.key, n.value, n.unit)).collect(),
+            curve: self.curve(),
+            torque: torque.to_owned(),
+        });
+        match words.is_empty() {
+            // an effect of the user's own has its name alone
+            true => self.title(robot),
+            false => words,
         }
     }
 

@@ -16,7 +16,20 @@ pub static ENTRY: Entry = Entry {
     separate_by: "move the joint both ways at three or more constant speeds and hold it still \
                   between them: an offset holds at standstill, friction does not",
     formula: "(coulomb + viscous v) H(v)",
-    source: "gears and seals that run unlike in the two directions",
+    source: "gears and seals that run differently in the two directions",
+    said: |f| {
+        let way = if f.value("coulomb") < 0.0 {
+            "backward"
+        } else {
+            "forward"
+        };
+        format!(
+            "friction of {} that is {} higher {way}",
+            f.at,
+            f.size("coulomb")
+        )
+    },
+    remedy: "look for a seal, a brake or a gear that rubs in one direction; the refined model compensates it",
     ..Entry::USUAL
 };
 

@@ -31,6 +31,8 @@ pub static ENTRY: Entry = Entry {
                   shrinks with the amplitude",
     formula: "-c sgn(v) inside the play operator's gap",
     source: "play between gear teeth: what lies behind it is not felt until it is used up",
+    said: |f| format!("play in the gear of {}, {} wide", f.at, f.size("gap")),
+    remedy: "check gear and coupling for play, preload them, or come to a position from one side",
     ..Entry::USUAL
 };
 

@@ -47,6 +47,8 @@ pub static ENTRY: Entry = Entry {
                 axis; or a cubic B-spline on three pieces between from and to",
     source: "a spring or gas cylinder between two fixed points",
     at_rest: true,
+    said: |f| format!("counterbalance of {}, {}", f.at, f.size("stiffness")),
+    remedy: "use the refined model; it holds the spring or gas cylinder that carries the joint",
     ..Entry::USUAL
 };
 

@@ -35,6 +35,17 @@ pub static ENTRY: Entry = Entry {
                 from 1",
     source: "gears that two joints share, as in the wrist of many arms, or a linkage",
     at_rest: true,
+    said: |f| {
+        let friction = f.size("coulomb");
+        match f.value("both") == 1.0 {
+            true => format!(
+                "gear train that {} shares with {}, with {friction} of friction",
+                f.at, f.with
+            ),
+            false => format!("torque of {} by the motion of {}, {friction}", f.at, f.with),
+        }
+    },
+    remedy: "declare the joints as coupled in the robot file (`[[robot.coupling]]`), or keep the refined model",
     ..Entry::USUAL
 };
 

@@ -5,6 +5,7 @@ use super::law::Law;
 use super::physics::{Limit, Number, Rule};
 use super::place::Places;
 use super::unit::Unit;
+use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "delay",
@@ -20,6 +21,13 @@ pub static ENTRY: Entry = Entry {
     separate_by: "log one signal twice, once beside the positions and once beside the torques",
     formula: "none; the log shows the torque of d before",
     source: "torques and positions stamped by two clocks, or a filter in the drive",
+    said: |f| {
+        let d = f.value("d");
+        let way = if d < 0.0 { "ahead of" } else { "behind" };
+        let ms = number::significant(1e3 * d.abs(), 3);
+        format!("torque {ms} ms {way} position on {}", f.at)
+    },
+    remedy: "log torques and positions with one clock and no filter between them, or shift the torque by this time",
     ..Entry::USUAL
 };
 

@@ -15,6 +15,8 @@ pub static ENTRY: Entry = Entry {
     formula: "c t + a random walk of rms walk sqrt(t)",
     source: "a torque sensor or an amplifier that warms up",
     at_rest: true,
+    said: |f| format!("torque of {} that drifts by {}", f.at, f.size("c")),
+    remedy: "zero the sensor or the amplifier before each log, and let it warm up",
     ..Entry::USUAL
 };
 

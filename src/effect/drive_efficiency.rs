@@ -5,6 +5,7 @@ use super::law::Law;
 use super::physics::{Limit, Number, Rule};
 use super::signal::Signal;
 use super::unit::Unit;
+use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "drive-efficiency",
@@ -23,6 +24,14 @@ pub static ENTRY: Entry = Entry {
     separate_by: "lift and lower a known payload at the same speeds",
     formula: "k tau_l H(tau_l v)",
     source: "a gear or screw that loses part of the power while it drives the load",
+    said: |f| {
+        format!(
+            "gear of {} that loses {} of the torque while it drives the load",
+            f.at,
+            number::percent(f.value("k").abs())
+        )
+    },
+    remedy: "use the refined model wherever the load changes; a worn or dry gear loses more",
     ..Entry::USUAL
 };
 

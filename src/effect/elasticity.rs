@@ -43,6 +43,8 @@ pub static ENTRY: Entry = Entry {
     formula: "a spring between motor and link of that inertia, four fifths of the joint's by \
                 default; encoder and friction on the motor's side; damping ratio of the link on it",
     source: "harmonic drives, belts and long shafts (Spong 1987)",
+    said: |f| format!("elastic drive of {}, {} stiff", f.at, f.size("stiffness")),
+    remedy: "keep `cutoff_hz` and the motion below the resonance, or log positions on both sides of the gear",
     ..Entry::USUAL
 };
 

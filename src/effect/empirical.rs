@@ -7,6 +7,7 @@ use super::law::{Law, Memory};
 use super::scene::Scene;
 use super::signal::{SIGNALS, Signal};
 use super::unit::Unit;
+use crate::number;
 
 /// Knots of the spline.
 const KNOTS: usize = 6;
@@ -50,12 +51,22 @@ pub static ENTRY: Entry = Entry {
               direction (5); constant beyond them",
     source: "cables, hoses, sensors and whatever has no law of its own; added only for an effect that passes \
              every test with numbers that no machine has",
+    said: |f| {
+        let Some((signal, peak)) = f.curve else {
+            return format!("torque of {}", f.at);
+        };
+        let words = signal.words()[0].replacen(' ', &format!(" of {} ", f.at), 1);
+        format!("{words}: peak {} {}", number::significant(peak, 2), f.torque)
+    },
+    remedy: "look where the curve is highest; no law of the catalogue has its shape with numbers that a machine has",
     ..Entry::USUAL
 };
 
 pub static LAW: Law = Law {
     shape: &["signal", "from", "to"],
-    starts: |_, _| Err("it stands in for an effect whose numbers no machine has".into()),
+    starts: |_, _| {
+        Err("it is used only in place of an effect with numbers that no machine has".into())
+    },
     varied: Some(|shape| {
         let signal = Signal::of(shape[0]);
         (signal.family(), signal == Signal::Position)
@@ -140,7 +151,7 @@ impl Signal {
 }
 
 /// Ways since the last turning point.
-fn ways(q: &[f64], least: f64) -> Vec<f64> {
+pub(crate) fn ways(q: &[f64], least: f64) -> Vec<f64> {
     let mut turning = [f64::NAN; TURNING];
     q.iter().map(|q| way(*q, least, &mut turning)).collect()
 }

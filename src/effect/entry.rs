@@ -1,6 +1,7 @@
 //! What is known of an effect, whoever models it. The estimator and the simulator read the same entries and
 //! have laws of their own, so that each checks the other.
 
+use super::facts::Facts;
 use super::physics::Rule;
 use super::place::Places;
 use super::signal::Signal;
@@ -213,6 +214,10 @@ pub struct Entry {
     pub formula: &'static str,
     /// Where it comes from in a machine, and who wrote of it.
     pub source: &'static str,
+    /// What it is called where it was found, with the numbers that a person asks for; nothing for a fault.
+    pub said: fn(&Facts) -> String,
+    /// What to do about it.
+    pub remedy: &'static str,
 }
 
 impl Entry {
@@ -232,6 +237,8 @@ impl Entry {
         separate_by: "",
         formula: "",
         source: "",
+        said: |_| String::new(),
+        remedy: "",
     };
 
     /// The family that results name.

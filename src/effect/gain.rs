@@ -4,6 +4,7 @@
 use super::entry::{Entry, Family, Key, Role};
 use super::law::Law;
 use super::unit::Unit;
+use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "gain",
@@ -14,6 +15,16 @@ pub static ENTRY: Entry = Entry {
     formula: "k times the acting torque: logged is (1 + k) times that",
     source: "a wrong torque constant or gear ratio",
     at_rest: true,
+    said: |f| {
+        let k = f.value("k");
+        let way = if k < 0.0 { "low" } else { "high" };
+        format!(
+            "torque of {} logged {} too {way}",
+            f.at,
+            number::percent(k.abs())
+        )
+    },
+    remedy: "check torque constant and gear ratio, and correct `torque_scale` in [log]",
     ..Entry::USUAL
 };
 

@@ -7,6 +7,7 @@ use super::law::Law;
 use super::place::{Place, Places};
 use super::scene::Scene;
 use super::unit::Unit;
+use crate::number;
 use crate::robot::tree::MOST_JOINTS;
 
 pub static ENTRY: Entry = Entry {
@@ -22,6 +23,11 @@ pub static ENTRY: Entry = Entry {
                 -inertia gx",
     source: "a base that stands askew",
     at_rest: true,
+    said: |f| {
+        let lean = f.value("gx").hypot(f.value("gy")).atan2(9.81).to_degrees();
+        format!("base that leans by {} deg", number::significant(lean, 2))
+    },
+    remedy: "level the base, or give `gravity` in the robot file as it is in the frame of the base",
     ..Entry::USUAL
 };
 

@@ -6,6 +6,7 @@ use super::law::Law;
 use super::physics::Rule;
 use super::signal::Signal;
 use super::unit::Unit;
+use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "load-friction",
@@ -23,6 +24,14 @@ pub static ENTRY: Entry = Entry {
     separate_by: "the same path at the same speed with and without a known payload",
     formula: "(mu_c + mu_v abs(v)) abs(tau_l) tanh(w v)",
     source: "gear teeth and bearings under load (Hamon, Gautier and Garrec 2010)",
+    said: |f| {
+        format!(
+            "gear of {} that rubs more under load, by {} of it",
+            f.at,
+            number::percent(f.value("mu_c"))
+        )
+    },
+    remedy: "use the refined model wherever the load changes; check gear and bearings for wear and lubrication",
     ..Entry::USUAL
 };
 

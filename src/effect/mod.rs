@@ -10,6 +10,7 @@ pub mod as_code;
 mod augmented_model;
 mod cover;
 pub(crate) mod entry;
+mod facts;
 pub mod formula;
 mod law;
 pub(crate) mod law_text;
@@ -29,6 +30,7 @@ pub use added::{Added, EffectNumber};
 pub use augmented_model::{AugmentedModel, Torques, shifted};
 pub use cover::{Cover, JointCover, stationary_joints};
 pub use entry::{Entry, Family, Key, Ladder, Range, Role, Search};
+pub use facts::Facts;
 pub use law::Law;
 pub use order::is_whole as order_is_whole;
 pub use physics::{Rule, Seen};
@@ -149,4 +151,33 @@ pub fn read_as(
         given,
     };
     Added::of_values(law, robot, joint, &values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::JointKind;
+
+    #[test]
+    fn every_effect_that_can_be_found_is_told_in_words_with_what_to_do_about_it() {
+        for law in LAWS {
+            let entry = law.entry;
+            let number = |key: &Key| (key.name.to_owned(), 0.5, "N".to_owned());
+            let said = (entry.said)(&Facts {
+                at: "q1".into(),
+                with: "q2".into(),
+                kind: JointKind::Prismatic,
+                numbers: entry.keys.iter().map(number).collect(),
+                curve: None,
+                torque: "N".into(),
+            });
+            let name = entry.name;
+            assert!(said.len() > 10 && !said.contains('-'), "{name}: {said}");
+            assert!(!said.contains("NaN"), "{name}: {said}");
+            assert!(
+                entry.remedy.len() > 20 && !entry.remedy.ends_with('.'),
+                "{name}"
+            );
+        }
+    }
 }

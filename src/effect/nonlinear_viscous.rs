@@ -4,6 +4,7 @@ use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::signal::Signal;
 use super::unit::Unit;
+use crate::number;
 use crate::robot::friction::sign;
 
 pub static ENTRY: Entry = Entry {
@@ -24,6 +25,14 @@ pub static ENTRY: Entry = Entry {
     separate_by: "plateaus of constant speed, both ways, up to the top speed",
     formula: "c sgn(v) abs(v)^p",
     source: "lubricants that shear thin, or churn at speed",
+    said: |f| {
+        format!(
+            "viscous friction of {} that bends with speed (power {})",
+            f.at,
+            number::significant(f.value("p"), 2)
+        )
+    },
+    remedy: "use the refined model for fast motion, and log the joint up to its top speed",
     ..Entry::USUAL
 };
 

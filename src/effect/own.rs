@@ -78,6 +78,7 @@ fn leaked(definition: &Definition, formula: Formula) -> &'static Law {
             true => "a formula of the user's own",
             false => text(&definition.meaning),
         },
+        remedy: "look for the cause that its formula describes, or keep the refined model",
         ..Entry::USUAL
     }));
     let nothing = |_: &Scene, _: Place, _: &[f64], _: usize, _: &mut [Vec<f64>]| {};

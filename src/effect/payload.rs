@@ -33,6 +33,8 @@ pub static ENTRY: Entry = Entry {
                 about every axis",
     source: "a tool or a load that the model was not identified with",
     at_rest: true,
+    said: |f| format!("payload of {}", f.size("mass")),
+    remedy: "take the load off, or use the refined model with it",
     ..Entry::USUAL
 };
 

@@ -30,6 +30,15 @@ pub static ENTRY: Entry = Entry {
     formula: "sgn(v) (sin sin(order q) + cos cos(order q))",
     source: "a bent screw or an eccentric gear that rubs more at some positions (Remark 1 of the \
                report)",
+    said: |f| {
+        format!(
+            "friction of {} that changes along its way, {}, {}",
+            f.at,
+            f.wave(),
+            f.amplitude()
+        )
+    },
+    remedy: "look for a bent screw, an eccentric gear or a tight seal where friction is highest",
     ..Entry::USUAL
 };
 

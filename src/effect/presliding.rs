@@ -40,6 +40,14 @@ pub static ENTRY: Entry = Entry {
     separate_by: "slow reversals with a ladder of amplitudes below and above breakaway",
     formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",
     source: "bristles that bend before they slip (Dahl 1968; Canudas de Wit et al. 1995)",
+    said: |f| {
+        format!(
+            "friction of {} that bends before it slips, {} stiff",
+            f.at,
+            f.size("sigma0")
+        )
+    },
+    remedy: "use the refined model where the joint reverses in small motions",
     ..Entry::USUAL
 };
 

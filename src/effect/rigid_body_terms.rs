@@ -27,6 +27,8 @@ pub static ENTRY: Entry = Entry {
     formula: "the ten columns that the twelve parameters leave out",
     source: "links that are no thin rods, by the full chain of the report",
     at_rest: true,
+    said: |_| "masses and inertias that the twelve parameters leave out".to_owned(),
+    remedy: "declare `parameters = 22` in the robot file and fit again",
     ..Entry::USUAL
 };
 

@@ -30,6 +30,8 @@ pub static ENTRY: Entry = Entry {
     formula: "sin sin(order q) + cos cos(order q), and harmonics 2 and 3",
     source: "cogging of a motor, teeth of a gear, an eccentric encoder",
     at_rest: true,
+    said: |f| format!("ripple of {}, {}, {}", f.at, f.wave(), f.amplitude()),
+    remedy: "compare it with the lead of the screw, the poles of the motor and the teeth of the gear; compensate it over position with the refined model",
     ..Entry::USUAL
 };
 

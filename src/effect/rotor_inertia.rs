@@ -20,6 +20,8 @@ pub static ENTRY: Entry = Entry {
     formula: "J a; at a screw J_a' J (J_a a + dJ_a/dt v)",
     source: "a rotor or screw that the links' inertias do not hold",
     at_rest: true,
+    said: |f| format!("inertia of {} in the drive of {}", f.size("J"), f.at),
+    remedy: "use the refined model, or declare the drive's inertia in the robot file",
     ..Entry::USUAL
 };
 

@@ -51,7 +51,7 @@ impl Signal {
             ],
             Signal::Speed => [
                 "torque that depends on its speed",
-                "a lubricant, or a law of friction that is none of the named ones",
+                "a lubricant, or a friction law that is not in the catalogue",
             ],
             Signal::Load => [
                 "friction that depends on its load",

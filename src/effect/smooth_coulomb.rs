@@ -32,6 +32,14 @@ pub static ENTRY: Entry = Entry {
     formula: "fc tanh(v/vs) for F - viscous v",
     source: "lubricated contacts and elastic seals, which creep before they slip (Andersson, Soderberg \
              and Bjorklund 2007)",
+    said: |f| {
+        format!(
+            "Coulomb friction of {} that sets in over {} instead of at once",
+            f.at,
+            f.size("vs")
+        )
+    },
+    remedy: "compensate friction with the refined model, whose torque does not jump where the joint reverses",
     ..Entry::USUAL
 };
 

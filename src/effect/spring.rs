@@ -19,6 +19,8 @@ pub static ENTRY: Entry = Entry {
     formula: "k (q - q0) + k3 (q - q0)^3",
     source: "a cable, a hose or a return spring",
     at_rest: true,
+    said: |f| format!("spring on {}, {}", f.at, f.size("k")),
+    remedy: "look for a cable, a hose or a spring that pulls the joint back, and reroute it or keep the refined model",
     ..Entry::USUAL
 };
 

@@ -34,6 +34,15 @@ pub static ENTRY: Entry = Entry {
     formula: "c sgn(v) exp(-(v/vs)^2)",
     source: "a lubricant film that builds up with speed (Armstrong-Helouvry, Dupont and Canudas \
                de Wit 1994)",
+    said: |f| {
+        format!(
+            "Stribeck friction of {}, {} more near rest, gone above {}",
+            f.at,
+            f.size("c"),
+            f.size("vs")
+        )
+    },
+    remedy: "compensate it with the refined model where the joint creeps; warm or thinner grease lowers it",
     ..Entry::USUAL
 };
 

@@ -14,6 +14,8 @@ pub static ENTRY: Entry = Entry {
     formula: "c",
     source: "bias of a torque sensor or of an amplifier",
     at_rest: true,
+    said: |f| format!("constant torque of {} on {}", f.size("c"), f.at),
+    remedy: "zero the torque sensor or the amplifier while the joint is unloaded, and log again",
     ..Entry::USUAL
 };
 

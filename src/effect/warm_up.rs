@@ -4,6 +4,7 @@ use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::{Limit, Number, Rule};
 use super::unit::Unit;
+use crate::number;
 
 pub static ENTRY: Entry = Entry {
     name: "warm-up",
@@ -26,7 +27,7 @@ pub static ENTRY: Entry = Entry {
         Rule::at_most(
             Number::Key("T"),
             Limit::Duration(3.0),
-            "a log tells of no warm-up that takes three times as long: that is a drift",
+            "a log shows no warm-up that takes three times as long as itself: that is a drift",
         ),
         Rule::at_least(
             Number::Key("k"),
@@ -39,6 +40,17 @@ pub static ENTRY: Entry = Entry {
     separate_by: "the same segment of motion at the begin and at the end of an hour",
     formula: "F(v) k (1 - exp(-t/T))",
     source: "grease that warms up",
+    said: |f| {
+        let k = f.value("k");
+        let way = if k < 0.0 { "falls" } else { "rises" };
+        format!(
+            "friction of {} that {way} by {} within {}",
+            f.at,
+            number::percent(k.abs()),
+            f.size("T")
+        )
+    },
+    remedy: "move the arm until it is warm before logging, or log at the temperature of its work",
     ..Entry::USUAL
 };
 
