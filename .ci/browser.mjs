@@ -108,6 +108,48 @@ async function zooming(name, page) {
   return figures.length;
 }
 
+// Words whose contrast with what lies behind them is below that of WCAG 2.1 AA.
+const faint = page => page.evaluate(() => {
+  const channels = text => text.match(/[\d.]+/g).map(Number);
+  const light = ([r, g, b]) => {
+    const [x, y, z] = [r, g, b].map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * x + 0.7152 * y + 0.0722 * z;
+  };
+  const behind = element => {
+    for (let e = element; e; e = e.parentElement) {
+      const colour = channels(getComputedStyle(e).backgroundColor);
+      if (colour.length < 4 || colour[3] > 0) return colour;
+    }
+    return [255, 255, 255];
+  };
+  const found = new Set();
+  for (const e of document.querySelectorAll('body *')) {
+    const own = [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim());
+    if (!own || !e.getClientRects().length || ['SCRIPT', 'STYLE', 'title', 'desc'].includes(e.tagName)) continue;
+    const style = getComputedStyle(e), drawn = e instanceof SVGElement;
+    const [a, b] = [light(channels(drawn ? style.fill : style.color)), light(behind(e))].sort((a, b) => b - a);
+    const size = parseFloat(style.fontSize), large = size >= 24 || size >= 18.7 && parseInt(style.fontWeight) >= 700;
+    if ((a + 0.05) / (b + 0.05) < (large ? 3 : 4.5)) found.add(`${e.tagName} ${e.textContent.trim().slice(0, 30)}`);
+  }
+  return [...found];
+});
+
+// The readout of a cursor names each line of its panel.
+async function reading(name, page) {
+  for (const figure of await page.$$('figure.live')) {
+    const plot = await figure.$('.plot');
+    await plot.scrollIntoViewIfNeeded();
+    const box = await plot.boundingBox();
+    await page.mouse.move(box.x + 0.5 * box.width, Math.max(box.y, 0) + 60);
+    await page.waitForTimeout(60);
+    const [keys, readouts] = await figure.evaluate(f => [
+      [...f.querySelectorAll('.key')].map(k => k.textContent), [...f.querySelectorAll('text.over')].map(t => t.textContent)]);
+    check(name, 'every panel has a readout that names a line',
+      readouts.length > 0 && readouts.every(r => keys.some(k => r.includes(k))), readouts);
+    await page.mouse.move(1, 1);
+  }
+}
+
 // Two fingers on a phone.
 async function pinching(name, file) {
   const context = await browser.newContext({ viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true });
@@ -141,6 +183,8 @@ for (const file of pages) {
   check(name, 'nothing is asked for but the page', wide.asked.length === 1, wide.asked.slice(1).join(' '));
   const lengths = await drawn(wide.page);
   check(name, 'every figure is drawn', lengths.length > 0 && lengths.every(l => l > 40), lengths);
+  check(name, 'words stand out', (await faint(wide.page)).length === 0, await faint(wide.page));
+  await reading(name, wide.page);
   const live = await zooming(name, wide.page);
   check(name, 'no error is told after zooming', wide.said.length === 0, wide.said.join('; '));
   if (pictures) await wide.page.screenshot({ path: join(pictures, `${name}-wide.png`), fullPage: true });
@@ -150,13 +194,15 @@ for (const file of pages) {
   check(name, 'paper shows the still pictures', paper);
   await wide.context.close();
 
-  for (const width of [360, 768]) {
+  for (const width of [360, 390, 768, 1920]) {
     const narrow = await opened(file, { width });
     const over = await narrow.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
     check(name, `nothing hangs over at ${width} px`, over <= 0, over);
     check(name, `every figure is drawn at ${width} px`, (await drawn(narrow.page)).every(l => l > 40));
-    if (pictures && width === 360) {
-      await narrow.page.screenshot({ path: join(pictures, `${name}-phone.png`), fullPage: true });
+    const cut = await narrow.page.$$eval('.cells', all => all.filter(c => c.scrollWidth > c.clientWidth + 1).length);
+    check(name, `no panel is cut at ${width} px`, cut === 0, cut);
+    if (pictures && width !== 768) {
+      await narrow.page.screenshot({ path: join(pictures, `${name}-${width}.png`), fullPage: true });
     }
     await narrow.context.close();
   }
@@ -169,6 +215,7 @@ for (const file of pages) {
       of(document.querySelector('.viewer text'), 'fill')];
   });
   check(name, 'dark is dark', brightness(colours[0]) < 60, colours[0]);
+  check(name, 'words stand out in the dark', (await faint(dark.page)).length === 0, await faint(dark.page));
   check(name, 'words are bright in the dark', colours.slice(1).filter(Boolean).every(c => brightness(c) > 150), colours);
   if (pictures) await dark.page.screenshot({ path: join(pictures, `${name}-dark.png`), fullPage: true });
   await dark.context.close();

@@ -115,6 +115,8 @@ fn friction(count: usize) -> FrictionFigure {
                 curve,
                 covered: vec![[-top, -0.02 * top], [0.02 * top, top]],
                 plateaus,
+                cloud: Vec::new(),
+                beyond_curve: false,
                 truth: (-60..=60)
                     .map(|k| top * k as f64 / 60.0)
                     .map(|v| [v, law(v)])

@@ -133,15 +133,18 @@ fn the_report_of_a_minute_is_whole_small_and_the_same_again() {
         headings(&page),
         [
             "Parameters",
+            "The robot in motion",
             "Friction",
             "Torque, measured and reconstructed",
             "The residual and its spectra",
-            "What the model hardly tells apart",
+            "Correlated parameters",
             "Data quality",
             "Where it came from"
         ]
     );
-    assert_eq!(page.matches("<figure>").count(), 3);
+    // bars; and cards of the sketch, of friction, and of the residual joint by joint
+    assert_eq!(page.matches("<figure>").count(), 1);
+    assert_eq!(page.matches("<figure class=\"card").count(), 2 + 4);
     assert_eq!(page.matches("class=\"traces\">").count(), 1);
     let verdict = page.find("class=\"verdict").unwrap();
     let table = page.find("<table>").unwrap();
@@ -237,18 +240,20 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     // a card per effect
     assert!(page.contains("residual without the effect"));
     assert!(page.contains("rms without it and"));
+    let remedies = page.matches("<p>What to do: ").count();
+    assert!(remedies > 0);
     let headings = headings(&page);
     for heading in [
-        "What was added",
+        "What the model lacks",
         "Candidates that were not added",
         "Data quality",
     ] {
         assert!(headings.contains(&heading), "{headings:?}");
     }
-    // bars, torques, residuals, friction, and a card for each effect
-    let cards = page.matches("residual without the effect").count();
-    assert!(cards > 0);
-    assert_eq!(page.matches("<figure>").count(), 4 + cards);
+    // bars; cards of each effect, of the sketch, of friction, and of the residual joint by joint
+    assert_eq!(page.matches("<figure>").count(), 1);
+    let cards = page.matches("<figure class=\"card").count();
+    assert_eq!(cards, remedies + 2 + 4);
 }
 
 #[cfg(unix)]

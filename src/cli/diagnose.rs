@@ -141,9 +141,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check()?;
     if !args.plot.is_empty() || args.report.is_some() {
         let figure = stages::diagnose::figure(&machine, &found).map_err(CliError::input)?;
-        let figure = figure.svg();
         for path in &args.plot {
-            context.write_picture(path, &figure)?;
+            context.write_picture(path, &figure.svg())?;
         }
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;

@@ -159,13 +159,13 @@ fn execute(
         keep(end, &machine, &title, (folder, context), &mut files)
     })?;
     warnings.extend(found.warnings.iter().cloned());
-    let (mut diagnosis, mut residuals) = (None, String::new());
+    let (mut diagnosis, mut residuals) = (None, None);
     match &found.diagnosed {
         Ok(DiagnoseEnd::DataFault(fault)) => diagnosis = Some(fault.result()),
         Ok(DiagnoseEnd::Diagnosed(diagnosed)) => {
             diagnosis = Some(diagnosed.result(&machine));
             let figure = stages::diagnose::figure(&machine, diagnosed).map_err(CliError::input)?;
-            residuals = figure.svg();
+            residuals = Some(figure);
         }
         Err(error) => warnings.push(format!("no diagnosis: {}", CliError::from(error))),
     }
@@ -185,8 +185,10 @@ fn execute(
         limit: campaign.settings.max_relative_error,
     };
     let mut report = stages::identify::identify(&of);
-    let in_memory = match residuals.as_str() {
-        "" if !unseen.is_empty() => pictures::in_memory(&machine, &role_logs.validation, context)?,
+    let in_memory = match &residuals {
+        None if !unseen.is_empty() => {
+            pictures::in_memory(&machine, &role_logs.validation, context)?
+        }
         _ => None,
     };
     let look = pictures::look(&machine, in_memory.as_ref(), &unseen_names)?;
@@ -199,11 +201,12 @@ fn execute(
         command: context.command(),
     };
     let mut page = report.page();
-    stages::identify::pictures(&mut page, &of, look.as_ref(), &residuals, &origin)
+    stages::identify::pictures(&mut page, &of, look.as_ref(), residuals.as_ref(), &origin)
         .map_err(CliError::input)?;
     context.check()?;
-    if !residuals.is_empty() {
-        write((folder, context), "residual.svg", &residuals, &mut files)?;
+    if let Some(residuals) = &residuals {
+        let picture = residuals.svg();
+        write((folder, context), "residual.svg", &picture, &mut files)?;
     }
     write((folder, context), "report.html", &report.html(), &mut files)?;
     write((folder, context), "summary.txt", &report.text(), &mut files)?;

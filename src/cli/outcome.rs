@@ -25,6 +25,8 @@ pub struct Outcome {
 
 /// Warnings that are shown before a result.
 const MOST: usize = 8;
+/// Those of them about one log or joint.
+const ABOUT_ONE: usize = 2;
 
 /// Shows `outcome` and returns the status that it stands for.
 ///
@@ -37,16 +39,17 @@ pub(super) fn show(
     stdout: &mut dyn Write,
     stderr: &mut dyn Write,
 ) -> Result<Exit, CliError> {
+    let all: Vec<&str> = outcome.document.warnings().collect();
     let most = match detail {
         Detail::Full => usize::MAX,
         _ => MOST,
     };
-    let all = outcome.document.warnings().count();
-    for warning in outcome.document.warnings().take(most) {
+    let (shown, more) = grouped(&all, detail);
+    for warning in shown.iter().take(most) {
         tell(stderr, &format!("warning: {}", indented(warning)));
     }
-    if all > most {
-        let more = all - most;
+    let more = more + shown.len().saturating_sub(most);
+    if more > 0 {
         tell(
             stderr,
             &format!("warning: {more} more; --verbose shows them, --json holds them"),
@@ -69,6 +72,24 @@ pub(super) fn show(
     } else {
         Exit::LimitMissed
     })
+}
+
+/// The warnings that are shown, and how many are not: of several about one log or joint the first two.
+fn grouped<'a>(all: &[&'a str], detail: Detail) -> (Vec<&'a str>, usize) {
+    // `log.csv: what is wrong with it`
+    let about = |warning: &'a str| {
+        let (name, _) = warning.split_once(": ")?;
+        (!name.contains(' ')).then_some(name)
+    };
+    let before = |k: usize| {
+        let name = about(all[k]);
+        let same = |warning: &&'a str| about(warning) == name;
+        name.map_or(0, |_| all[..k].iter().copied().filter(same).count())
+    };
+    let kept = |k: &usize| detail == Detail::Full || before(*k) < ABOUT_ONE;
+    let shown: Vec<&str> = (0..all.len()).filter(kept).map(|k| all[k]).collect();
+    let more = all.len() - shown.len();
+    (shown, more)
 }
 
 fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
@@ -174,6 +195,14 @@ mod tests {
             String::from_utf8(err).unwrap().lines().count()
         };
         assert_eq!((lines(Detail::Usual), lines(Detail::Full)), (MOST + 1, 40));
+    }
+
+    #[test]
+    fn of_several_warnings_about_one_log_the_first_two_are_shown() {
+        let all = ["a.csv: 1", "b.csv: 1", "a.csv: 2", "a.csv: 3", "in all: 1"];
+        let expected = vec!["a.csv: 1", "b.csv: 1", "a.csv: 2", "in all: 1"];
+        assert_eq!(grouped(&all, Detail::Usual), (expected, 1));
+        assert_eq!(grouped(&all, Detail::Full), (all.to_vec(), 0));
     }
 
     /// A standard output that fails with the given kind.

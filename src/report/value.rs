@@ -2,6 +2,7 @@
 //! and a page are two renderings of it ([`super::text`], [`super::page`]); each part says where it is
 //! shown, since a page has room for more.
 
+use super::figure::Cells;
 use super::table::Table;
 use super::traces::Traces;
 
@@ -50,6 +51,8 @@ pub enum Part {
     Table(Table),
     /// An SVG document.
     Figure(String),
+    /// Small pictures that belong together.
+    Figures(Cells),
     /// Series over time that can be zoomed, as the page's viewer reads them, and the SVG document that
     /// stands in for them.
     Traces {
@@ -174,6 +177,11 @@ impl Writer<'_> {
 
     pub fn figure(&mut self, svg: &str) {
         self.push(Part::Figure(svg.to_owned()));
+    }
+
+    /// Small pictures that belong together.
+    pub fn figures(&mut self, cells: &Cells) {
+        self.push(Part::Figures(cells.clone()));
     }
 
     /// Series over time, and the still picture that stands in for them.

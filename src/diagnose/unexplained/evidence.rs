@@ -29,8 +29,12 @@ pub struct JointEvidence {
 const BINS: usize = 60;
 /// Rows that a bin needs.
 const LEAST: usize = 5;
-/// Points of a spectrum.
+/// Points of a spectrum: the fewest, the most, and how many a peak is wide.
 const SPECTRUM: usize = 240;
+const MOST_POINTS: usize = 2000;
+const PEAK: f64 = 3.0;
+/// Over the highest order that was found, where its spectrum ends.
+const ABOVE: f64 = 1.25;
 /// Rows that a spectrum is made of, about.
 const ROWS: usize = 4000;
 
@@ -44,7 +48,8 @@ struct ResidualRows {
     e: Vec<f64>,
 }
 
-/// Evidence of a model along stretches, joint by joint.
+/// Evidence of a model along stretches, joint by joint. Spectra over frequency end above the cut-off, those over
+/// order above `orders`, one per joint.
 ///
 /// # Errors
 /// [`MotionError`] of the filter.
@@ -52,12 +57,20 @@ pub fn evidence(
     model: &AugmentedModel,
     stretches: &[&Stretch],
     filters: &ParallelFilters,
-    cutoff_hz: f64,
+    (cutoff_hz, orders): (f64, &[f64]),
 ) -> Result<Vec<JointEvidence>, MotionError> {
     let robot = &model.model.robot;
     let n = robot.joints();
     let mut all: Vec<ResidualRows> = (0..n).map(|_| ResidualRows::default()).collect();
+    // logs stand one after the other, whose clocks may begin alike
+    let (mut log, mut late, mut end) = (None, 0.0, f64::NEG_INFINITY);
     for stretch in stretches {
+        if log != Some(stretch.log) {
+            log = Some(stretch.log);
+            let begin = stretch.t.first().copied().unwrap_or(0.0);
+            late = if end >= begin { end - begin } else { 0.0 };
+        }
+        end = stretch.t.last().copied().unwrap_or(0.0) + late;
         let parallel = filters.of(stretch);
         let load = model.torques(stretch).load;
         let hat = model.reconstruct(stretch);
@@ -73,7 +86,7 @@ pub fn evidence(
             for (i, e) in filtered[0].iter().enumerate() {
                 let k = parallel.sample_of(i);
                 rows.push([
-                    stretch.t[k],
+                    stretch.t[k] + late,
                     stretch.q[j][k],
                     stretch.v[j][k],
                     load[j][k],
@@ -105,14 +118,21 @@ pub fn evidence(
                 JointKind::Prismatic => std::f64::consts::TAU,
             };
             let [low, high] = range(&rows.q);
-            let waves = 40.0 / ((high - low) * per_unit / std::f64::consts::TAU).max(1e-9);
+            let turns = ((high - low) * per_unit / std::f64::consts::TAU).max(1e-9);
+            let found = orders.get(j).copied().unwrap_or(0.0);
+            let waves = (40.0 / turns).max(ABOVE * found);
             JointEvidence {
                 position: by(&rows.q),
                 velocity: binned(&rows.v, &rows.e, &rows.v, &|_| true),
                 load: by(&rows.load),
                 time: rows.t.iter().zip(&rows.e).map(|(t, e)| [*t, *e]).collect(),
-                order: spectrum(&rows.q, &rows.e, per_unit, waves),
-                frequency: spectrum(&rows.t, &rows.e, std::f64::consts::TAU, 1.5 * cutoff_hz),
+                order: spectrum(&rows.q, &rows.e, per_unit, (waves, turns)),
+                frequency: spectrum(
+                    &rows.t,
+                    &rows.e,
+                    std::f64::consts::TAU,
+                    (1.5 * cutoff_hz, 0.0),
+                ),
             }
         })
         .collect())
@@ -169,8 +189,9 @@ fn binned(x: &[f64], e: &[f64], v: &[f64], wanted: &dyn Fn(f64) -> bool) -> Line
         .collect()
 }
 
-/// Amplitude of e at waves of x, from 0 to `last` waves per unit.
-fn spectrum(x: &[f64], e: &[f64], per_unit: f64, last: f64) -> Line {
+/// Amplitude of e at waves of x, from 0 to `last` waves per unit, where x covers `units` of them, as far as that is
+/// known: a peak is as narrow as a wave over the whole of it.
+fn spectrum(x: &[f64], e: &[f64], per_unit: f64, (last, units): (f64, f64)) -> Line {
     let stride = (x.len() / ROWS).max(1);
     let rows: Vec<(f64, f64)> = x
         .iter()
@@ -183,9 +204,10 @@ fn spectrum(x: &[f64], e: &[f64], per_unit: f64, last: f64) -> Line {
         return Vec::new();
     }
     let mean = rows.iter().map(|r| r.1).sum::<f64>() / rows.len() as f64;
-    (1..=SPECTRUM)
+    let points = ((PEAK * last * units) as usize).clamp(SPECTRUM, MOST_POINTS);
+    (1..=points)
         .map(|i| {
-            let wave = last * i as f64 / SPECTRUM as f64;
+            let wave = last * i as f64 / points as f64;
             let (mut re, mut im) = (0.0, 0.0);
             for (x, e) in &rows {
                 let (s, c) = (per_unit * wave * x).sin_cos();
@@ -208,7 +230,7 @@ mod tests {
             .iter()
             .map(|x| 0.7 * (std::f64::consts::TAU * 8.0 * x).sin())
             .collect();
-        let line = spectrum(&x, &e, std::f64::consts::TAU, 40.0);
+        let line = spectrum(&x, &e, std::f64::consts::TAU, (40.0, 1.0));
         let peak = line.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
         assert!(
             (peak[0] - 8.0).abs() < 0.2 && (peak[1] - 0.7).abs() < 0.02,

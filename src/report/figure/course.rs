@@ -68,7 +68,7 @@ impl CoursePanel {
         let values = axis::interval(values, 0.06);
         let times = axis::interval(self.times.iter().copied(), 0.03);
         let (Some(times), Some(values)) = (times, values) else {
-            Panel::empty(svg, frame, "no log tells it");
+            Panel::empty(svg, frame, "no log determines it");
             return;
         };
         let panel = Panel::new(frame, times, values, [4, 5]);
@@ -129,6 +129,6 @@ mod tests {
         panel.course = vec![None; 3];
         panel.estimates = vec![None; 3];
         let none = figure(&panel).svg();
-        assert!(none.contains("no log tells it") && !none.contains("NaN"));
+        assert!(none.contains("no log determines it") && !none.contains("NaN"));
     }
 }

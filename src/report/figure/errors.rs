@@ -32,13 +32,13 @@ pub struct ErrorFigure {
     pub limit: Option<f64>,
 }
 
-const WIDTH: f64 = 560.0;
+const WIDTH: f64 = 440.0;
 const TOP: f64 = 62.0;
 /// Height of one bar, and of the room below a joint's bars [px].
 const BAR: f64 = 13.0;
 const APART: f64 = 12.0;
 /// Room at the right for the numbers [px].
-const NUMBERS: f64 = 150.0;
+const NUMBERS: f64 = 142.0;
 const SIZE: f64 = 12.0;
 
 impl ErrorFigure {
@@ -62,7 +62,11 @@ impl ErrorFigure {
             keys.push((Key::Patch(colour::BLUE), "error"));
         }
         let whisker = Stroke::solid(colour::INK, 1.2);
-        keys.push((Key::Line(whisker), "95 % confidence interval"));
+        let bars = self.joints.iter();
+        let mut bars = bars.flat_map(|joint| joint.before.into_iter().chain([joint.after]));
+        if bars.any(|bar| bar.interval_95.is_some()) {
+            keys.push((Key::Line(whisker), "95 % confidence interval"));
+        }
         let wanted = Stroke::dashed(colour::INK, 1.2, "6 3");
         if self.limit.is_some() {
             keys.push((Key::Line(wanted), "limit"));

@@ -2,12 +2,14 @@
 //! and the mean torque of plateaus as an independent check (eq. (29) of the report).
 
 use super::axis;
+use super::cell::{self, Cells};
 use super::colour;
 use super::joint_grid::{self, Heading};
 use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
 use crate::friction::estimate::FrictionCurvePoint;
+use crate::number;
 
 /// Half a 95 % interval in standard deviations.
 const WITHIN_95: f64 = 1.959_964;
@@ -30,6 +32,10 @@ pub struct FrictionPanel {
     pub covered: Vec<[f64; 2]>,
     /// Mean torque at constant speed.
     pub plateaus: Vec<FrictionCurvePoint>,
+    /// Velocity, measured torque less all that is no friction, and the friction of the model with every effect.
+    pub cloud: Vec<[f64; 3]>,
+    /// Effects make the friction differ from the curve, which is not drawn: the model stands in the cloud.
+    pub beyond_curve: bool,
     /// The true curve in order of `v`, where it is known; else empty.
     pub truth: Vec<[f64; 2]>,
 }
@@ -45,6 +51,9 @@ pub struct FrictionFigure {
 
 /// Radius of a plateau's dot [px].
 const DOT: f64 = 2.3;
+/// Height of a panel by itself [px], and most rows of a cloud.
+const ALONE: f64 = 180.0;
+const ROWS: usize = 500;
 
 const CURVE: Stroke = Stroke::solid(colour::BLUE, 1.8);
 const BEYOND: Stroke = Stroke::dashed(colour::BLUE, 1.2, "3 3");
@@ -70,12 +79,38 @@ impl FrictionFigure {
         joint_grid::draw(&heading, &self.panels, FrictionPanel::draw)
     }
 
+    /// The panels as pictures of their own.
+    pub fn cells(&self) -> Cells {
+        let cell = |panel: &FrictionPanel| {
+            let title = format!("friction of {}", panel.joint);
+            cell::cell(&title, &panel.words(), ALONE, |svg, frame| {
+                panel.draw(svg, frame)
+            })
+        };
+        Cells {
+            title: self.title.clone(),
+            key: cell::key(&self.entries()),
+            pictures: self.panels.iter().map(cell).collect(),
+            words: Vec::new(),
+        }
+    }
+
     /// Only what is drawn is in the legend.
     fn entries(&self) -> Vec<(Key, &'static str)> {
         let any = |has: fn(&FrictionPanel) -> bool| self.panels.iter().any(has);
-        let mut entries = vec![(Key::Band(CURVE), "estimated, 95 % band")];
-        let beyond =
-            |panel: &FrictionPanel| !lines(&panel.curve, |a, b| !panel.covers(a.v, b.v)).is_empty();
+        let mut entries = Vec::new();
+        if any(|panel| !panel.cloud.is_empty()) {
+            entries.push((Key::Spot(colour::VERMILLION), "measured, less all else"));
+        }
+        if any(|panel| panel.beyond_curve) {
+            entries.push((Key::Spot(colour::BLUE), "model with every effect"));
+        }
+        if any(|panel| !panel.beyond_curve) {
+            entries.push((Key::Band(CURVE), "estimated, 95 % band"));
+        }
+        let beyond = |panel: &FrictionPanel| {
+            !panel.beyond_curve && !lines(&panel.curve, |a, b| !panel.covers(a.v, b.v)).is_empty()
+        };
         if self.panels.iter().any(beyond) {
             entries.push((Key::Line(BEYOND), "beyond the data"));
         }
@@ -125,6 +160,24 @@ impl FrictionPanel {
         }
         panel.grid(svg);
         svg.clip(frame);
+        let every = self.cloud.len().div_ceil(ROWS).max(1);
+        let finite = |row: &&[f64; 3]| row.iter().all(|x| x.is_finite());
+        let cloud = self.cloud.iter().step_by(every).filter(finite);
+        for [v, measured, _] in cloud.clone() {
+            svg.dot(
+                [panel.x.px(*v), panel.y.px(*measured)],
+                1.1,
+                colour::VERMILLION,
+            );
+        }
+        if self.beyond_curve {
+            for [v, _, model] in cloud {
+                svg.dot([panel.x.px(*v), panel.y.px(*model)], 1.5, colour::BLUE);
+            }
+            svg.end_clip();
+            self.axes(svg, &panel);
+            return;
+        }
         for run in runs(&self.curve, |point| point.std.is_finite()) {
             svg.area(&band(&panel, &run), CURVE.colour, 0.22);
         }
@@ -139,10 +192,44 @@ impl FrictionPanel {
             plateau(svg, &panel, point);
         }
         svg.end_clip();
+        self.axes(svg, &panel);
+    }
+
+    fn axes(&self, svg: &mut Svg, panel: &Panel) {
         panel.outline(svg);
         panel.x_numbers(svg);
         panel.x_title(svg, "velocity", &self.speed_unit);
         panel.y_title(svg, 46.0, "friction", &self.torque_unit);
+    }
+
+    /// What a screen reader says: friction at the lowest and at the highest speed that the data cover.
+    fn words(&self) -> String {
+        let of_model = self.cloud.iter().map(|[v, _, model]| [*v, *model]);
+        let of_curve = self.curve.iter().map(|point| [point.v, point.torque]);
+        let points: Vec<[f64; 2]> = match self.beyond_curve {
+            true => of_model.collect(),
+            false => of_curve.collect(),
+        };
+        let forward = points
+            .iter()
+            .filter(|[v, torque]| *v > 0.0 && torque.is_finite());
+        let by_speed = |a: &&[f64; 2], b: &&[f64; 2]| a[0].total_cmp(&b[0]);
+        let ends = forward
+            .clone()
+            .min_by(by_speed)
+            .zip(forward.max_by(by_speed));
+        let Some(([slow, at_rest], [fast, at_speed])) = ends else {
+            return format!("no friction of {} is known", self.joint);
+        };
+        let told = |x: f64, unit: &str| format!("{} {unit}", number::significant(x, 3));
+        format!(
+            "{}: {} at {}, {} at {}",
+            self.joint,
+            told(*at_rest, &self.torque_unit),
+            told(*slow, &self.speed_unit),
+            told(*at_speed, &self.torque_unit),
+            told(*fast, &self.speed_unit)
+        )
     }
 
     fn speeds(&self) -> Option<[f64; 2]> {
@@ -161,6 +248,12 @@ impl FrictionPanel {
             };
             [point.torque - half, point.torque + half]
         });
+        let curve = curve.filter(|_| !self.beyond_curve);
+        let cloud = self
+            .cloud
+            .iter()
+            .flat_map(|[_, measured, model]| [*measured, *model]);
+        let curve = curve.chain(cloud);
         let plateaus = self.plateaus.iter().map(|point| point.torque);
         let truth = self.truth.iter().map(|[_, torque]| *torque);
         axis::interval(curve.chain(plateaus).chain(truth), 0.06)
@@ -260,8 +353,33 @@ mod tests {
             curve: [-2.0, -1.0, -0.5, 0.5, 1.0, 2.0].map(point).to_vec(),
             covered: vec![[-1.0, -0.5], [0.5, 1.0]],
             plateaus: Vec::new(),
+            cloud: Vec::new(),
+            beyond_curve: false,
             truth: Vec::new(),
         }
+    }
+
+    #[test]
+    fn the_cloud_and_the_model_with_every_effect_stand_where_effects_are() {
+        let mut panel = panel();
+        panel.cloud = vec![[0.5, 9.0, 7.0], [1.0, f64::NAN, 2.0]];
+        let mut figure = FrictionFigure {
+            title: "t".into(),
+            panels: vec![panel],
+        };
+        let circles =
+            |figure: &FrictionFigure| figure.cells().pictures[0].matches("<circle").count();
+        assert_eq!(circles(&figure), 1);
+        figure.panels[0].beyond_curve = true;
+        let cells = figure.cells();
+        assert_eq!(circles(&figure), 2);
+        assert!(
+            cells.key.contains("model with every effect"),
+            "{}",
+            cells.key
+        );
+        assert!(!cells.key.contains("95 % band"));
+        assert!(cells.pictures[0].contains("q1: 7.00 N at 0.500 m/s, 2.00 N at 1.00 m/s"));
     }
 
     #[test]

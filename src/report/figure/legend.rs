@@ -11,12 +11,45 @@ pub(super) enum Key {
     Band(Stroke),
     /// A dot with an error bar.
     Dot(&'static str),
+    /// A dot of a cloud.
+    Spot(&'static str),
     /// A tinted patch.
     Patch(&'static str),
 }
 
 const SIZE: f64 = 11.0;
 const SAMPLE: f64 = 26.0;
+/// Room between two entries, and height of a line.
+const APART: f64 = 14.0;
+const LINE: f64 = 18.0;
+
+/// The legend as a picture of its own, in as many lines as `width` takes.
+pub(super) fn alone(entries: &[(Key, &str)], width: f64) -> String {
+    let mut lines: Vec<Vec<(Key, &str)>> = vec![Vec::new()];
+    let mut at = 0.0;
+    let mut most: f64 = 0.0;
+    for (key, name) in entries {
+        let own = SAMPLE + 6.0 + width_of(name, SIZE) + APART;
+        if at + own > width
+            && let Some(last) = lines.last()
+            && !last.is_empty()
+        {
+            lines.push(Vec::new());
+            at = 0.0;
+        }
+        if let Some(line) = lines.last_mut() {
+            line.push((*key, *name));
+        }
+        at += own;
+        most = most.max(at);
+    }
+    let names: Vec<&str> = entries.iter().map(|(_, name)| *name).collect();
+    let mut svg = Svg::new(most, LINE * lines.len() as f64, "legend", &names.join(", "));
+    for (k, line) in lines.iter().enumerate() {
+        draw(&mut svg, [0.0, LINE * (k as f64 + 0.72)], line);
+    }
+    svg.finish()
+}
 
 /// Draws the legend from `x` rightwards, its baseline at `y`. The names are the figures' own, few
 /// and short enough for one line.
@@ -44,6 +77,7 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
                 svg.line([centre, middle - 6.0], [centre, middle + 6.0], bar);
                 svg.dot([centre, middle], 2.6, fill);
             }
+            Key::Spot(fill) => svg.dot([at + 0.5 * SAMPLE, middle], 2.6, fill),
             Key::Patch(fill) => svg.rect(
                 [at, middle - 5.0, SAMPLE, 10.0],
                 fill,
@@ -51,6 +85,6 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
             ),
         }
         svg.text([at + SAMPLE + 6.0, y], name, Type::new(SIZE, Anchor::Start));
-        at += width + 14.0;
+        at += width + APART;
     }
 }

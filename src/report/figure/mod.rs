@@ -5,6 +5,7 @@
 //! bytes.
 
 mod axis;
+mod cell;
 mod course;
 mod decimate;
 mod effect;
@@ -17,9 +18,11 @@ mod overlay;
 mod panel;
 mod png;
 mod residual;
+mod sketch;
 mod svg;
 mod torque;
 
+pub use cell::Cells;
 pub use course::{CourseFigure, CoursePanel};
 pub use effect::EffectFigure;
 pub use errors::{ErrorBar, ErrorFigure, JointBars};
@@ -28,6 +31,7 @@ pub use motion::{MotionFigure, MotionPanel};
 pub use overlay::{OverlayFigure, OverlayPanel};
 pub use png::{PngError, png};
 pub use residual::{ResidualFigure, ResidualPanel, When};
+pub use sketch::{Sketch, SketchJoint};
 pub use torque::{JointTorque, TorqueFigure};
 
 /// Colours that stay apart for colour-blind readers and in grey print (Okabe and Ito 2008).

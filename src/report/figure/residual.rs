@@ -2,11 +2,13 @@
 //! backward apart, and its spectra over order and frequency.
 
 use super::axis;
+use super::cell::{self, Cells};
 use super::colour;
 use super::decimate::decimated;
 use super::legend::{self, Key};
 use super::panel::Panel;
-use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use crate::number;
 
 /// One panel: a quantity below, and lines before and after.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +19,8 @@ pub struct ResidualPanel {
     pub of: (String, String),
     /// Lines of (x, y); a y that is not finite parts a line.
     pub lines: Vec<(When, Vec<[f64; 2]>)>,
+    /// Places below that are marked, with what stands there.
+    pub marks: Vec<(f64, String)>,
 }
 
 /// Which line it is.
@@ -100,6 +104,26 @@ impl ResidualFigure {
         svg.finish()
     }
 
+    /// The panels as pictures of their own, joint by joint.
+    pub fn cells(&self) -> Vec<Cells> {
+        let entries = self.entries();
+        let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
+            let picture = |panel: &ResidualPanel| {
+                let title = format!("residual of {name} over {}", panel.over.0);
+                cell::cell(&title, &panel.words(name), PLOT, |svg, frame| {
+                    panel.draw(svg, frame)
+                })
+            };
+            Cells {
+                title: format!("{}, {name}", self.title),
+                key: cell::key(&entries),
+                pictures: panels.iter().map(picture).collect(),
+                words: Vec::new(),
+            }
+        };
+        self.joints.iter().map(of_joint).collect()
+    }
+
     /// Only what is drawn is in the legend; a residual that nothing came after is not `before`.
     fn entries(&self) -> Vec<(Key, &'static str)> {
         let drawn = |when: When| {
@@ -124,6 +148,30 @@ impl ResidualFigure {
 }
 
 impl ResidualPanel {
+    /// What a screen reader says: the greatest of each line.
+    fn words(&self, joint: &str) -> String {
+        let most = |wanted: [When; 2]| {
+            let lines = self.lines.iter().filter(|(when, _)| wanted.contains(when));
+            let values = lines.flat_map(|(_, line)| line.iter().map(|p| p[1].abs()));
+            values.filter(|y| y.is_finite()).reduce(f64::max)
+        };
+        let told = |x: f64| format!("{} {}", number::significant(x, 3), self.of.1);
+        let before = most([When::Before, When::BeforeBackward]);
+        let after = most([When::After, When::AfterBackward]);
+        let (what, over) = (&self.of.0, &self.over.0);
+        match (before, after) {
+            (Some(before), Some(after)) => format!(
+                "greatest {what} of {joint} over {over}: {} before, {} after",
+                told(before),
+                told(after)
+            ),
+            (Some(only), None) | (None, Some(only)) => {
+                format!("greatest {what} of {joint} over {over}: {}", told(only))
+            }
+            (None, None) => format!("not enough motion of {joint} to tell"),
+        }
+    }
+
     fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
         let points = || self.lines.iter().flat_map(|(_, line)| line);
         let finite = |v: &f64| v.is_finite();
@@ -141,10 +189,32 @@ impl ResidualPanel {
             svg.curve(&panel.place(decimated(&x, &y, POINTS)), when.stroke());
         }
         svg.end_clip();
+        self.mark(svg, &panel);
         panel.outline(svg);
         panel.y_title(svg, 46.0, &self.of.0, &self.of.1);
         panel.x_numbers(svg);
         panel.x_title(svg, &self.over.0, &self.over.1);
+    }
+}
+
+impl ResidualPanel {
+    /// Marks, with their names above the frame where these do not meet.
+    fn mark(&self, svg: &mut Svg, panel: &Panel) {
+        let [_, top, _, height] = panel.frame;
+        let mut marks: Vec<&(f64, String)> = self.marks.iter().collect();
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free = f64::NEG_INFINITY;
+        let within = |x: f64| panel.x.from <= x && x <= panel.x.to;
+        for (x, name) in marks.into_iter().filter(|(x, _)| within(*x)) {
+            let at = panel.x.px(*x);
+            let line = Stroke::dashed(colour::INK, 0.9, "2 2");
+            svg.line([at, top], [at, top + height], line);
+            let half = 0.5 * width_of(name, 10.0) + 2.0;
+            if at - half > free {
+                svg.text([at, top - 3.0], name, Type::new(10.0, Anchor::Middle));
+                free = at + half;
+            }
+        }
     }
 }
 
@@ -158,6 +228,7 @@ mod tests {
             over: ("velocity".into(), "rad/s".into()),
             of: ("residual".into(), "Nm".into()),
             lines: vec![(When::Before, line.clone()), (When::AfterBackward, line)],
+            marks: vec![(1.0, "1.00".into()), (9.0, "9.00".into())],
         };
         let figure = ResidualFigure {
             title: "a<b".into(),
@@ -173,5 +244,15 @@ mod tests {
         assert!(svg.contains("velocity [rad/s]") && svg.contains("residual [Nm]"));
         assert!(svg.contains("not enough motion"));
         assert!(svg.contains("q&lt;1") && !svg.contains("NaN"));
+        // what lies beyond the axis is not marked
+        assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
+        let cells = figure.cells();
+        assert_eq!(cells[0].pictures.len(), 2);
+        let told = "greatest residual of q&lt;1 over velocity: 2.00 Nm before, 2.00 Nm after";
+        assert!(
+            cells[0].pictures[0].contains(told),
+            "{}",
+            cells[0].pictures[0]
+        );
     }
 }

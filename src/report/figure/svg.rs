@@ -167,6 +167,17 @@ impl Svg {
         );
     }
 
+    /// A dot with a ring around it.
+    pub(crate) fn ringed(&mut self, [x, y]: [f64; 2], radius: f64, fill: &str, ring: Stroke) {
+        let (x, y, radius) = (px(x), px(y), px(radius));
+        let _ = write!(
+            self.body,
+            "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"{fill}\""
+        );
+        self.stroke(ring);
+        self.body.push_str("/>\n");
+    }
+
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, style: Type) {
         let _ = write!(self.body, "<text x=\"{}\" y=\"{}\"", px(x), px(y));
         self.set("", text, style);

@@ -54,18 +54,24 @@ const RECONSTRUCTED: Stroke = Stroke::solid(colour::SKY, 2.4);
 const DIFFERENCE: Stroke = Stroke::solid(colour::VERMILLION, 0.9);
 
 impl TorqueFigure {
+    /// A picture for each joint, one SVG document after the other: paper parts them where it must.
+    pub fn by_joint(&self) -> String {
+        let of_joint = |joint: &JointTorque| TorqueFigure {
+            title: self.title.clone(),
+            joints: vec![joint.clone()],
+        };
+        self.joints.iter().map(|j| of_joint(j).svg()).collect()
+    }
+
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
         let group = NAME + TORQUE + BETWEEN + RESIDUAL + NUMBERS;
         let height = HEAD + group * self.joints.len() as f64 + FOOT;
-        let names: Vec<&str> = self
-            .joints
-            .iter()
-            .map(|joint| joint.joint.as_str())
-            .collect();
+        let told = |joint: &JointTorque| format!("{}{}", joint.joint, joint.figures());
+        let told: Vec<String> = self.joints.iter().map(told).collect();
         let description = format!(
-            "Measured and reconstructed torque over time and their difference, joints {}",
-            names.join(", ")
+            "Measured and reconstructed torque over time and their difference: {}",
+            told.join("; ")
         );
         let mut svg = Svg::new(WIDTH, height, &self.title, &description);
         svg.text(

@@ -8,6 +8,7 @@
 use std::fmt::Write;
 
 use super::encode;
+use super::figure::Cells;
 use super::table::Table;
 use super::value::{Part, Report, Shown};
 use crate::log::{Provenance, is_hidden};
@@ -82,8 +83,9 @@ fn shown(part: &Part) -> String {
             let svg = inline(svg);
             format!("<figure><div class=\"still\">{svg}</div></figure>\n")
         }
+        Part::Figures(cells) => figures(cells),
         Part::Traces { data, still } => format!(
-            "<figure><div class=\"still\">{}</div>\
+            "<figure class=\"series\"><div class=\"still\">{}</div>\
              <script type=\"application/json\" class=\"traces\">{data}</script></figure>\n",
             inline(still)
         ),
@@ -93,6 +95,45 @@ fn shown(part: &Part) -> String {
             escaped(summary),
             escaped(text)
         ),
+    }
+}
+
+/// Small pictures beside each other, with their title, what the colours mean, and what is said of them.
+fn figures(cells: &Cells) -> String {
+    let mut out = format!(
+        "<figure class=\"{}\"><figcaption>{}</figcaption>",
+        if cells.pictures.len() > 2 {
+            "card many"
+        } else {
+            "card"
+        },
+        escaped(&capital(&cells.title))
+    );
+    if !cells.key.is_empty() {
+        let _ = write!(out, "<div class=\"legend\">{}</div>", inline(&cells.key));
+    }
+    out.push_str("<div class=\"still cells\">");
+    for picture in &cells.pictures {
+        out.push_str(inline(picture));
+    }
+    out.push_str("</div>");
+    for words in &cells.words {
+        let _ = write!(out, "<p>{}</p>", escaped(words));
+    }
+    out.push_str("</figure>\n");
+    out
+}
+
+/// A title with a capital letter, unless its first word is no plain one.
+fn capital(title: &str) -> String {
+    let first = title.split(' ').next().unwrap_or("");
+    match first.chars().all(char::is_alphabetic) {
+        true => {
+            let mut chars = title.chars();
+            let initial = chars.next().map(char::to_uppercase).into_iter().flatten();
+            initial.chain(chars).collect()
+        }
+        false => title.to_owned(),
     }
 }
 

@@ -400,8 +400,12 @@ class Viewer {
       put(inside, 'path', { class: 'l ' + line.style, d: path(view, line.y, i0, i1, x, py, dense) });
     }
     if (over >= 0) {
-      const values = panel.lines.map(line => shown(line.y[over], high - low)).join(' / ');
-      put(svg, 'text', { x: right, y: top - 6, 'text-anchor': 'end' }, `${values} ${panel.unit}`);
+      // each number behind the name of its line; on a narrow screen inside the panel, below its heading
+      const named = line => `${line.name} ${shown(line.y[over], high - low)}`;
+      const words = `${panel.lines.map(named).join(', ')} ${panel.unit}`;
+      const wide = right - left > 6.5 * words.length + 150;
+      put(svg, 'text', { class: 'over', x: right - (wide ? 0 : 4), y: top + (wide ? -6 : 12), 'text-anchor': 'end' },
+        words);
     }
   }
 }

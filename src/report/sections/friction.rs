@@ -1,9 +1,10 @@
-//! Friction curves of a model, with their bands and the speeds of the logs.
+//! Friction of a model, with everything that was found, over the cloud of what was measured.
 
 use super::look::Look;
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::identify::friction_curve;
+use crate::motion::MotionError;
 use crate::report::Writer;
 use crate::report::figure::{FrictionFigure, FrictionPanel};
 use crate::robot::model::JointFriction;
@@ -11,18 +12,33 @@ use crate::robot::model::JointFriction;
 /// Points of a curve on each side of rest.
 const POINTS: usize = 90;
 
-/// The curves of every joint that has friction.
-pub fn figure(look: &Look, file: &ModelFile, model: &AugmentedModel) -> FrictionFigure {
+/// The friction of every joint that has any, over the rows of all logs.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn figure(
+    look: &Look,
+    file: &ModelFile,
+    model: &AugmentedModel,
+) -> Result<FrictionFigure, MotionError> {
     let machine = look.machine;
+    let mut clouds = clouds(look, model)?;
     let joints = machine.robot.joint_names().iter().enumerate();
     let panels = joints
         .filter_map(|(j, joint)| {
             let law = model.model.friction.get(j)?;
             let [low, high] = look.velocities(j)?;
-            if *law == JointFriction::None {
+            let effects = model.effects.iter();
+            let beyond_curve = effects
+                .clone()
+                .any(|e| is_friction(e) && e.place.touches(j));
+            if *law == JointFriction::None && !beyond_curve {
                 return None;
             }
-            let curve = friction_curve(file, law, joint, speeds(low.abs().max(high.abs())));
+            let curve = match law {
+                JointFriction::None => Vec::new(),
+                law => friction_curve(file, law, joint, speeds(low.abs().max(high.abs()))),
+            };
             let unit = machine.robot.joint_kind(j).position_unit();
             Some(FrictionPanel {
                 joint: joint.clone(),
@@ -32,17 +48,44 @@ pub fn figure(look: &Look, file: &ModelFile, model: &AugmentedModel) -> Friction
                 curve,
                 covered: vec![[low, high]],
                 plateaus: Vec::new(),
+                cloud: std::mem::take(&mut clouds[j]),
+                beyond_curve,
                 truth: Vec::new(),
             })
         })
         .collect();
-    FrictionFigure {
-        title: format!(
-            "Friction of the model, and the speeds of {}",
-            look.names.join(", ")
-        ),
+    let all: Vec<usize> = (0..look.names.len()).collect();
+    Ok(FrictionFigure {
+        title: format!("Friction of the model along {}", look.named(&all)),
         panels,
+    })
+}
+
+fn is_friction(effect: &crate::effect::Added) -> bool {
+    effect.law.entry.friction
+}
+
+/// Velocity, measured torque less all that is no friction, and friction of the model, row by row of every joint.
+fn clouds(look: &Look, model: &AugmentedModel) -> Result<Vec<Vec<[f64; 3]>>, MotionError> {
+    let mut bare = model.clone();
+    bare.model.friction.fill(JointFriction::None);
+    bare.effects.retain(|effect| !is_friction(effect));
+    let mut all = vec![Vec::new(); model.model.robot.joints()];
+    for stretch in look.stretches {
+        let parallel = look.filters.of(stretch);
+        let (full, rest) = (model.reconstruct(stretch), bare.reconstruct(stretch));
+        for (j, rows) in all.iter_mut().enumerate() {
+            let less =
+                |x: &[f64]| -> Vec<f64> { x.iter().zip(&rest[j]).map(|(x, y)| x - y).collect() };
+            let (measured, friction) = (less(&stretch.tau[j]), less(&full[j]));
+            let filtered = parallel.run(&[&measured, &friction])?;
+            rows.extend((0..filtered[0].len()).map(|i| {
+                let v = stretch.v[j][parallel.sample_of(i)];
+                [v, filtered[0][i], filtered[1][i]]
+            }));
+        }
     }
+    Ok(all)
 }
 
 /// From the fastest backward to the fastest forward, closer together towards rest, where laws bend.
@@ -61,5 +104,5 @@ pub fn section(page: &mut Writer, figure: &FrictionFigure) {
         return;
     }
     page.heading("Friction");
-    page.figure(&figure.svg());
+    page.figures(&figure.cells());
 }

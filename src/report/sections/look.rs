@@ -37,12 +37,27 @@ impl<'a> Look<'a> {
         })
     }
 
+    /// Names of some of the logs, the first few of many.
+    pub fn named(&self, logs: &[usize]) -> String {
+        const MOST: usize = 3;
+        let names = logs.iter().filter_map(|log| self.names.get(*log));
+        let mut names: Vec<String> = names.cloned().collect();
+        // spans of one log have its name
+        names.dedup();
+        if names.len() > MOST {
+            let more = names.len() - MOST;
+            names.truncate(MOST);
+            names.push(format!("{more} more"));
+        }
+        names.join(", ")
+    }
+
     /// Stretches of one log.
     pub fn of_log(&self, log: usize) -> impl Iterator<Item = &Stretch> {
         self.stretches.iter().filter(move |s| s.log == log)
     }
 
-    /// What the residual of a model depends on, over the logs of `wanted`.
+    /// What the residual of a model depends on, over the logs of `wanted`; spectra reach `orders`, one per joint.
     ///
     /// # Errors
     /// Stretches that are too short for the filter.
@@ -50,9 +65,11 @@ impl<'a> Look<'a> {
         &self,
         model: &AugmentedModel,
         wanted: &dyn Fn(usize) -> bool,
+        orders: &[f64],
     ) -> Result<Vec<JointEvidence>, MotionError> {
         let stretches: Vec<&Stretch> = self.stretches.iter().filter(|s| wanted(s.log)).collect();
-        evidence(model, &stretches, &self.filters, self.cutoff_hz)
+        let settings = (self.cutoff_hz, orders);
+        evidence(model, &stretches, &self.filters, settings)
     }
 
     /// Lowest and highest velocity of a joint over all logs [m/s or rad/s].

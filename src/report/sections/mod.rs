@@ -8,6 +8,7 @@ pub mod parameters;
 pub mod provenance;
 pub mod quality;
 pub mod residual;
+pub mod sketch;
 pub mod torque;
 
 pub use look::Look;

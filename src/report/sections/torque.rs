@@ -206,7 +206,7 @@ pub fn section(
     let traces = traces(look, logs, models)?;
     page.heading("Torque, measured and reconstructed");
     let first = traces.traces.first();
-    let figure = first.map_or(String::new(), |t| still(look.machine, t, title).svg());
+    let figure = first.map_or(String::new(), |t| still(look.machine, t, title).by_joint());
     page.traces(&traces, &figure);
     Ok(())
 }

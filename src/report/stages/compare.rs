@@ -152,7 +152,7 @@ fn words(of: &Compared) -> String {
     let told = match tried.differences.overall.sign() {
         -1 => "B is closer on these logs",
         1 => "A is closer on these logs",
-        _ => "these logs do not tell which model is closer",
+        _ => "these logs do not show which model is closer",
     };
     let error = |k: usize| number::percent(tried.validations[k].overall.mean_relative_error);
     text += &format!(

@@ -1,7 +1,7 @@
 //! The report of `diagnose`.
 
-use super::first_screen;
 use super::step_words::{in_words, tentative, titled, worsened};
+use super::{first_screen, found_effects};
 use crate::config::ModelFile;
 use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, Turn};
 use crate::identify::{
@@ -14,7 +14,7 @@ use crate::report::figure::ResidualFigure;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
 use crate::report::sections::{
-    Look, effects, fit, friction, parameters, provenance, residual, torque,
+    Look, fit, friction, parameters, provenance, residual, sketch, torque,
 };
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
@@ -52,7 +52,7 @@ pub fn diagnose(of: &Diagnose) -> Report {
 pub fn pictures(
     page: &mut Writer,
     of: &Diagnose,
-    figure: &str,
+    figure: &ResidualFigure,
     quality: &[Inspected],
     command: &str,
 ) -> Result<(), MotionError> {
@@ -61,9 +61,9 @@ pub fn pictures(
     let look = look(machine, found)?;
     let refined = found.model(machine, of.file);
     parameters::section(page, &refined, &|_| None);
-    let curves = friction::figure(&look, &refined, &found.diagnosis.model);
+    let curves = friction::figure(&look, &refined, &found.diagnosis.model)?;
     friction::section(page, &curves);
-    page.heading("What the model hardly tells apart");
+    page.heading("Correlated parameters");
     fit::pairs(page, &refined);
     quality::section(page, quality, &found.in_memory.warnings);
     let mut inputs = vec![of.given.clone()];
@@ -219,7 +219,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
 /// Nothing is missing, or nothing that matters.
 fn nothing_missing(d: &Diagnosis) -> String {
     match d.remainder().next() {
-        None => "Nothing is missing: what is left of the torque is noise.".to_owned(),
+        None => "Nothing is missing: the remaining residual is noise.".to_owned(),
         Some(_) => "Nothing that matters is missing.".to_owned(),
     }
 }
@@ -235,7 +235,13 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let open: Vec<String> = d
         .structured_joints()
         .map(|j| match d.unexplained[j].over_floor {
-            Some(over) => format!("{} ({over:.1} times the noise)", robot.joint_names()[j]),
+            Some(over) => {
+                let times = match over < 100.0 {
+                    true => number::significant(over, 2),
+                    false => "more than 100".to_owned(),
+                };
+                format!("{} ({times} times the noise)", robot.joint_names()[j])
+            }
             None => robot.joint_names()[j].clone(),
         })
         .collect();
@@ -288,7 +294,12 @@ fn dependences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
             )
         });
         let told: Vec<String> = told.collect();
-        (!told.is_empty()).then(|| format!("what is left on {name} depends on {}", told.join(", ")))
+        (!told.is_empty()).then(|| {
+            format!(
+                "the residual of {name} still depends on {}",
+                told.join(", ")
+            )
+        })
     };
     names.iter().enumerate().filter_map(of_joint).collect()
 }
@@ -374,18 +385,10 @@ pub fn sections(
     page: &mut Writer,
     machine: &LoggedRobot,
     found: &Diagnosed,
-    figure: &str,
+    figure: &ResidualFigure,
 ) -> Result<(), MotionError> {
     let look = look(machine, found)?;
     let d = &found.diagnosis;
-    if !d.steps.is_empty() {
-        page.heading("What was added");
-        steps(page, machine, found);
-    }
-    if let Some(path) = path(found) {
-        page.paragraph(&path);
-    }
-    page.list(doubts(machine, found));
     // held-out logs, where there are any
     let all: Vec<usize> = (0..look.names.len()).collect();
     let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
@@ -395,17 +398,18 @@ pub fn sections(
         true => "the fitted data",
         false => "held-out data",
     };
-    let added = d.steps.iter().map(|step| {
-        let would = match step.alternatives.is_empty() {
-            true => String::new(),
-            false => {
-                let effect = &d.model.effects[step.effect];
-                format!("To tell it from others: {}.", effect.law.entry.separate_by)
-            }
-        };
-        (step.effect, would)
-    });
-    effects::cards(page, &look, &d.model, added, (shown, data))?;
+    let errors = d.after.holdout.as_ref().unwrap_or(&d.after.train);
+    let errors = errors.joints.iter().map(|joint| joint.relative_error);
+    let errors: Vec<f64> = errors.collect();
+    if !d.steps.is_empty() {
+        page.heading("What the model lacks");
+    }
+    page.list(doubts(machine, found));
+    found_effects::show(page, (machine, found), &look, (shown, data))?;
+    if let Some(path) = path(found) {
+        page.paragraph(&path);
+    }
+    sketch::section(page, &look, shown, &errors);
     let after = Drawn {
         names: ["after", "residual after"],
         styles: [TraceStyle::Model, TraceStyle::After],
@@ -505,54 +509,6 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             "95 % CI",
             "rms after",
             "torque power left above noise",
-        ],
-        rows,
-    );
-}
-
-fn steps(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
-    let d = &found.diagnosis;
-    let mut rows = Vec::new();
-    for step in &d.steps {
-        let effect = &d.model.effects[step.effect];
-        let unseen = step.holdout.map_or("-".to_owned(), |[before, after]| {
-            let worse = worsened(step);
-            format!(
-                "{} to {}{worse}",
-                number::percent(before),
-                number::percent(after)
-            )
-        });
-        let alike: Vec<String> = step
-            .alternatives
-            .iter()
-            .map(|c| c.effect.title(&machine.robot))
-            .collect();
-        let score = step.candidate.score.as_ref();
-        let title = titled(machine, effect);
-        rows.push(vec![
-            match tentative(d, step) {
-                None => title,
-                Some(why) => format!("{title} (tentative: {why})"),
-            },
-            in_words(machine, found, step.effect),
-            score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
-            unseen,
-            if alike.is_empty() {
-                "separated from all others".to_owned()
-            } else {
-                format!("{}: {}", alike.join(", "), effect.law.entry.separate_by)
-            },
-        ]);
-    }
-    page.rows(
-        "in the order in which they were added; numbers of the last fit",
-        &[
-            "effect",
-            "parameters",
-            "cross-validated gain",
-            "unseen",
-            "not separated from; what would",
         ],
         rows,
     );

@@ -57,7 +57,7 @@ pub fn pictures(
     page.figure(&figure(of.machine, of.found).svg());
     parameters::section(page, of.file, &|_| None);
     nuisance(page, of.found);
-    page.heading("What the model hardly tells apart");
+    page.heading("Correlated parameters");
     fit::pairs(page, of.file);
     quality::section(page, quality, &of.found.warnings);
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
@@ -220,6 +220,8 @@ pub fn figure(machine: &LoggedRobot, found: &IdentifiedFriction) -> FrictionFigu
             curve: curve.collect(),
             covered: vec![[-high, -low], [low, high]],
             plateaus: plateaus.collect(),
+            cloud: Vec::new(),
+            beyond_curve: false,
             truth: Vec::new(),
         }
     };

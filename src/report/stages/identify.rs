@@ -7,9 +7,12 @@ use crate::identify::{Campaigned, DataFault, DiagnoseEnd, Diagnosed, LoggedRobot
 use crate::log::{Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
+use crate::report::figure::ResidualFigure;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::sections::{
+    Look, fit, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::Table;
 use crate::report::{Report, Writer, summary};
 use crate::verdict::Verdict;
@@ -168,7 +171,7 @@ pub fn pictures(
     page: &mut Writer,
     of: &Identify,
     look: Option<&Look>,
-    residuals: &str,
+    residuals: Option<&ResidualFigure>,
     origin: &Origin,
 ) -> Result<(), MotionError> {
     let (machine, found) = (of.machine, of.found);
@@ -179,19 +182,24 @@ pub fn pictures(
              speeds that the logs cover, and the mean torque of their plateaus, which took no part \
              in the fit.",
         );
-        page.figure(&filter::figure(machine, laws).svg());
+        page.figures(&filter::figure(machine, laws).cells());
     } else if let Some(look) = look {
-        let figure = friction::figure(look, &found.model, &found.numbers);
+        let figure = friction::figure(look, &found.model, &found.numbers)?;
         friction::section(page, &figure);
     }
-    if let Some(diagnosed) = of.diagnosed() {
+    if let (Some(diagnosed), Some(residuals)) = (of.diagnosed(), residuals) {
         diagnose::sections(page, machine, diagnosed, residuals)?;
     } else if let Some(look) = look {
         let logs: Vec<usize> = (0..of.unseen.len()).collect();
+        if let Some(validated) = &found.validated {
+            let errors = validated.validation.joints.iter();
+            let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();
+            sketch::section(page, look, &logs, &errors);
+        }
         let drawn = [Drawn::only(&found.numbers)];
         torque::section(page, look, &logs, &drawn, &of.title())?;
         let figure = residual::figure(look, &|_| true, &found.numbers, None)?;
-        residual::section(page, &figure.svg());
+        residual::section(page, &figure);
     }
     fit::section(page, &found.dynamics, of.model());
     quality::section(page, origin.quality, origin.warnings);

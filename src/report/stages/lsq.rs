@@ -78,12 +78,12 @@ pub fn pictures(
 ) -> Result<(), MotionError> {
     parameters::section(page, of.file, &|_| None);
     if let Some(look) = look {
-        friction::section(page, &friction::figure(look, of.file, model));
+        friction::section(page, &friction::figure(look, of.file, model)?);
         let logs: Vec<usize> = (0..of.logs.len()).collect();
         let title = look.names.join(", ");
         torque::section(page, look, &logs, &[Drawn::only(model)], &title)?;
         let figure = residual::figure(look, &|_| true, model, None)?;
-        residual::section(page, &figure.svg());
+        residual::section(page, &figure);
     }
     fit::section(page, of.found, of.file);
     quality::section(page, quality, &of.found.warnings);

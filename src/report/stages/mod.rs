@@ -6,6 +6,7 @@ pub mod diagnose;
 pub mod diff;
 pub mod excite;
 mod first_screen;
+mod found_effects;
 pub mod friction;
 pub mod identify;
 pub mod inspect;

@@ -39,23 +39,15 @@ pub(super) fn tentative(d: &Diagnosis, step: &AcceptedEffect) -> Option<String> 
         why.push("held-out data do not confirm it");
     }
     if !d.assured() {
-        why.push("what is left is more than noise");
+        why.push("the remaining residual is more than noise");
     }
     Some(why.join("; "))
 }
 
-/// An effect by its name and place; a curve that stands in for one by what it depends on, and its peak.
+/// What an effect is called where it was found.
 pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
-    let Some((signal, peak)) = effect.curve() else {
-        return effect.title(&machine.robot);
-    };
-    let words = signal.words()[0];
-    let what = match effect.place.name(&machine.robot) {
-        Some(joint) => words.replacen(' ', &format!(" of {joint} "), 1),
-        None => words.to_owned(),
-    };
     let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-    format!("{what}: peak {} {unit}", number::significant(peak, 2))
+    effect.said(&machine.robot, unit)
 }
 
 /// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.

@@ -6,10 +6,12 @@ use crate::identify::{LoggedRobot, Validated};
 use crate::log::{DataRole, Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
-use crate::report::figure::{JointTorque, TorqueFigure};
+use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::sections::{
+    Look, fit, friction, parameters, provenance, residual, sketch, torque,
+};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary};
 use crate::validate::{JointError, Validation};
@@ -45,8 +47,26 @@ pub fn validate(of: &Validate) -> Report {
     told(&mut report.terminal(), validation, &caption);
     overall(&mut report.detail(), validation);
     let mut page = report.page();
+    page.figure(&bars(validation, of.limit).svg());
     errors(&mut page, validation, "errors of the reconstructed torque");
     report
+}
+
+/// Errors joint by joint as bars, with the limit that the user set.
+fn bars(validation: &Validation, limit: Option<f64>) -> ErrorFigure {
+    let joint = |e: &JointError| JointBars {
+        joint: e.joint.clone(),
+        before: None,
+        after: ErrorBar {
+            error: e.relative_error,
+            interval_95: None,
+        },
+    };
+    ErrorFigure {
+        title: "Relative torque error".to_owned(),
+        joints: validation.joints.iter().map(joint).collect(),
+        limit,
+    }
 }
 
 /// What a page has room for besides; `look` is absent where the logs are too long to be held.
@@ -65,11 +85,13 @@ pub fn pictures(
     parameters::section(page, of.file, &|_| None);
     match look {
         Some(look) => {
-            friction::section(page, &friction::figure(look, of.file, of.model));
             let logs: Vec<usize> = (0..of.logs.len()).collect();
+            let errors = validation.joints.iter().map(|joint| joint.relative_error);
+            sketch::section(page, look, &logs, &errors.collect::<Vec<_>>());
+            friction::section(page, &friction::figure(look, of.file, of.model)?);
             torque::section(page, look, &logs, &[Drawn::only(of.model)], &title)?;
             let figure = residual::figure(look, &|_| true, of.model, None)?;
-            residual::section(page, &figure.svg());
+            residual::section(page, &figure);
         }
         None => {
             page.heading("Torque, measured and reconstructed");
@@ -80,7 +102,7 @@ pub fn pictures(
             page.figure(&figure(validation, &title).svg());
         }
     }
-    page.heading("What the model hardly tells apart");
+    page.heading("Correlated parameters");
     fit::pairs(page, of.file);
     quality::section(page, quality, &of.found.warnings);
     let mut inputs = vec![of.given.clone()];

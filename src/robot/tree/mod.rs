@@ -6,12 +6,14 @@
 //! | [`links`] | links, joints, dependent coordinates |
 //! | [`newton_euler`] | the regressor of the standard parameters, one recursion |
 //! | [`base`] | which combinations of them torques can tell |
+//! | [`pose`] | where the links are |
 //! | [`parameters`] | these, drive inertias and couplings as parameters with names |
 
 pub mod base;
 pub mod links;
 pub mod newton_euler;
 pub mod parameters;
+pub mod pose;
 pub mod space;
 
 pub use base::Grouping;
