@@ -105,7 +105,7 @@ impl<'a> Band<'a> {
 }
 
 /// How to get a band where the model file has none.
-pub const NO_BAND: &str = "the model file holds no [[held_out]], so that nothing tells how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
+pub const NO_BAND: &str = "the model file holds no [[held_out]], so that it is not known how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
 
 /// Ranges that a motion takes up, beside those that a model was fitted and tried in.
 pub struct Reach<'a> {

@@ -15,7 +15,7 @@ Example:
 
 /// Set two models of one robot side by side, and on the same logs.
 ///
-/// Differences of parameters are told in standard deviations; errors on the logs with an interval of
+/// Differences of parameters are given in standard deviations; errors on the logs with an interval of
 /// their difference. Both models are judged with the log mapping and the filter of the first.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]

@@ -17,7 +17,7 @@ Example:
   cft-ident validate unseen.csv -m refined.toml --json after.json
   cft-ident diff before.json after.json";
 
-/// Tell what differs between two runs of one command, by the JSON documents that they wrote.
+/// List what differs between two runs of one command, by the JSON documents that they wrote.
 ///
 /// Parameters are compared in standard deviations of their difference; errors stand beside each other,
 /// and verdicts are listed where they changed. Documents of `friction`, `lsq`, `validate`, `diagnose`

@@ -15,7 +15,7 @@ Example:
 
 /// Follow the parameters of robots over their logs: courses, changes, and robots that differ.
 ///
-/// Takes reduced logs, each fitted by itself, or models. A robot's files stand in a folder of its own, whose name is
+/// Takes reduced logs, each fitted by itself, or models. A robot's files are in a folder of its own, whose name is
 /// the robot's; files of one folder are one robot. Logs are followed in order of their clocks, and where
 /// those overlap in the order given.
 #[derive(Debug, Clone, clap::Args)]

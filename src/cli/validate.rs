@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, value_name = "X", value_parser = arguments::positive)]
     pub max_relative_error: Option<f64>,
     /// Simulate the motion from the measured torques too, in windows of so many seconds that begin at
-    /// measured states, and tell by how much positions are off [default: single axes from begin to
+    /// measured states, and say by how much positions are off [default: single axes from begin to
     /// end, others 0.25]
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true, value_parser = arguments::positive)]
     pub open_loop: Option<Option<f64>>,

@@ -21,7 +21,7 @@ Example:
 ///
 /// Prints one JSON object a line: {"t", "joints": [{"joint", "external", "std"}], "alarm"}; with -o or
 /// `--json -` none. External torque is what was measured less the model's, both behind the same causal
-/// filters: the summary tells by how much it is late. Rows on standard input are CSV with a header line,
+/// filters: the summary says by how much it is late. Rows on standard input are CSV with a header line,
 /// or JSON lines: {"t": 0.1, "q": [..], "tau": [..]}, or columns by their names.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE, override_usage = "cft-ident watch [OPTIONS] -m MODEL.toml LOG|-")]
@@ -173,7 +173,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let text = told(&found, &args.log.name());
     let document = Document::new("watch", &found.inputs, &found.warnings, &found)?;
     if let Some(error) = found.error.take() {
-        let error = CliError::from(error).hint("what was seen before it is told above");
+        let error = CliError::from(error).hint("the results before it are printed above");
         context.end_with(error);
     }
     let text = match sink {

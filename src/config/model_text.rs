@@ -192,7 +192,7 @@ impl ModelFile {
             text.push_str(&toml::to_string(&self.residual_std).map_err(unwritable)?);
         }
         if !self.friction_prior.is_empty() {
-            text.push_str("\n# Friction as one-joint logs tell it: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
+            text.push_str("\n# Friction by one-joint logs: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
             let priors = BTreeMap::from([("friction_prior", &self.friction_prior)]);
             text.push_str(&toml::to_string(&priors).map_err(unwritable)?);
         }

@@ -270,7 +270,7 @@ fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
         && pair.correlation.abs() > ALIKE
     {
         warnings.push(format!(
-            "this motion hardly tells {} from {}: their errors correlate by {:.3}",
+            "this motion barely separates {} from {}: their errors correlate by {:.3}",
             pair.first, pair.second, pair.correlation
         ));
     }

@@ -142,7 +142,7 @@ impl ConsistentLinks {
         let given = self.links.iter();
         let given = given.filter(|l| l.prior == LinkPrior::RobotFile).count();
         let mut out = vec![format!(
-            "parameters are those of links that can exist; standard deviations are those of the free fit, and what torques do not tell of the links is filled by {}",
+            "parameters are those of links that can exist; standard deviations are those of the free fit, and what the torques do not determine of the links is set by {}",
             match given {
                 0 => "a plain body each (2 kg, radius of gyration 0.1 m)".to_owned(),
                 n if n == self.links.len() => "the robot file's `inertial`".to_owned(),

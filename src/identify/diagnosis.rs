@@ -94,7 +94,7 @@ pub struct DiagnosisStep {
     pub holdout_after: Option<f64>,
     /// The mean over the joints rises, or the error of a joint by its whole interval.
     pub holdout_worsened: bool,
-    /// Errors on data that decided nothing, joint by joint.
+    /// Errors on held-out data, joint by joint.
     pub joints: Vec<JointChange>,
 }
 

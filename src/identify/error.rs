@@ -91,7 +91,7 @@ pub enum IdentifyError {
     Formula(FormulaError),
     /// A model that nothing was set aside for.
     #[error(
-        "{model}: holds no [[held_out]] and [excesses], so that nothing tells how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
+        "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
     )]
     NothingHeldOut { model: String },
     #[error(transparent)]

@@ -94,7 +94,7 @@ impl OpenLog<'_> {
             };
             let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
             out.push(format!(
-                "{}: {told}: {}; `cft-ident inspect` tells more",
+                "{}: {told}: {}; see `cft-ident inspect`",
                 self.name,
                 causes.join(", ")
             ));

@@ -167,7 +167,7 @@ impl Mapping {
                 .push(format!("{what}: found by what the columns hold")),
             How::Fits => {}
             How::InOrder => {
-                self.how = "in the order of the columns, for their names tell nothing: CHECK IT";
+                self.how = "in the order of the columns, for their names say nothing: CHECK IT";
                 self.checks
                     .push(format!("{what}: {pattern} in the order of the joints"));
             }

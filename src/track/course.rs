@@ -18,7 +18,7 @@ pub struct Estimate {
 /// A parameter over time.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Course {
-    /// Smoothed parameter at each log, and its standard deviation (infinite where no log tells it).
+    /// Smoothed parameter at each log, and its standard deviation (infinite where no log determines it).
     pub values: Vec<f64>,
     pub std: Vec<f64>,
     /// In order of time.

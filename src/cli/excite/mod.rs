@@ -39,7 +39,7 @@ Example:
   cft-ident excite -r configs/cft.toml --joint q4 -o ladder.toml
   cft-ident excite --check configs/table3.toml";
 
-/// Design a motion for identification that keeps every limit, or check one that is there.
+/// Design a motion for identification that keeps every limit, or check one that exists.
 ///
 /// The motion is a finite Fourier series, entered from rest and left to it. Printed before the
 /// robot moves: the expected standard deviation of every parameter, what the motion confounds, and

@@ -56,7 +56,7 @@ impl DelayEstimator {
         };
         match self.estimate() {
             None => format!(
-                "the delay between {positions} and {torques} cannot be told from the motion ({removed})"
+                "the delay between {positions} and {torques} cannot be determined from the motion ({removed})"
             ),
             Some(DelayEstimate { delay_s, std_s }) => format!(
                 "{torques} lags behind {positions} by {:.1} ms (standard deviation {:.1} ms), estimated from the motion; {removed}",
@@ -281,7 +281,7 @@ mod tests {
         assert!(
             DelayEstimator::default()
                 .describe("/a", "/b", 0.0)
-                .contains("cannot be told")
+                .contains("cannot be determined")
         );
     }
 }
