@@ -8,7 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{
+    HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle,
+};
 
 use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
@@ -273,11 +275,11 @@ impl Progress {
             }
         };
         let template = match total {
-            Some(_) => "{msg:<24} [{bar:32}] {percent:>3} %  {eta} left",
+            Some(_) => "{msg:<24} [{bar:32}] {percent:>3} %  {left}",
             None => "{msg:<24} {spinner} {elapsed}",
         };
         if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style.progress_chars("=> "));
+            bar.set_style(style.with_key("left", left).progress_chars("=> "));
         }
         bar.set_message(label.to_owned());
         if drawn {
@@ -300,6 +302,14 @@ impl Progress {
     /// What is being done now.
     pub fn label(&self, label: &str) {
         self.bar.set_message(label.to_owned());
+    }
+}
+
+/// The time that is left, where a step has been done from which to tell it.
+fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    if state.pos() > 0 {
+        // what cannot be written is not missed
+        let _ = write!(out, "{:#} left", HumanDuration(state.eta()));
     }
 }
 

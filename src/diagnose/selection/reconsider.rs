@@ -149,7 +149,7 @@ fn instead(
     let open = |law: &Law| law.entry.search != Search::Orders && fewer(law);
     let wanted = |law: &Law, place: Place| open(law) && moved(place) && !same(law, place);
     let of = (&wanted as &(dyn Fn(&Law, Place) -> bool + Sync), needed);
-    let name = (watch, "effects in place of others");
+    let name = (watch, "other effects instead");
     let found = search(without, problem, case, baseline, &torques, of, name)?;
     let mut sets: Vec<(f64, Vec<Candidate>)> = Vec::new();
     for candidate in found.candidates {
