@@ -360,13 +360,6 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
                     number::percent(after.overall.mean_relative_error)
                 );
             }
-            let open = d.steps.iter().filter(|s| tentative(d, s).is_some());
-            match (open.count(), d.steps.len()) {
-                (0, _) => (),
-                (1, 1) => text += " Its name is tentative.",
-                (open, all) if open == all => text += " All names are tentative.",
-                (open, all) => text += &format!(" {open} of {all} names are tentative."),
-            }
             (text, true)
         }
         DiagnosisVerdict::NothingMissing => (nothing_missing(d), true),
