@@ -1,6 +1,6 @@
 #!/bin/bash
-# The Python package from a fresh virtual environment: built by maturin, tested by pytest against the command
-# line that is given.
+# The Python package from a fresh virtual environment: installed as `pip install ./python` does it, its program run, tested
+# by pytest against the command line that is given, and the notebooks in a short form.
 #   .ci/python.sh TOOL
 set -eu
 cd "$(dirname "$0")/.."
@@ -20,9 +20,27 @@ trap 'rm -rf "$work"' EXIT
   skip "pip cannot install maturin, numpy, pandas and pytest"
 # the cluster's test is skipped aloud by pytest without it
 "$work/venv/bin/pip" install -q distributed || echo "SKIPPED: distributed cannot be installed"
-export VIRTUAL_ENV=$work/venv PATH=$work/venv/bin:$PATH
+export VIRTUAL_ENV=$work/venv PATH=$work/venv/bin:$PATH PYTHONDONTWRITEBYTECODE=1
 # the crates below are built once for the program and the package
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
-(cd python && maturin develop --release --locked -q)
-cd python
-CFT_IDENT=$tool timeout 300 python -m pytest -q -rs -p no:cacheprovider
+pip install -q --no-build-isolation ./python
+
+# the wheel holds the program
+installed=$work/venv/bin/cft-ident
+[ "$("$installed" --version)" = "$("$tool" --version)" ]
+(cd "$work" && "$installed" example ur10 && "$installed" inspect ur10/ur10.csv -r ur10/ur10.toml -q)
+
+CFT_IDENT=$tool timeout 300 pytest -q -rs -p no:cacheprovider python/tests
+
+if pip install -q nbclient ipykernel > "$work/pip.log" 2>&1; then
+  for notebook in python/notebooks/*.ipynb; do
+    if grep -q '"import mujoco' "$notebook" && ! pip install -q mujoco >> "$work/pip.log" 2>&1; then
+      echo "SKIPPED: $notebook: mujoco cannot be installed"
+      continue
+    fi
+    echo "$notebook"
+    CFT_IDENT_SHORT=1 timeout 300 jupyter-execute "$notebook"
+  done
+else
+  echo "SKIPPED: notebooks: nbclient and ipykernel cannot be installed: $(tail -n 1 "$work/pip.log")"
+fi

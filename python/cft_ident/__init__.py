@@ -35,13 +35,13 @@ from ._native import (
     UsageError,
     __version__,
 )
-from .results import Diagnosis, Excitation, Fit, Result, Simulation, Track
+from .results import Diagnosis, Excitation, Fit, NewRobot, Result, Simulation, Track
 
 __all__ = [
-    "CftIdentError", "Diagnosis", "Excitation", "Fit", "InputError", "Log", "Model", "Part", "Result",
-    "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "diagnose",
-    "excite", "export", "friction", "inspect", "lsq", "merge", "reduce", "simulate", "track",
-    "validate",
+    "CftIdentError", "Diagnosis", "Excitation", "Fit", "InputError", "Log", "Model", "NewRobot", "Part",
+    "Result", "Robot", "Simulation", "Track", "UndeterminedError", "UsageError", "__version__", "diagnose",
+    "example", "excite", "export", "friction", "inspect", "lsq", "merge", "new", "reduce", "simulate",
+    "track", "validate",
 ]
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -334,15 +334,36 @@ def simulate(robot: Robot | PathLike, output: PathLike, *options: str, seconds: 
     return Simulation(*_command(line), os.fspath(output))
 
 
+def example(name: str, folder: PathLike) -> Result:
+    """Write a measured log with its robot file into a folder: ``ur10``, ``tx40``, ``bldc``, or the simulated ``cft``."""
+    return Result(*_command(["example", name, "-o", os.fspath(folder)]))
+
+
+def new(name: PathLike, *, urdf: PathLike | None = None, log: PathLike | None = None,
+        rate_hz: float | None = None) -> NewRobot:
+    """Write the robot file ``name.toml`` from a URDF and a log; what was guessed is marked in it with CHECK IT."""
+    line = ["new", os.fspath(name)]
+    for option, value in [("--urdf", urdf), ("--log", log)]:
+        line += [option, os.fspath(value)] if value is not None else []
+    if rate_hz is not None:
+        line += ["--rate", repr(float(rate_hz))]
+    return NewRobot(*_command(line), os.fspath(name).removesuffix(".toml") + ".toml")
+
+
 def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike | None = None,
-           rust: PathLike | None = None) -> Result:
-    """Write a model as URDF, C header or Rust module."""
-    outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust)]
+           rust: PathLike | None = None, mjcf: PathLike | None = None, sdf: PathLike | None = None,
+           usd: PathLike | None = None, logs: PathLike | Iterable[PathLike] = ()) -> Result:
+    """Write a model as URDF, C header, Rust module, or file of MuJoCo, Gazebo or Isaac Sim.
+
+    ``logs`` are log files along which the size of what such a file cannot say is taken.
+    """
+    outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd)]
+    files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
     with tempfile.TemporaryDirectory() as folder:
         path = os.fspath(model) if not isinstance(model, Model) else os.path.join(folder, "model.toml")
         if isinstance(model, Model):
             model.save(path)
-        line = ["export", "-m", path]
+        line = ["export", "-m", path, *map(os.fspath, files)]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
         return Result(*_command(line))

@@ -98,6 +98,14 @@ class Excitation(Result):
         self.path = path
 
 
+class NewRobot(Result):
+    """A robot file that was written; ``path`` is its file."""
+
+    def __init__(self, document: str, page: None, text: str, path: str):
+        super().__init__(document, page, text)
+        self.path = path
+
+
 class Simulation(Result):
     """A log that was simulated; ``path`` is its file."""
 
