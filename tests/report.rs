@@ -239,7 +239,7 @@ fn a_diagnosis_shows_what_was_added_and_what_was_not() {
     assert!(first.contains("95 % confidence interval") && first.contains("Next: "));
     // a card per effect
     assert!(page.contains("residual without the effect"));
-    assert!(page.contains("rms without it and"));
+    assert!(page.contains("rms with this torque left out"));
     let remedies = page.matches("<p>What to do: ").count();
     assert!(remedies > 0);
     let headings = headings(&page);

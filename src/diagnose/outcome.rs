@@ -64,7 +64,7 @@ impl AcceptedEffect {
 pub enum Turn {
     /// An effect was added.
     Added(String),
-    /// An effect went, for the others make it superfluous.
+    /// An effect went: it does not stand beside the others, or its numbers do not hold with them.
     Dropped(String),
     /// Effects went for others that say the same with fewer numbers, or more.
     Replaced {

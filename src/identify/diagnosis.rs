@@ -113,7 +113,7 @@ pub struct SearchTurn {
 #[serde(rename_all = "kebab-case")]
 pub enum TurnAction {
     Added,
-    /// The others make it superfluous.
+    /// It does not stand beside the others, or its numbers do not hold with them.
     Dropped,
     /// Others say the same with fewer numbers, or say more.
     Replaced,

@@ -86,7 +86,8 @@ pub(crate) fn beyond_chance(
         candidate.placebo_p_value = Some(p);
         if p > limits.false_alarm {
             candidate.reject(&format!(
-                "not significant (corrected p = {p:.3}, by placebos)"
+                "not significant (corrected p = {p:.3} by placebos, at most {} is asked)",
+                limits.false_alarm
             ));
             continue;
         }
@@ -230,7 +231,7 @@ mod tests {
             ),
             (|s| s.delta_bic = -1.0, "not worth"),
             (|s| s.cv_gain = 0.001, "cross-validation:"),
-            (|s| s.cv_std = 0.3, "cross-validation is not"),
+            (|s| s.cv_std = 0.3, "cross-validation is uncertain"),
             (|s| s.vetoes[1] = vec![1.1; 10], "vetoed"),
         ];
         for (change, says) in failures {

@@ -46,7 +46,8 @@ pub fn cards(
             format!("{} {unit}", number::significant(mean, 3))
         };
         let told = format!(
-            "The residual of {joint} on {data} is {} rms without it and {} with it.",
+            "The residual of {joint} on {data} is {} rms with this torque left out and nothing else fitted anew, and {} \
+             with it.",
             rms(|row| row[1]),
             rms(|row| row[1] - row[2])
         );

@@ -3,7 +3,9 @@
 use super::step_words::{in_words, tentative, titled, worsened};
 use super::{first_screen, found_effects};
 use crate::config::ModelFile;
-use crate::diagnose::{AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, Turn};
+use crate::diagnose::{
+    AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, StepStatus, Turn,
+};
 use crate::identify::{
     DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command, signal_words,
 };
@@ -312,7 +314,7 @@ fn path(found: &Diagnosed) -> Option<String> {
     }
     let turns = path.iter().map(|turn| match turn {
         Turn::Added(effect) => format!("{effect} added"),
-        Turn::Dropped(effect) => format!("{effect} dropped, for the others make it superfluous"),
+        Turn::Dropped(effect) => format!("{effect} dropped again"),
         Turn::Replaced { gone, come } => {
             format!("{} in place of {}", come.join(" and "), gone.join(" and "))
         }
@@ -337,6 +339,17 @@ fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, 
     Look::new(machine, &found.in_memory, found.logs.iter().cloned())
 }
 
+/// How many of the names are tentative, as a sentence.
+fn tentative_names(d: &Diagnosis) -> String {
+    let tentative = |s: &&AcceptedEffect| d.status(s) == StepStatus::Tentative;
+    match (d.steps.iter().filter(tentative).count(), d.steps.len()) {
+        (0, _) => String::new(),
+        (1, 1) => " The name is tentative.".to_owned(),
+        (some, all) if some == all => " Their names are tentative.".to_owned(),
+        (some, all) => format!(" Of the {all} names {some} are tentative."),
+    }
+}
+
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let d = &found.diagnosis;
@@ -350,7 +363,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             let mut text = format!("The model lacks: {}.", titles.join("; "));
             if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
                 text += &format!(
-                    " {} the held-out error goes from {} to {}, as the mean over \
+                    " {} the held-out error goes from {} to {}, as the rms over \
                      the joints.",
                     match titles.as_slice() {
                         [_] => "With it",
@@ -360,6 +373,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
                     number::percent(after.overall.mean_relative_error)
                 );
             }
+            text += &tentative_names(d);
             (text, true)
         }
         DiagnosisVerdict::NothingMissing => (nothing_missing(d), true),

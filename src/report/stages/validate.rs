@@ -176,7 +176,7 @@ fn at_rest(validation: &Validation) -> Option<String> {
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (String, bool) {
     let mut text = format!(
-        "The model gives the torque of {title} to within {}, as the mean over the joints.",
+        "The model gives the torque of {title} to within {}, as the rms over the joints.",
         number::percent(validation.overall.mean_relative_error)
     );
     let joints = validation.joints.iter();
