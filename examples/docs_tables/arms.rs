@@ -17,7 +17,11 @@ pub fn errors(names: &[&str]) -> Rendered {
         if columns.is_empty() {
             columns.push("<model and log".to_owned());
             columns.extend(joints.iter().map(|j| text(&j["joint"]).to_owned()));
-            columns.extend(["all".to_owned(), "mean".to_owned(), "rows".to_owned()]);
+            columns.extend([
+                "all".to_owned(),
+                "rms of these".to_owned(),
+                "rows".to_owned(),
+            ]);
         }
         let mut line = vec![title.replace('_', " ")];
         let error = |value: &Value| value.as_f64().map_or("-".to_owned(), percent);

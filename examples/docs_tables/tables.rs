@@ -213,7 +213,7 @@ fn estimators(names: &[&str]) -> Rendered {
         let joints = rows(&result["joints"]);
         if i == 0 {
             columns.extend(joints.iter().map(|j| text(&j["joint"]).to_owned()));
-            columns.push("mean".to_owned());
+            columns.push("rms of these".to_owned());
         }
         let estimator = name.rsplit_once("_est_").map_or(*name, |(_, e)| e);
         let input = &result["inputs"][0];
