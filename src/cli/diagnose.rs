@@ -141,8 +141,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check()?;
     if !args.plot.is_empty() || args.report.is_some() {
         let figure = stages::diagnose::figure(&machine, &found).map_err(CliError::input)?;
-        for path in &args.plot {
-            context.write_picture(path, &figure.svg())?;
+        if !args.plot.is_empty() {
+            let picture = figure.svg();
+            for path in &args.plot {
+                context.write_picture(path, &picture)?;
+            }
         }
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;

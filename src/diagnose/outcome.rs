@@ -45,13 +45,13 @@ pub enum StepStatus {
 }
 
 impl AcceptedEffect {
-    /// Whether data that decided nothing confirm the step: the 95 % CI of the change of the error lies below zero
+    /// Whether held-out data confirm the step: the 95 % CI of the change of the error lies below zero
     /// on a joint, and above it on none.
     pub fn confirmed(&self) -> bool {
         self.joints.iter().any(JointChange::improved) && !self.worsens()
     }
 
-    /// Whether it makes data that decided nothing worse: as the mean over the joints, or on one of them by its
+    /// Whether it makes held-out data worse: as the rms over the joints, or on one of them by its
     /// whole interval.
     pub fn worsens(&self) -> bool {
         self.holdout.is_some_and(|[before, after]| after > before)

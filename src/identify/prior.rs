@@ -24,16 +24,15 @@ pub(super) fn open(
         .iter()
         .zip(&given.model.friction)
         .map(|(joint, law)| {
+            let names = names_of(law);
             if hold_friction {
                 let spread = |name: &str| file.find(name, Some(joint)).and_then(|p| p.std);
                 let known = |name: &&str| spread(name).is_some_and(|s| s > 0.0);
-                return names_of(law).iter().map(known).collect();
+                return names.iter().map(known).collect();
             }
-            let names: &[&str] = match law {
-                JointFriction::None => &[],
-                JointFriction::ViscousCoulomb(_) => return vec![true; ViscousCoulomb::NAMES.len()],
-                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
-            };
+            if matches!(law, JointFriction::ViscousCoulomb(_)) {
+                return vec![true; names.len()];
+            }
             let known = |name: &&str| {
                 file.find(name, Some(joint)).is_some_and(|p| {
                     p.std.is_some_and(|s| s > 0.0)

@@ -142,18 +142,18 @@ fn settled(
         ..
     } = about;
     let mut next = clearest(signal, about, &sizes, found)?;
-    let mut anew = self::sizes(signal, estimate, spacings);
-    for _ in 0..REFINED {
+    let mut rounds = 0;
+    loop {
         let all = [found, &[next.change]].concat();
-        anew = self::sizes(&rest_of(signal, times, &all), estimate, spacings);
+        let anew = self::sizes(&rest_of(signal, times, &all), estimate, spacings);
         let again = clearest(signal, about, &anew.sizes, found)?;
         let same = (again.change.kind, again.change.at) == (next.change.kind, next.change.at);
         next = again;
-        if same {
-            break;
+        rounds += 1;
+        if same || rounds == REFINED {
+            return Some((next, anew));
         }
     }
-    Some((next, anew))
 }
 
 /// The signal without changes.

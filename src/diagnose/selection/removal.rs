@@ -74,27 +74,32 @@ fn without_by_sums(at: &FittedModel, problem: &FitProblem, i: usize) -> Option<C
     let own = own.collect::<Option<Vec<usize>>>()?;
 
     let (joints, u) = (at.weights.len(), reduced.len());
+    // columns of the others and of the effect in each joint's rows, the same in every piece
+    let of_joint = |j: usize| -> [Vec<usize>; 2] {
+        let column = |global: usize| all.columns[j].iter().position(|x| *x == global);
+        let others = reduced.columns[j].iter();
+        [
+            others.filter_map(|x| column(of_others[*x])).collect(),
+            own.iter().filter_map(|x| column(*x)).collect(),
+        ]
+    };
+    let of_joints: Vec<[Vec<usize>; 2]> = (0..joints).map(of_joint).collect();
     let mut sums = Vec::with_capacity(at.base.sums.len());
     let mut cross = Vec::with_capacity(at.base.sums.len());
-    for of_joints in &at.base.sums {
+    for of_piece in &at.base.sums {
         let mut crossed = CrossProducts::none(u, k);
-        let each = of_joints.iter().enumerate().map(|(j, s)| {
-            let column = |global: usize| all.columns[j].iter().position(|x| *x == global);
-            let rest: Vec<usize> = reduced.columns[j]
-                .iter()
-                .filter_map(|x| column(of_others[*x]))
-                .collect();
-            let own: Vec<usize> = own.iter().filter_map(|x| column(*x)).collect();
+        let each = of_piece.iter().zip(&of_joints).enumerate();
+        let each = each.map(|(j, (s, [rest, own]))| {
             let mut out = PieceSums {
-                normal: s.normal.select_rows(&rest).select_columns(&rest),
-                score: s.score.select_rows(&rest),
+                normal: s.normal.select_rows(rest).select_columns(rest),
+                score: s.score.select_rows(rest),
                 square: s.square,
             };
             if own.len() == k {
                 let beta = DVector::from_column_slice(&effect.linear);
-                let with_rest = s.normal.select_rows(&rest).select_columns(&own);
-                let of_own = s.normal.select_rows(&own).select_columns(&own);
-                let score = s.score.select_rows(&own);
+                let with_rest = s.normal.select_rows(rest).select_columns(own);
+                let of_own = s.normal.select_rows(own).select_columns(own);
+                let score = s.score.select_rows(own);
                 // e + C beta in place of e
                 out.score += &with_rest * &beta;
                 out.square += 2.0 * beta.dot(&score) + beta.dot(&(&of_own * &beta));
