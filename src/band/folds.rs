@@ -123,7 +123,7 @@ pub fn without_each(
     for stretch in stretches {
         add(model, &layout, stretch, filters, rest_speed, &mut |row| {
             let fold = folds.of_time(stretch.log, row.t);
-            sums[fold][row.joint].add(row.columns, row.error);
+            sums[fold][row.joint].add(row.places, row.columns, row.error);
         })?;
     }
     // one weight a joint, that of its residual in all blocks
@@ -192,13 +192,14 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, columns: &[f64], error: f64) {
+    /// Adds a row whose entries stand at `places`; all others are 0.
+    fn add(&mut self, places: &[usize], columns: &[f64], error: f64) {
         self.square += error * error;
         self.rows += 1.0;
-        for (i, x) in columns.iter().enumerate().filter(|(_, x)| **x != 0.0) {
-            self.gradient[i] += x * error;
-            for (k, y) in columns.iter().enumerate() {
-                self.normal[(k, i)] += x * y;
+        for (i, x) in places.iter().zip(columns) {
+            self.gradient[*i] += x * error;
+            for (k, y) in places.iter().zip(columns) {
+                self.normal[(*k, *i)] += x * y;
             }
         }
     }
@@ -208,6 +209,8 @@ impl Sums {
 struct Row<'a> {
     t: f64,
     joint: usize,
+    /// Where its entries stand among the unknowns.
+    places: &'a [usize],
     columns: &'a [f64],
     error: f64,
 }
@@ -221,64 +224,65 @@ fn add(
     rest_speed: &[f64],
     take: &mut dyn FnMut(&Row),
 ) -> Result<(), MotionError> {
-    let (n, u) = (model.model.robot.joints(), layout.count);
+    let n = model.model.robot.joints();
     let filter = filters.of(stretch);
     let torques = model.torques(stretch);
     let residual = model.residual(stretch, &torques);
     // effects remember: their columns are those of the whole stretch
-    let plain = AugmentedModel::plain(model.model.clone()).torques(stretch);
+    let plain = (!model.effects.is_empty())
+        .then(|| AugmentedModel::plain(model.model.clone()).torques(stretch));
     let scene = Scene {
         robot: &model.model.robot,
         theta: &model.model.theta,
         laws: &model.model.friction,
         stretch,
-        hat: &plain.hat,
-        load: &plain.load,
+        hat: plain.as_ref().map_or(&torques.hat, |plain| &plain.hat),
+        load: &torques.load,
         direction: &torques.direction,
         tilt: Some(&torques.tilt),
     };
-    let mut gradient = vec![0.0; model.model.parameters()];
+    let joints: Vec<OfJoint> = model
+        .model
+        .robot
+        .parameters_by_joint()
+        .iter()
+        .enumerate()
+        .map(|(j, held)| OfJoint::new(model, layout, &scene, (j, held)))
+        .collect();
+    let p = layout.theta;
+    let mut regressor = vec![0.0; n * p];
+    let mut channels: Vec<Vec<Vec<f64>>> = joints
+        .iter()
+        .map(|of| vec![Vec::new(); of.places.len() + 2])
+        .collect();
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    for j in 0..n {
-        let added: Vec<(usize, Vec<Vec<f64>>)> = (model.effects.iter().zip(&layout.effects))
-            .filter(|(effect, _)| is_linear(effect) && effect.place.touches(j))
-            .map(|(effect, first)| (*first, effect.columns(&scene, j)))
-            .collect();
-        for from in (0..stretch.len()).step_by(PIECE) {
-            let piece = from..(from + PIECE).min(stretch.len());
-            if filter.rows(piece.len()) < 2 {
-                continue;
+    for from in (0..stretch.len()).step_by(PIECE) {
+        let piece = from..(from + PIECE).min(stretch.len());
+        if filter.rows(piece.len()) < 2 {
+            continue;
+        }
+        channels.iter_mut().flatten().for_each(Vec::clear);
+        for k in piece.clone() {
+            stretch.at(k, &mut q, &mut v, &mut a);
+            model.model.robot.regressor(&q, &v, &a, &mut regressor);
+            for (j, (of, channels)) in joints.iter().zip(&mut channels).enumerate() {
+                let mut entries = [0.0; 5];
+                model.model.friction[j].gradient(v[j], &mut entries);
+                let row = &regressor[j * p..(j + 1) * p];
+                let theta = of.theta.iter().map(|i| row[*i]);
+                let friction = entries[..of.friction].iter().copied();
+                let offset = of.offset.then_some(1.0);
+                let added = of.added.iter().map(|column| column[k]);
+                let last = [residual[j][k], rest::movement(v[j], rest_speed[j])];
+                let all = theta.chain(friction).chain(offset).chain(added).chain(last);
+                channels
+                    .iter_mut()
+                    .zip(all)
+                    .for_each(|(channel, x)| channel.push(x));
             }
-            let mut channels = vec![vec![0.0; piece.len()]; u + 2];
-            for (i, k) in piece.clone().enumerate() {
-                stretch.at(k, &mut q, &mut v, &mut a);
-                let law = &model.model.friction[j];
-                model
-                    .model
-                    .robot
-                    .regressor_row(j, &q, &v, &a, &mut gradient[..layout.theta]);
-                for (channel, x) in channels.iter_mut().zip(&gradient[..layout.theta]) {
-                    channel[i] = *x;
-                }
-                let (first, count) = layout.friction[j];
-                if count > 0 {
-                    let mut of_law = [0.0; 5];
-                    law.gradient(v[j], &mut of_law);
-                    for (c, x) in of_law[..count].iter().enumerate() {
-                        channels[first + c][i] = *x;
-                    }
-                }
-                if let Some(place) = layout.offset[j] {
-                    channels[place][i] = 1.0;
-                }
-                for (first, columns) in &added {
-                    for (c, column) in columns.iter().enumerate() {
-                        channels[first + c][i] = column[k];
-                    }
-                }
-                channels[u][i] = residual[j][k];
-                channels[u + 1][i] = rest::movement(v[j], rest_speed[j]);
-            }
+        }
+        for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {
+            let u = of.places.len();
             let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
             let rows = filter.run(&channels)?;
             let jumps = model.model.friction[j].jumps();
@@ -293,6 +297,7 @@ fn add(
                 take(&Row {
                     t: stretch.t[piece.start + filter.sample_of(i)],
                     joint: j,
+                    places: &of.places,
                     columns: &columns,
                     error: rows[u][i],
                 });
@@ -300,6 +305,50 @@ fn add(
         }
     }
     Ok(())
+}
+
+/// The columns that a joint's rows have.
+struct OfJoint {
+    /// Inertial parameters that its torque holds.
+    theta: Vec<usize>,
+    /// Number of its friction's parameters.
+    friction: usize,
+    offset: bool,
+    /// Columns of the effects, along the whole stretch.
+    added: Vec<Vec<f64>>,
+    /// Where all of them stand among the unknowns, in this order.
+    places: Vec<usize>,
+}
+
+impl OfJoint {
+    fn new(
+        model: &AugmentedModel,
+        layout: &Layout,
+        scene: &Scene,
+        (j, held): (usize, &Vec<bool>),
+    ) -> Self {
+        let theta: Vec<usize> = (0..layout.theta).filter(|i| held[*i]).collect();
+        let mut places = theta.clone();
+        let (first, friction) = layout.friction[j];
+        places.extend(first..first + friction);
+        places.extend(layout.offset[j]);
+        let mut added = Vec::new();
+        let effects = model.effects.iter().zip(&layout.effects);
+        for (effect, first) in
+            effects.filter(|(effect, _)| is_linear(effect) && effect.place.touches(j))
+        {
+            let columns = effect.columns(scene, j);
+            places.extend(*first..*first + columns.len());
+            added.extend(columns);
+        }
+        OfJoint {
+            theta,
+            friction,
+            offset: layout.offset[j].is_some(),
+            added,
+            places,
+        }
+    }
 }
 
 fn is_linear(effect: &Added) -> bool {

@@ -90,7 +90,7 @@ impl ModelFile {
         })
     }
 
-    /// Covariance in the order of [`Model::gradient`], row-major; 0 where unknown.
+    /// Covariance in the order of [`Model::parameters`], row-major; 0 where unknown.
     pub fn model_covariance(&self, model: &Model) -> Vec<f64> {
         let mut keys: Vec<String> = model
             .robot

@@ -11,7 +11,7 @@ use crate::config::ModelFile;
 use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
 use crate::log::{Block, Provenance};
-use crate::motion::{FilterSettings, ParallelFilters, Stretch, stretches};
+use crate::motion::{FilterSettings, MotionError, ParallelFilters, Stretch, stretches};
 use crate::observe::{KEPT, Observer, Quiet, QuietSample};
 use crate::robot::model::JointFriction;
 
@@ -215,6 +215,7 @@ impl<'a> Trial<'a> {
         let deviation = Deviation::new(self.file, &self.model.model);
         let mut errors: Vec<Vec<Error>> = vec![Vec::with_capacity(samples / every + 1); n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let mut variances = vec![0.0; n];
         for stretch in stretches {
             let of_fold: Vec<usize> = (stretch.t.iter())
                 .map(|t| folds.of_time(stretch.log, *t))
@@ -229,6 +230,7 @@ impl<'a> Trial<'a> {
                 let hat = model.reconstruct(&part(stretch, begin, until));
                 for k in (from..until).step_by(every) {
                     stretch.at(k, &mut q, &mut v, &mut a);
+                    deviation.variances([&q, &v, &a], &mut variances);
                     for (j, errors) in errors.iter_mut().enumerate() {
                         let torque = hat[j][k - begin];
                         errors.push(Error {
@@ -236,7 +238,7 @@ impl<'a> Trial<'a> {
                             speed: v[j],
                             torque,
                             error: stretch.tau[j][k] - torque,
-                            variance: deviation.variance(j, [&q, &v, &a]),
+                            variance: variances[j],
                         });
                     }
                 }
@@ -266,43 +268,26 @@ impl<'a> Trial<'a> {
     ) -> Result<Option<Excesses>, IdentifyError> {
         let cutoff = self.settings.cutoff_hz;
         let mut quiet: Option<Quiet> = None;
-        let lead = LEAD / cutoff;
         for (index, log) in self.logs.iter().enumerate() {
-            for (fold, model) in models.iter().enumerate() {
-                let failed = |error| IdentifyError::motion(&log.name(), error);
-                let mut observer = Observer::new(model.clone(), &self.settings).map_err(failed)?;
-                let mut open = self.machine.open(log, self.control)?;
-                let mut block = Block::default();
-                let (mut first, mut next, mut begins) = (None, f64::NEG_INFINITY, true);
-                let mut more = true;
-                while more {
-                    more = open.read(&mut block)?;
-                    if let Some(t) = block.t.first() {
-                        let first = *first.get_or_insert(*t);
-                        self.observed[index].keep(&mut block, first);
+            let failed = |error| IdentifyError::motion(&log.name(), error);
+            let mut open = self.machine.open(log, self.control)?;
+            let mut watched: Vec<Watched> = (models.iter().enumerate())
+                .map(|(fold, model)| Watched::new((index, fold), model, &self.settings))
+                .collect::<Result<_, _>>()
+                .map_err(failed)?;
+            let (mut block, mut first, mut more) = (Block::default(), None, true);
+            while more {
+                more = open.read(&mut block)?;
+                if let Some(t) = block.t.first() {
+                    let first = *first.get_or_insert(*t);
+                    self.observed[index].keep(&mut block, first);
+                }
+                for watched in &mut watched {
+                    let taken = watched.take(&block, !more, folds).map_err(failed)?;
+                    if taken.is_empty() {
+                        continue;
                     }
-                    let of = |t: f64| folds.of_time(index, t);
-                    block.retain(|t| of(t) == fold || of(t + lead) == fold);
-                    let (step, mut taken) = (observer.step_s(), Vec::new());
-                    let every = 1.0 / (KEPT * cutoff);
-                    let pushed = observer.push(&block, !more, &mut |o| {
-                        begins |= o.begins;
-                        if of(o.t) != fold || o.t < next {
-                            return;
-                        }
-                        next = o.t + every * (1.0 - 1e-6);
-                        taken.push(QuietSample {
-                            t: o.t,
-                            begins: std::mem::take(&mut begins),
-                            external: o.external.to_vec(),
-                            speed: o.speed.to_vec(),
-                        });
-                    });
-                    pushed.map_err(failed)?;
-                    let step = step.or(observer.step_s()).unwrap_or(every);
-                    // kept at multiples of the sampling step
-                    let kept = step * (every / step).ceil().max(1.0);
-                    let quiet = quiet.get_or_insert_with(|| Quiet::new(kept));
+                    let quiet = quiet.get_or_insert_with(|| Quiet::new(watched.kept_s()));
                     taken.into_iter().for_each(|sample| quiet.push(sample));
                 }
             }
@@ -325,6 +310,80 @@ impl<'a> Trial<'a> {
             }
         }
         Ok(learnt)
+    }
+}
+
+/// One block of a log behind the observer, by the model of the others.
+struct Watched {
+    log: usize,
+    fold: usize,
+    observer: Observer,
+    /// Samples are kept at least so far apart \[s\].
+    every: f64,
+    /// Time before the block from which the observer runs \[s\].
+    lead: f64,
+    /// Time from which the next sample is kept \[s\].
+    next: f64,
+    begins: bool,
+    /// Nothing of the block comes any more.
+    done: bool,
+}
+
+impl Watched {
+    fn new(
+        (log, fold): (usize, usize),
+        model: &AugmentedModel,
+        settings: &FilterSettings,
+    ) -> Result<Self, MotionError> {
+        Ok(Self {
+            log,
+            fold,
+            observer: Observer::new(model.clone(), settings)?,
+            every: 1.0 / (KEPT * settings.cutoff_hz),
+            lead: LEAD / settings.cutoff_hz,
+            next: f64::NEG_INFINITY,
+            begins: true,
+            done: false,
+        })
+    }
+
+    /// The samples of its block that these rows of the log determine; `last` ends the log.
+    fn take(
+        &mut self,
+        rows: &Block,
+        last: bool,
+        folds: &Folds,
+    ) -> Result<Vec<QuietSample>, MotionError> {
+        let of = |t: f64| folds.of_time(self.log, t);
+        let (fold, every, mut taken) = (self.fold, self.every, Vec::new());
+        let reached = |t: &f64| of(*t + self.lead) >= fold;
+        if self.done || !(last || rows.t.last().is_some_and(reached)) {
+            return Ok(taken);
+        }
+        let mut own = rows.clone();
+        own.retain(|t| of(t) == fold || of(t + self.lead) == fold);
+        // blocks stand one behind the other: what is left of this one goes before the next one's samples
+        self.done = last || rows.t.last().is_some_and(|t| of(*t) > fold);
+        self.observer.push(&own, self.done, &mut |o| {
+            self.begins |= o.begins;
+            if of(o.t) != fold || o.t < self.next {
+                return;
+            }
+            self.next = o.t + every * (1.0 - 1e-6);
+            taken.push(QuietSample {
+                t: o.t,
+                begins: std::mem::take(&mut self.begins),
+                external: o.external.to_vec(),
+                speed: o.speed.to_vec(),
+            });
+        })?;
+        Ok(taken)
+    }
+
+    /// Time between the samples that are kept: a multiple of the sampling step, where that is known \[s\].
+    fn kept_s(&self) -> f64 {
+        let step = self.observer.step_s().unwrap_or(self.every);
+        step * (self.every / step).ceil().max(1.0)
     }
 }
 

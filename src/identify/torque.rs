@@ -174,8 +174,9 @@ impl<'a> Deviations<'a> {
 
     /// Those of every joint at one position, velocity and acceleration.
     fn at(&self, motion: [&[f64]; 3], out: &mut [f64]) {
-        for (j, (out, residual)) in out.iter_mut().zip(&self.residual).enumerate() {
-            *out = (self.of_parameters.variance(j, motion) + residual * residual).sqrt();
+        self.of_parameters.variances(motion, out);
+        for (out, residual) in out.iter_mut().zip(&self.residual) {
+            *out = (*out + residual * residual).sqrt();
         }
     }
 }

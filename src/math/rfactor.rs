@@ -11,7 +11,7 @@
 use nalgebra::DMatrix;
 
 use super::MathError;
-use super::lanes::widest;
+use super::lanes::{LaneWork, Simd, widest};
 
 /// Rows folded at once: the block of 13 columns stays in a first-level cache of 32 KiB.
 const BLOCK_ROWS: usize = 256;
@@ -152,7 +152,28 @@ impl RFactor {
 
 /// Annihilates `k` rows of the column-major `block` under the row-major upper `triangle`.
 fn reduce(n: usize, triangle: &mut [f64], block: &mut [f64], k: usize) {
-    widest(|| reflect_all(n, triangle, block, k));
+    widest(Reduction {
+        n,
+        triangle,
+        block,
+        k,
+    });
+}
+
+struct Reduction<'a> {
+    n: usize,
+    triangle: &'a mut [f64],
+    block: &'a mut [f64],
+    k: usize,
+}
+
+impl LaneWork for Reduction<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        reflect_all(self.n, self.triangle, self.block, self.k);
+    }
 }
 
 #[inline(always)]

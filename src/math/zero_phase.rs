@@ -6,7 +6,7 @@
 //! state of its first value.
 
 use super::MathError;
-use super::lanes::widest;
+use super::lanes::{LaneWork, Simd, widest};
 use super::sos::Sos;
 
 /// Sections of the highest order that [`Sos`] offers.
@@ -71,143 +71,220 @@ pub fn run_each<'a>(
             needed: pad,
         });
     }
-    // A pass takes as long as its recursion, whether a lane is empty or not: few passes are fast.
-    let (filter, mut first) = (&filter as &dyn Fn(usize) -> &'a ZeroPhase, 0);
-    while first < channels {
-        let left = channels - first;
-        match left {
-            8.. => widest(|| run_lanes::<8, 8>(filter, data, channels, first)),
-            7 => widest(|| run_lanes::<8, 7>(filter, data, channels, first)),
-            6 => widest(|| run_lanes::<8, 6>(filter, data, channels, first)),
-            5 => widest(|| run_lanes::<8, 5>(filter, data, channels, first)),
-            4 => widest(|| run_lanes::<4, 4>(filter, data, channels, first)),
-            3 => widest(|| run_lanes::<4, 3>(filter, data, channels, first)),
-            2 => run_lanes::<2, 2>(filter, data, channels, first),
-            _ => run_lanes::<1, 1>(filter, data, channels, first),
-        }
-        first += left.min(8);
-    }
+    widest(Passes {
+        filter: &filter as &dyn Fn(usize) -> &'a ZeroPhase,
+        data,
+        channels,
+    });
     Ok(())
 }
 
-/// Both passes over the channels `first..first + W`, in L lanes of which those behind W are empty.
-#[inline(always)]
-fn run_lanes<'a, const L: usize, const W: usize>(
-    filter: &dyn Fn(usize) -> &'a ZeroPhase,
-    data: &mut [f64],
+/// Vectors that go through a filter side by side: the recursion of one waits for its sums while the other's are formed.
+const VECTORS: usize = 2;
+/// Lanes of the widest of them.
+const MOST_LANES: usize = 8 * VECTORS;
+
+/// Both passes over all channels.
+struct Passes<'a, 'f> {
+    filter: &'a dyn Fn(usize) -> &'f ZeroPhase,
+    data: &'a mut [f64],
+    channels: usize,
+}
+
+impl LaneWork for Passes<'_, '_> {
+    type Output = ();
+
+    // A pass takes as long as its recursion, whether a lane is empty or not: few passes are fast.
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let whole = VECTORS * S::F64_LANES;
+        let sections = (self.filter)(0).sos.sections().len();
+        for first in (0..self.channels).step_by(whole) {
+            let width = whole.min(self.channels - first);
+            let lanes = Lanes {
+                simd,
+                filter: self.filter,
+                channels: self.channels,
+                first,
+                width,
+            };
+            // states whose number is known stay in registers
+            match (width == whole, sections) {
+                (true, 2) => lanes.both::<2, true>(self.data),
+                (true, 4) => lanes.both::<4, true>(self.data),
+                (true, _) => lanes.both::<MAX_SECTIONS, true>(self.data),
+                (false, 2) => lanes.both::<2, false>(self.data),
+                (false, _) => lanes.both::<MAX_SECTIONS, false>(self.data),
+            }
+        }
+    }
+}
+
+/// One number of each channel that is filtered at once.
+type Of<S> = [<S as Simd>::f64s; VECTORS];
+
+/// The channels `first..first + width`.
+#[derive(Clone, Copy)]
+struct Lanes<'a, 'f, S> {
+    simd: S,
+    filter: &'a dyn Fn(usize) -> &'f ZeroPhase,
     channels: usize,
     first: usize,
-) {
-    let filters: [&ZeroPhase; L] = std::array::from_fn(|l| filter(first + l.min(W - 1)));
-    let samples = data.len() / channels;
-    let pad = filters[0].sos.pad_samples();
-    let last = samples - 1;
-    let lanes = |data: &[f64], i: usize| -> [f64; L] {
-        let at = i * channels + first;
-        std::array::from_fn(|l| if l < W { data[at + l] } else { 0.0 })
-    };
-    let reflected =
-        |end: [f64; L], x: [f64; L]| -> [f64; L] { std::array::from_fn(|l| 2.0 * end[l] - x[l]) };
-
-    // The forward pass overwrites what the extension of the far end mirrors.
-    let end = lanes(data, last);
-    let mut tail: Vec<[f64; L]> = (1..=pad)
-        .map(|i| reflected(end, lanes(data, last - i)))
-        .collect();
-
-    let start = lanes(data, 0);
-    let sections = sections(&filters);
-    let sections = &sections[..filters[0].sos.sections().len()];
-    let mut cascade = Cascade::settled(sections, reflected(start, lanes(data, pad)));
-    for i in (1..=pad).rev() {
-        cascade.step(reflected(start, lanes(data, i)));
-    }
-    for sample in data.chunks_exact_mut(channels) {
-        cascade.step_in_place::<W>(sample, first);
-    }
-    for x in &mut tail {
-        *x = cascade.step(*x);
-    }
-
-    let mut cascade = Cascade::settled(sections, tail.last().copied().unwrap_or(end));
-    for x in tail.iter().rev() {
-        cascade.step(*x);
-    }
-    for sample in data.chunks_exact_mut(channels).rev() {
-        cascade.step_in_place::<W>(sample, first);
-    }
+    width: usize,
 }
 
-/// One section of L filters.
-#[derive(Debug, Clone, Copy)]
-struct LaneSection<const L: usize> {
-    b: [[f64; L]; 3],
-    a: [[f64; L]; 2],
-    steady: [[f64; L]; 2],
-}
+impl<S: Simd> Lanes<'_, '_, S> {
+    /// Both passes with at most N sections; `FULL` where every lane has a channel.
+    #[inline(always)]
+    fn both<const N: usize, const FULL: bool>(self, data: &mut [f64]) {
+        let like = (self.filter)(self.first);
+        let pad = like.sos.pad_samples();
+        let last = data.len() / self.channels - 1;
+        let own = self.first..self.first + self.width;
+        let at = |data: &[f64], i: usize| {
+            let row = &data[i * self.channels..(i + 1) * self.channels];
+            self.read::<FULL>(&row[own.clone()])
+        };
 
-/// The sections of L filters of one order, section by section; behind the last they are empty.
-#[inline(always)]
-fn sections<const L: usize>(filters: &[&ZeroPhase; L]) -> [LaneSection<L>; MAX_SECTIONS] {
-    let empty = [0.0; L];
-    let mut out = [LaneSection {
-        b: [empty; 3],
-        a: [empty; 2],
-        steady: [empty; 2],
-    }; MAX_SECTIONS];
-    for (l, filter) in filters.iter().enumerate() {
-        let own = filter.sos.sections().iter().zip(&filter.steady);
-        for (lanes, (section, steady)) in out.iter_mut().zip(own) {
-            for (lane, b) in lanes.b.iter_mut().zip(section.b) {
-                lane[l] = b;
-            }
-            for (lane, a) in lanes.a.iter_mut().zip(section.a) {
-                lane[l] = a;
-            }
-            for (lane, s) in lanes.steady.iter_mut().zip(steady) {
-                lane[l] = *s;
-            }
+        // The forward pass overwrites what the extension of the far end mirrors.
+        let end = at(data, last);
+        let tail = (1..=pad).map(|i| self.reflected(end, at(data, last - i)));
+        let mut tail: Vec<Of<S>> = tail.collect();
+
+        let start = at(data, 0);
+        let sections: [Section<S>; N] = self.sections();
+        let sections = &sections[..like.sos.sections().len()];
+        let mut cascade =
+            Cascade::<S, N>::settled(self.simd, sections, self.reflected(start, at(data, pad)));
+        for i in (1..=pad).rev() {
+            cascade.step(self.reflected(start, at(data, i)));
+        }
+        for row in data.chunks_exact_mut(self.channels) {
+            let sample = &mut row[own.clone()];
+            let y = cascade.step(self.read::<FULL>(sample));
+            self.write::<FULL>(sample, y);
+        }
+        for x in &mut tail {
+            *x = cascade.step(*x);
+        }
+
+        let from = tail.last().copied().unwrap_or(end);
+        let mut cascade = Cascade::<S, N>::settled(self.simd, sections, from);
+        for x in tail.iter().rev() {
+            cascade.step(*x);
+        }
+        for row in data.chunks_exact_mut(self.channels).rev() {
+            let sample = &mut row[own.clone()];
+            let y = cascade.step(self.read::<FULL>(sample));
+            self.write::<FULL>(sample, y);
         }
     }
-    out
+
+    #[inline(always)]
+    fn read<const FULL: bool>(self, sample: &[f64]) -> Of<S> {
+        if FULL {
+            let (vectors, _) = S::as_simd_f64s(sample);
+            return std::array::from_fn(|m| vectors[m]);
+        }
+        std::array::from_fn(|m| {
+            let from = (m * S::F64_LANES).min(sample.len());
+            self.simd.partial_load_f64s(&sample[from..])
+        })
+    }
+
+    #[inline(always)]
+    fn write<const FULL: bool>(self, sample: &mut [f64], values: Of<S>) {
+        if FULL {
+            let (vectors, _) = S::as_mut_simd_f64s(sample);
+            vectors.copy_from_slice(&values);
+            return;
+        }
+        for (m, values) in values.into_iter().enumerate() {
+            let from = (m * S::F64_LANES).min(sample.len());
+            self.simd.partial_store_f64s(&mut sample[from..], values);
+        }
+    }
+
+    /// 2 end - x.
+    #[inline(always)]
+    fn reflected(self, end: Of<S>, x: Of<S>) -> Of<S> {
+        let two = self.simd.splat_f64s(2.0);
+        std::array::from_fn(|m| self.simd.sub_f64s(self.simd.mul_f64s(two, end[m]), x[m]))
+    }
+
+    /// A number of each channel.
+    #[inline(always)]
+    fn each(self, of: impl Fn(&ZeroPhase) -> f64) -> Of<S> {
+        let mut numbers = [0.0; MOST_LANES];
+        for (l, number) in numbers[..self.width].iter_mut().enumerate() {
+            *number = of((self.filter)(self.first + l));
+        }
+        self.read::<false>(&numbers[..VECTORS * S::F64_LANES])
+    }
+
+    /// The sections of the channels' filters, section by section; behind the last they are empty.
+    #[inline(always)]
+    fn sections<const N: usize>(self) -> [Section<S>; N] {
+        let count = (self.filter)(self.first).sos.sections().len();
+        std::array::from_fn(|k| {
+            let number = |of: &dyn Fn(&ZeroPhase) -> f64| {
+                self.each(|filter| if k < count { of(filter) } else { 0.0 })
+            };
+            Section {
+                b: std::array::from_fn(|m| number(&|filter| filter.sos.sections()[k].b[m])),
+                a: std::array::from_fn(|m| number(&|filter| filter.sos.sections()[k].a[m])),
+                steady: std::array::from_fn(|m| number(&|filter| filter.steady[k][m])),
+            }
+        })
+    }
 }
 
-/// Running state of L cascades, transposed direct form II.
-struct Cascade<'a, const L: usize> {
-    sections: &'a [LaneSection<L>],
-    state: [[[f64; L]; 2]; MAX_SECTIONS],
+/// One section of the filters of all lanes.
+#[derive(Clone, Copy)]
+struct Section<S: Simd> {
+    b: [Of<S>; 3],
+    a: [Of<S>; 2],
+    steady: [Of<S>; 2],
 }
 
-impl<'a, const L: usize> Cascade<'a, L> {
+/// Running state of cascades of at most N sections, transposed direct form II.
+struct Cascade<'a, S: Simd, const N: usize> {
+    simd: S,
+    sections: &'a [Section<S>],
+    state: [[Of<S>; 2]; N],
+}
+
+impl<'a, S: Simd, const N: usize> Cascade<'a, S, N> {
     /// The state after a long constant input `x`.
     #[inline(always)]
-    fn settled(sections: &'a [LaneSection<L>], x: [f64; L]) -> Self {
-        let mut state = [[[0.0; L]; 2]; MAX_SECTIONS];
+    fn settled(simd: S, sections: &'a [Section<S>], x: Of<S>) -> Self {
+        let mut state = [[[simd.splat_f64s(0.0); VECTORS]; 2]; N];
         for (state, section) in state.iter_mut().zip(sections) {
-            *state = section.steady.map(|s| std::array::from_fn(|l| s[l] * x[l]));
+            *state = section
+                .steady
+                .map(|s| std::array::from_fn(|m| simd.mul_f64s(s[m], x[m])));
         }
-        Self { sections, state }
+        Self {
+            simd,
+            sections,
+            state,
+        }
     }
 
     #[inline(always)]
-    fn step(&mut self, mut x: [f64; L]) -> [f64; L] {
-        for (section, [s1, s2]) in self.sections.iter().zip(&mut self.state) {
-            let ([b0, b1, b2], [a1, a2]) = (&section.b, &section.a);
-            for l in 0..L {
-                let y = b0[l] * x[l] + s1[l];
-                s1[l] = (b1[l] * x[l] + s2[l]) - a1[l] * y;
-                s2[l] = b2[l] * x[l] - a2[l] * y;
-                x[l] = y;
+    fn step(&mut self, mut x: Of<S>) -> Of<S> {
+        let simd = self.simd;
+        for (Section { b, a, .. }, [s1, s2]) in self.sections.iter().zip(&mut self.state) {
+            for m in 0..VECTORS {
+                let of = |number: &Of<S>, x: S::f64s| simd.mul_f64s(number[m], x);
+                let y = simd.add_f64s(of(&b[0], x[m]), s1[m]);
+                let next = simd.add_f64s(of(&b[1], x[m]), s2[m]);
+                s1[m] = simd.sub_f64s(next, of(&a[0], y));
+                s2[m] = simd.sub_f64s(of(&b[2], x[m]), of(&a[1], y));
+                x[m] = y;
             }
         }
         x
-    }
-
-    #[inline(always)]
-    fn step_in_place<const W: usize>(&mut self, sample: &mut [f64], first: usize) {
-        let lanes = &mut sample[first..first + W];
-        let y = self.step(std::array::from_fn(|l| if l < W { lanes[l] } else { 0.0 }));
-        lanes.copy_from_slice(&y[..W]);
     }
 }
 

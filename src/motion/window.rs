@@ -1,11 +1,28 @@
 //! One window of a segment: smoothing, differentiation, the computed channels and their filter.
 
+use std::cell::RefCell;
+
 use super::settings::FilterChain;
 use super::{FilteredRow, MotionError, MotionSample};
 
 /// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in
 /// a second-level cache.
 const GROUP: usize = 8;
+
+/// Computed channels of a window.
+#[derive(Debug, Default)]
+struct Computed {
+    /// [group][sample][lane]
+    lanes: Vec<f64>,
+    /// Whether a group holds zeros only, as the columns of links do that a joint does not carry: it is neither
+    /// written nor filtered, for the filter of zeros is zeros.
+    empty: Vec<bool>,
+}
+
+thread_local! {
+    /// The largest memory of a window, kept from one to the next that a thread computes.
+    static COMPUTED: RefCell<Computed> = RefCell::default();
+}
 
 /// A stretch of one segment, with the overlaps that its filters need, and the rows that come of it.
 /// Its memory is reused from window to window.
@@ -26,11 +43,6 @@ pub(super) struct FilterWindow {
     pub tau: Vec<f64>,
     v: Vec<f64>,
     a: Vec<f64>,
-    /// Computed channels, [group][sample][lane].
-    channels: Vec<f64>,
-    /// Whether a group holds zeros only, as the columns of links do that a joint does not carry: it is neither
-    /// written nor filtered, for the filter of zeros is zeros.
-    empty: Vec<bool>,
     /// Samples of the rows, as indices within the window.
     kept: Vec<usize>,
     /// Channels of the rows before and after the filter, row-major.
@@ -71,27 +83,39 @@ impl FilterWindow {
         let from = lost(self.first == 0);
         let to = samples - lost(self.ends);
         self.choose_rows(chain, samples);
-        self.compute(from..to, joints, channels, fill);
-        let span = to - from;
-        let groups = self.channels.chunks_exact_mut(span * GROUP);
-        for (group, _) in groups.zip(&self.empty).filter(|(_, empty)| !**empty) {
-            chain.parallel.run(group, GROUP)?;
-        }
-        self.filtered.resize(self.kept.len() * channels, 0.0);
-        for (row, &k) in self.kept.iter().enumerate() {
-            let row = &mut self.filtered[row * channels..(row + 1) * channels];
-            for (lanes, group) in row
-                .chunks_mut(GROUP)
-                .zip(self.channels.chunks_exact(span * GROUP))
-            {
-                let at = (k - from) * GROUP;
-                lanes.copy_from_slice(&group[at..at + lanes.len()]);
-            }
-        }
+        COMPUTED.with_borrow_mut(|computed| {
+            self.compute(computed, from..to, joints, channels, fill);
+            self.filter(computed, chain, from..to, channels)
+        })?;
         match self.filtered.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => Err(self.offending(from..to, joints, channels, fill)),
         }
+    }
+
+    /// Filters the channels of the samples `span` and keeps those of the rows.
+    fn filter(
+        &mut self,
+        Computed { lanes, empty }: &mut Computed,
+        chain: &FilterChain,
+        span: std::ops::Range<usize>,
+        channels: usize,
+    ) -> Result<(), MotionError> {
+        let size = span.len() * GROUP;
+        self.filtered.clear();
+        self.filtered.resize(self.kept.len() * channels, 0.0);
+        let groups = lanes.chunks_exact_mut(size).zip(empty).enumerate();
+        for (g, (group, _)) in groups.filter(|(_, (_, empty))| !**empty) {
+            chain.parallel.run(group, GROUP)?;
+            let first = g * GROUP;
+            let width = GROUP.min(channels - first);
+            let rows = self.filtered.chunks_exact_mut(channels);
+            for (row, &k) in rows.zip(&self.kept) {
+                let at = (k - span.start) * GROUP;
+                row[first..first + width].copy_from_slice(&group[at..at + width]);
+            }
+        }
+        Ok(())
     }
 
     /// The rows, in order of time.
@@ -134,29 +158,33 @@ impl FilterWindow {
     /// Fills the channels of the samples `span` and the raw values of the rows.
     fn compute(
         &mut self,
+        Computed { lanes, empty }: &mut Computed,
         span: std::ops::Range<usize>,
         joints: usize,
         channels: usize,
         fill: &(dyn Fn(&MotionSample<'_>, &mut [f64]) + Sync),
     ) {
-        let size = span.len() * GROUP;
-        let needed = channels.div_ceil(GROUP) * size;
-        if self.channels.len() != needed {
-            // Lanes without a channel stay zero.
-            self.channels = vec![0.0; needed];
-            self.empty = vec![true; channels.div_ceil(GROUP)];
-        }
+        let (size, groups) = (span.len() * GROUP, channels.div_ceil(GROUP));
+        lanes.resize(groups * size, 0.0);
+        empty.clear();
+        empty.resize(groups, true);
         self.raw.clear();
         let mut values = vec![0.0; channels];
         let mut rows = self.kept.iter().peekable();
         for k in span.clone() {
             fill(&self.sample(k, joints), &mut values);
             let at = (k - span.start) * GROUP;
-            let groups = self.channels.chunks_exact_mut(size).zip(&mut self.empty);
-            for (lanes, (group, empty)) in values.chunks(GROUP).zip(groups) {
-                *empty = *empty && lanes.iter().all(|x| *x == 0.0);
+            let groups = lanes.chunks_exact_mut(size).zip(&mut *empty);
+            for (values, (group, empty)) in values.chunks(GROUP).zip(groups) {
+                if *empty && values.iter().any(|x| *x != 0.0) {
+                    *empty = false;
+                    // of another window until here
+                    group[..at].fill(0.0);
+                }
                 if !*empty {
-                    group[at..at + lanes.len()].copy_from_slice(lanes);
+                    let (lanes, rest) = group[at..at + GROUP].split_at_mut(values.len());
+                    lanes.copy_from_slice(values);
+                    rest.fill(0.0);
                 }
             }
             if rows.next_if_eq(&&k).is_some() {

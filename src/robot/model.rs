@@ -106,20 +106,4 @@ impl Model {
         let friction: usize = self.friction.iter().map(JointFriction::parameters).sum();
         self.theta.len() + friction + self.offset.len()
     }
-
-    /// d tau_j / d(parameters) at q, v, a into `out` of [`Self::parameters`] numbers.
-    pub fn gradient(&self, joint: usize, q: &[f64], v: &[f64], a: &[f64], out: &mut [f64]) {
-        let p = self.theta.len();
-        out.fill(0.0);
-        self.robot.regressor_row(joint, q, v, a, &mut out[..p]);
-        let mut at = p;
-        for (j, friction) in self.friction.iter().enumerate() {
-            let k = friction.parameters();
-            if j == joint {
-                friction.gradient(v[j], &mut out[at..at + k]);
-            }
-            at += k;
-        }
-        out[at + joint] = 1.0;
-    }
 }

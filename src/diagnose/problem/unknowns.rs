@@ -1,7 +1,6 @@
 //! The unknowns of the joint fit: inertias, friction, offsets, and what effects bring.
 
 use crate::effect::{AugmentedModel, Cover, Role};
-use crate::robot::Robot;
 use crate::robot::model::JointFriction;
 
 /// One unknown.
@@ -60,9 +59,9 @@ impl Unknowns {
             let free = (0..shapes).filter(open);
             list.extend(free.map(|k| Unknown::Shape { effect, k }));
         }
-        let shown = shown(&plain.robot);
+        let held = plain.robot.parameters_by_joint();
         let touches = |u: &Unknown, j: usize| match *u {
-            Unknown::Theta(i) => shown[j][i],
+            Unknown::Theta(i) => held[j][i],
             Unknown::Friction { joint, .. } | Unknown::Offset(joint) => joint == j,
             Unknown::Linear { effect, .. } | Unknown::Shape { effect, .. } => {
                 model.effects[effect].place.touches(j)
@@ -78,32 +77,6 @@ impl Unknowns {
     pub fn len(&self) -> usize {
         self.list.len()
     }
-}
-
-/// States in which a parameter that a joint's torque holds shows.
-const STATES: usize = 3;
-
-/// Whether the torque of each joint holds each inertial parameter, `[joint][parameter]`: the last joints of an arm are
-/// told nothing of its first links.
-fn shown(robot: &Robot) -> Vec<Vec<bool>> {
-    let (n, p) = (robot.joints(), robot.parameters().len());
-    let mut shown = vec![vec![false; p]; n];
-    let mut y = vec![0.0; n * p];
-    for state in 0..STATES {
-        // numbers without a pattern, in which nothing is zero by chance
-        let at = |order: usize| -> Vec<f64> {
-            let of =
-                |j: usize| (1.7 + 2.9 * j as f64 + 5.3 * order as f64 + 7.1 * state as f64).sin();
-            (0..n).map(of).collect()
-        };
-        robot.regressor(&at(0), &at(1), &at(2), &mut y);
-        for (shown, row) in shown.iter_mut().zip(y.chunks_exact(p.max(1))) {
-            for (shown, y) in shown.iter_mut().zip(row) {
-                *shown |= *y != 0.0;
-            }
-        }
-    }
-    shown
 }
 
 /// Adds a step to a model; shapes stay within their limits, slopes positive.

@@ -110,23 +110,6 @@ impl Parameters {
         self.of_drives(v, a, |joint, at, x| y[joint * p + at] = x);
     }
 
-    /// Writes row `joint` of Y(q, v, a).
-    pub fn row(&self, tree: &Tree, joint: usize, [q, v, a]: [&[f64]; 3], y: &mut [f64]) {
-        y.fill(0.0);
-        walk(tree, q, v, a, |link, on, row| {
-            if on == joint {
-                for &(c, at) in &self.kept[link] {
-                    y[at] = row[c];
-                }
-            }
-        });
-        self.of_drives(v, a, |on, at, x| {
-            if on == joint {
-                y[at] = x;
-            }
-        });
-    }
-
     /// Writes Y(q, v, a) theta without the matrix.
     #[inline]
     pub fn torque(&self, tree: &Tree, theta: &[f64], [q, v, a]: [&[f64]; 3], tau: &mut [f64]) {
