@@ -141,13 +141,133 @@ fn a_formula_that_is_in_the_logs_is_found_kept_in_the_model_and_predicts_unseen_
             .unwrap()
             .contains("cross-drag")
     );
-    // generated code has no formula of the user's yet, and says so
-    let (status, message, _) = run(at, &["export", "-m", "refined.toml", "--c", "model.h"]);
+    // and not with another formula of the same name, which is told before the logs are looked at
+    let other = OWN.replace("q_shoulder + q_elbow", "q_shoulder - q_elbow");
+    fs::write(at.join("own.toml"), other).unwrap();
+    let words = [
+        "diagnose",
+        "none.csv",
+        "-m",
+        "refined.toml",
+        "-o",
+        "last.toml",
+    ];
+    let (status, message, _) = run(at, &[&words[..], &["--candidates", "own.toml"]].concat());
+    assert_eq!(status, 3, "{message}");
     assert!(
-        status != 0 && message.contains("cross-drag"),
+        message.contains("candidate `cross-drag`: refined.toml has an effect of that name"),
+        "{message}"
+    );
+    // generated code has it
+    done(at, &["export", "-m", "refined.toml", "--c", "model.h"]);
+    let header = fs::read_to_string(at.join("model.h")).unwrap();
+    assert!(header.contains("* (cos(q[0] + q[1]) * v[0]);"), "{header}");
+}
+
+/// One effect in every signal of the plant, also those that its own torque decides.
+const ALL_SIGNALS: &str = r#"
+[[candidate]]
+name = "all-signals"
+joints = ["shoulder", "slide"]
+formulas = { inertia = "a + 0.3 * a_elbow", rub = "tanh(w * v) * load", turn = "direction * sin(3 * q_elbow)", slow = "t * q" }
+shapes = { w = { from = 1.0, to = 40.0, unit = "s/rad" } }
+"#;
+
+#[test]
+fn formulas_in_the_plant_are_the_torque_that_the_tool_reckons_along_its_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    write(at, ASKEW, "");
+    fs::write(at.join("own.toml"), ALL_SIGNALS).unwrap();
+    let numbers = [
+        ("w", 9.0),
+        ("inertia", 0.2),
+        ("rub", 0.06),
+        ("turn", 0.7),
+        ("slow", 0.05),
+    ];
+    let keys: Vec<String> = numbers.iter().map(|(k, x)| format!("{k}={x}")).collect();
+    let effect = format!("all-signals:shoulder:{}", keys.join(","));
+    let long = ["--seconds", "20"];
+    simulate(at, "plain.csv", &long);
+    let own = ["--candidates", "own.toml", "--effect", &effect];
+    simulate(at, "id.csv", &[&long[..], &own].concat());
+    // the same from a model file
+    let mut model = fs::read_to_string(at.join("truth.toml")).unwrap();
+    model += ALL_SIGNALS;
+    model += "[[effect]]\nname = \"all-signals\"\njoint = \"shoulder\"\n[effect.parameters]\n";
+    for (key, value) in numbers {
+        model += &format!("{key} = {{ value = {value:?}, unit = \"1\" }}\n");
+    }
+    fs::write(at.join("with.toml"), model).unwrap();
+    let words = [
+        "simulate",
+        "-r",
+        "robot.toml",
+        "-m",
+        "with.toml",
+        "-o",
+        "again.csv",
+    ];
+    done(at, &[&words[..], &long].concat());
+    let read = |name: &str| fs::read(at.join(name)).unwrap();
+    assert!(read("id.csv") == read("again.csv") && read("id.csv") != read("plain.csv"));
+    let truth = fs::read_to_string(at.join("id.truth.toml")).unwrap();
+    assert!(truth.contains("effect = \"all-signals\"") && truth.contains("family = \"own\""));
+    let rms = |log: &str, model: &str| -> f64 {
+        let document = done(at, &["validate", log, "-m", model]);
+        document["joints"][0]["rmse"].as_f64().unwrap()
+    };
+    // what is left is the noise of a log without it; without its law much more
+    let (floor, without, with) = (
+        rms("plain.csv", "truth.toml"),
+        rms("id.csv", "truth.toml"),
+        rms("id.csv", "with.toml"),
+    );
+    assert!(
+        with < 1.1 * floor && without > 5.0 * floor,
+        "{floor} {without} {with}"
+    );
+
+    for (effect, says) in [
+        ("all-signals:shoulder:inertia=1", "`w` has no number"),
+        ("all-signals:elbow:w=9", "its `joints` do not name it"),
+        ("all-signals:shoulder:w=90", "must be from 1 to 40"),
+        ("all-signals:shoulder:x=1", "no key `x`"),
+        ("all-signal:shoulder:w=9", "no effect `all-signal`"),
+    ] {
+        let words = [
+            "simulate",
+            "-r",
+            "robot.toml",
+            "-m",
+            "truth.toml",
+            "-o",
+            "bad.csv",
+        ];
+        let own = ["--candidates", "own.toml", "--effect", effect];
+        let (status, message, _) = run(at, &[&words[..], &own].concat());
+        assert!(status == 2 && message.contains(says), "{status} {message}");
+    }
+    fs::write(
+        at.join("own.toml"),
+        ALL_SIGNALS.replace("a_elbow", "a_wrist"),
+    )
+    .unwrap();
+    let words = [
+        "simulate",
+        "-r",
+        "robot.toml",
+        "-m",
+        "truth.toml",
+        "-o",
+        "bad.csv",
+    ];
+    let (status, message, _) = run(at, &[&words[..], &own].concat());
+    assert!(
+        status == 3 && message.contains("`a_wrist` is no signal") && !at.join("bad.csv").exists(),
         "{status} {message}"
     );
-    assert!(!at.join("model.h").exists());
 }
 
 #[test]

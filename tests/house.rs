@@ -61,7 +61,7 @@ const DOORS: &[(&str, &str)] = &[
     ("indicatif", "cli/context.rs"),
     ("ctrlc", "cli/mod.rs"),
     ("csv", "log/text/csv.rs"),
-    ("exmex", "effect/formula.rs"),
+    ("exmex", "math/formula.rs"),
     ("fast_float2", "log/text/number.rs"),
     // one to read, one to write
     ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),

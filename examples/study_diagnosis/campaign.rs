@@ -226,6 +226,7 @@ fn on_drive(setting: &Setting, name: &str, seed: u64) -> (Lab, Vec<Truth>, Campa
 
 fn spec(put: &Put, values: &BTreeMap<String, f64>) -> EffectSpec {
     EffectSpec {
+        own: None,
         name: put.kind.name.to_owned(),
         joint: (!put.place.is_empty()).then(|| put.place.to_owned()),
         values: values.clone().into_iter().collect(),

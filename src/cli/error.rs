@@ -164,6 +164,7 @@ impl From<SimulateError> for CliError {
             SimulateError::EffectSyntax { .. }
             | SimulateError::UnknownEffect { .. }
             | SimulateError::UnknownKey { .. }
+            | SimulateError::MissingKey { .. }
             | SimulateError::UnknownJoint { .. }
             | SimulateError::EffectPlace { .. }
             | SimulateError::EffectNumber { .. } => Exit::Usage,

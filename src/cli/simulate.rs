@@ -76,6 +76,9 @@ pub struct Args {
     /// Effect that the plant has beyond the model, or fault of its log; may be given more than once
     #[arg(long = "effect", value_name = "NAME[:JOINT][:key=value,...]")]
     pub effects: Vec<EffectSpec>,
+    /// Effects of your own for --effect: [[candidate]] tables with formulas, whose numbers --effect gives
+    #[arg(long, value_name = "FILE.toml", requires = "effects")]
+    pub candidates: Option<PathBuf>,
     /// Seed of every random number
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -90,6 +93,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut read: Vec<&Path> = vec![&args.robot];
     read.extend(args.reference.as_deref());
     read.extend(args.model.as_deref());
+    read.extend(args.candidates.as_deref());
     read.extend(args.volts.as_ref().map(|log| log.path.as_path()));
     context.check_outputs(&read, &[&args.output, &truth_path])?;
 
@@ -112,6 +116,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     inputs.extend(volts.iter().map(|volts| volts.provenance.clone()));
 
+    let own = match &args.candidates {
+        Some(path) => Some(files::candidates(path)?),
+        None => None,
+    };
+    inputs.extend(own.iter().map(|file| file.provenance.clone()));
+    let own = own.map(|file| file.value).unwrap_or_default();
+    let effects = args.effects.iter().cloned();
+
     let experiment = match (&reference, &args.move_joint, &volts) {
         (Some(reference), ..) => Experiment::Trajectory(&reference.value),
         (_, Some(joint), _) => Experiment::OneJoint {
@@ -131,7 +143,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .map(|model| (model.name.as_str(), &model.value)),
         experiment,
         seconds: args.seconds,
-        effects: args.effects.clone(),
+        effects: effects.map(|effect| effect.or_own(&own)).collect(),
         seed: args.seed,
     };
     let bar = context.progress("simulating", None);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
-use crate::robot::FORMULA_SIGNALS;
+use crate::robot::FormulaSignal;
 
 /// Most effects of one file.
 const MOST: usize = 100;
@@ -157,13 +157,9 @@ fn is_name(name: &str) -> bool {
 
 /// Whether a text can be the name of a number in a formula.
 fn is_key(name: &str) -> bool {
-    let of_signal = FORMULA_SIGNALS.iter().any(|signal| {
-        name.strip_prefix(signal)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
-    });
     name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.len() <= 64
-        && !of_signal
+        && !FormulaSignal::has_name(name)
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 

@@ -11,7 +11,7 @@ use super::{Added, AugmentedModel, EffectError, Place, Role, Signal, entry};
 use crate::robot::cft::geometry::L4;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::{Body, STANDARD};
-use crate::robot::{JointKind, Robot};
+use crate::robot::{FormulaSignal, JointKind, Robot};
 
 /// What a model remembers from sample to sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,6 +91,25 @@ impl Effects {
         // most sit at one joint
         let to = |what: String| format!("tau[{j}] += {what};");
         let (v, q) = (format!("v[{j}]"), format!("q[{j}]"));
+        if let Some(formulas) = effect.law.formula {
+            let signal = |signal: FormulaSignal, j: usize| {
+                Some(match signal {
+                    FormulaSignal::Position => format!("q[{j}]"),
+                    FormulaSignal::Speed => format!("v[{j}]"),
+                    FormulaSignal::Acceleration => format!("a[{j}]"),
+                    FormulaSignal::Load => format!("load[{j}]"),
+                    FormulaSignal::Direction => direction(refined, j, &format!("v[{j}]")),
+                    FormulaSignal::Time => "state.t".to_owned(),
+                })
+            };
+            let text = formulas.code(j, (shape, c), &signal);
+            let (text, timed) = text.ok_or_else(unknown)?;
+            match timed {
+                true => self.steps.push(to(text)),
+                false => self.added.push(to(text)),
+            }
+            return Ok(());
+        }
         match (effect.name(), effect.place) {
             ("delay", _) => {
                 for (j, lead) in self.lead_s.iter_mut().enumerate() {

@@ -1,10 +1,10 @@
 //! Effects of a user's own: torques linear in some coefficients, each of which has a formula in the motion.
 
-use exmex::{Express, FlatEx};
-
+use super::law_text::exact;
 use super::place::Place;
 use super::scene::Scene;
-use crate::robot::{FORMULA_SIGNALS, Robot};
+use crate::math::formula::{Formula, MOST_NAMES};
+use crate::robot::{FormulaSignal, Robot};
 
 /// What a formula effect is made of, by name.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -62,7 +62,7 @@ pub enum FormulaError {
 }
 
 /// A compiled effect of a user's own.
-pub struct Formula {
+pub struct Formulas {
     /// Joints at which it may sit.
     joints: Vec<usize>,
     columns: Vec<Column>,
@@ -70,22 +70,19 @@ pub struct Formula {
 }
 
 struct Column {
-    formula: FlatEx<f64>,
+    formula: Formula,
     inputs: Vec<Input>,
 }
 
 /// What stands for a name in a formula.
 #[derive(Debug, Clone, Copy)]
 enum Input {
-    /// One of [`FORMULA_SIGNALS`], of a joint or of the effect's own.
-    Signal(usize, Option<usize>),
+    /// Of a joint, or of the effect's own.
+    Signal(FormulaSignal, Option<usize>),
     Shape(usize),
 }
 
-/// Most names in one formula.
-const MOST_INPUTS: usize = 16;
-
-impl Formula {
+impl Formulas {
     /// Reads the formulas of a definition.
     ///
     /// # Errors
@@ -112,9 +109,8 @@ impl Formula {
                 formula: formula.clone(),
                 why,
             };
-            let compiled: FlatEx<f64> =
-                exmex::parse(formula).map_err(|error| syntax(error.to_string()))?;
-            let inputs = compiled.var_names().iter().map(|variable| {
+            let compiled = Formula::parse(formula).map_err(syntax)?;
+            let inputs = compiled.names().iter().map(|variable| {
                 input(variable, definition, names).ok_or_else(|| FormulaError::Variable {
                     name: name.clone(),
                     coefficient: coefficient.clone(),
@@ -128,19 +124,12 @@ impl Formula {
                 })
             });
             let inputs: Vec<Input> = inputs.collect::<Result<_, _>>()?;
-            if inputs.len() > MOST_INPUTS {
-                return Err(syntax(format!("more than {MOST_INPUTS} names in it")));
-            }
-            // what cannot be reckoned at all is told here
-            let values = [0.5; MOST_INPUTS];
-            let tried = compiled.eval(&values[..inputs.len()]);
-            tried.map_err(|error| syntax(error.to_string()))?;
             Ok(Column {
                 formula: compiled,
                 inputs,
             })
         };
-        Ok(Formula {
+        Ok(Formulas {
             joints,
             columns: definition
                 .coefficients
@@ -192,7 +181,7 @@ impl Formula {
     /// Adds the columns of joint `joint` along a scene. What a formula does not give, as a root of what is negative,
     /// is no number.
     pub(super) fn fill(&self, scene: &Scene, shape: &[f64], joint: usize, out: &mut [Vec<f64>]) {
-        let mut values = [0.0; MOST_INPUTS];
+        let mut values = [0.0; MOST_NAMES];
         for (column, out) in self.columns.iter().zip(out) {
             let count = column.inputs.len();
             for (k, out) in out.iter_mut().enumerate() {
@@ -204,9 +193,40 @@ impl Formula {
                         Input::Shape(i) => shape[*i],
                     };
                 }
-                *out += column.formula.eval(&values[..count]).unwrap_or(f64::NAN);
+                *out += column.formula.value(&values[..count]);
             }
         }
+    }
+}
+
+impl Formulas {
+    /// The torque at joint `joint` as an expression of generated code, for the text of a signal; and whether it
+    /// hangs on the time.
+    ///
+    /// # Errors
+    /// What has no text.
+    pub(super) fn code(
+        &self,
+        joint: usize,
+        (shape, linear): (&[f64], &[f64]),
+        signal: &dyn Fn(FormulaSignal, usize) -> Option<String>,
+    ) -> Option<(String, bool)> {
+        let mut timed = false;
+        let mut term = |(column, coefficient): (&Column, &f64)| {
+            let inputs = column.inputs.iter().map(|input| match input {
+                Input::Shape(i) => Some(exact(shape[*i])),
+                Input::Signal(of, other) => {
+                    timed |= *of == FormulaSignal::Time;
+                    signal(*of, other.unwrap_or(joint))
+                }
+            });
+            let inputs: Vec<String> = inputs.collect::<Option<_>>()?;
+            let formula = column.formula.code(&inputs).ok()?;
+            Some(format!("{} * {formula}", exact(*coefficient)))
+        };
+        let terms = self.columns.iter().zip(linear).map(&mut term);
+        let terms: Vec<String> = terms.collect::<Option<_>>()?;
+        Some((terms.join(" + "), timed))
     }
 }
 
@@ -215,30 +235,20 @@ fn input(variable: &str, definition: &Definition, joints: &[String]) -> Option<I
     if let Some(i) = definition.shapes.iter().position(|s| s.name == variable) {
         return Some(Input::Shape(i));
     }
-    FORMULA_SIGNALS
-        .iter()
-        .enumerate()
-        .find_map(|(signal, name)| {
-            let rest = variable.strip_prefix(name)?;
-            if rest.is_empty() {
-                return Some(Input::Signal(signal, None));
-            }
-            let joint = rest.strip_prefix('_').filter(|_| *name != "t")?;
-            let of = joints.iter().position(|j| j == joint)?;
-            Some(Input::Signal(signal, Some(of)))
-        })
+    let (signal, of) = FormulaSignal::read(variable, joints)?;
+    Some(Input::Signal(signal, of))
 }
 
-/// A signal of a joint at sample k, in the order of [`FORMULA_SIGNALS`].
-fn signal_at(scene: &Scene, signal: usize, joint: usize, k: usize) -> f64 {
+/// A signal of a joint at sample k.
+fn signal_at(scene: &Scene, signal: FormulaSignal, joint: usize, k: usize) -> f64 {
     let s = scene.stretch;
     match signal {
-        0 => s.q[joint][k],
-        1 => s.v[joint][k],
-        2 => s.a[joint][k],
-        3 => scene.load[joint][k],
-        4 => scene.direction(joint, k),
+        FormulaSignal::Position => s.q[joint][k],
+        FormulaSignal::Speed => s.v[joint][k],
+        FormulaSignal::Acceleration => s.a[joint][k],
+        FormulaSignal::Load => scene.load[joint][k],
+        FormulaSignal::Direction => scene.direction(joint, k),
         // since the begin of the log, whatever its clock shows
-        _ => s.began + k as f64 * s.dt,
+        FormulaSignal::Time => s.began + k as f64 * s.dt,
     }
 }

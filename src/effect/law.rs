@@ -3,7 +3,7 @@
 
 use super::cover::Cover;
 use super::entry::{Entry, Family};
-use super::formula::Formula;
+use super::formula::Formulas;
 use super::place::Place;
 use super::scene::Scene;
 use super::values::{EffectError, Values};
@@ -38,7 +38,7 @@ pub struct Law {
     /// Family and whether it is the same torque at rest, where these hang on the shape.
     pub varied: Option<Varied>,
     /// Formulas of a user's own, in place of the functions above.
-    pub formula: Option<&'static Formula>,
+    pub formula: Option<&'static Formulas>,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
 }

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use super::cover::Cover;
 use super::entry::{Entry, Family, Key, Search};
-use super::formula::{Definition, Formula, FormulaError};
+use super::formula::{Definition, FormulaError, Formulas};
 use super::law::{Law, Starts};
 use super::place::Place;
 use super::scene::Scene;
@@ -31,7 +31,7 @@ pub fn law(definition: &Definition, robot: &Robot) -> Result<&'static Law, Formu
             name: definition.name.clone(),
         });
     }
-    let formula = Formula::of(definition, robot)?;
+    let formula = Formulas::of(definition, robot)?;
     let law = leaked(definition, formula);
     made.push((definition.clone(), robot.joint_names().to_vec(), law));
     Ok(law)
@@ -41,7 +41,7 @@ fn text(text: &str) -> &'static str {
     Box::leak(text.to_owned().into_boxed_str())
 }
 
-fn leaked(definition: &Definition, formula: Formula) -> &'static Law {
+fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
     let unit = |unit: &str| Unit::Fixed(text(unit));
     let shapes = definition.shapes.iter().map(|s| {
         let [least, most] = s.range;
@@ -237,7 +237,7 @@ mod tests {
             }
             let formula: String = formula.into_iter().collect();
             // what is read is not kept: a law would stay for good
-            let _ = Formula::of(&definition(&formula), &robot);
+            let _ = Formulas::of(&definition(&formula), &robot);
         }
     }
 }

@@ -10,7 +10,7 @@ struct Function {
 }
 
 /// What C has in `math.h` and Rust as methods: function, method and its arguments.
-const METHODS: [(&str, &str); 7] = [
+const METHODS: [(&str, &str); 30] = [
     ("sin(", "fn sin(x: f64) -> f64 {\n    x.sin()\n}\n"),
     ("cos(", "fn cos(x: f64) -> f64 {\n    x.cos()\n}\n"),
     ("exp(", "fn exp(x: f64) -> f64 {\n    x.exp()\n}\n"),
@@ -21,6 +21,42 @@ const METHODS: [(&str, &str); 7] = [
         "pow(",
         "fn pow(x: f64, p: f64) -> f64 {\n    x.powf(p)\n}\n",
     ),
+    // what formulas of users may call beside these
+    ("tan(", "fn tan(x: f64) -> f64 {\n    x.tan()\n}\n"),
+    ("asin(", "fn asin(x: f64) -> f64 {\n    x.asin()\n}\n"),
+    ("acos(", "fn acos(x: f64) -> f64 {\n    x.acos()\n}\n"),
+    ("atan(", "fn atan(x: f64) -> f64 {\n    x.atan()\n}\n"),
+    ("sinh(", "fn sinh(x: f64) -> f64 {\n    x.sinh()\n}\n"),
+    ("cosh(", "fn cosh(x: f64) -> f64 {\n    x.cosh()\n}\n"),
+    ("asinh(", "fn asinh(x: f64) -> f64 {\n    x.asinh()\n}\n"),
+    ("acosh(", "fn acosh(x: f64) -> f64 {\n    x.acosh()\n}\n"),
+    ("atanh(", "fn atanh(x: f64) -> f64 {\n    x.atanh()\n}\n"),
+    ("floor(", "fn floor(x: f64) -> f64 {\n    x.floor()\n}\n"),
+    ("round(", "fn round(x: f64) -> f64 {\n    x.round()\n}\n"),
+    ("ceil(", "fn ceil(x: f64) -> f64 {\n    x.ceil()\n}\n"),
+    ("trunc(", "fn trunc(x: f64) -> f64 {\n    x.trunc()\n}\n"),
+    ("sqrt(", "fn sqrt(x: f64) -> f64 {\n    x.sqrt()\n}\n"),
+    ("cbrt(", "fn cbrt(x: f64) -> f64 {\n    x.cbrt()\n}\n"),
+    ("log(", "fn log(x: f64) -> f64 {\n    x.ln()\n}\n"),
+    ("log2(", "fn log2(x: f64) -> f64 {\n    x.log2()\n}\n"),
+    ("log10(", "fn log10(x: f64) -> f64 {\n    x.log10()\n}\n"),
+    (
+        "atan2(",
+        "fn atan2(x: f64, y: f64) -> f64 {\n    x.atan2(y)\n}\n",
+    ),
+    (
+        "fmin(",
+        "fn fmin(x: f64, y: f64) -> f64 {\n    x.min(y)\n}\n",
+    ),
+    (
+        "fmax(",
+        "fn fmax(x: f64, y: f64) -> f64 {\n    x.max(y)\n}\n",
+    ),
+    (
+        "copysign(",
+        "fn copysign(x: f64, y: f64) -> f64 {\n    x.copysign(y)\n}\n",
+    ),
+    ("fmod(", "fn fmod(x: f64, y: f64) -> f64 {\n    x % y\n}\n"),
 ];
 
 const FUNCTIONS: [Function; 6] = [

@@ -104,6 +104,16 @@ pub fn diagnose(
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
     let given = refined(file, name)?;
+    let other = |own: &&Candidate| {
+        let mut known = file.candidates.iter();
+        known.any(|known| known.name == own.name && known != *own)
+    };
+    if let Some(own) = settings.candidates.iter().find(other) {
+        return Err(IdentifyError::CandidateOfModel {
+            name: own.name.clone(),
+            model: name.to_owned(),
+        });
+    }
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }

@@ -89,6 +89,11 @@ pub enum IdentifyError {
     /// A formula of the user's own that is none on this robot.
     #[error("{0}; correct the [[candidate]] table")]
     Formula(FormulaError),
+    /// A candidate whose name the given model has for something else.
+    #[error(
+        "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table; give the candidate another name, or leave it as it is there"
+    )]
+    CandidateOfModel { name: String, model: String },
     /// A model that nothing was set aside for.
     #[error(
         "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
@@ -143,6 +148,7 @@ impl IdentifyError {
             | Self::Effect { .. }
             | Self::Formula(_)
             | Self::NothingHeldOut { .. }
+            | Self::CandidateOfModel { .. }
             | Self::OtherRobot { .. } => ErrorKind::Input,
         }
     }

@@ -11,12 +11,14 @@
 //! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
 //! | [`descent`] | step control of the Gauss-Newton loops | none |
 //! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
+//! | [`formula`] | formulas of users, evaluated or as text of a program | `exmex` |
 //! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
 //! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
 
 pub(crate) mod bootstrap;
 pub mod causal;
 pub mod descent;
+pub mod formula;
 pub(crate) mod jacobi;
 pub(crate) mod lanes;
 pub(crate) mod long_run;

@@ -5,10 +5,6 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What formulas of users call the position, speed, acceleration, load and direction of friction of a joint, and the
-/// time.
-pub const FORMULA_SIGNALS: [&str; 6] = ["q", "v", "a", "load", "direction", "t"];
-
 /// Kind of a joint: it decides the units of position and torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

@@ -23,6 +23,7 @@ pub mod cft;
 pub mod drive;
 pub mod dynamics;
 pub mod error;
+mod formula_signal;
 pub mod friction;
 pub mod joint;
 pub mod model;
@@ -40,7 +41,8 @@ use cft::{Setup, Structure};
 use tree::{Coordinate, Coupling, Grouping, Link, Parameters, Tree};
 
 pub use error::RobotError;
-pub use joint::{FORMULA_SIGNALS, JointKind, ParameterInfo};
+pub use formula_signal::FormulaSignal;
+pub use joint::{JointKind, ParameterInfo};
 use practice::{Nominal, Practice};
 pub use transmission::Transmission;
 

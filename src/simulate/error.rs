@@ -76,6 +76,14 @@ pub enum SimulateError {
         key: String,
         known: String,
     },
+    /// An effect of the user's own without one of its numbers.
+    #[error(
+        "effect `{effect}`: `{key}` has no number; give each by `--effect {effect}:JOINT:{key}=..`"
+    )]
+    MissingKey { effect: String, key: String },
+    /// An effect of the user's own that is none on this robot.
+    #[error("candidate `{name}`: {what}; correct its [[candidate]] table")]
+    Candidate { name: String, what: String },
     /// A joint that the robot does not have.
     #[error(
         "the robot has no joint `{name}`; {}its joints are {known}",

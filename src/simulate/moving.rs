@@ -72,40 +72,101 @@ impl<const J: usize> Moving<'_, J> {
         let mut share = [[0.0; 2]; J];
         self.effects.load(&motion, &mut share);
         let torque = self.plant.mechanism.torque(&q, &self.volts);
-        let mut net: [f64; J] =
-            std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i]);
-        // tau_l (1 + share) = net is linear on each side of zero.
-        let mut load: [f64; J] = std::array::from_fn(|i| {
-            let [positive, negative] = share[i];
-            net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
-        });
-        for twist in self.effects.twists(z) {
-            let [positive, negative] = share[twist.joint];
-            load[twist.joint] = twist.torque;
-            net[twist.joint] -= twist.torque
-                * if twist.torque > 0.0 {
-                    positive
-                } else {
-                    negative
-                };
-        }
         let (mass, bias) = self.body(t, link, speed, z);
-        for i in 0..J {
-            load[i] -= bias[i];
-        }
         let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
-        let solved = if symmetric {
-            self.plant.solve(&mass, &load)
-        } else {
-            eliminate(mass, load)
+        // net torque, load and acceleration, once more torque is taken
+        let respond = |taken: &[f64; J]| {
+            let mut net: [f64; J] =
+                std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i] - taken[i]);
+            // tau_l (1 + share) = net is linear on each side of zero.
+            let mut load: [f64; J] = std::array::from_fn(|i| {
+                let [positive, negative] = share[i];
+                net[i] / (1.0 + if net[i] > 0.0 { positive } else { negative })
+            });
+            for twist in self.effects.twists(z) {
+                let [positive, negative] = share[twist.joint];
+                load[twist.joint] = twist.torque;
+                net[twist.joint] -= twist.torque
+                    * if twist.torque > 0.0 {
+                        positive
+                    } else {
+                        negative
+                    };
+            }
+            let driven: [f64; J] = std::array::from_fn(|i| load[i] - bias[i]);
+            let solved = if symmetric {
+                self.plant.solve(&mass, &driven)
+            } else {
+                eliminate(mass, driven)
+            };
+            (net, load, solved.unwrap_or([f64::NAN; J]))
         };
+        let taken = self.implicit(&respond, &motion);
+        let (net, _, acceleration) = respond(&taken);
         Balance {
             q,
             v,
             friction,
             net,
-            acceleration: solved.unwrap_or([f64::NAN; J]),
+            acceleration,
         }
+    }
+
+    /// The torque that effects take by the accelerations and loads that are left when they have taken it: Newton's
+    /// method, by differences, on their joints; NaN where it finds none.
+    fn implicit(
+        &self,
+        respond: &impl Fn(&[f64; J]) -> ([f64; J], [f64; J], [f64; J]),
+        motion: &Motion,
+    ) -> [f64; J] {
+        const MOST_STEPS: usize = 30;
+        let mut joints: Vec<usize> = self.effects.implicit_joints().collect();
+        joints.sort_unstable();
+        joints.dedup();
+        let mut taken = [0.0; J];
+        if joints.is_empty() {
+            return taken;
+        }
+        let n = self.plant.joints();
+        let left = |taken: &[f64; J]| {
+            let (net, load, a) = respond(taken);
+            let motion = Motion {
+                a: &a[..n],
+                load: &load[..n],
+                ..*motion
+            };
+            let mut wanted = [0.0; J];
+            self.effects.implicit(&motion, &mut wanted);
+            let left: [f64; J] = std::array::from_fn(|i| wanted[i] - taken[i]);
+            (left, net)
+        };
+        for _ in 0..MOST_STEPS {
+            let (rest, net) = left(&taken);
+            let scale = |j: usize| 1.0 + net[j].abs() + taken[j].abs();
+            if joints.iter().all(|&j| rest[j].abs() <= 1e-11 * scale(j)) {
+                return taken;
+            }
+            let mut slopes = [[0.0; J]; J];
+            for (i, row) in slopes.iter_mut().enumerate() {
+                row[i] = 1.0;
+            }
+            for &j in &joints {
+                let step = 1e-4 * scale(j);
+                let mut tried = taken;
+                tried[j] += step;
+                let (moved, _) = left(&tried);
+                for &i in &joints {
+                    slopes[i][j] = (rest[i] - moved[i]) / step;
+                }
+            }
+            let Some(step) = eliminate(slopes, rest) else {
+                break;
+            };
+            for &j in &joints {
+                taken[j] += step[j];
+            }
+        }
+        [f64::NAN; J]
     }
 
     /// Rigid-body torque C v + G with what effects add to it, at no acceleration.
@@ -146,6 +207,13 @@ impl<const J: usize> Moving<'_, J> {
         };
         let mut torque = self.plant.offset;
         self.effects.torque(&motion, &mut torque);
+        let still = [0.0; J];
+        let at_rest = Motion {
+            a: &still[..n],
+            load: &load[..n],
+            ..motion
+        };
+        self.effects.implicit(&at_rest, &mut torque);
         let mut share = [[0.0; 2]; J];
         self.effects.load(&motion, &mut share);
         let mut acting = [1.0; J];
@@ -179,6 +247,7 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             friction: &balance.friction[..n],
             a: &balance.acceleration[..n],
             net: &balance.net[..n],
+            ..Motion::default()
         };
         self.effects.rates(&motion, &mut dydt[2 * J..]);
     }

@@ -335,7 +335,9 @@ fn built_effects(
                 name: effect.name.clone(),
                 joint: effect.joint.clone(),
                 values: values.map(|(key, p)| (key.clone(), p.value)).collect(),
-            };
+                own: None,
+            }
+            .or_own(&model.candidates);
             // Tried alone, so that what is wrong with it is said of the file and not of the command line.
             Effects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
                 SimulateError::ModelEffect {

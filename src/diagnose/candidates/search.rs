@@ -131,18 +131,11 @@ impl SearchRound<'_> {
             // a peak was picked out of all orders that were looked at
             tried.picked_from = SCANNED;
         }
-        if law.formula.is_some() && !self.is_finite(law, place, &starts)? {
-            return refused(
-                "its formula gives no number somewhere along these logs",
-                tried,
-            );
-        }
         let open = vec![f64::NAN; law.shape.len()];
         let mut effect = Added::new(law, place, open, vec![0.0; law.linear.len()]);
-        let Some((gain, mut sums)) = self.best_start(&mut effect, starts, &mut tried)? else {
-            let reason = "the filter's cut-off takes the orders that are there: raise cutoff_hz in \
-                          [filter] to look for them";
-            return refused(reason, tried);
+        let (gain, mut sums) = match self.best_start(&mut effect, starts, &mut tried)? {
+            Ok(best) => best,
+            Err(reason) => return refused(reason, tried),
         };
         if gain < self.needed {
             return refused(
@@ -210,38 +203,20 @@ impl SearchRound<'_> {
         columns(&self.at.model, self.problem, self.torques, effect)
     }
 
-    /// Whether the columns of a law are numbers everywhere, for the shapes to begin from.
-    fn is_finite(
-        &self,
-        law: &'static Law,
-        place: Place,
-        starts: &[Vec<f64>],
-    ) -> Result<bool, MotionError> {
-        for shape in starts {
-            let effect = Added::new(law, place, shape.clone(), vec![0.0; law.linear.len()]);
-            let columns = self.columns(&effect)?;
-            let all = columns.iter().flatten().flatten();
-            if !all.flatten().all(|x| x.is_finite()) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
     /// What an effect removes with its shape.
     fn gain(&self, effect: &Added) -> Result<f64, MotionError> {
         let columns = self.columns(effect)?;
         Ok(self.test.gain(&columns, effect.linear.len()))
     }
 
-    /// Gives the effect the best of the shapes to start from, and says what it removes; none where the filter
-    /// takes all of them.
+    /// Gives the effect the best of the shapes to start from, and says what it removes; or why there is
+    /// none.
     fn best_start(
         &self,
         effect: &mut Added,
         starts: Vec<Vec<f64>>,
         tried: &mut Tried,
-    ) -> Result<Option<(f64, Sums)>, MotionError> {
+    ) -> Result<Result<(f64, Sums), &'static str>, MotionError> {
         let mut best = None;
         let mut highest = f64::NEG_INFINITY;
         for shape in starts {
@@ -253,6 +228,13 @@ impl SearchRound<'_> {
                 }
             }
             let sums = self.sums(effect)?;
+            if effect.law.formula.is_some() && !is_finite(&sums.0) {
+                // nothing that was tried before counts then
+                *tried = Tried::default();
+                return Ok(Err(
+                    "its formula gives no number somewhere along these logs",
+                ));
+            }
             let (gain, scores) = self.test.gain_by_blocks(&sums.1, effect.linear.len());
             if gain > highest {
                 highest = gain;
@@ -261,10 +243,13 @@ impl SearchRound<'_> {
             }
             tried.starts.extend(scores);
         }
-        Ok(best.map(|(shape, sums)| {
-            effect.shape = shape;
-            (highest, sums)
-        }))
+        let Some((shape, sums)) = best else {
+            return Ok(Err(
+                "the filter's cut-off takes the orders that are there: raise cutoff_hz in [filter] to look for them",
+            ));
+        };
+        effect.shape = shape;
+        Ok(Ok((highest, sums)))
     }
 
     /// Columns of an effect and their sums.
@@ -322,6 +307,12 @@ impl SearchRound<'_> {
             }
         }
     }
+}
+
+/// Whether the columns of an effect are numbers everywhere.
+fn is_finite(columns: &CandidateColumns) -> bool {
+    let mut all = columns.iter().flatten().flatten().flatten();
+    all.all(|x| x.is_finite())
 }
 
 /// Whether two shapes are one and the same effect.

@@ -3,13 +3,15 @@
 //! An effect is named on the command line as `NAME[:JOINT][:key=value,...]`; without a joint it acts on
 //! every joint, and a key that is left out takes a default that scales with the joint (docs/effects.md).
 //! Most effects are torques or states of the plant ([`Effect`]); delays and faults of the data are put
-//! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`].
+//! into the log that the plant left ([`Fault`]). A new effect is one file here and one line in [`LAWS`]. Effects of a
+//! user's own come with their formulas ([`EffectSpec::own`]).
 //!
 //! A jump in speed would leave the differential equation without a solution at rest. Signs and steps of
 //! the speed are therefore tanh(w v) and (1 + tanh(w v))/2, with w as steep as the joint's inertia lets an
 //! explicit integrator follow ([`Site::slope`]).
 
 mod fault;
+mod formula;
 mod frames;
 mod plant_law;
 mod site;
@@ -35,10 +37,13 @@ pub struct Motion<'a> {
     pub z: &'a [f64],
     /// The plant's own friction F(v), N or N m per joint.
     pub friction: &'a [f64],
-    /// Joint accelerations of the links, m/s^2 or rad/s^2; known to [`Effect::rates`] only.
+    /// Joint accelerations of the links, m/s^2 or rad/s^2; known to [`Effect::rates`] and
+    /// [`Effect::implicit`] only.
     pub a: &'a [f64],
     /// Motor torque less friction and added torques, N or N m; known to [`Effect::rates`] only.
     pub net: &'a [f64],
+    /// Rigid-body torque of the links, N or N m; known to [`Effect::implicit`] only.
+    pub load: &'a [f64],
 }
 
 /// What an effect is told before the first step.
@@ -68,6 +73,14 @@ pub struct Twist {
 pub trait Effect: std::fmt::Debug + Send {
     /// Adds to `torque` what the motors must supply because of the effect, in N or N m per joint.
     fn torque(&self, _motion: &Motion, _torque: &mut [f64]) {}
+
+    /// Joint whose torque hangs on accelerations or loads, which hang on it in turn.
+    fn implicit_joint(&self) -> Option<usize> {
+        None
+    }
+
+    /// Adds that torque, N or N m per joint, for accelerations and loads that are tried.
+    fn implicit(&self, _motion: &Motion, _torque: &mut [f64]) {}
 
     /// How many states of its own the effect integrates.
     fn states(&self) -> usize {
@@ -167,8 +180,15 @@ impl Effects {
         let mut effects = Self::default();
         let mut values = Vec::new();
         for spec in specs {
+            if let Some(candidate) = &spec.own {
+                for (effect, value) in formula::build(spec, candidate, sites)? {
+                    effects.push(effect);
+                    values.push(value);
+                }
+                continue;
+            }
             let law = spec.law()?;
-            for site in spec.sites(law.entry, sites)? {
+            for site in spec.sites(law.entry.name, law.entry.places, sites)? {
                 let numbers = spec.numbers(law, site)?;
                 match law.built(site, &sites.machine, &numbers)? {
                     Built::Plant(effect) => effects.push(effect),
@@ -207,6 +227,20 @@ impl Effects {
     pub fn torque(&self, motion: &Motion, torque: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.torque(&own(motion, states), torque);
+        }
+    }
+
+    /// Joints whose torque hangs on accelerations or loads, some more than once.
+    pub fn implicit_joints(&self) -> impl Iterator<Item = usize> {
+        self.list
+            .iter()
+            .filter_map(|(effect, _)| effect.implicit_joint())
+    }
+
+    /// Adds every effect's torque that hangs on accelerations or loads.
+    pub fn implicit(&self, motion: &Motion, torque: &mut [f64]) {
+        for (effect, states) in &self.list {
+            effect.implicit(&own(motion, states), torque);
         }
     }
 

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::{LAWS, Machine, PlantLaw, Site, Sites};
+use crate::config::candidates::Candidate;
 use crate::effect::{Entry, Key, Place, Places};
 use crate::number::is_usable;
 use crate::robot::JointKind;
@@ -19,6 +20,9 @@ pub struct EffectSpec {
     pub joint: Option<String>,
     /// Keys that are given, in the order in which they are given.
     pub values: Vec<(String, f64)>,
+    /// Its formulas, where it is the user's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own: Option<Candidate>,
 }
 
 /// An effect as it acts: all its values, with units.
@@ -57,6 +61,7 @@ impl FromStr for EffectSpec {
             name: name.to_owned(),
             joint: None,
             values: Vec::new(),
+            own: None,
         };
         for (place, part) in parts.enumerate() {
             let part = part.trim();
@@ -86,6 +91,12 @@ impl FromStr for EffectSpec {
 }
 
 impl EffectSpec {
+    /// The same with its formulas, where a candidate has its name.
+    pub fn or_own(mut self, candidates: &[Candidate]) -> Self {
+        self.own = candidates.iter().find(|c| c.name == self.name).cloned();
+        self
+    }
+
     /// The law that the name stands for.
     pub(super) fn law(&self) -> Result<&'static PlantLaw, SimulateError> {
         let found = LAWS.iter().find(|law| law.entry.name == self.name);
@@ -101,7 +112,8 @@ impl EffectSpec {
     /// The sites that the effect acts on: the one that is named, or all that the effect may sit at.
     pub(super) fn sites<'a>(
         &self,
-        entry: &Entry,
+        effect: &str,
+        places: Places,
         sites: &'a Sites,
     ) -> Result<&'a [Site], SimulateError> {
         let whole = sites.whole.as_slice();
@@ -112,10 +124,10 @@ impl EffectSpec {
                     name: String::new(),
                     known: String::new(),
                 },
-                |site| site.refuse(entry.name, why),
+                |site| site.refuse(effect, why),
             )
         };
-        let (joints, screws): (&[Site], &[Site]) = match entry.places {
+        let (joints, screws): (&[Site], &[Site]) = match places {
             Places::Joints | Places::JointsOrAll | Places::Pairs => (&sites.joints, &[]),
             Places::Actuators if sites.screws.is_empty() => {
                 return Err(refuse(
