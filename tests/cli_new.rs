@@ -214,6 +214,67 @@ fn a_urdf_elsewhere_is_named_from_where_the_robot_file_is() {
 }
 
 #[test]
+fn capsules_hold_the_collision_shapes_of_a_urdf_and_meshes_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = |name: &str, shape: &str| {
+        format!("<link name=\"{name}\"><collision>{shape}</collision></link>")
+    };
+    let joint = |name: &str, parent: &str, child: &str, z: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <origin xyz=\"0 0 {z}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"9\" velocity=\"1\"/></joint>"
+        )
+    };
+    let urdf = [
+        "<robot name=\"r\">".to_owned(),
+        link(
+            "foot",
+            "<geometry><cylinder radius=\"0.2\" length=\"0.4\"/></geometry>",
+        ),
+        link(
+            "upper",
+            "<origin xyz=\"0 0 0.25\"/><geometry><box size=\"0.06 0.08 0.5\"/></geometry>",
+        ),
+        link("lower", "<geometry><sphere radius=\"0.1\"/></geometry>"),
+        link("hand", "<geometry><mesh filename=\"hand.stl\"/></geometry>"),
+        // a fixed link belongs to the moving one before it
+        "<link name=\"tool\"><collision><origin rpy=\"0 1.5707963267948966 0\"/><geometry>\
+         <cylinder radius=\"0.02\" length=\"0.3\"/></geometry></collision></link>"
+            .to_owned(),
+        joint("q1", "foot", "upper", "0.5"),
+        joint("q2", "upper", "lower", "0.5"),
+        joint("q3", "lower", "hand", "0.05"),
+        "<joint name=\"held\" type=\"fixed\"><parent link=\"hand\"/><child link=\"tool\"/>\
+         </joint></robot>"
+            .to_owned(),
+    ];
+    std::fs::write(folder.path().join("r.urdf"), urdf.concat()).unwrap();
+    command(folder.path())
+        .args(["new", "r", "--urdf", "r.urdf"])
+        .assert()
+        .success();
+    let text = std::fs::read_to_string(folder.path().join("r.toml")).unwrap();
+    assert!(text.contains("meshes are not read; give [[limits.capsule]] tables for hand:"));
+    let file = cft_ident::config::RobotFile::load(&folder.path().join("r.toml")).unwrap();
+    let limits = &file.limits;
+    let found: Vec<(&str, [f64; 3], [f64; 3], f64)> = (limits.capsule.iter())
+        .map(|c| (c.link.as_str(), c.from, c.to, c.radius))
+        .collect();
+    let (low, high) = ([0.0, 0.0, -0.2], [0.0, 0.0, 0.2]);
+    assert_eq!(found[0], ("base", low, high, 0.2));
+    // half a diagonal of its section holds a box
+    assert_eq!(found[1], ("upper", [0.0; 3], [0.0, 0.0, 0.5], 0.05));
+    assert_eq!(found[2], ("lower", [0.0; 3], [0.0; 3], 0.1));
+    assert_eq!(
+        found[3],
+        ("hand", [-0.15, 0.0, 0.0], [0.15, 0.0, 0.0], 0.02)
+    );
+    assert_eq!(found.len(), 4);
+    // the upper link ends at q2, 0.05 m from q3, about which the tool turns
+    assert_eq!(limits.touching, [["upper".to_owned(), "hand".to_owned()]]);
+}
+
+#[test]
 fn completions_and_manual_pages_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {

@@ -92,7 +92,7 @@ fn blends_keep_every_limit_and_begin_and_end_at_rest() {
     for seed in [3, 9, 14] {
         let series = quick(&machine, seed, 60);
         let reserved: Vec<Channel> = machine.channels.iter().map(|c| c.reserved(-0.02)).collect();
-        let blend = Blend::within(&machine, &reserved, &series, 2).expect("a blend");
+        let blend = Blend::within(&machine, &reserved, &series, 2, None).expect("a blend");
         let end = blend.duration(series.period());
         let step = end / 40_000.0;
         let at = |m: usize| blend.at(&series, step * m as f64);
@@ -124,7 +124,7 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
     };
     let found = design(&machine, &task, &|_| {}, &AtomicBool::new(false)).expect("a design");
     let reserved: Vec<Channel> = machine.channels.iter().map(|c| c.reserved(0.05)).collect();
-    let blend = Blend::within(&machine, &reserved, &found.series, 2).expect("a blend");
+    let blend = Blend::within(&machine, &reserved, &found.series, 2, None).expect("a blend");
     let mut fourier = trajectory(&machine, &found.series);
     fourier.start_s = Some(blend.start);
     fourier.blend_s = Some(blend.seconds);

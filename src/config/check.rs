@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
-use super::{ConfigError, check_log, serial_chain};
+use super::{ConfigError, check_log, limits as places, serial_chain};
 
 /// Checks a robot file that was read from `document`.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
@@ -182,8 +182,8 @@ fn filter(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
 }
 
 fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
-    document.known_names(&["limits"], &file.limits, &file.coordinate_names())?;
-    for (name, limits) in &file.limits {
+    document.known_names(&["limits"], &file.limits.of, &file.coordinate_names())?;
+    for (name, limits) in &file.limits.of {
         let at = |key| ["limits", name.as_str(), key];
         if let Some([low, high]) = limits.position
             && low >= high
@@ -201,7 +201,7 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             }
         }
     }
-    Ok(())
+    places::check_places(file, document)
 }
 
 fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {

@@ -16,6 +16,7 @@ mod embedded;
 mod error;
 pub mod held_out;
 pub mod identified;
+pub mod limits;
 pub mod model_file;
 mod model_text;
 pub mod robot_file;

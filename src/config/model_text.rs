@@ -12,12 +12,13 @@ use super::contents::{self, Contents};
 use super::document::Document;
 use super::embedded::other_kind;
 use super::held_out::{Excesses, HeldOut};
+use super::limits::Limits;
 use super::model_file::{
     Covariance, Effect, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
 };
 use super::robot_file::{
-    ControlSection, CoordinateLimits, FilterSection, FrictionSection, NoiseSection, RobotFile,
-    RobotSection, SensorsSection,
+    ControlSection, FilterSection, FrictionSection, NoiseSection, RobotFile, RobotSection,
+    SensorsSection,
 };
 use super::robot_file::{ModelKind, Notes};
 use super::{ConfigError, check, urdf};
@@ -39,7 +40,7 @@ pub(super) struct ModelToml {
     #[serde(default)]
     noise: NoiseSection,
     #[serde(default)]
-    limits: BTreeMap<String, CoordinateLimits>,
+    limits: Limits,
     #[serde(default)]
     drive: BTreeMap<String, Drive>,
     #[serde(default)]

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::is_default;
+use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::log::LogSection;
 use crate::robot::cft::{self, Setup, Structure};
@@ -299,9 +300,9 @@ pub struct RobotFile {
     /// Overrides of estimated noise.
     #[serde(default, skip_serializing_if = "is_default")]
     pub noise: NoiseSection,
-    /// Limits by joint or actuator coordinate.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub limits: BTreeMap<String, CoordinateLimits>,
+    /// Limits by joint or actuator coordinate, and of points and links.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub limits: Limits,
     /// Drives by joint: what play and presliding it can have.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub drive: BTreeMap<String, Drive>,

@@ -15,6 +15,7 @@ use super::ExciteError;
 use super::limits::{Channel, Quantity};
 use super::machine::Machine;
 use super::series::{MOST, Series};
+use super::space::Space;
 
 /// Share of the speed limit within which the sign of a Coulomb column is smoothed in a search.
 const SIGN: f64 = 0.005;
@@ -59,11 +60,15 @@ pub fn machine(
         },
         model,
         mechanism: Mechanism::of(file)?,
+        space: Space::default(),
         channels: Vec::new(),
         noise: vec![1.0; n],
         coulomb_speed: vec![1.0; n],
     };
     machine.channels = channels(file, &machine.mechanism)?;
+    let (space, of_places) = Space::of(file, &machine.model.robot);
+    machine.space = space;
+    machine.channels.extend(of_places);
     for i in 0..n {
         let of = |quantity| {
             let mut all = machine.channels.iter();

@@ -8,7 +8,7 @@ use super::foresee::{Condition, Expected, Foresight, Pair, Part, foresee, inform
 use super::limits::{Channel, Quantity};
 use super::machine::Machine;
 use super::motion::{spectrum, torque_band};
-use super::usage::Use;
+use super::usage::{Use, along_way};
 use super::{ExciteError, Given, Motion};
 use crate::number;
 
@@ -32,6 +32,11 @@ pub struct Judgement {
     pub limits_used: Vec<LimitsUsed>,
     /// Every limit along the motion.
     pub limits: Vec<LimitUse>,
+    /// Every limit on the straight way from the given pose to the first point, `t` as a share of the way; null
+    /// where no pose is given.
+    pub way: Option<Vec<LimitUse>>,
+    /// What nobody looked at, in one sentence.
+    pub not_checked: String,
     /// Expected deviations, friction known.
     pub parameters: Vec<Expected>,
     /// The combination of columns, scaled to norm 1, that is least certain; largest parts first.
@@ -93,7 +98,7 @@ pub struct LimitUse {
     pub most: f64,
     /// Share of the limit: 1 at it; null where the machine cannot follow.
     pub used: f64,
-    /// Time at which it comes nearest \[s\].
+    /// Time at which it comes nearest \[s\]; a share of the way on one.
     pub t: f64,
     pub broken: bool,
 }
@@ -173,6 +178,8 @@ pub struct Terms<'a> {
     pub given: Option<&'a Given>,
     /// Of a one-joint move.
     pub friction: Option<LawForeseen>,
+    /// Pose from which the robot goes to the first point, in the designed coordinates \[m or rad\].
+    pub from: Option<&'a [f64]>,
     /// Rate of the log that is foreseen \[Hz\].
     pub rate_hz: f64,
     /// Its duration where the motion does not end by itself \[s\].
@@ -188,6 +195,8 @@ pub struct Terms<'a> {
 /// [`ExciteError::Robot`] where the machine cannot follow.
 pub fn judge(machine: &Machine, motion: &Motion, terms: Terms) -> Result<Judgement, ExciteError> {
     let uses = motion.usage(machine, terms.channels);
+    let first = motion.at(0.0);
+    let way = (terms.from).map(|from| along_way(machine, terms.channels, from, &first));
     let (information, rows) = information(machine, motion, terms.rate_hz, terms.seconds)?;
     let foresight = foresee(machine, &information, rows, None)?;
     let together = match terms.given {
@@ -239,6 +248,8 @@ pub fn judge(machine: &Machine, motion: &Motion, terms: Terms) -> Result<Judgeme
         samples_per_period: foresight.samples,
         limits_used: limits_used(&names, &uses),
         limits: uses.iter().map(LimitUse::of).collect(),
+        not_checked: machine.space.not_checked(way.is_some()),
+        way: way.map(|way| way.iter().map(LimitUse::of).collect()),
         parameters: foresight.parameters,
         weakest_direction: foresight.weakest_direction,
         confounded: foresight.confounded,
@@ -316,30 +327,37 @@ impl LimitUse {
         }
     }
 
-    /// One sentence of a limit that is broken.
-    fn sentence(&self) -> String {
+    /// One sentence of a limit that is broken, on the way to the motion or along it.
+    fn sentence(&self, on_way: bool) -> String {
         let what = format!("{} of {}", self.quantity.name(), self.name);
         let unit = match self.unit.as_str() {
             "" => String::new(),
             unit => format!(" {unit}"),
         };
+        let (on, at) = match on_way {
+            true => {
+                let percent = number::significant(100.0 * self.t, 3);
+                (
+                    "on the way from the given pose ",
+                    format!("at {percent} % of it"),
+                )
+            }
+            false => ("", format!("at t = {:.4} s", self.t)),
+        };
         if self.used.is_infinite() && !self.most.is_finite() {
-            return format!(
-                "the robot cannot follow at t = {:.4} s, where {what} would be needed",
-                self.t
-            );
+            return format!("{on}the robot cannot follow {at}, where {what} would be needed");
         }
         let value = |v: f64| number::significant(v, 5);
-        let allowed = if self.upper.is_finite() {
-            format!("[{}, {}]", value(self.lower), value(self.upper))
+        let (allowed, nearest) = if self.upper.is_finite() {
+            let allowed = format!("[{}, {}]", value(self.lower), value(self.upper));
+            (allowed, "farthest")
         } else {
-            format!("at least {}", value(self.lower))
+            (format!("at least {}", value(self.lower)), "nearest")
         };
         format!(
-            "{what} runs from {} to {}{unit}, allowed is {allowed}; farthest at t = {:.4} s",
+            "{on}{what} runs from {} to {}{unit}, allowed is {allowed}; {nearest} {at}",
             value(self.least),
             value(self.most),
-            self.t
         )
     }
 }
@@ -347,8 +365,12 @@ impl LimitUse {
 impl Judgement {
     /// One sentence for each limit that the motion breaks.
     pub fn broken(&self) -> Vec<String> {
-        let broken = self.limits.iter().filter(|limit| limit.broken);
-        broken.map(LimitUse::sentence).collect()
+        let way = self.way.iter().flatten().map(|limit| (limit, true));
+        let all = way.chain(self.limits.iter().map(|limit| (limit, false)));
+        let broken = all.filter(|(limit, _)| limit.broken);
+        broken
+            .map(|(limit, on_way)| limit.sentence(on_way))
+            .collect()
     }
 
     /// The limit of a coordinate, where it has one.

@@ -25,6 +25,12 @@ pub enum Quantity {
     JointAcceleration,
     /// sin q5 of the CFT robot, which vanishes where links 4 and 5 are in line; 1 elsewhere.
     Clearance,
+    /// Of a point along an axis of the base \[m\]; the index is three times the point's, and the axis.
+    PointPosition,
+    /// Of a point above the floor \[m\].
+    Height,
+    /// Of the capsules of two links \[m\].
+    Distance,
 }
 
 impl Quantity {
@@ -33,15 +39,25 @@ impl Quantity {
         matches!(self, Self::Position | Self::Speed | Self::Acceleration)
     }
 
+    /// Whether it tells where links are, and so bounds no coordinate alone.
+    pub(super) fn is_of_places(self) -> bool {
+        matches!(
+            self,
+            Self::Clearance | Self::PointPosition | Self::Height | Self::Distance
+        )
+    }
+
     /// The word in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Position | Self::JointPosition => "position",
+            Self::Position | Self::JointPosition | Self::PointPosition => "position",
             Self::Speed | Self::JointSpeed => "speed",
             Self::Acceleration | Self::JointAcceleration => "acceleration",
             Self::Drive => "volts",
             Self::Torque => "torque",
             Self::Clearance => "sin q5",
+            Self::Height => "height",
+            Self::Distance => "distance",
         }
     }
 }

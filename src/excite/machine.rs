@@ -9,6 +9,7 @@ use crate::simulate::Mechanism;
 
 use super::limits::{Channel, Quantity};
 use super::series::{Kinematics, MOST};
+use super::space::Space;
 
 /// A robot with the numbers that its torques are foreseen with, and its limits.
 #[derive(Debug, Clone)]
@@ -18,6 +19,8 @@ pub struct Machine {
     pub columns: RegressorColumns,
     /// Motors and limits, as the simulator knows them.
     pub mechanism: Mechanism<MOST>,
+    /// Points and links that some of the limits speak of.
+    pub space: Space,
     /// Limits that a motion must keep.
     pub channels: Vec<Channel>,
     /// Standard deviation of the noise on each joint's torque \[N or N m\], sample by sample.
@@ -300,6 +303,10 @@ impl Machine {
                 let transmission = self.model.robot.transmission();
                 let clearance = transmission.clearance(&state.q[..self.coordinates()]);
                 clearance.unwrap_or(1.0)
+            }
+            place => {
+                let q = &state.q[..self.coordinates()];
+                self.space.value(place, i, &self.model.robot, q)
             }
         }
     }

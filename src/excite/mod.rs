@@ -8,6 +8,7 @@
 //! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
 //! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
 //! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
+//! | [`space`] | points above a floor and in a box, links apart |
 //! | [`judgement`] | the result: what a log of the motion will tell, and the limits along it |
 
 pub mod blend;
@@ -27,6 +28,7 @@ pub mod peak;
 mod repair;
 pub mod search;
 pub mod series;
+pub mod space;
 mod start;
 pub mod usage;
 mod variables;
@@ -81,6 +83,14 @@ pub enum ExciteError {
         100.0 * share
     )]
     NoBlend { seconds: f64, share: f64 },
+    #[error(
+        "the pose of --from breaks a limit itself: the {what} is {value:.4}; give the pose in which the robot stands"
+    )]
+    BrokenPose { what: String, value: f64 },
+    #[error(
+        "no straight way leads from the given pose into the motion within the limits: one of them breaks that on the {what} after {percent} % of the way; give another pose with --from, or move the robot by hand and leave --from out"
+    )]
+    NoWay { what: String, percent: f64 },
     #[error(
         "`[limits.{joint}] volts` cannot be kept: the motors of this robot act on x_c1..x_c4; write the limit there, or limit the torque of {joint}"
     )]

@@ -265,7 +265,7 @@ fn check(machine: &Machine, task: &Task, channels: &[Channel]) -> Result<(), Exc
             });
         };
         let bounded = machine.channels.iter().any(|c| {
-            c.index == i && c.quantity != Quantity::Position && c.quantity != Quantity::Clearance
+            c.index == i && c.quantity != Quantity::Position && !c.quantity.is_of_places()
         });
         if !bounded {
             return Err(ExciteError::NoSpeed {

@@ -125,25 +125,76 @@ pub fn along_blend(
         .collect()
 }
 
+/// Parts of a straight way to begin with.
+const WAY_PARTS: usize = 512;
+
+/// Channels along the straight way between two poses in the designed coordinates, slowly: on the clock that is 0
+/// at the first and 1 at the other.
+pub fn along_way(
+    machine: &Machine,
+    channels: &[Channel],
+    from: &[f64],
+    to: &Kinematics,
+) -> Vec<Use> {
+    let at = |share: f64| {
+        let mut k = Kinematics::REST;
+        for ((x, from), to) in k.x.iter_mut().zip(from).zip(to.x) {
+            *x = from + share * (to - from);
+        }
+        k
+    };
+    let path = Interval {
+        at: &at,
+        span: [0.0, 1.0],
+        parts: WAY_PARTS,
+    };
+    along(machine, channels, &path)
+}
+
+/// Refuses a pose in the designed coordinates that breaks a limit itself: no way leads out of it.
+///
+/// # Errors
+/// [`ExciteError::BrokenPose`] with the limit that it breaks most.
+pub fn check_pose(machine: &Machine, from: &[f64]) -> Result<(), ExciteError> {
+    let mut here = Kinematics::REST;
+    here.x[..from.len()].copy_from_slice(from);
+    let uses = along_way(machine, &machine.channels, from, &here);
+    let worst = uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
+    match worst.filter(|found| found.share > 1.0) {
+        None => Ok(()),
+        Some(found) => Err(ExciteError::BrokenPose {
+            what: format!(
+                "{} of {}",
+                found.channel.quantity.name(),
+                found.channel.name
+            ),
+            value: found.range[0],
+        }),
+    }
+}
+
 /// Durations that are tried, in periods.
 const DURATIONS: [f64; 10] = [0.4, 0.5, 0.64, 0.8, 1.0, 1.2, 1.6, 2.0, 3.2, 6.4];
 /// Points of the period at which the motion may begin.
 const STARTS: u32 = 16;
 
 impl Blend {
-    /// The shortest blend of those tried along which every channel holds, begun where it stays
-    /// farthest from them.
+    /// The shortest blend of those tried along which every channel holds, and on the straight way to its first
+    /// point from a pose where one is given, begun where it stays farthest from them.
     ///
     /// # Errors
-    /// [`ExciteError::NoBlend`] where even the longest breaks one.
+    /// [`ExciteError::NoBlend`] where even the longest breaks one, [`ExciteError::NoWay`] where all ways to
+    /// the points where blends begin do.
     pub fn within(
         machine: &Machine,
         channels: &[Channel],
         series: &Series,
         periods: u32,
+        from: Option<&[f64]>,
     ) -> Result<Self, ExciteError> {
         let period = series.period();
-        let mut last = f64::INFINITY;
+        // of the longest: the least that a blend uses, and the way that leads to it
+        let mut last = (f64::INFINITY, None);
         for duration in DURATIONS {
             let tried = (0..STARTS).map(|k| {
                 let blend = Self {
@@ -154,17 +205,34 @@ impl Blend {
                 let share = worst(&along_blend(machine, channels, series, &blend));
                 (share, blend)
             });
-            let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((share, blend)) = best {
-                if share <= 1.0 {
-                    return Ok(blend);
+            let mut tried: Vec<(f64, Self)> = tried.collect();
+            tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+            last = (tried[0].0, None);
+            for (_, blend) in tried.into_iter().filter(|(share, _)| *share <= 1.0) {
+                let Some(from) = from else { return Ok(blend) };
+                let way = along_way(machine, channels, from, &blend.at(series, 0.0));
+                let nearest = way.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
+                match nearest {
+                    Some(broken) if broken.share > 1.0 => {
+                        last.1.get_or_insert(broken);
+                    }
+                    _ => return Ok(blend),
                 }
-                last = share;
             }
         }
-        Err(ExciteError::NoBlend {
-            seconds: DURATIONS[DURATIONS.len() - 1] * period,
-            share: last,
+        Err(match last {
+            (_, Some(broken)) => ExciteError::NoWay {
+                what: format!(
+                    "{} of {}",
+                    broken.channel.quantity.name(),
+                    broken.channel.name
+                ),
+                percent: (100.0 * broken.t).round(),
+            },
+            (share, None) => ExciteError::NoBlend {
+                seconds: DURATIONS[DURATIONS.len() - 1] * period,
+                share,
+            },
         })
     }
 }

@@ -76,7 +76,7 @@ impl<const J: usize> Mechanism<J> {
                 mechanism.resolution[i] = step;
             }
         }
-        mechanism.given.clone_from(&file.limits);
+        mechanism.given.clone_from(&file.limits.of);
         Ok(mechanism)
     }
 

@@ -94,13 +94,15 @@ fn sampled(
 fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
     let file = bench.args.robot.file_name().unwrap_or_default();
     vec![
-        "NOT CHECKED: collisions of the robot with itself and with what stands around it, and the way to the \
-         first point."
-            .to_owned(),
+        escape(&judged.not_checked),
         match &judged.broken()[..] {
             [] => format!(
-                "Checked: the limits of {} along the whole motion. {} s at {} Hz, by cft-ident {}.",
+                "Checked: the limits of {} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",
                 escape(&file.to_string_lossy()),
+                match judged.way {
+                    Some(_) => " and on the straight way from the given pose",
+                    None => "",
+                },
                 number::significant(judged.seconds, 4),
                 number::significant(bench.rate_hz, 4),
                 env!("CARGO_PKG_VERSION")

@@ -18,6 +18,7 @@ pub(super) fn judged(
         channels,
         given,
         friction,
+        from: bench.args.from.as_deref(),
         rate_hz: bench.rate_hz,
         seconds: bench.args.seconds,
         criterion: &criterion_name(bench),

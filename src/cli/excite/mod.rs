@@ -21,6 +21,7 @@ use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
 use crate::excite::machine::Machine;
 use crate::excite::search::{Found, Task, design};
 use crate::excite::series::Series;
+use crate::excite::usage::check_pose;
 use crate::excite::{
     Criterion, ExciteError, Given, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
     foresee, machine, series_of, trajectory, usual_torque,
@@ -86,6 +87,10 @@ pub struct Args {
     /// Share of every limit that the design leaves free, for what a controller strays
     #[arg(long, value_name = "SHARE", default_value_t = 0.05, value_parser = share)]
     pub margin: f64,
+    /// Pose from which the robot goes straight to the first point, coordinate by coordinate [m or rad]: limits are
+    /// kept on the way too
+    #[arg(long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub from: Option<Vec<f64>>,
     /// Log or trajectory (.toml) that is used together with the design; may be given more than once
     #[arg(long, value_name = "LOG|TRAJECTORY.toml")]
     pub with: Vec<String>,
@@ -154,6 +159,13 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A coordinate of a pose.
+fn finite(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse::<f64>().ok();
+    let usable = value.filter(|value| crate::number::is_usable(*value));
+    usable.ok_or_else(|| "is no finite number".into())
+}
+
 /// A frequency of a machine's motion: a robot follows some Hz.
 fn frequency(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -203,13 +215,13 @@ struct Bench<'a> {
 /// # Errors
 /// Every [`CliError`]; a search that is stopped writes the best motion that it has first.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let names = Names::of(args);
+    let all = Names::of(args);
     let mut read: Vec<&Path> = vec![&args.robot];
     read.extend(args.model.as_deref());
     read.extend(args.check.as_deref());
     read.extend(args.offsets.as_deref());
     read.extend(args.with.iter().map(Path::new));
-    let outputs: Vec<&Path> = names.iter().flat_map(Names::paths).collect();
+    let outputs: Vec<&Path> = all.iter().flat_map(Names::paths).collect();
     context.check_outputs(&read, &outputs)?;
 
     let robot = files::robot(&args.robot)?;
@@ -224,6 +236,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let named = model.as_ref().map(|(name, model)| (name.as_str(), model));
     let mut machine = machine(&robot.value, named)?;
+    let names = machine.coordinate_names();
+    if let Some(from) = args.from.as_ref().filter(|from| from.len() != names.len()) {
+        return Err(
+            CliError::usage(format!("--from gives {} numbers", from.len()))
+                .hint(format!("give one for each of {}", names.join(", "))),
+        );
+    }
     let usual = usual_torque(
         &machine,
         std::f64::consts::TAU * args.frequency,
@@ -239,9 +258,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         inputs,
     };
     match (&args.check, &args.joint) {
-        (Some(path), _) => check(&mut bench, path, &names[0]),
-        (None, Some(joint)) => ladder(&bench, joint, &names[0]),
-        (None, None) => designs(&mut bench, &names),
+        (Some(path), _) => check(&mut bench, path, &all[0]),
+        (None, Some(joint)) => ladder(&bench, joint, &all[0]),
+        (None, None) => designs(&mut bench, &all),
     }
 }
 
@@ -327,6 +346,9 @@ fn ladder(bench: &Bench, joint: &str, names: &Names) -> Result<Outcome, CliError
 /// Designs one motion after the other, each with those before it given.
 fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
     let args = bench.args;
+    if let Some(from) = &args.from {
+        check_pose(&bench.machine, from)?;
+    }
     let mut task = task(bench)?;
     let mut given = Given::nothing(&bench.machine);
     let mut warnings = Vec::new();
@@ -416,7 +438,13 @@ fn blended(bench: &Bench, series: Series) -> Result<(Motion, Fourier), CliError>
     let (args, machine) = (bench.args, &bench.machine);
     let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
     let reserved: Vec<_> = reserved.collect();
-    let blend = Blend::within(machine, &reserved, &series, args.periods)?;
+    let blend = Blend::within(
+        machine,
+        &reserved,
+        &series,
+        args.periods,
+        args.from.as_deref(),
+    )?;
     let fourier = Fourier {
         start_s: Some(blend.start),
         blend_s: Some(blend.seconds),

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::{CliError, Context, Outcome, inspect};
 use crate::config::{RobotFile, UrdfChain};
+use crate::excite::space::always_touching;
 use crate::identify::LoggedRobot;
 use crate::inspect::{LogFault, Severity};
 use crate::log::{LogSpec, Provenance, Reader, escape};
@@ -142,7 +143,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         (None, 0 | 1) => Shape::Single(mapping.kind()),
         (None, _) => Shape::Rows,
     };
-    let draft = Draft {
+    let mut draft = Draft {
         name: target
             .file_stem()
             .map(|stem| escape(&stem.to_string_lossy()))
@@ -150,13 +151,22 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         shape,
         mapping: &mapping,
         seen: seen.as_ref(),
+        chain: chain.as_ref(),
+        touching: Vec::new(),
     };
-    let text = draft.text();
     // what is written must be readable, and the log by it
     let folder = target.parent();
-    // rows that are to be filled in are read as if they were
-    let filled = text.replace("= nan ", "= 1.0 ");
-    let file = RobotFile::parse_in(&target.display().to_string(), &filled, folder)?;
+    let read = |draft: &Draft| {
+        // rows that are to be filled in are read as if they were
+        let filled = draft.text().replace("= nan ", "= 1.0 ");
+        RobotFile::parse_in(&target.display().to_string(), &filled, folder)
+    };
+    let mut file = read(&draft)?;
+    draft.touching = always_touching(&file);
+    if !draft.touching.is_empty() {
+        file = read(&draft)?;
+    }
+    let text = draft.text();
     let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
     if let Some(seen) = &seen
         && args.topic.is_none()

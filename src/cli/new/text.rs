@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::Shape;
-use crate::log::escape;
+use crate::config::UrdfChain;
+use crate::log::{escape, list};
 use crate::mapping::{Clock, JointColumns, Mapping, Seen};
 use crate::number;
 use crate::robot::JointKind;
@@ -14,6 +15,9 @@ pub(super) struct Draft<'a> {
     pub shape: Shape,
     pub mapping: &'a Mapping,
     pub seen: Option<&'a Seen>,
+    pub chain: Option<&'a UrdfChain>,
+    /// Pairs of links whose capsules overlap in every pose.
+    pub touching: Vec<[String; 2]>,
 }
 
 /// A text in quotes, as TOML holds it.
@@ -78,6 +82,7 @@ impl Draft<'_> {
         out.push_str(
             "\n# Limits are used by `inspect`, `excite` and `simulate`; those of a URDF need not be repeated.\n",
         );
+        self.places(&mut out);
         if let Some(joint) = self.mapping.joints.first() {
             let _ = write!(
                 out,
@@ -86,6 +91,56 @@ impl Draft<'_> {
             );
         }
         out
+    }
+
+    /// Capsules about the collision shapes of the URDF, and how to bound points.
+    fn places(&self, out: &mut String) {
+        let Some(chain) = self.chain else { return };
+        out.push_str(
+            "# A floor, and a box in the frame of the base, for points of links: `excite` keeps them along a motion.\n\
+             # [limits]\n# floor = 0.05\n# box = [[-1.0, -1.0, 0.0], [1.0, 1.0, 1.5]]\n# [[limits.point]]\n\
+             # name = \"flange\"\n",
+        );
+        if let Some(name) = chain.links.last().and_then(|link| link.name.as_deref()) {
+            let _ = writeln!(out, "# link = {}\n# xyz = [0.0, 0.0, 0.1]", quoted(name));
+        }
+        if !chain.meshes.is_empty() {
+            let links = chain.meshes.iter().map(String::as_str);
+            let _ = writeln!(
+                out,
+                "# CHECK IT: meshes are not read; give [[limits.capsule]] tables for {}: link, from, to, radius.",
+                escape(&list(links))
+            );
+        }
+        if chain.capsules.is_empty() {
+            return;
+        }
+        out.push_str(
+            "\n# Capsules that hold the collision shapes of the URDF. Those of links that are no neighbours keep apart.\n",
+        );
+        if !self.touching.is_empty() {
+            let pairs = self.touching.iter();
+            let pairs: Vec<String> = pairs
+                .map(|[one, other]| format!("[{}, {}]", quoted(one), quoted(other)))
+                .collect();
+            let _ = writeln!(
+                out,
+                "[limits]\n# They overlap in every pose that was tried.\ntouching = [{}]",
+                pairs.join(", ")
+            );
+        }
+        for capsule in &chain.capsules {
+            let rounded = |x: [f64; 3]| x.map(|x| (x * 1e6).round() / 1e6 + 0.0);
+            let _ = writeln!(
+                out,
+                "\n[[limits.capsule]]\nlink = {}\nfrom = {:?}\nto = {:?}\nradius = {:?}",
+                quoted(&capsule.link),
+                rounded(capsule.from),
+                rounded(capsule.to),
+                capsule.radius
+            );
+        }
+        out.push('\n');
     }
 
     fn robot(&self, out: &mut String) {

@@ -4,16 +4,18 @@
 //! |---|---|
 //! | `xml` | the text as elements with lines; the door to the XML reader |
 //! | `parts` | elements as links and joints |
+//! | `shapes` | collision shapes as capsules |
 //! | [`source`] | a URDF with other inertials and friction |
 //! | `beside` | model files that leave links and inertials to a URDF |
 //! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
 //!
 //! Only what torques depend on is read: placements, axes, kinds, mimic joints, inertials (as a
-//! prior) and limits. The crate urdf-rs was tried and not taken: its errors name no line, and a
+//! prior), limits, and capsules about collision shapes for `new`. The crate urdf-rs was tried and not taken: its errors name no line, and a
 //! file of some thousand nested elements ends the process.
 
 pub(super) mod beside;
 mod parts;
+mod shapes;
 pub(super) mod source;
 mod tree;
 mod xml;
@@ -22,6 +24,7 @@ use std::path::Path;
 
 use super::ConfigError;
 use super::document::Document;
+use super::limits::CapsuleSection;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
 use super::text_file::text_of;
@@ -37,6 +40,10 @@ pub struct UrdfChain {
     pub limits: Vec<(String, CoordinateLimits)>,
     /// Links that fixed joints hang on moving ones, by their placement alone.
     pub frames: Vec<FrameSection>,
+    /// Capsules that hold the collision shapes, in the order of the links.
+    pub capsules: Vec<CapsuleSection>,
+    /// Links of the URDF with shapes that none holds: meshes.
+    pub meshes: Vec<String>,
     /// What was taken otherwise than it is written, one sentence each.
     pub notes: Vec<String>,
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::shapes::{Shape, of_link};
 use super::xml::{EXPAND, Element, MACRO};
 use super::{Angles, Place};
 use crate::config::ConfigError;
@@ -27,6 +28,7 @@ pub(super) struct Link {
     pub name: String,
     pub line: usize,
     pub body: Option<Body>,
+    pub shapes: Vec<Shape>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,6 +170,7 @@ fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Li
         name: first.parent.clone(),
         line: first.line,
         body: None,
+        shapes: Vec::new(),
     })
 }
 
@@ -217,6 +220,7 @@ fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError
         name: name.to_owned(),
         line: element.line(),
         body,
+        shapes: of_link(element),
     })
 }
 

@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::parts::{Body, Joint, Kind, Parts};
+use super::shapes::Shape;
 use super::{Place, UrdfChain, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
+use crate::config::limits::CapsuleSection;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::{
     BASE, FollowsSection, FrameSection, InertialSection, LinkSection, MOST_LINKS,
@@ -54,6 +56,7 @@ pub(super) fn chain(
     let mut reached = vec![false; parts.links.len()];
     let mut moving: Vec<Moving> = Vec::new();
     let mut fixed: Vec<(&str, Seat)> = Vec::new();
+    let (mut capsules, mut meshes) = (Vec::new(), Vec::new());
     // links to visit, the next one last; a link stands here once, for it has one joint before it
     let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(
         None,
@@ -76,6 +79,21 @@ pub(super) fn chain(
                 centre: add(&seat.origin, &turn(&seat.rotation, &body.centre)),
                 inertia: turned(&seat.rotation, &body.inertia),
             });
+        }
+        let on = hangs_on(&moving, seat.on);
+        for shape in &parts.links[link].shapes {
+            match shape {
+                Shape::Within(ends, radius) => {
+                    let [from, to] = ends.map(|e| add(&seat.origin, &turn(&seat.rotation, &e)));
+                    capsules.push(CapsuleSection {
+                        link: on.clone(),
+                        from,
+                        to,
+                        radius: *radius,
+                    });
+                }
+                Shape::Unknown => meshes.push(parts.links[link].name.clone()),
+            }
         }
         if joint.is_some_and(|j| parts.joints[j].kind == Kind::Fixed) && seat.on.is_some() {
             fixed.push((&parts.links[link].name, seat));
@@ -109,6 +127,8 @@ pub(super) fn chain(
     let frames = frames(&fixed, &moving);
     Ok(UrdfChain {
         notes: parts.changes.told(place.file).into_iter().collect(),
+        capsules,
+        meshes,
         ..finish(moving, frames, place)?
     })
 }
@@ -287,13 +307,9 @@ fn sit<'a>(
         true => (joint.xyz, joint.rpy),
         false => (here.origin, roll_pitch_yaw(&here.rotation)),
     };
-    let hangs_on = |on: Option<usize>| match on {
-        None => BASE.to_owned(),
-        Some(on) => moving[on].section.name.clone().unwrap_or_default(),
-    };
     let section = LinkSection {
         name: Some(unused(link, moving)),
-        parent: (parent.on != at.checked_sub(1)).then(|| hangs_on(parent.on)),
+        parent: (parent.on != at.checked_sub(1)).then(|| hangs_on(moving, parent.on)),
         joint: joint.mimic.is_none().then(|| joint.name.clone()),
         kind: (kind == JointKind::Prismatic).then_some(kind),
         xyz: Some(xyz),
@@ -312,6 +328,14 @@ fn sit<'a>(
         origin: [0.0; 3],
         rpy: None,
     })
+}
+
+/// The name of a moving link, or of the base.
+fn hangs_on(moving: &[Moving], on: Option<usize>) -> String {
+    match on {
+        None => BASE.to_owned(),
+        Some(on) => moving[on].section.name.clone().unwrap_or_default(),
+    }
 }
 
 /// The name of a link; `base` is taken by what stands still.
@@ -356,6 +380,8 @@ fn finish(
         links: moving.into_iter().map(|m| m.section).collect(),
         limits,
         frames,
+        capsules: Vec::new(),
+        meshes: Vec::new(),
         notes: Vec::new(),
     })
 }

@@ -19,7 +19,9 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
+    report.terminal().paragraph(&judged.not_checked);
     report.page().verdict(&text, good);
+    report.page().paragraph(&judged.not_checked);
     report.terminal().table(limits(judged, path));
     report.page().table(limits(judged, &name));
     report.page().list(judged.broken());

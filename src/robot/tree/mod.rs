@@ -7,9 +7,11 @@
 //! | [`newton_euler`] | the regressor of the standard parameters, one recursion |
 //! | [`base`] | which combinations of them torques can tell |
 //! | [`pose`] | where the links are |
+//! | [`capsule`] | how far their shapes are from each other |
 //! | [`parameters`] | these, drive inertias and couplings as parameters with names |
 
 pub mod base;
+pub mod capsule;
 pub mod links;
 pub mod newton_euler;
 pub mod parameters;

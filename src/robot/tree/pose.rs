@@ -4,29 +4,32 @@ use super::links::{Coordinate, MOST_JOINTS, Tree};
 use super::space::{Rotation, UNTURNED, Vector, about, add, product, times, turn};
 use crate::robot::joint::JointKind;
 
+/// Orientation and origin \[m\] of link i's frame in the base frame where the independent joints are at `q`
+/// \[m or rad\]; of the base itself for `None`. Does not allocate.
+pub fn frame(tree: &Tree, q: &[f64], i: Option<usize>) -> (Rotation, Vector) {
+    let Some(link) = i.map(|i| &tree.links()[i]) else {
+        return (UNTURNED, [0.0; 3]);
+    };
+    let (rotation, origin) = frame(tree, q, link.parent);
+    let at = add(&origin, &turn(&rotation, &link.origin));
+    let joint = product(&rotation, &link.rotation);
+    let (still, mut slope) = ([0.0; MOST_JOINTS], [0.0; MOST_JOINTS]);
+    let (v, a) = (&still[..q.len()], &still[..q.len()]);
+    let [moved, ..] = link.coordinate.motion(q, v, a, &mut slope);
+    match link.kind {
+        JointKind::Revolute => (product(&joint, &about(&link.axis, moved)), at),
+        JointKind::Prismatic => {
+            let slid = turn(&joint, &times(moved, &link.axis));
+            (joint, add(&at, &slid))
+        }
+    }
+}
+
 /// Origins of the links' frames in the base frame \[m\], in the order of the tree, where the independent joints are
 /// at `q` \[m or rad\].
 pub fn origins(tree: &Tree, q: &[f64]) -> Vec<Vector> {
-    let still = vec![0.0; q.len()];
-    let mut frames: Vec<(Rotation, Vector)> = Vec::with_capacity(tree.links().len());
-    for link in tree.links() {
-        let (rotation, origin) = match link.parent {
-            Some(parent) => frames[parent],
-            None => (UNTURNED, [0.0; 3]),
-        };
-        let at = add(&origin, &turn(&rotation, &link.origin));
-        let joint = product(&rotation, &link.rotation);
-        let mut slope = [0.0; MOST_JOINTS];
-        let [moved, ..] = link.coordinate.motion(q, &still, &still, &mut slope);
-        frames.push(match link.kind {
-            JointKind::Revolute => (product(&joint, &about(&link.axis, moved)), at),
-            JointKind::Prismatic => {
-                let slid = turn(&joint, &times(moved, &link.axis));
-                (joint, add(&at, &slid))
-            }
-        });
-    }
-    frames.into_iter().map(|(_, origin)| origin).collect()
+    let links = 0..tree.links().len();
+    links.map(|i| frame(tree, q, Some(i)).1).collect()
 }
 
 /// The link that each independent joint drives itself, or moves first.
