@@ -36,6 +36,33 @@ pub fn friction_meaning(name: &str) -> &'static str {
     }
 }
 
+impl Covariance {
+    /// Pairs of parameters whose errors correlate by `least` or more, the strongest first.
+    pub fn correlated(&self, least: f64) -> Vec<([&str; 2], f64)> {
+        let at = |i: usize, j: usize| self.matrix.get(i).and_then(|row| row.get(j)).copied();
+        let mut found = Vec::new();
+        for i in 0..self.names.len() {
+            for j in 0..i {
+                let (Some(a), Some(b), Some(both)) = (at(i, i), at(j, j), at(i, j)) else {
+                    continue;
+                };
+                let correlation = both / (a * b).sqrt();
+                if correlation.is_finite() && correlation.abs() >= least {
+                    found.push((correlation, j, i));
+                }
+            }
+        }
+        found.sort_by(|x, y| {
+            let places = (x.1, x.2).cmp(&(y.1, y.2));
+            y.0.abs().total_cmp(&x.0.abs()).then(places)
+        });
+        let named = |(correlation, i, j): (f64, usize, usize)| {
+            ([i, j].map(|k| self.names[k].as_str()), correlation)
+        };
+        found.into_iter().map(named).collect()
+    }
+}
+
 impl ModelFile {
     /// The model that the file describes; `file` names it in errors.
     ///

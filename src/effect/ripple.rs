@@ -31,7 +31,7 @@ pub static ENTRY: Entry = Entry {
     source: "cogging of a motor, teeth of a gear, an eccentric encoder",
     at_rest: true,
     said: |f| format!("ripple of {}, {}, {}", f.at, f.wave(), f.amplitude()),
-    remedy: "compare it with the lead of the screw, the poles of the motor and the teeth of the gear; compensate it over position with the refined model",
+    remedy: "compare it with the poles of the motor, the teeth of the gear and, on a linear axis, the lead of the screw; compensate it over position with the refined model",
     ..Entry::USUAL
 };
 

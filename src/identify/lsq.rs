@@ -24,6 +24,7 @@ use super::reduced::reduced_log::{MadeWith, ReducedLog};
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{Unknown, columns, unknowns};
+use super::weakest::{WeakestPart, weakest};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
 use crate::config::identified::friction_meaning;
@@ -78,6 +79,8 @@ pub struct IdentifiedDynamics {
     pub condition: ConditionNumbers,
     /// Directions of the parameters that the rows tell of.
     pub rank: usize,
+    /// The combination of parameters that they tell least about.
+    pub weakest_direction: Vec<WeakestPart>,
     /// Rows of all joints.
     pub samples: u64,
     /// Independent rows that they are worth, of all joints.
@@ -258,6 +261,7 @@ pub fn lsq(
         },
         condition: fit.condition,
         rank: fit.rank,
+        weakest_direction: weakest(&fit, &unknowns),
         samples: fit.rows * machine.robot.joints() as u64,
         effective_samples: fit.effective_rows * machine.robot.joints() as f64,
         joints: joints.collect(),

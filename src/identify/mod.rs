@@ -63,6 +63,7 @@ mod track_error;
 mod unknowns;
 mod validate;
 mod watch;
+mod weakest;
 
 pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
 pub use compare::{Compared, Comparison, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
@@ -107,3 +108,4 @@ pub use track_error::TrackError;
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};
 pub use watch::{STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch};
+pub use weakest::WeakestPart;

@@ -101,8 +101,8 @@ pub(crate) fn beyond_chance(
         candidate.placebo_p_value = Some(p.max(beyond));
         if beyond > limits.false_alarm {
             candidate.reject(&format!(
-                "processing makes as much: the filter of the positions and their noise leave such a residual in a \
-                 model that lacks nothing; beyond it p = {beyond:.3}"
+                "filtering and noise of the positions alone leave such a residual in a model that lacks nothing; \
+                 beyond that, p = {beyond:.3}"
             ));
         }
     }

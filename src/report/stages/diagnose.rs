@@ -472,7 +472,7 @@ fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             "effect",
             "family",
             "cross-validated gain",
-            "own share",
+            "independent of the model",
             "why not",
         ],
         rows,
@@ -522,7 +522,7 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             "after",
             "95 % CI",
             "rms after",
-            "torque power left above noise",
+            "residual with a pattern, of torque power",
         ],
         rows,
     );
