@@ -16,7 +16,7 @@ pub type Starts = Result<Vec<Vec<f64>>, String>;
 /// Fills the columns of one joint along a scene: place, shape, joint, columns.
 pub type Fill = fn(&Scene, Place, &[f64], usize, &mut [Vec<f64>]);
 
-/// The estimator's law of an effect.
+/// The estimator's law of an effect. What a formula may stand for is asked of its methods.
 pub struct Law {
     pub entry: &'static Entry,
     /// Whether it can sit at one of the entry's places on this robot.
@@ -26,11 +26,11 @@ pub struct Law {
     /// Coefficients of the columns, one each.
     pub linear: &'static [&'static str],
     /// Shapes to try on these data, or what they lack.
-    pub starts: fn(&Cover, Place) -> Starts,
+    pub(super) starts: fn(&Cover, Place) -> Starts,
     /// Limits of each shape parameter that is refined, on these data.
-    pub limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
+    pub(super) limits: fn(&Cover, Place) -> Vec<[f64; 2]>,
     /// Adds to `out` (one vector per linear coefficient, zero before) the columns of joint `joint`.
-    pub columns: Fill,
+    pub(super) columns: Fill,
     /// One sample at a time, where a column depends on samples before it.
     pub memory: Option<Memory>,
     /// Direction of the joint's friction at a speed, where the effect makes it smooth: shape, speed.
