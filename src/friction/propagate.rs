@@ -62,6 +62,10 @@ struct FrictionAt {
 /// tanh through one exponential: four times as fast as the library's, absolute error below 3e-16.
 #[inline(always)]
 fn tanh(x: f64) -> f64 {
+    // what is left to 1 is rounded away; most samples of a sharp law are so far from standstill
+    if x.abs() >= 20.0 {
+        return 1.0_f64.copysign(x);
+    }
     1.0 - 2.0 / (1.0 + (2.0 * x).exp())
 }
 
@@ -381,6 +385,8 @@ mod tests {
             let x = f64::from(i) * 0.1;
             assert!((tanh(x) - x.tanh()).abs() < 4e-16, "{x}");
         }
-        assert_eq!((tanh(1e4), tanh(-1e4)), (1.0, -1.0));
+        for x in [1e4, 20.0, 20.0_f64.next_down()] {
+            assert_eq!((tanh(x), tanh(-x)), (1.0, -1.0));
+        }
     }
 }
