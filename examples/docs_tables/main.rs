@@ -2,10 +2,11 @@
 //! `cargo run --example docs_tables`. With `--check` it writes nothing and fails where one differs.
 //!
 //! A table stands between `<!-- table: KIND FILE... -->` and `<!-- end of table -->`; the kinds are
-//! in `tables.rs`. The results are made by `docs/generate`, or by the command that they name.
+//! in `tables.rs`, figures of results in `figures.rs`. The results are made by `docs/generate`, or by the command that they name.
 
 mod arms;
 mod blocks;
+mod figures;
 mod setup;
 mod tables;
 
@@ -34,6 +35,14 @@ fn main() -> ExitCode {
                 eprintln!("{shown}: {problem}");
                 failed = true;
             }
+        }
+    }
+    for (name, svg) in figures::all(root) {
+        let path = root.join("docs/figures").join(name);
+        let same = std::fs::read_to_string(&path).is_ok_and(|old| old == svg);
+        if !same && (check || std::fs::write(&path, svg).is_err()) {
+            eprintln!("docs/figures/{name}: differs from docs/results, or cannot be written");
+            failed = true;
         }
     }
     ExitCode::from(u8::from(failed))

@@ -57,6 +57,7 @@ mod separate;
 mod setup;
 mod setup_words;
 mod speeds;
+mod told;
 mod torque;
 mod track;
 mod track_error;

@@ -10,24 +10,17 @@ use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
-use super::estimate::estimate;
-use super::log::Log;
-use super::logged_robot::LoggedRobot;
-use super::passes::Passes;
 use super::reduced::reduced_log::{MadeWith, ReducedLog};
+use super::told::{Source, Told};
 use super::track_error::TrackError;
-use super::unknowns::columns;
-use crate::config::campaign::EstimatorKind;
-use crate::config::identified::{friction_unit, inertia_unit};
-use crate::config::{ModelFile, RobotFile};
+use crate::config::ModelFile;
 use crate::log::Provenance;
-use crate::track::{Change, ChangeKind, Estimate, Level, apart, follow};
-use crate::verdict::Verdict;
+use crate::track::{Change, ChangeKind, Course, Estimate, Level, apart, follow_together};
 
 /// Probability at which changes are told of a robot that has none, all its parameters together, at one look. A robot is
 /// looked at after each of its logs, and payloads follow no normal law: over fifty logs there are more
 /// (`examples/study_track`).
-const ALARMS: f64 = 0.0005;
+const ALARMS: f64 = 0.0002;
 /// The same of robots of a fleet that are alike.
 const DIFFERENCES: f64 = 0.01;
 /// A time between two logs over the usual one from which on the clock is doubted.
@@ -111,7 +104,8 @@ pub struct TrackedChange {
     /// The size over the parameter before it; null where that is nothing.
     pub relative: Option<f64>,
     pub kind: ChangeKind,
-    /// Probability of one as clear in this course without a change.
+    /// Probability of one as clear in this course without a change; in the courses of all sizes of a joint's friction,
+    /// which are followed together.
     pub p_value: f64,
     pub unit: String,
     /// Number of the log, from 0.
@@ -133,16 +127,6 @@ pub struct FleetDifference {
     /// Corrected for all comparisons.
     pub p_value: f64,
     pub unit: String,
-}
-
-/// What one source tells of one parameter.
-#[derive(Debug, Clone, PartialEq)]
-struct Told {
-    name: String,
-    joint: Option<String>,
-    unit: String,
-    value: f64,
-    variance: f64,
 }
 
 /// Follows the parameters of robots.
@@ -364,67 +348,6 @@ fn one_robot(robot: &RobotSources) -> Result<(), TrackError> {
     Ok(())
 }
 
-/// What a model tells.
-fn of_model(file: &ModelFile) -> Vec<Told> {
-    let told = |p: &crate::config::model_file::Parameter| {
-        let known = p.verdict != Some(Verdict::NotIdentifiable);
-        let std = p.std.filter(|std| known && *std > 0.0);
-        Told {
-            name: p.name.clone(),
-            joint: p.joint.clone(),
-            unit: p.unit.clone(),
-            value: p.value,
-            variance: std.map_or(f64::INFINITY, |std| std * std),
-        }
-    };
-    file.parameters.iter().map(told).collect()
-}
-
-/// What a reduced log tells by itself; all that is not determined has an infinite variance.
-fn of_part(part: &Arc<ReducedLog>, control: &Control) -> Result<Vec<Told>, IdentifyError> {
-    let name = format!("the robot file of {}", part.name().replace('.', "-"));
-    let file = RobotFile::parse(&name, &part.made_with.robot_file)?;
-    let machine = LoggedRobot::new(&name, file);
-    part.belongs_to_robot(&machine.file)?;
-    let log = Log::Reduced(part.clone());
-    let known = part.known_friction();
-    let linear = columns(&machine, known.as_deref());
-    let mut passes = Passes::new(&machine, from_ref(&log), control);
-    let found = match estimate(&mut passes, linear.clone(), EstimatorKind::Wls, false) {
-        Ok(found) => Some(found.fit),
-        // a log that tells nothing is a log that tells nothing
-        Err(IdentifyError::Fit(_)) => None,
-        Err(error) => return Err(error),
-    };
-    let robot = &machine.robot;
-    let inertial = robot.parameters().iter().map(|info| {
-        let unit = inertia_unit(robot, &info.unit, machine.file.inertial_torque_unit());
-        (info.name.to_string(), None, unit)
-    });
-    let joints = robot.joint_names().iter().enumerate();
-    let own = joints.flat_map(|(j, joint)| {
-        let unit = machine.file.torque_unit(j);
-        linear.own[j].iter().map(move |own| {
-            let unit = friction_unit(robot, j, own.name(), unit);
-            (own.name().to_owned(), Some(joint.clone()), unit)
-        })
-    });
-    let named = inertial.chain(own).enumerate();
-    Ok(named
-        .map(|(i, (name, joint, unit))| {
-            let told = found.as_ref().filter(|fit| fit.determined[i]);
-            let variance = told.map(|fit| fit.covariance[(i, i)]);
-            Told {
-                name,
-                joint,
-                unit,
-                value: told.map_or(0.0, |fit| fit.theta[i]),
-                variance: variance.filter(|v| *v > 0.0).unwrap_or(f64::INFINITY),
-            }
-        })
-        .collect())
-}
-
 /// One robot over its sources in order of time.
 fn followed(
     name: &str,
@@ -432,83 +355,41 @@ fn followed(
     times: &[f64],
     control: &Control,
 ) -> Result<TrackedRobot, IdentifyError> {
-    let told: Vec<Vec<Told>> = sources
+    let told: Vec<Source> = sources
         .par_iter()
         .map(|source| {
             if control.stopped() {
                 return Err(IdentifyError::Interrupted);
             }
             match source {
-                TrackSource::Part { log, .. } => of_part(log, control),
-                TrackSource::Model { file, .. } => Ok(of_model(file)),
+                TrackSource::Part { log, .. } => Source::of_part(log, control),
+                TrackSource::Model { file, .. } => Ok(Source::of_model(file)),
             }
         })
         .collect::<Result<_, _>>()?;
-    let mut keys: Vec<&Told> = Vec::new();
-    for one in told.iter().flatten() {
-        if !keys
-            .iter()
-            .any(|k| (&k.name, &k.joint) == (&one.name, &one.joint))
-        {
-            keys.push(one);
-        }
-    }
-    let level = ALARMS / keys.len().max(1) as f64;
+    let groups = groups(&told);
+    let level = ALARMS / groups.len().max(1) as f64;
     let (mut parameters, mut changes) = (Vec::new(), Vec::new());
-    for key in keys {
-        let estimates: Vec<Estimate> = told
-            .iter()
-            .zip(times)
-            .map(|(told, time)| {
-                let same = |t: &&Told| (&t.name, &t.joint) == (&key.name, &key.joint);
-                let own = told.iter().find(same);
+    for keys in &groups {
+        let of_key = |key: &&Told| -> Vec<Estimate> {
+            let each = told.iter().zip(times);
+            each.map(|(source, time)| {
+                let own = source.told.iter().find(|t| t.is(key));
                 Estimate {
                     time: *time,
                     value: own.map_or(0.0, |t| t.value),
                     variance: own.map_or(f64::INFINITY, |t| t.variance),
                 }
             })
-            .collect();
-        let course = follow(&estimates, level);
-        let change = |c: &Change| {
-            let before = course.values[c.at.saturating_sub(1)];
-            TrackedChange {
-                parameter: key.name.clone(),
-                joint: key.joint.clone(),
-                time: times[c.at],
-                size: c.size,
-                std: c.std,
-                relative: (before != 0.0).then(|| c.size / before.abs()),
-                kind: c.kind,
-                p_value: c.p_value,
-                unit: key.unit.clone(),
-                log: c.at,
-            }
+            .collect()
         };
-        changes.extend(course.changes.iter().map(change));
-        let known = |x: &[f64]| -> Vec<Option<f64>> {
-            let pairs = x.iter().zip(&course.std);
-            pairs
-                .map(|(x, std)| std.is_finite().then_some(*x))
-                .collect()
-        };
-        let of_log = |of: fn(&Estimate) -> f64| -> Vec<Option<f64>> {
-            let told = |e: &Estimate| e.variance.is_finite().then(|| of(e));
-            estimates.iter().map(told).collect()
-        };
-        parameters.push(TrackedParameter {
-            name: key.name.clone(),
-            joint: key.joint.clone(),
-            unit: key.unit.clone(),
-            times: times.to_vec(),
-            values: known(&course.values),
-            std: known(&course.std),
-            estimates: of_log(|e| e.value),
-            estimates_std: of_log(|e| e.variance.sqrt()),
-            walk: course.walk,
-            scatter: course.scatter,
-            outliers: course.outliers.clone(),
-        });
+        let estimates: Vec<Vec<Estimate>> = keys.iter().map(of_key).collect();
+        let own: Vec<&[Estimate]> = estimates.iter().map(Vec::as_slice).collect();
+        let courses = follow_together(&own, correlation(&told, keys).as_deref(), level);
+        for ((key, estimates), course) in keys.iter().zip(&estimates).zip(&courses) {
+            changes.extend(changed(key, course, &courses, times));
+            parameters.push(tracked(key, course, estimates, times));
+        }
     }
     changes.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
     Ok(TrackedRobot {
@@ -517,6 +398,97 @@ fn followed(
         parameters,
         changes,
     })
+}
+
+/// Parameters that are followed together: sizes of the friction of one joint, and each other one by itself.
+fn groups(told: &[Source]) -> Vec<Vec<&Told>> {
+    let mut groups: Vec<Vec<&Told>> = Vec::new();
+    for one in told.iter().flat_map(|source| &source.told) {
+        if groups.iter().flatten().any(|key| key.is(one)) {
+            continue;
+        }
+        let with = |group: &&mut Vec<&Told>| {
+            let alike = |key: &&Told| key.is_friction() && key.joint == one.joint;
+            one.is_friction() && group.iter().any(alike)
+        };
+        match groups.iter_mut().find(with) {
+            Some(group) => group.push(one),
+            None => groups.push(vec![one]),
+        }
+    }
+    groups
+}
+
+/// Correlation of the errors of estimates of one log, as the logs say it on average, row by row.
+fn correlation(told: &[Source], keys: &[&Told]) -> Option<Vec<f64>> {
+    let mean = |one: &Told, other: &Told| {
+        let all = told
+            .iter()
+            .filter_map(|source| source.correlation(one, other));
+        let all: Vec<f64> = all.collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    };
+    let pairs = keys
+        .iter()
+        .flat_map(|one| keys.iter().map(move |other| mean(one, other)));
+    pairs.collect()
+}
+
+/// Sizes of a joint's friction that are less than so many deviations from none are not told of a change that others
+/// show.
+const SHOWN: f64 = 2.0;
+
+/// Changes of one parameter of those that are followed together.
+fn changed(key: &Told, course: &Course, together: &[Course], times: &[f64]) -> Vec<TrackedChange> {
+    let clear = |c: &Change| (c.size / c.std).abs();
+    let shown = |(i, change): &(usize, &Change)| {
+        let all = together.iter().map(|course| clear(&course.changes[*i]));
+        clear(change) >= all.fold(0.0, f64::max).min(SHOWN)
+    };
+    let changes = course.changes.iter().enumerate().filter(shown);
+    let told = changes.map(|(_, c)| {
+        let before = course.values[c.at.saturating_sub(1)];
+        TrackedChange {
+            parameter: key.name.clone(),
+            joint: key.joint.clone(),
+            time: times[c.at],
+            size: c.size,
+            std: c.std,
+            relative: (before != 0.0).then(|| c.size / before.abs()),
+            kind: c.kind,
+            p_value: c.p_value,
+            unit: key.unit.clone(),
+            log: c.at,
+        }
+    });
+    told.collect()
+}
+
+/// One parameter over time.
+fn tracked(key: &Told, course: &Course, estimates: &[Estimate], times: &[f64]) -> TrackedParameter {
+    let known = |x: &[f64]| -> Vec<Option<f64>> {
+        let pairs = x.iter().zip(&course.std);
+        pairs
+            .map(|(x, std)| std.is_finite().then_some(*x))
+            .collect()
+    };
+    let of_log = |of: fn(&Estimate) -> f64| -> Vec<Option<f64>> {
+        let told = |e: &Estimate| e.variance.is_finite().then(|| of(e));
+        estimates.iter().map(told).collect()
+    };
+    TrackedParameter {
+        name: key.name.clone(),
+        joint: key.joint.clone(),
+        unit: key.unit.clone(),
+        times: times.to_vec(),
+        values: known(&course.values),
+        std: known(&course.std),
+        estimates: of_log(|e| e.value),
+        estimates_std: of_log(|e| e.variance.sqrt()),
+        walk: course.walk,
+        scatter: course.scatter,
+        outliers: course.outliers.clone(),
+    }
 }
 
 /// Robots that differ from the others.

@@ -1,11 +1,13 @@
-//! Steps and ramps in a course, one after the other, by generalised least squares.
+//! Steps and ramps, one after the other, by generalised least squares: of one parameter, or of some that change
+//! together, as the friction of a joint does.
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::local_level::Whitener;
-use super::walk::{Likeliest, Sizes, sizes, still};
+use super::local_level::smooth;
+use super::together::{About, White, orthonormal, without};
+use super::walk::{Likeliest, Sizes, median, sizes, still};
 
 /// How a parameter changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -27,7 +29,18 @@ pub struct Change {
     pub size: f64,
     /// Its standard deviation.
     pub std: f64,
-    /// Probability of one as clear somewhere in the course without a change.
+    /// Probability of one as clear somewhere in the course without a change, of all parameters that are followed
+    /// together.
+    pub p_value: f64,
+}
+
+/// A change of parameters that are followed together.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub kind: ChangeKind,
+    pub at: usize,
+    /// Of each parameter, and its standard deviation.
+    pub sizes: Vec<[f64; 2]>,
     pub p_value: f64,
 }
 
@@ -37,11 +50,14 @@ const MOST: usize = 3;
 const BEFORE: usize = 6;
 /// Least number of logs from a change on: one log in ten may carry a payload, and some of these follow each other.
 const AFTER: usize = 6;
-/// Largest share of the logs from a change on that stand alone: where more do, the robot carries something now and then.
-const ALONE: f64 = 0.2;
+/// Largest share of the logs on one side of a change that are not of that side: where more are, the robot carries
+/// something now and then.
+const ASTRAY: f64 = 0.2;
+/// Deviations from the level of its side, from which on a log that is nearer to the other is not of its side.
+const FAR: f64 = 3.0;
 /// Most times that walk and scatter are sized anew with a change taken out.
 const REFINED: usize = 3;
-/// What is estimated besides the changes: level, walk and scatter.
+/// What is estimated of each parameter besides the changes: level, walk and scatter.
 const OTHERS: usize = 3;
 
 /// What a change of `kind` at log `at` adds, over its size.
@@ -56,167 +72,149 @@ fn shape(kind: ChangeKind, at: usize, times: &[f64]) -> Vec<f64> {
     times.iter().enumerate().map(of).collect()
 }
 
-/// What is known of the estimates of a course besides their values.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct About<'a> {
-    /// Variances; infinite where a log tells nothing, or stands alone.
-    pub estimate: &'a [f64],
-    /// Spacings over the usual one.
-    pub spacings: &'a [f64],
-    pub times: &'a [f64],
-    /// Logs that stand alone.
-    pub alone: &'a [usize],
-}
-
-impl About<'_> {
-    /// Whether so many logs before or from `at` on stand alone that the robot carries something now and then: that
-    /// some of these follow each other is no change.
-    fn varies_beside(&self, at: usize) -> bool {
-        let before = self.alone.iter().filter(|k| **k < at).count();
-        let since = self.alone.len() - before;
-        let often = |alone: usize, logs: usize| alone as f64 > ALONE * logs as f64;
-        often(before, at) || often(since, self.times.len() - at)
+impl Found {
+    fn shape(&self, times: &[f64]) -> Vec<f64> {
+        shape(self.kind, self.at, times)
     }
 }
 
 /// A change that is the clearest of those tried.
 struct Clearest {
-    change: Change,
-    /// Its size over its deviation.
-    clear: f64,
+    change: Found,
+    /// What it removes per parameter over what is left per degree of freedom.
+    ratio: f64,
     tried: u32,
 }
 
 /// Seeks changes whose probability without one is below `level`, Bonferroni's correction for the places and kinds that
-/// are tried included; with them the sizes of walk and scatter. Those are estimated with the clearest change taken
-/// out, for a change that is left in makes a walk. The deviation is scaled by the residual where that is larger than
-/// the variances say.
-pub(super) fn seek(signal: &[f64], about: About, level: f64) -> (Sizes, Vec<Change>) {
-    let About {
-        estimate,
-        spacings,
-        times,
-        ..
-    } = about;
-    let n = estimate.iter().filter(|r| r.is_finite()).count();
-    let mut found: Vec<Change> = Vec::new();
-    let mut sizes = self::sizes(signal, estimate, spacings).sizes;
-    while found.len() < MOST && n > OTHERS + found.len() + 2 {
-        let freedom = (n - OTHERS - found.len() - 1) as f64;
-        let Ok(law) = StudentsT::new(0.0, 1.0, freedom) else {
+/// are tried included; with them the sizes of walk and scatter of each parameter. Those are estimated with the clearest
+/// change taken out, for a change that is left in makes a walk. The deviation is scaled by the residual where that is
+/// larger than the variances say. Of several parameters the likelihood ratio is tested, with the correlation of their
+/// innovations (Basseville and Nikiforov 1993, section 7.2).
+pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
+    let (count, told) = (about.members.len(), about.told());
+    let mut found: Vec<Found> = Vec::new();
+    let mut sizes = likeliest(about, &[], sizes).0;
+    while found.len() < MOST && told > count * (OTHERS + found.len() + 2) {
+        let freedom = (told - count * (OTHERS + found.len() + 1)) as f64;
+        let Ok(law) = FisherSnedecor::new(count as f64, freedom) else {
             break;
         };
         // a walk that is large enough hides a change, and a change that is left in makes a walk: both starts are tried
-        let known = rest_of(signal, times, &found);
-        let starts = [sizes, still(&known, estimate, spacings).sizes];
-        let tried = starts.map(|start| settled(signal, about, start, &found));
+        let starts = [sizes.clone(), likeliest(about, &found, still).0];
+        let tried = starts.map(|start| settled(about, start, &found));
         let tried = tried.into_iter().flatten();
-        let best = tried.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        let Some((mut next, Likeliest { sizes: anew, .. })) = best else {
+        let best = tried.min_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((mut next, anew, _)) = best else {
             break;
         };
-        next.change.p_value = (f64::from(next.tried) * 2.0 * law.sf(next.clear)).min(1.0);
+        next.change.p_value = (f64::from(next.tried) * law.sf(next.ratio)).min(1.0);
         if next.change.p_value > level {
             break;
         }
         sizes = anew;
         found.push(next.change);
-        let whitener = Whitener::new(&sizes.variances(estimate, spacings));
-        together(&whitener.apply(signal), &whitener, (times, n), &mut found);
+        fit(about, &sizes, &mut found);
     }
     found.sort_by_key(|c| c.at);
     (sizes, found)
 }
 
-/// The clearest change and the sizes with it taken out, each found anew by the other from `sizes` on.
-fn settled(
-    signal: &[f64],
+/// Sizes of walk and scatter of each parameter with changes taken out, and how unlikely the innovations are.
+fn likeliest(
     about: About,
-    sizes: Sizes,
-    found: &[Change],
-) -> Option<(Clearest, Likeliest)> {
-    let About {
-        estimate,
-        spacings,
-        times,
-        ..
-    } = about;
-    let mut next = clearest(signal, about, &sizes, found)?;
+    found: &[Found],
+    by: fn(&[f64], &[f64], &[f64]) -> Likeliest,
+) -> (Vec<Sizes>, f64) {
+    let rests = rests(about, found);
+    let members = about.members.iter().zip(&rests);
+    let all: Vec<Likeliest> = members
+        .map(|(member, rest)| by(rest, member.estimate, about.spacings))
+        .collect();
+    let cost = all.iter().map(|one| one.cost).sum();
+    (all.iter().map(|one| one.sizes).collect(), cost)
+}
+
+/// The clearest change and the sizes with it taken out, each found anew by the other from `sizes` on; and how unlikely
+/// the innovations are then.
+fn settled(
+    about: About,
+    sizes: Vec<Sizes>,
+    found: &[Found],
+) -> Option<(Clearest, Vec<Sizes>, f64)> {
+    let mut next = clearest(about, &sizes, found)?;
     let mut rounds = 0;
     loop {
-        let all = [found, &[next.change]].concat();
-        let anew = self::sizes(&rest_of(signal, times, &all), estimate, spacings);
-        let again = clearest(signal, about, &anew.sizes, found)?;
+        let all = [found, std::slice::from_ref(&next.change)].concat();
+        let (anew, cost) = likeliest(about, &all, self::sizes);
+        let again = clearest(about, &anew, found)?;
         let same = (again.change.kind, again.change.at) == (next.change.kind, next.change.at);
         next = again;
         rounds += 1;
         if same || rounds == REFINED {
-            return Some((next, anew));
+            return Some((next, anew, cost));
         }
     }
 }
 
-/// The signal without changes.
-fn rest_of(signal: &[f64], times: &[f64], changes: &[Change]) -> Vec<f64> {
-    let mut rest = signal.to_vec();
+/// The signals without changes.
+fn rests(about: About, changes: &[Found]) -> Vec<Vec<f64>> {
+    let mut rests: Vec<Vec<f64>> = (about.members.iter())
+        .map(|member| member.signal.to_vec())
+        .collect();
     for change in changes {
-        let shape = shape(change.kind, change.at, times);
-        let pairs = rest.iter_mut().zip(shape);
-        pairs.for_each(|(x, shape)| *x -= change.size * shape);
+        let shape = change.shape(about.times);
+        for (rest, [size, _]) in rests.iter_mut().zip(&change.sizes) {
+            let pairs = rest.iter_mut().zip(&shape);
+            pairs.for_each(|(x, shape)| *x -= size * shape);
+        }
     }
-    rest
+    rests
 }
 
 /// The clearest change besides those that are known.
-fn clearest(signal: &[f64], about: About, sizes: &Sizes, found: &[Change]) -> Option<Clearest> {
-    let About {
-        estimate,
-        spacings,
-        times,
-        ..
-    } = about;
-    let told: Vec<usize> = (0..signal.len())
-        .filter(|k| estimate[*k].is_finite())
-        .collect();
-    let n = told.len();
-    let whitener = Whitener::new(&sizes.variances(estimate, spacings));
+fn clearest(about: About, sizes: &[Sizes], found: &[Found]) -> Option<Clearest> {
+    let count = about.members.len();
+    let white = White::new(about, sizes, &rests(about, found));
     let columns: Vec<Vec<f64>> = (found.iter())
-        .map(|c| whitener.apply(&shape(c.kind, c.at, times)))
+        .flat_map(|c| white.columns(&c.shape(about.times)))
         .collect();
     let known = orthonormal(columns.iter());
-    let freedom = n.saturating_sub(OTHERS + found.len() + 1).max(1) as f64;
-    let residual = without(&whitener.apply(signal), &known);
-    let square = residual.iter().map(|x| x * x).sum::<f64>();
+    let freedom = about
+        .told()
+        .saturating_sub(count * (OTHERS + found.len() + 1));
+    let freedom = freedom.max(1) as f64;
+    let residual = without(&white.signals(), &known);
+    let square = dot(&residual, &residual);
+    let told: Vec<usize> = (0..about.times.len())
+        .filter(|k| about.members.iter().any(|m| m.estimate[*k].is_finite()))
+        .collect();
     let mut best: Option<Clearest> = None;
     let mut tried = 0_u32;
     for kind in [ChangeKind::Step, ChangeKind::Ramp] {
-        let places = BEFORE..(n + 1).saturating_sub(AFTER).max(BEFORE);
+        let places = BEFORE..(told.len() + 1).saturating_sub(AFTER).max(BEFORE);
         for at in told.get(places).into_iter().flatten().copied() {
             tried += 1;
-            if about.varies_beside(at) {
+            let shape = shape(kind, at, about.times);
+            let own = white.columns(&shape);
+            let own: Vec<Vec<f64>> = own.iter().map(|column| without(column, &known)).collect();
+            let units = orthonormal(own.iter());
+            let gain = units.iter().map(|u| dot(u, &residual).powi(2)).sum::<f64>();
+            let scale = ((square - gain).max(0.0) / freedom).max(1.0);
+            let ratio = gain / (count as f64 * scale);
+            if units.is_empty() || best.as_ref().is_some_and(|b| ratio <= b.ratio) {
                 continue;
             }
-            let column = without(&whitener.apply(&shape(kind, at, times)), &known);
-            let norm = column.iter().map(|x| x * x).sum::<f64>();
-            if norm <= 1e-12 {
-                continue;
-            }
-            let product: f64 = column.iter().zip(&residual).map(|(x, y)| x * y).sum();
-            let left = (square - product * product / norm).max(0.0);
-            let std = ((left / freedom).max(1.0) / norm).sqrt();
-            let size = product / norm;
-            let clear = (size / std).abs();
-            if best.as_ref().is_none_or(|b| clear > b.clear) {
-                let change = Change {
-                    kind,
-                    at,
-                    size,
-                    std,
-                    p_value: 1.0,
-                };
+            let change = Found {
+                kind,
+                at,
+                sizes: fitted(&own, &residual, scale),
+                p_value: 1.0,
+            };
+            if !carries(about, sizes, found, &change) {
                 best = Some(Clearest {
                     change,
-                    clear,
+                    ratio,
                     tried,
                 });
             }
@@ -225,46 +223,72 @@ fn clearest(signal: &[f64], about: About, sizes: &Sizes, found: &[Change]) -> Op
     best.map(|best| Clearest { tried, ..best })
 }
 
-/// A signal without its parts along orthonormal ones.
-fn without(signal: &[f64], known: &[Vec<f64>]) -> Vec<f64> {
-    let mut rest = signal.to_vec();
-    for unit in known {
-        let part: f64 = rest.iter().zip(unit).map(|(x, u)| x * u).sum();
-        rest.iter_mut().zip(unit).for_each(|(x, u)| *x -= part * u);
-    }
-    rest
+/// Whether so many logs on one side of a change are not of that side, stand alone, or are as those that stood alone
+/// before it, that the robot carries something now and then: that some of these follow each other is no change.
+fn carries(about: About, sizes: &[Sizes], found: &[Found], change: &Found) -> bool {
+    let all = [found, std::slice::from_ref(change)].concat();
+    let rests = rests(about, &all);
+    let shape = change.shape(about.times);
+    let members = about.members.iter().zip(sizes).zip(&rests).enumerate();
+    members.into_iter().any(|(i, ((member, own), rest))| {
+        let variances = own.variances(member.estimate, about.spacings);
+        let (level, _) = smooth(&member.told(rest), &variances);
+        let [size, _] = change.sizes[i];
+        let off = |k: usize| rest[k] - level[k];
+        let before = member.alone.iter().filter(|k| **k < change.at);
+        let carried = median(before.map(|k| off(*k)));
+        let astray = |k: &usize| {
+            // from the level of its side, from that of the other, and from what was carried before
+            let own = off(*k);
+            let since = *k >= change.at;
+            let old = if since { own + size * shape[*k] } else { own };
+            let other = if since { old } else { own - size };
+            let far = FAR * variances.estimate[*k].sqrt();
+            let again = |carried: f64| old.abs() > far && (old - carried).abs() < far;
+            member.alone.contains(k)
+                || (own.abs() > far && other.abs() < own.abs())
+                || (since && carried.is_some_and(again))
+        };
+        let often = |side: std::ops::Range<usize>| {
+            let logs = side.len() as f64;
+            side.filter(astray).count() as f64 > ASTRAY * logs
+        };
+        often(0..change.at) || often(change.at..about.times.len())
+    })
 }
 
-/// Sizes of all changes fitted together, and their deviations; `n` estimates tell something.
-fn together(white: &[f64], whitener: &Whitener, (times, n): (&[f64], usize), found: &mut [Change]) {
+/// Sizes of changes that are fitted together, each with the deviation of its size.
+fn fit(about: About, sizes: &[Sizes], found: &mut [Found]) {
+    let count = about.members.len();
+    let white = White::new(about, sizes, &rests(about, found));
     let columns: Vec<Vec<f64>> = (found.iter())
-        .map(|c| whitener.apply(&shape(c.kind, c.at, times)))
+        .flat_map(|c| white.columns(&c.shape(about.times)))
         .collect();
-    let freedom = n.saturating_sub(OTHERS + found.len()).max(1) as f64;
-    let all = orthonormal(columns.iter());
-    let left = without(white, &all).iter().map(|x| x * x).sum::<f64>();
-    let scale = (left / freedom).max(1.0);
-    for (i, change) in found.iter_mut().enumerate() {
+    let signals = white.signals();
+    let left = without(&signals, &orthonormal(columns.iter()));
+    let freedom = about.told().saturating_sub(count * (OTHERS + found.len()));
+    let scale = (dot(&left, &left) / freedom.max(1) as f64).max(1.0);
+    let fitted = fitted(&columns, &signals, scale);
+    for (change, sizes) in found.iter_mut().zip(fitted.chunks_exact(count)) {
+        change.sizes = sizes.to_vec();
+    }
+}
+
+/// Coefficient of each column and its standard deviation; 0 and infinite where the others hold it.
+fn fitted(columns: &[Vec<f64>], signal: &[f64], scale: f64) -> Vec<[f64; 2]> {
+    let of = |i: usize| {
         let others = columns.iter().enumerate().filter(|(j, _)| *j != i);
         let others = orthonormal(others.map(|(_, column)| column));
         let own = without(&columns[i], &others);
-        let norm = own.iter().map(|x| x * x).sum::<f64>();
-        if norm > 1e-12 {
-            change.size = own.iter().zip(white).map(|(x, y)| x * y).sum::<f64>() / norm;
-            change.std = (scale / norm).sqrt();
+        let norm = dot(&own, &own);
+        match norm > 1e-12 {
+            true => [dot(&own, signal) / norm, (scale / norm).sqrt()],
+            false => [0.0, f64::INFINITY],
         }
-    }
+    };
+    (0..columns.len()).map(of).collect()
 }
 
-/// Orthonormal signals that span the same.
-fn orthonormal<'a>(columns: impl Iterator<Item = &'a Vec<f64>>) -> Vec<Vec<f64>> {
-    let mut units: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let rest = without(column, &units);
-        let norm = rest.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if norm > 1e-9 {
-            units.push(rest.iter().map(|x| x / norm).collect());
-        }
-    }
-    units
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

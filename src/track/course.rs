@@ -1,8 +1,9 @@
 //! One parameter of one robot over its logs.
 
-use super::changes::{About, Change, ChangeKind, seek};
+use super::changes::{Change, ChangeKind, seek};
 use super::local_level::{Variances, smooth};
-use super::walk::median;
+use super::together::{About, Member};
+use super::walk::{Sizes, median};
 
 /// What one log tells of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,55 +42,112 @@ const NEIGHBOURS: usize = 5;
 /// The course of a parameter from estimates in order of time. `level` is the probability at which a change is told
 /// where there is none.
 pub fn follow(estimates: &[Estimate], level: f64) -> Course {
-    let signal: Vec<f64> = estimates.iter().map(|e| e.value).collect();
-    let told = |e: &Estimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
-    let mut variances: Vec<f64> = (estimates.iter())
-        .map(|e| if told(e) { e.variance } else { f64::INFINITY })
-        .collect();
-    let signal: Vec<f64> = (signal.iter().zip(&variances))
-        .map(|(y, r)| if r.is_finite() { *y } else { 0.0 })
-        .collect();
-    let times: Vec<f64> = estimates.iter().map(|e| e.time).collect();
+    let mut courses = follow_together(&[estimates], None, level);
+    courses.pop().unwrap_or_default()
+}
+
+/// Courses of parameters that change together, as the friction of a joint does: a change is sought in all of them at
+/// once, `level` is the probability that one is told where there is none, and each course has its own size of it.
+/// `parameters` are estimates of the same logs `[parameter][log]`, `correlation` is that of the errors of one log's
+/// estimates, row by row, where their fits say it.
+pub fn follow_together(
+    parameters: &[&[Estimate]],
+    correlation: Option<&[f64]>,
+    level: f64,
+) -> Vec<Course> {
+    let Some(first) = parameters.first() else {
+        return Vec::new();
+    };
+    let times: Vec<f64> = first.iter().map(|e| e.time).collect();
     let spacings = spacings(&times);
-    let outliers = alone(&signal, &variances);
-    for k in &outliers {
-        variances[*k] = f64::INFINITY;
-    }
+    let signals: Vec<Signal> = parameters.iter().map(|own| Signal::of(own)).collect();
+    let members: Vec<Member> = (signals.iter())
+        .map(|own| Member {
+            signal: &own.values,
+            estimate: &own.variances,
+            alone: &own.outliers,
+        })
+        .collect();
     let about = About {
-        estimate: &variances,
+        members: &members,
         spacings: &spacings,
         times: &times,
-        alone: &outliers,
+        correlation,
     };
-    let (sizes, changes) = seek(&signal, about, level);
-    let mut all: Variances = sizes.variances(&variances, &spacings);
-    let mut rest = signal.clone();
-    for change in &changes {
-        match change.kind {
-            ChangeKind::Step => all.walk[change.at] += FORGET * change.size * change.size,
-            // the walk has to follow the slope
-            ChangeKind::Ramp => {
-                let logs = (signal.len() - change.at).max(1) as f64;
-                let slope = change.size / logs;
-                all.walk[change.at..]
-                    .iter_mut()
-                    .for_each(|q| *q += slope * slope);
+    let (sizes, found) = seek(about, level);
+    let each = signals.iter().zip(&sizes).enumerate();
+    each.map(|(i, (signal, sizes))| {
+        let changes = found.iter().map(|change| Change {
+            kind: change.kind,
+            at: change.at,
+            size: change.sizes[i][0],
+            std: change.sizes[i][1],
+            p_value: change.p_value,
+        });
+        signal.course(sizes, &spacings, changes.collect())
+    })
+    .collect()
+}
+
+/// Estimates of one parameter, as they are followed.
+struct Signal {
+    values: Vec<f64>,
+    /// Infinite where a log tells nothing, or stands alone.
+    variances: Vec<f64>,
+    outliers: Vec<usize>,
+}
+
+impl Signal {
+    fn of(estimates: &[Estimate]) -> Self {
+        let told = |e: &Estimate| e.variance.is_finite() && e.variance > 0.0 && e.value.is_finite();
+        let mut variances: Vec<f64> = (estimates.iter())
+            .map(|e| if told(e) { e.variance } else { f64::INFINITY })
+            .collect();
+        let values: Vec<f64> = (estimates.iter())
+            .map(|e| if told(e) { e.value } else { 0.0 })
+            .collect();
+        let outliers = alone(&values, &variances);
+        for k in &outliers {
+            variances[*k] = f64::INFINITY;
+        }
+        Signal {
+            values,
+            variances,
+            outliers,
+        }
+    }
+
+    /// Its course with these changes.
+    fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<Change>) -> Course {
+        let mut all: Variances = sizes.variances(&self.variances, spacings);
+        for change in &changes {
+            match change.kind {
+                ChangeKind::Step => all.walk[change.at] += FORGET * change.size * change.size,
+                // the walk has to follow the slope
+                ChangeKind::Ramp => {
+                    let logs = (self.values.len() - change.at).max(1) as f64;
+                    let slope = change.size / logs;
+                    all.walk[change.at..]
+                        .iter_mut()
+                        .for_each(|q| *q += slope * slope);
+                }
             }
         }
-    }
-    for (y, r) in rest.iter_mut().zip(&all.estimate) {
-        if !r.is_finite() {
-            *y = 0.0;
+        let mut rest = self.values.clone();
+        for (y, r) in rest.iter_mut().zip(&all.estimate) {
+            if !r.is_finite() {
+                *y = 0.0;
+            }
         }
-    }
-    let (values, variance) = smooth(&rest, &all);
-    Course {
-        values,
-        std: variance.into_iter().map(f64::sqrt).collect(),
-        changes,
-        walk: sizes.walk.sqrt(),
-        scatter: sizes.scatter.sqrt(),
-        outliers,
+        let (values, variance) = smooth(&rest, &all);
+        Course {
+            values,
+            std: variance.into_iter().map(f64::sqrt).collect(),
+            changes,
+            walk: sizes.walk.sqrt(),
+            scatter: sizes.scatter.sqrt(),
+            outliers: self.outliers.clone(),
+        }
     }
 }
 
@@ -212,6 +270,70 @@ mod tests {
         }
         // of 200 courses at 1e-3 more than 3 come in one test of 17 000
         assert!(alarms.iter().all(|n| *n <= 3), "{alarms:?}");
+    }
+
+    /// Viscous and Coulomb friction, with errors of a correlation of 0.36, that grow by `size` from log 16 of 26 on.
+    fn friction(seed: u64, size: f64) -> [Vec<Estimate>; 2] {
+        let mut draw = chance(seed);
+        let mut out = [Vec::new(), Vec::new()];
+        for k in 0..26 {
+            let common = draw();
+            for own in &mut out {
+                let error = 0.3 * (0.6 * common + 0.8 * draw());
+                own.push(Estimate {
+                    time: k as f64 * 3600.0,
+                    value: 10.0 + if k < 16 { 0.0 } else { size } + error,
+                    variance: 0.09,
+                });
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn parameters_that_change_together_are_found_where_each_alone_is_not() {
+        const CORRELATION: [f64; 4] = [1.0, 0.36, 0.36, 1.0];
+        let (mut together, mut alone, mut alarms) = (0, 0, 0);
+        for seed in 0..30 {
+            let both = |size: f64| {
+                let own = friction(seed, size);
+                let found = follow_together(&[&own[0], &own[1]], Some(&CORRELATION), 1e-5);
+                (own, found)
+            };
+            let (own, found) = both(0.8);
+            // two courses, and the same chance of a false alarm
+            let shows = |own: &Vec<Estimate>| !follow(own, 0.5e-5).changes.is_empty();
+            alone += u32::from(own.iter().any(shows));
+            if let [change] = found[0].changes.as_slice() {
+                together += 1;
+                let other = found[1].changes[0];
+                assert_eq!((change.at, change.kind), (other.at, other.kind));
+                for c in [change, &other] {
+                    assert!((c.size - 0.8).abs() < 5.0 * c.std, "{c:?}");
+                }
+            }
+            alarms += both(0.0).1[0].changes.len();
+        }
+        assert!(together > 2 * alone, "{together} {alone}");
+        assert_eq!(alarms, 0);
+    }
+
+    #[test]
+    fn a_payload_that_comes_again_for_some_logs_is_no_change_and_a_first_one_that_stays_is() {
+        for seed in 0..20 {
+            let again = |k: usize| match k {
+                7 | 26 => 4.0,
+                31.. if k != 34 => 4.0,
+                _ => 0.0,
+            };
+            let found = follow(&course(seed, again)[..38], 1e-4);
+            assert!(found.changes.is_empty(), "{seed}: {:?}", found.changes);
+            let first = follow(
+                &course(seed, |k| if k < 31 { 0.0 } else { 4.0 })[..38],
+                1e-4,
+            );
+            assert_eq!(first.changes.len(), 1, "{seed}");
+        }
     }
 
     #[test]

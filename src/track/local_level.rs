@@ -57,14 +57,17 @@ impl Whitener {
         }
     }
 
-    /// Innovations of a signal over their deviations: uncorrelated and of variance 1 for the model's own. The level
-    /// is not in them.
+    /// Innovations of a signal over their deviations, log by log: uncorrelated and of variance 1 for the model's own; 0
+    /// where there is none. The level is not in them.
     pub(super) fn apply(&self, signal: &[f64]) -> Vec<f64> {
         let (mut level, mut out) = (0.0, Vec::with_capacity(signal.len()));
         for (step, y) in self.steps.iter().zip(signal) {
             match step {
-                Step::Nothing => {}
-                Step::Start => level = *y,
+                Step::Nothing => out.push(0.0),
+                Step::Start => {
+                    level = *y;
+                    out.push(0.0);
+                }
                 Step::Innovation { gain, std } => {
                     let innovation = y - level;
                     level += gain * innovation;
@@ -73,6 +76,11 @@ impl Whitener {
             }
         }
         out
+    }
+
+    /// Whether a log has an innovation.
+    pub(super) fn tells(&self, log: usize) -> bool {
+        matches!(self.steps[log], Step::Innovation { .. })
     }
 
     /// Sum of the logarithms of the innovations' deviations.
@@ -172,10 +180,13 @@ mod tests {
         let level = (one.dot(&(&inverse * &y))) / one.dot(&(&inverse * &one));
         let e = &y - &one * level;
         let square = e.dot(&(&inverse * &e));
-        let white = Whitener::new(&variances()).apply(&SIGNAL);
+        let whitener = Whitener::new(&variances());
+        let white = whitener.apply(&SIGNAL);
         let found: f64 = white.iter().map(|x| x * x).sum();
         assert!((found / square - 1.0).abs() < 1e-12, "{found} {square}");
-        assert_eq!(white.len(), 3);
+        let told: Vec<usize> = (0..5).filter(|k| whitener.tells(*k)).collect();
+        assert_eq!(told, [1, 3, 4]);
+        assert!((0..5).all(|k| told.contains(&k) || white[k] == 0.0));
     }
 
     #[test]

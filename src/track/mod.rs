@@ -10,8 +10,9 @@ mod changes;
 mod course;
 mod fleet;
 mod local_level;
+mod together;
 mod walk;
 
 pub use changes::{Change, ChangeKind};
-pub use course::{Course, Estimate, follow};
+pub use course::{Course, Estimate, follow, follow_together};
 pub use fleet::{Apart, Level, apart};

@@ -4,23 +4,12 @@
 
 use rayon::prelude::*;
 
+use super::map::ResidualMap;
+use super::signal::{Signal, values};
 use crate::diagnose::placebo::blocks::Signs;
 use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::effect::Torques;
-use crate::motion::Stretch;
-
-/// What a residual may depend on; positions and speeds of any joint, all else of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Signal {
-    Position(usize),
-    Speed(usize),
-    Acceleration,
-    Load,
-    Direction,
-    SinceReversal,
-    Time,
-}
 
 /// A dependence of one joint's residual.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,9 +21,8 @@ pub struct Dependence {
     pub share: f64,
     /// Chance of as much among all signals where the residual depends on none.
     pub p_value: f64,
-    /// Mean residual over the first signal's bins, `[signal, mean]` [N or Nm]: of all rows, or of those in the lower and
-    /// upper half of the second.
-    pub curves: Vec<Vec<[f64; 2]>>,
+    /// Of the strongest of each joint: the residual over the two signals on which it depends most.
+    pub map: Option<ResidualMap>,
 }
 
 /// Bins of one signal, and of each of two.
@@ -97,7 +85,7 @@ fn of_joint(
     }
     let values: Vec<Vec<f64>> = signals
         .iter()
-        .map(|s| values(*s, j, &rows, problem.stretches, torques))
+        .map(|s| values(*s, j, &rows.at, problem.stretches, torques))
         .collect();
     let mut tried: Vec<(Vec<usize>, Taken)> = Vec::new();
     for (i, x) in values.iter().enumerate() {
@@ -143,19 +131,32 @@ fn of_joint(
         if of.len() == 2 && share < TOGETHER * better {
             continue;
         }
-        let second = of.get(1).map(|i| values[*i].as_slice());
         let dependence = Dependence {
             joint: j,
             signals: of.iter().map(|i| signals[*i]).collect(),
             share,
             p_value,
-            curves: curves(&values[of[0]], second, &rows.residual),
+            map: None,
         };
         found.push((share, dependence));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(TOLD);
-    found.into_iter().map(|(_, d)| d).collect()
+    let mut found: Vec<Dependence> = found.into_iter().map(|(_, d)| d).collect();
+    if let Some(strongest) = found.first_mut() {
+        let place = |of: &Signal| signals.iter().position(|s| s == of);
+        let told: Vec<usize> = strongest.signals.iter().filter_map(place).collect();
+        // beside one alone stands the next strongest by itself
+        let mut others: Vec<usize> = (0..signals.len()).filter(|i| !told.contains(i)).collect();
+        others.sort_by(|a, b| tried[*b].1.surely().total_cmp(&tried[*a].1.surely()));
+        let drawn: Vec<usize> = told.into_iter().chain(others).take(2).collect();
+        if let &[a, b] = drawn.as_slice() {
+            let of = [&values[a], &values[b]].map(Vec::as_slice);
+            let map = ResidualMap::of([signals[a], signals[b]], of, &rows.residual, &rows.block);
+            strongest.map = Some(map);
+        }
+    }
+    found
 }
 
 fn rows(at: &FittedModel, problem: &FitProblem, signs: &Signs, j: usize) -> Rows {
@@ -180,51 +181,6 @@ fn rows(at: &FittedModel, problem: &FitProblem, signs: &Signs, j: usize) -> Rows
     rows
 }
 
-/// A signal at the rows of joint `j`.
-fn values(
-    signal: Signal,
-    j: usize,
-    rows: &Rows,
-    stretches: &[Stretch],
-    torques: &[Torques],
-) -> Vec<f64> {
-    let since: Vec<Vec<f64>> = match signal {
-        Signal::SinceReversal => stretches.iter().map(|s| since_reversal(s, j)).collect(),
-        _ => Vec::new(),
-    };
-    let value = |(i, k): &(usize, usize)| {
-        let s = &stretches[*i];
-        match signal {
-            Signal::Position(of) => s.q[of][*k],
-            Signal::Speed(of) => s.v[of][*k],
-            Signal::Acceleration => s.a[j][*k],
-            Signal::Load => torques[*i].load.get(j).map_or(0.0, |load| load[*k]),
-            Signal::Direction => s.v[j][*k].signum(),
-            Signal::SinceReversal => since[*i][*k],
-            Signal::Time => s.began + s.dt * *k as f64,
-        }
-    };
-    rows.at.iter().map(value).collect()
-}
-
-/// Time since a joint last turned [s].
-fn since_reversal(stretch: &Stretch, j: usize) -> Vec<f64> {
-    let mut since = 0.0;
-    let mut before = 0.0;
-    let step = |v: &f64| {
-        since = if v * before < 0.0 {
-            0.0
-        } else {
-            since + stretch.dt
-        };
-        if *v != 0.0 {
-            before = *v;
-        }
-        since
-    };
-    stretch.v[j].iter().map(step).collect()
-}
-
 /// Bin of each value, equally many in each; equal values in one.
 fn bins(x: &[f64], count: usize) -> Vec<usize> {
     let mut sorted = x.to_vec();
@@ -235,25 +191,6 @@ fn bins(x: &[f64], count: usize) -> Vec<usize> {
     x.iter()
         .map(|x| edges.partition_point(|e| e <= x))
         .collect()
-}
-
-/// Mean residual over bins of a signal: of all rows, or of the lower and upper half of another.
-fn curves(x: &[f64], other: Option<&[f64]>, residual: &[f64]) -> Vec<Vec<[f64; 2]>> {
-    let cells = bins(x, BINS[0]);
-    let halves = other.map_or(vec![0; x.len()], |other| bins(other, 2));
-    let count = 1 + halves.iter().copied().max().unwrap_or(0);
-    let curve = |half: usize| {
-        let mut sums = vec![[0.0; 3]; BINS[0]];
-        for i in (0..x.len()).filter(|i| halves[*i] == half) {
-            let [n, at, mean] = &mut sums[cells[i]];
-            *n += 1.0;
-            *at += x[i];
-            *mean += residual[i];
-        }
-        let filled = sums.iter().filter(|s| s[0] > 0.0);
-        filled.map(|[n, x, e]| [x / n, e / n]).collect()
-    };
-    (0..count).map(curve).collect()
 }
 
 /// What the means over cells take up of the residual's square, and of the draws.

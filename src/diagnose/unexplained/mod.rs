@@ -3,8 +3,10 @@
 pub mod dependence;
 pub mod errors;
 pub mod evidence;
+pub mod map;
 mod noise_floor;
 mod period;
+pub mod signal;
 
 use self::errors::Errors;
 use self::noise_floor::floor;

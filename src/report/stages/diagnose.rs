@@ -1,14 +1,12 @@
 //! The report of `diagnose`.
 
 use super::step_words::{in_words, tentative, titled, worsened};
-use super::{first_screen, found_effects};
+use super::{first_screen, found_effects, what_is_left};
 use crate::config::ModelFile;
 use crate::diagnose::{
     AcceptedEffect, Candidate, Diagnosis, Errors, SplitErrors, StepStatus, Turn,
 };
-use crate::identify::{
-    DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command, signal_words,
-};
+use crate::identify::{DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command};
 use crate::log::{Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
@@ -255,7 +253,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
             open.join(", ")
         ));
     }
-    out.extend(dependences(machine, found));
+    out.extend(what_is_left::sentences(machine, found));
     let mut remainder: Vec<&Candidate> = d.remainder().collect();
     let gain = |c: &Candidate| c.score.as_ref().map_or(0.0, |s| s.cv_gain);
     remainder.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
@@ -278,32 +276,6 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
         ));
     }
     out
-}
-
-/// What the residual that is left depends on, a sentence for each joint.
-fn dependences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
-    let names = machine.robot.joint_names();
-    let all = &found.diagnosis.dependence;
-    let of_joint = |(j, name): (usize, &String)| {
-        let told = all.iter().filter(|d| d.joint == j).map(|d| {
-            let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
-            let signals: Vec<String> = signals.collect();
-            format!(
-                "{} ({} of its square, p = {:.3})",
-                signals.join(" with "),
-                number::percent(d.share),
-                d.p_value
-            )
-        });
-        let told: Vec<String> = told.collect();
-        (!told.is_empty()).then(|| {
-            format!(
-                "the residual of {name} still depends on {}",
-                told.join(", ")
-            )
-        })
-    };
-    names.iter().enumerate().filter_map(of_joint).collect()
 }
 
 /// How the search came to what it found, where it changed its mind.
@@ -439,6 +411,7 @@ pub fn sections(
         false => vec![before, after],
     };
     torque::section(page, &look, shown, &models, &names.join(", "))?;
+    what_is_left::section(page, machine, found);
     residual::section(page, figure);
     candidates(page, machine, found);
     Ok(())

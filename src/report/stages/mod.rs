@@ -15,3 +15,4 @@ pub mod setup;
 mod step_words;
 pub mod track;
 pub mod validate;
+mod what_is_left;

@@ -1,0 +1,105 @@
+//! How soon changes are found: the share of them over the logs since, a line for each size.
+
+use super::colour;
+use super::joint_grid::{self, Heading};
+use super::legend::Key;
+use super::panel::Panel;
+use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+
+/// Changes of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RatePanel {
+    pub name: String,
+    /// Share that is found within 0, 1, .. logs, for each name of the figure.
+    pub lines: Vec<Vec<f64>>,
+}
+
+/// A figure of one panel per kind, two beside each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RateFigure {
+    pub title: String,
+    /// What the lines are of; four at most.
+    pub names: Vec<String>,
+    pub panels: Vec<RatePanel>,
+}
+
+/// Told apart by dashes as well as by colour.
+const STROKES: [Stroke; 4] = [
+    Stroke::dashed(colour::SKY, 1.6, "2 3"),
+    Stroke::solid(colour::BLUE, 1.8),
+    Stroke::dashed(colour::VERMILLION, 1.6, "7 3"),
+    Stroke::dashed(colour::INK, 1.4, "9 3 2 3"),
+];
+
+impl RateFigure {
+    /// The figure as an SVG document.
+    pub fn svg(&self) -> String {
+        let keys = STROKES.iter().zip(&self.names);
+        let legend: Vec<(Key, &str)> = keys
+            .map(|(stroke, name)| (Key::Line(*stroke), name.as_str()))
+            .collect();
+        let panels: Vec<&str> = self.panels.iter().map(|p| p.name.as_str()).collect();
+        let heading = Heading {
+            title: &self.title,
+            description: &format!(
+                "Share of changes found over the logs since, of {}; {}",
+                self.names.join(", "),
+                panels.join("; ")
+            ),
+            legend: &legend,
+        };
+        joint_grid::draw(&heading, &self.panels, RatePanel::draw)
+    }
+}
+
+impl RatePanel {
+    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+        let [left, top, width, _] = frame;
+        let name = fitted(&self.name, 11.5, width);
+        svg.heading([left, top - 7.0], &name, "", Type::new(11.5, Anchor::Start));
+        let longest = self.lines.iter().map(Vec::len).max().unwrap_or_default();
+        if longest < 2 {
+            Panel::empty(svg, frame, "no changes");
+            return;
+        }
+        let panel = Panel::new(frame, [0.0, (longest - 1) as f64], [0.0, 100.0], [5, 5]);
+        panel.grid(svg);
+        for (line, stroke) in self.lines.iter().zip(STROKES) {
+            let points = line.iter().enumerate();
+            let points = points.map(|(k, share)| [k as f64, 100.0 * share]);
+            svg.curve(&panel.place(vec![points.collect()]), stroke);
+        }
+        panel.outline(svg);
+        panel.x_numbers(svg);
+        panel.x_title(svg, "since the change", "logs");
+        panel.y_title(svg, 46.0, "found", "%");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_size_has_a_line_of_its_own() {
+        let figure = RateFigure {
+            title: "found".into(),
+            names: vec!["10 %".into(), "20 %".into()],
+            panels: vec![
+                RatePanel {
+                    name: "step".into(),
+                    lines: vec![vec![0.0, 0.5, 0.9], vec![0.0, 1.0, 1.0]],
+                },
+                RatePanel {
+                    name: "ramp".into(),
+                    lines: Vec::new(),
+                },
+            ],
+        };
+        let svg = figure.svg();
+        assert!(svg.contains("20 %") && svg.contains("no changes") && !svg.contains("NaN"));
+        for stroke in &STROKES[..2] {
+            assert!(svg.matches(stroke.colour).count() >= 2, "{svg}");
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Courses that are followed together: their innovations, made white over time and among each other.
+
+use nalgebra::DMatrix;
+
+use super::local_level::Whitener;
+use super::walk::{Sizes, median};
+
+/// One parameter of those that are followed together.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member<'a> {
+    pub signal: &'a [f64],
+    /// Variances of the estimates; infinite where a log tells nothing, or stands alone.
+    pub estimate: &'a [f64],
+    /// Logs that stand alone.
+    pub alone: &'a [usize],
+}
+
+impl Member<'_> {
+    /// A signal of this course with 0 where no log tells it.
+    pub(super) fn told(&self, signal: &[f64]) -> Vec<f64> {
+        let pairs = signal.iter().zip(self.estimate);
+        pairs
+            .map(|(x, r)| if r.is_finite() { *x } else { 0.0 })
+            .collect()
+    }
+}
+
+/// What is known of courses.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct About<'a> {
+    pub members: &'a [Member<'a>],
+    /// Spacings of the logs over the usual one.
+    pub spacings: &'a [f64],
+    pub times: &'a [f64],
+    /// Correlation of the errors of one log's estimates, row by row, where their fits say it.
+    pub correlation: Option<&'a [f64]>,
+}
+
+impl About<'_> {
+    /// Number of estimates that tell something.
+    pub(super) fn told(&self) -> usize {
+        let all = self.members.iter().flat_map(|member| member.estimate);
+        all.filter(|r| r.is_finite()).count()
+    }
+}
+
+/// Logs that the correlation by the fits counts for, beside those that are seen.
+const FITS_COUNT: f64 = 10.0;
+/// Innovations count up to so many of their deviations where their correlation is estimated.
+const CLIPPED: f64 = 2.5;
+/// Most that two are taken to go together.
+const MOST_CORRELATED: f64 = 0.9;
+
+/// What makes signals of all courses white.
+pub(super) struct White<'a> {
+    about: About<'a>,
+    whiteners: Vec<Whitener>,
+    /// Lower Cholesky factor of the correlation of the innovations.
+    factors: Vec<(u64, DMatrix<f64>)>,
+}
+
+impl<'a> White<'a> {
+    /// By the sizes of walk and scatter; `rests` are signals without changes, whose innovations tell how they go
+    /// together.
+    pub(super) fn new(about: About<'a>, sizes: &[Sizes], rests: &[Vec<f64>]) -> Self {
+        let members = about.members.iter().zip(sizes);
+        let whiteners: Vec<Whitener> = members
+            .map(|(m, own)| Whitener::new(&own.variances(m.estimate, about.spacings)))
+            .collect();
+        let correlation = match whiteners.len() {
+            1 => DMatrix::identity(1, 1),
+            _ => correlation(&whiteners, rests, about.correlation),
+        };
+        let mut masks: Vec<u64> = (0..about.times.len())
+            .map(|k| mask(&whiteners, k))
+            .collect();
+        masks.sort_unstable();
+        masks.dedup();
+        let factor = |mask: u64| {
+            let told: Vec<usize> = members_of(mask, whiteners.len()).collect();
+            let own = correlation.select_rows(&told).select_columns(&told);
+            let size = told.len();
+            let factor = own.cholesky().map(|c| c.l());
+            (mask, factor.unwrap_or(DMatrix::identity(size, size)))
+        };
+        White {
+            factors: masks.into_iter().map(factor).collect(),
+            about,
+            whiteners,
+        }
+    }
+
+    /// All courses' signals, white, one after the other log by log.
+    pub(super) fn signals(&self) -> Vec<f64> {
+        let pairs = self.whiteners.iter().zip(self.about.members);
+        let apart: Vec<Vec<f64>> = pairs.map(|(own, m)| own.apply(m.signal)).collect();
+        self.mixed(&apart)
+    }
+
+    /// What a shape is in each of the courses.
+    pub(super) fn columns(&self, shape: &[f64]) -> Vec<Vec<f64>> {
+        let count = self.whiteners.len();
+        let column = |i: usize| {
+            let mut apart = vec![Vec::new(); count];
+            apart[i] = self.whiteners[i].apply(shape);
+            self.mixed(&apart)
+        };
+        (0..count).map(column).collect()
+    }
+
+    /// Innovations that were white over time alone; an empty one is 0.
+    fn mixed(&self, apart: &[Vec<f64>]) -> Vec<f64> {
+        let (count, logs) = (apart.len(), self.about.times.len());
+        let mut out = vec![0.0; count * logs];
+        for (k, out) in out.chunks_exact_mut(count).enumerate() {
+            let mask = mask(&self.whiteners, k);
+            let factor = self.factors.iter().find(|(of, _)| *of == mask);
+            let Some((_, factor)) = factor else { continue };
+            for (row, i) in members_of(mask, count).enumerate() {
+                let own = apart[i].get(k).copied().unwrap_or_default();
+                let known: f64 = (0..row).map(|c| factor[(row, c)] * out[c]).sum();
+                out[row] = (own - known) / factor[(row, row)];
+            }
+        }
+        out
+    }
+}
+
+/// Courses with an innovation at a log, as bits.
+fn mask(whiteners: &[Whitener], log: usize) -> u64 {
+    let own = whiteners.iter().enumerate();
+    own.map(|(i, w)| u64::from(w.tells(log)) << i).sum()
+}
+
+fn members_of(mask: u64, count: usize) -> impl Iterator<Item = usize> {
+    (0..count).filter(move |i| mask >> i & 1 == 1)
+}
+
+/// Correlation of innovations of the same log, those that are far out clipped; drawn to what the fits say.
+fn correlation(whiteners: &[Whitener], rests: &[Vec<f64>], fits: Option<&[f64]>) -> DMatrix<f64> {
+    let count = whiteners.len();
+    let clipped = |(own, rest): (&Whitener, &Vec<f64>)| {
+        let white = own.apply(rest);
+        let known = white.iter().enumerate().filter(|(k, _)| own.tells(*k));
+        let most = median(known.map(|(_, x)| x.abs())).unwrap_or_default();
+        let most = (CLIPPED * 1.4826 * most).max(1e-12);
+        white.iter().map(|x| x.clamp(-most, most)).collect()
+    };
+    let white: Vec<Vec<f64>> = whiteners.iter().zip(rests).map(clipped).collect();
+    let of = |i: usize, j: usize| {
+        if i == j {
+            return 1.0;
+        }
+        let both = (0..white[i].len()).filter(|k| whiteners[i].tells(*k) && whiteners[j].tells(*k));
+        let (mut n, mut product, mut squares) = (0.0, 0.0, [0.0; 2]);
+        for k in both {
+            let (x, y) = (white[i][k], white[j][k]);
+            n += 1.0;
+            product += x * y;
+            squares[0] += x * x;
+            squares[1] += y * y;
+        }
+        let norm = (squares[0] * squares[1]).sqrt();
+        let seen = if norm > 0.0 { product / norm } else { 0.0 };
+        let together = match fits {
+            Some(fits) => (n * seen + FITS_COUNT * fits[i * count + j]) / (n + FITS_COUNT),
+            None => seen,
+        };
+        together.clamp(-MOST_CORRELATED, MOST_CORRELATED)
+    };
+    DMatrix::from_fn(count, count, of)
+}
+
+/// A signal without its parts along orthonormal ones.
+pub(super) fn without(signal: &[f64], known: &[Vec<f64>]) -> Vec<f64> {
+    let mut rest = signal.to_vec();
+    for unit in known {
+        let part: f64 = rest.iter().zip(unit).map(|(x, u)| x * u).sum();
+        rest.iter_mut().zip(unit).for_each(|(x, u)| *x -= part * u);
+    }
+    rest
+}
+
+/// Orthonormal signals that span the same.
+pub(super) fn orthonormal<'a>(columns: impl Iterator<Item = &'a Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut units: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let rest = without(column, &units);
+        let norm = rest.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if norm > 1e-9 {
+            units.push(rest.iter().map(|x| x / norm).collect());
+        }
+    }
+    units
+}
