@@ -1,9 +1,11 @@
-//! Draws both figures from made-up numbers, to be looked at: `cargo run --example figures -- DIR`.
+//! Draws figures from made-up numbers, to be looked at: `cargo run --example figures -- DIR`.
 
 use std::path::PathBuf;
 
 use cft_ident::friction::estimate::FrictionCurvePoint;
-use cft_ident::report::figure::{FrictionFigure, FrictionPanel, JointTorque, TorqueFigure};
+use cft_ident::report::figure::{
+    FrictionFigure, FrictionPanel, JointTorque, MapFigure, TorqueFigure,
+};
 
 fn main() -> std::io::Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".into()));
@@ -16,8 +18,38 @@ fn main() -> std::io::Result<()> {
         folder.join("torque-one.svg"),
         torque(&["slide"], 25.0).svg(),
     )?;
+    for (k, picture) in map().cells(Vec::new()).pictures.iter().enumerate() {
+        std::fs::write(folder.join(format!("left-{k}.svg")), picture)?;
+    }
     std::fs::write(folder.join("friction.svg"), friction(4).svg())?;
     std::fs::write(folder.join("friction-one.svg"), friction(1).svg())
+}
+
+/// What is left of a joint that lacks a term of two signals.
+fn map() -> MapFigure {
+    let at = |k: usize| -1.0 + 2.0 * (k as f64 + 0.5) / 20.0;
+    let left = |x: f64, y: f64| 3.0 * (2.0 * x).sin() * y;
+    let cell = |b: usize, a: usize| {
+        let (x, y) = (at(a), at(b));
+        (x * x + y * y < 1.3).then(|| left(x, y) + 0.1 * noise(20 * b + a))
+    };
+    MapFigure {
+        title: "what is left of q2".into(),
+        told: "made-up numbers".into(),
+        over: [
+            ("position".into(), "rad".into()),
+            ("speed of q3".into(), "rad/s".into()),
+        ],
+        unit: "Nm".into(),
+        ends: [[-1.0, 1.0]; 2],
+        cells: (0..20)
+            .map(|b| (0..20).map(|a| cell(b, a)).collect())
+            .collect(),
+        curve: (0..24)
+            .map(|k| -1.0 + 2.0 * f64::from(k) / 23.0)
+            .map(|x| [x, left(x, 0.3), 0.15])
+            .collect(),
+    }
 }
 
 /// Numbers that look like noise and are the same in every run.

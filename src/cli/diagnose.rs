@@ -90,6 +90,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let specs = args.logs.iter().chain(&args.veto).chain(&args.holdout);
     let model = (name.as_str(), &file);
+    // before the logs are looked at
+    identify::check_candidates(&settings.candidates, &machine, model)?;
     let report = setup::report(&machine, &train, None, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     let end = match fault {

@@ -92,6 +92,29 @@ pub struct DataFault {
     pub remedy: String,
 }
 
+/// Refuses effects of a user's own that cannot be tried beside a model, whose file is called `name`.
+///
+/// # Errors
+/// Formulas that are none on this robot, and a name that the model has for another effect.
+pub fn check_candidates(
+    candidates: &[Candidate],
+    machine: &LoggedRobot,
+    (name, file): (&str, &ModelFile),
+) -> Result<(), IdentifyError> {
+    own_laws(candidates, &machine.robot)?;
+    let other = |own: &&Candidate| {
+        let mut known = file.candidates.iter();
+        known.any(|known| known.name == own.name && known != *own)
+    };
+    match candidates.iter().find(other) {
+        Some(own) => Err(IdentifyError::CandidateOfModel {
+            name: own.name.clone(),
+            model: name.to_owned(),
+        }),
+        None => Ok(()),
+    }
+}
+
 /// Diagnoses a model, whose file is called `name`, on logs.
 ///
 /// # Errors
@@ -104,16 +127,7 @@ pub fn diagnose(
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
     let given = refined(file, name)?;
-    let other = |own: &&Candidate| {
-        let mut known = file.candidates.iter();
-        known.any(|known| known.name == own.name && known != *own)
-    };
-    if let Some(own) = settings.candidates.iter().find(other) {
-        return Err(IdentifyError::CandidateOfModel {
-            name: own.name.clone(),
-            model: name.to_owned(),
-        });
-    }
+    check_candidates(&settings.candidates, machine, (name, file))?;
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }

@@ -71,7 +71,9 @@ pub use compare::{Compared, Comparison, Curves, DIFFERENT, GivenModel, Side, Tri
 pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
 pub use control::{Control, Progress};
 pub use curve::friction_curve;
-pub use diagnose::{DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, diagnose};
+pub use diagnose::{
+    DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, check_candidates, diagnose,
+};
 pub use diagnosis::{DiagnosisResult, DiagnosisVerdict, signal_words};
 pub use error::{IdentifyError, ReadError};
 pub use error_kind::ErrorKind;
