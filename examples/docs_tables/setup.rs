@@ -11,6 +11,14 @@ pub fn faults(name: &str) -> Rendered {
     let study = json(name)?;
     let mut out = counts("fault", &study["kinds"], Some(&study["all"]));
     let _ = write!(out, "\n{}", counts("machine", &study["machines"], None));
+    let sample = &study["sample"];
+    if sample["cases"] != sample["of"] {
+        let _ = writeln!(
+            out,
+            "\nA sample: {} of {} cases, faults and right set-ups together.",
+            sample["cases"], sample["of"]
+        );
+    }
     let falsely = rows(&study["clean"]["false"]);
     let clean = &study["clean"]["cases"];
     let _ = match falsely {
@@ -43,6 +51,7 @@ fn counts(first: &str, counts: &Value, all: Option<&Value>) -> String {
             "cases",
             "matter",
             "named",
+            "likely",
             "first",
             "tied",
             "right_joint",
@@ -62,6 +71,7 @@ fn counts(first: &str, counts: &Value, all: Option<&Value>) -> String {
         "cases",
         "that matter",
         "named",
+        "as likely only",
         "truth first",
         "one of two",
         "right joint",

@@ -1,9 +1,10 @@
 //! Faults of the set-up, made one at a time on measured and simulated machines, and what the tool says
-//! of each: `cargo build && cargo run --example study_setup -- [MACHINE...] [--kind=KIND]`.
+//! of each: `cargo build --release && cargo run --release --example study_setup -- [MACHINE...] [--kind=KIND]`.
 //!
 //! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
-//! goes on where it was. `--again` begins anew. The summary goes to docs/results/study_setup.json, from
-//! which docs/setup.md has its tables.
+//! goes on where it was. `--again` begins anew. `--every=K` takes a sample, every K-th case of each machine from a
+//! place on that chance chose, and `--minutes=M` begins no case after that time. The summary goes to
+//! docs/results/study_setup.json, from which docs/setup.md has its tables; it says of how many cases it is.
 
 mod bench;
 mod summary;
@@ -12,10 +13,12 @@ use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use bench::cases::cases;
 use bench::judge::{Clean, judge};
 use bench::machines::{NAMES, machine};
+use bench::rows::Chance;
 use rayon::prelude::*;
 use serde_json::Value;
 
@@ -26,6 +29,15 @@ fn main() {
         .iter()
         .filter_map(|w| w.strip_prefix("--kind="))
         .collect();
+    let number = |key: &str| {
+        let word = words.iter().find_map(|w| w.strip_prefix(key));
+        word.map(|w| w.parse::<usize>().expect("a whole number"))
+    };
+    let every = number("--every=").unwrap_or(1).max(1);
+    let until = number("--minutes=").map(|m| Instant::now() + Duration::from_secs(60 * m as u64));
+    let late = || until.is_some_and(|until| Instant::now() > until);
+    let mut chance = Chance(17);
+    let mut all = 0;
     let wanted = |name: &str| named.is_empty() || named.iter().any(|w| *w == name);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/study_setup");
     std::fs::create_dir_all(&folder).expect("the folder can be made");
@@ -36,21 +48,31 @@ fn main() {
     let known = finished(&path);
     let file = OpenOptions::new().create(true).append(true).open(&path);
     let file = Mutex::new(file.expect("the file of rows opens"));
-    for name in NAMES.into_iter().filter(|name| wanted(name)) {
+    for name in NAMES {
+        // drawn for every machine, so that the sample does not depend on which are named
+        let from = (chance.next() * every as f64) as usize;
+        if !wanted(name) {
+            continue;
+        }
         let Some(machine) = machine(name, &folder) else {
             continue;
         };
+        let fresh = cases(&machine);
+        all += fresh.len();
+        if late() {
+            continue;
+        }
         let clean = Clean::new(machine);
         let done = |case: &str| {
             known
                 .iter()
                 .any(|r| r["machine"] == name && r["case"] == case)
         };
-        let fresh = cases(&clean.machine);
-        fresh.par_iter().for_each(|case| {
+        let sample: Vec<_> = fresh.iter().skip(from).step_by(every).collect();
+        sample.par_iter().for_each(|case| {
             let case_name = case.name(&clean.machine);
             let other = !kinds.is_empty() && !kinds.contains(&case.kind());
-            if other || done(&case_name) {
+            if other || late() || done(&case_name) {
                 return;
             }
             let Some(mut row) = judge(&clean, case) else {
@@ -63,13 +85,14 @@ fn main() {
             writeln!(file, "{row}").expect("the row is written");
         });
         eprintln!(
-            "{name}: error {:.4}, {} cases",
+            "{name}: error {:.4}, {} of {} cases",
             clean.fit.error(),
+            sample.len(),
             fresh.len()
         );
     }
     let rows = finished(&path);
-    let summary = summary::summary(&rows);
+    let summary = summary::summary(&rows, all);
     let out = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results/study_setup.json");
     std::fs::write(out, format!("{summary:#}\n")).expect("the summary is written");
     summary::print(&summary);

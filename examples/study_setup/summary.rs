@@ -29,6 +29,8 @@ struct Count {
     cases: usize,
     matter: usize,
     named: usize,
+    /// Named as likely and no more: a warning.
+    likely: usize,
     first: usize,
     tied: usize,
     right_joint: usize,
@@ -46,6 +48,7 @@ impl Count {
             }
             out.matter += 1;
             out.named += usize::from(is(row, "named"));
+            out.likely += usize::from(row["sure"] == false && told(row));
             out.first += usize::from(is(row, "first"));
             out.tied += usize::from(!is(row, "first") && is(row, "tied"));
             out.right_joint += usize::from(is(row, "right_joint"));
@@ -60,6 +63,7 @@ impl Count {
             "cases": self.cases,
             "matter": self.matter,
             "named": self.named,
+            "likely": self.likely,
             "first": self.first,
             "tied": self.tied,
             "right_joint": self.right_joint,
@@ -69,7 +73,13 @@ impl Count {
     }
 }
 
-pub fn summary(rows: &[Value]) -> Value {
+/// Whether the check of the set-up said anything of a case.
+fn told(row: &Value) -> bool {
+    row["setup"].as_array().is_some_and(|list| !list.is_empty())
+}
+
+/// Counts of rows. `all` is how many cases there are.
+pub fn summary(rows: &[Value], all: usize) -> Value {
     let faults: Vec<&Value> = rows.iter().filter(|r| r["kind"] != "clean").collect();
     let clean: Vec<&Value> = rows.iter().filter(|r| r["kind"] == "clean").collect();
     let of = |key: &str, name: &str| {
@@ -117,7 +127,8 @@ pub fn summary(rows: &[Value]) -> Value {
     let seconds: f64 = rows.iter().filter_map(|r| r["seconds"].as_f64()).sum();
     json!({
         "study": "faults of the set-up",
-        "command": "cargo build && cargo run --example study_setup",
+        "command": "cargo build --release && cargo run --release --example study_setup",
+        "sample": {"cases": rows.len(), "of": all},
         "all": Count::of(faults.iter().copied()).json(),
         "kinds": kinds,
         "machines": machines,

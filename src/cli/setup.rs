@@ -162,7 +162,10 @@ fn new_text(
 }
 
 fn likely(finding: &Finding) -> String {
-    format!("the set-up may be wrong: {}", finding.told())
+    format!(
+        "the set-up may be wrong: {}; the set-up as declared is possible too, and the fit goes on with it",
+        finding.told()
+    )
 }
 
 /// The error with which a fit refuses the logs.

@@ -60,13 +60,16 @@ pub fn check_setup(
         file.robot.gravity = Some(gravity);
         Some(file.robot())
     };
-    let problem = Problem {
-        robot: &machine.robot,
-        in_gravity: machine.file.declares_gravity().then_some(&in_gravity),
-        channels: sampled.channels,
-        columns: &sampled.columns,
-        sample: sampled.sample,
-    };
+    let problem = Problem::new(
+        &machine.robot,
+        machine
+            .file
+            .declares_gravity()
+            .then_some(&in_gravity as &(dyn Fn([f64; 3]) -> Option<Robot> + Sync)),
+        sampled.channels,
+        &sampled.columns,
+        sampled.sample,
+    );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
     Ok(told(machine, &problem, &searched))

@@ -11,6 +11,12 @@ use crate::robot::Robot;
 /// Correlation below which rows count as independent.
 const UNCORRELATED: f64 = 0.05;
 
+/// A block that gains so many times what the median one does is counted as that.
+const OUTLIER: f64 = 3.0;
+
+/// Share of a gain that is one joint's alone.
+const MOSTLY: f64 = 0.8;
+
 /// What one hypothesis gains over another on held-out blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gain {
@@ -32,30 +38,50 @@ pub(super) fn gain(
 ) -> Option<Gain> {
     let (b, a) = (before.held_out(of_before)?, after.held_out(of_after)?);
     let rows = of_after.rows as f64;
-    let of = |blocks: Range<usize>| -> f64 {
+    let of_joint = |blocks: Range<usize>, j: usize| -> f64 {
+        if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
+            return 0.0;
+        }
         let share = blocks.len() as f64 / b.len() as f64;
-        let sum = |of: &[Vec<f64>], j: usize| of[blocks.clone()].iter().map(|x| x[j]).sum::<f64>();
-        let of_joint = |j: usize| {
-            if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
-                return 0.0;
-            }
-            // beyond the torque itself a prediction is worth no more than none
-            let left = |x: f64, power: f64| (x / (share * power)).clamp(1e-8, 1.0);
-            let ratio = left(sum(&b, j), power_before[j]) / left(sum(&a, j), power_after[j]);
-            0.5 * rows * share * independent[j] * ratio.ln()
-        };
-        (0..of_after.joints).map(of_joint).sum()
+        let sum = |of: &[Vec<f64>]| of[blocks.clone()].iter().map(|x| x[j]).sum::<f64>();
+        // beyond the torque itself a prediction is worth no more than none
+        let left = |x: f64, power: f64| (x / (share * power)).clamp(1e-8, 1.0);
+        let ratio = left(sum(&b), power_before[j]) / left(sum(&a), power_after[j]);
+        0.5 * rows * share * independent[j] * ratio.ln()
+    };
+    let of = |blocks: Range<usize>| -> f64 {
+        let joints = 0..of_after.joints;
+        joints.map(|j| of_joint(blocks.clone(), j)).sum()
     };
     let count = b.len();
-    let each: Vec<f64> = (0..count).map(|k| of(k..k + 1)).collect();
-    let mean = each.iter().sum::<f64>() / count as f64;
-    let square: f64 = each.iter().map(|g| (g - mean).powi(2)).sum();
-    let std = (square / (count * (count - 1).max(1)) as f64).sqrt();
+    let all = of(0..count);
+    let each = (0..count).map(|k| of(k..k + 1)).collect();
+    let mut deviations = deviations(each);
+    // a gain that is one joint's alone is told by its own blocks: the others' are noise beside it
+    let alone = (0..of_after.joints).find(|j| of_joint(0..count, *j) > MOSTLY * all.max(0.0));
+    if let Some(j) = alone {
+        let each = (0..count).map(|k| of_joint(k..k + 1, j)).collect();
+        deviations = deviations.max(self::deviations(each));
+    }
     Some(Gain {
-        all: of(0..count),
+        all,
         half: of(0..count / 2).min(of(count / 2..count)),
-        deviations: mean / std.max(f64::MIN_POSITIVE),
+        deviations,
     })
+}
+
+/// How many of its own deviations the mean gain of the blocks is above zero.
+fn deviations(mut each: Vec<f64>) -> f64 {
+    let count = each.len();
+    let mut sizes: Vec<f64> = each.iter().map(|gain| gain.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // one block that gains very much is no reason to doubt the others
+    let most = OUTLIER * sizes.get(count / 2).copied().unwrap_or(0.0);
+    each.iter_mut().for_each(|gain| *gain = gain.min(most));
+    let mean = each.iter().sum::<f64>() / count as f64;
+    let square: f64 = each.iter().map(|gain| (gain - mean).powi(2)).sum();
+    let std = (square / (count * (count - 1).max(1)) as f64).sqrt();
+    mean / std.max(f64::MIN_POSITIVE)
 }
 
 /// Of each joint, the share of the rows that are worth an independent one: one over the sum of the
@@ -146,5 +172,16 @@ mod tests {
         let held: Vec<f64> = white.iter().flat_map(|x| [*x; 5]).collect();
         let (one, five) = (share(&white), share(&held));
         assert!(one > 0.8 && (one / five - 5.0).abs() < 1.2, "{one} {five}");
+    }
+
+    #[test]
+    fn a_block_that_gains_very_much_leaves_the_others_their_say() {
+        let mut each = vec![1.0, 2.0, 1.5, 0.5, 1.2, 0.8, 1.1, 1.4];
+        let plain = deviations(each.clone());
+        each.push(1000.0);
+        assert!(plain > 5.0 && deviations(each.clone()) > 4.0);
+        // losses count in full
+        each.push(-1000.0);
+        assert!(deviations(each) < 0.0);
     }
 }

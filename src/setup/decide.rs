@@ -3,7 +3,6 @@
 use super::confirm;
 use super::correction::Change;
 use super::finding::ChannelKind;
-use super::fit::Fit;
 use super::normal::Problem;
 use super::physics::{Positive, Quantity, credit, positives};
 use super::trial::Trial;
@@ -12,6 +11,12 @@ use super::trial::Trial;
 pub(super) const BLOCKS: usize = 24;
 /// Log-likelihood that one right hypothesis must gain: odds of e^8, some 3000 to 1.
 const ODDS: f64 = 8.0;
+/// The same for a reading that is likely, and no more: 20 to 1.
+const LIKELY: f64 = 3.0;
+/// Times what is needed that physics alone must say where the fit does not confirm it.
+const FORCED: f64 = 2.0;
+/// Share of the most that any reading gains, below which another one is not looked at.
+const SHADOW: f64 = 0.5;
 /// Readings that are as likely to within e^3, 20 to 1, are told as tied.
 const TIED: f64 = 3.0;
 /// The error must move by more than a tenth..
@@ -121,7 +126,7 @@ pub(super) fn decide(
     let moving = problem.moving();
     let of_moving = independent
         .iter()
-        .zip(&moving)
+        .zip(moving)
         .filter(|(_, m)| **m)
         .map(|(x, _)| *x);
     let share = of_moving.clone().sum::<f64>() / of_moving.count().max(1) as f64;
@@ -138,6 +143,37 @@ pub(super) fn decide(
             .map(|curvature| (share * curvature).max(1e-12).sqrt().recip());
     }
     drop_flat(&mut list);
+    let judge = Judge {
+        problem,
+        declared,
+        share,
+        independent: &independent,
+        needed: ODDS + (tried.max(1) as f64).ln(),
+        tried,
+    };
+    let from = worth(declared);
+    let best = list.iter().map(|j| j.worth).fold(from, f64::max);
+    let mut likely = None;
+    while let Some(at) = choose(&list, from) {
+        // what explains much less than another one is a shadow of it
+        if list[at].worth - from < SHADOW * (best - from) {
+            break;
+        }
+        match judge.found(&list, at) {
+            Some(found) if found.sure => return Some(found),
+            Some(found) => likely = likely.or(Some(found)),
+            None => {}
+        }
+        // blocks that were held out do not confirm it
+        let place = list[at].change.clone();
+        list.retain(|j| !same_place(&j.change, &place));
+    }
+    likely
+}
+
+/// The most probable of the list; where several are, the simplest, and a round number before a fitted one.
+/// `from` is what the set-up as it is declared is worth.
+fn choose(list: &[Judged], from: f64) -> Option<usize> {
     let most = list
         .iter()
         .map(|j| j.worth)
@@ -147,124 +183,144 @@ pub(super) fn decide(
     // a round number before a fitted one that is hardly better, or that differs as calibrations do
     let rounds = list.iter().enumerate().filter(|(_, j)| {
         let alike = same_place(&j.change, &list[simplest].change) && j.std.is_none();
-        let near = calibrated(&j.change, &list[simplest].change)
-            && j.worth - worth(declared) > MOST * (most - worth(declared));
+        let near =
+            calibrated(&j.change, &list[simplest].change) && j.worth - from > MOST * (most - from);
         alike && (j.worth >= most - TIED || near)
     });
     let round = rounds
         .max_by(|a, b| a.1.worth.total_cmp(&b.1.worth).then(b.0.cmp(&a.0)))
         .map(|(i, _)| i);
-    let best = round.unwrap_or(simplest);
-    if list[best].worth <= worth(declared) {
-        return None;
-    }
-    let chosen = &list[best];
-    let parts = |j: &'_ Judged| -> (Fit, Vec<f64>) { (j.trial.fit.clone(), j.trial.power.clone()) };
-    let ((b, pb), (a, pa)) = (parts(declared), parts(chosen));
-    let held_out = confirm::gain(
-        (&b, &declared.trial.normal, &pb),
-        (&a, &chosen.trial.normal, &pa),
-        &independent,
-    )?;
-    let physics = credit(&chosen.positives) - credit(&declared.positives);
-    let needed = ODDS + (tried.max(1) as f64).ln();
-    let gain = held_out.all + physics;
-    let fitted = share * (a.score - b.score);
-    // few independent rows for each unknown: what the model lacks repeats itself in them
-    let rows = independent.iter().sum::<f64>() * chosen.trial.normal.rows as f64;
-    let unknowns = chosen.trial.normal.unknowns as f64;
-    let deviations = match rows < FEW * unknowns {
-        true => MORE_DEVIATIONS,
-        false => DEVIATIONS,
-    };
-    let strokes = problem.sample.strokes();
-    // what physics says alone needs no residual
-    let deviations = if physics > needed { 0.0 } else { deviations };
-    // what is right predicts no worse, and wins in both halves of the logs and in most blocks
-    if gain < needed
-        || held_out.all < -WORSE
-        || fitted < -0.5 * WORSE
-        || a.error()
-            > if physics > 0.5 * needed {
-                NO_WORSE
-            } else {
-                BETTER
-            } * b.error()
-        || held_out.half + 0.5 * physics < -LOST * held_out.all
-        || held_out.deviations < deviations
-        || (strokes < HARDLY * unknowns && physics < needed)
-        || (strokes < STROKES[0].max(STROKES[1] * unknowns)
-            && !wins_in_halves(problem, declared, chosen, share, 0.5 * needed))
-    {
-        return None;
-    }
-    let error = [b.error(), a.error()];
-    let largest = b
-        .left
-        .iter()
-        .zip(&a.left)
-        .filter(|(b, a)| **b > 0.0 && **a > 0.0)
-        .map(|(b, a)| (b / a).sqrt())
-        .fold(error[0] / error[1], f64::max);
-    // what leaves a third of the torque unexplained must explain much more than that
-    let poor = error[1] > THIRD && error[0] < 1.5 * error[1];
-    let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
-        && joints_below(&chosen.positives, FORBIDDEN).is_empty();
-    let sure = !poor && (largest > TENTH || forbidden);
-    if !sure {
-        return None;
-    }
-    let name = |p: &Positive| {
-        let joint = &problem.robot.joint_names()[p.joint];
-        match p.quantity {
-            Quantity::Inertia => format!("inertia of {joint}"),
-            Quantity::FrictionPower => format!("friction power of {joint}"),
+    Some(round.unwrap_or(simplest)).filter(|best| list[*best].worth > from)
+}
+
+/// What a reading is judged by.
+struct Judge<'a> {
+    problem: &'a Problem<'a>,
+    declared: &'a Judged,
+    /// Share of the rows that are independent, over all joints and of each.
+    share: f64,
+    independent: &'a [f64],
+    needed: f64,
+    tried: usize,
+}
+
+impl Judge<'_> {
+    /// A reading of the list as it is told; none where blocks that did not choose it do not confirm it.
+    fn found(&self, list: &[Judged], at: usize) -> Option<Found> {
+        let (problem, declared, chosen) = (self.problem, self.declared, &list[at]);
+        let (b, a) = (&declared.trial, &chosen.trial);
+        let held_out = confirm::gain(
+            (&b.fit, &b.normal, &b.power),
+            (&a.fit, &a.normal, &a.power),
+            self.independent,
+        )?;
+        let physics = credit(&chosen.positives) - credit(&declared.positives);
+        let gain = held_out.all + physics;
+        let fitted = self.share * (a.fit.score - b.fit.score);
+        let sure = gain >= self.needed;
+        let needed = if sure {
+            self.needed
+        } else {
+            self.needed - ODDS + LIKELY
+        };
+        // few independent rows for each unknown: what the model lacks repeats itself in them
+        let rows = self.independent.iter().sum::<f64>() * a.normal.rows as f64;
+        let unknowns = a.normal.unknowns as f64;
+        let deviations = match rows < FEW * unknowns {
+            true => MORE_DEVIATIONS,
+            false => DEVIATIONS,
+        };
+        let strokes = problem.sample.strokes();
+        // what physics says alone needs no residual
+        let deviations = if physics > needed { 0.0 } else { deviations };
+        let no_worse = if physics > 0.5 * needed {
+            NO_WORSE
+        } else {
+            BETTER
+        };
+        if gain < needed {
+            return None;
         }
-    };
-    let violated = |of: &[Positive]| -> Vec<String> {
-        of.iter()
-            .filter(|p| p.told && p.deviations() < NEGATIVE)
-            .map(name)
-            .collect()
-    };
-    let mut tied: Vec<Change> = Vec::new();
-    let mut order: Vec<&Judged> = list
-        .iter()
-        .filter(|j| j.worth >= chosen.worth - TIED)
-        .collect();
-    // a round number stands for a fitted one that is hardly better
+        // what is right predicts no worse, and wins in both halves of the logs and in most blocks, unless what physics
+        // forbids by itself outweighs what the fit loses
+        let confirmed = held_out.all >= -WORSE
+            && fitted >= -0.5 * WORSE
+            && a.fit.error() <= no_worse * b.fit.error()
+            && held_out.half + 0.5 * physics >= -LOST * held_out.all
+            && held_out.deviations >= deviations;
+        if !confirmed && physics < FORCED * needed {
+            return None;
+        }
+        if (strokes < HARDLY * unknowns && physics < needed)
+            || (strokes < STROKES[0].max(STROKES[1] * unknowns)
+                && !wins_in_halves(problem, declared, chosen, self.share, 0.5 * needed))
+        {
+            return None;
+        }
+        let error = [b.fit.error(), a.fit.error()];
+        let pairs = b.fit.left.iter().zip(&a.fit.left);
+        let largest = pairs
+            .filter(|(b, a)| **b > 0.0 && **a > 0.0)
+            .map(|(b, a)| (b / a).sqrt())
+            .fold(error[0] / error[1], f64::max);
+        let forbidden = !joints_below(&declared.positives, FORBIDDEN).is_empty()
+            && joints_below(&chosen.positives, FORBIDDEN).is_empty();
+        if largest <= TENTH && !forbidden {
+            return None;
+        }
+        // what leaves a third of the torque unexplained must explain much more than that
+        let poor = error[1] > THIRD && error[0] < 1.5 * error[1];
+        let name = |p: &Positive| {
+            let joint = &problem.robot.joint_names()[p.joint];
+            match p.quantity {
+                Quantity::Inertia => format!("inertia of {joint}"),
+                Quantity::FrictionPower => format!("friction power of {joint}"),
+            }
+        };
+        let violated = |of: &[Positive]| -> Vec<String> {
+            let below = of.iter().filter(|p| p.told && p.deviations() < NEGATIVE);
+            below.map(name).collect()
+        };
+        Some(Found {
+            tied: tied(list, chosen),
+            change: chosen.change.clone()?,
+            // of a direction there is none
+            std: chosen.std.filter(|std| *std < UNKNOWN),
+            error,
+            gain,
+            needed: self.needed,
+            tried: self.tried,
+            violated: [violated(&declared.positives), violated(&chosen.positives)],
+            sure: sure && !poor,
+        })
+    }
+}
+
+/// Readings that explain as much as a chosen one: of other places, else another factor of the same channel.
+fn tied(list: &[Judged], chosen: &Judged) -> Vec<Change> {
     let fitted = |j: &Judged| j.std.is_some();
+    let as_much = |j: &&Judged| j.worth >= chosen.worth - TIED;
+    let mut order: Vec<&Judged> = list.iter().filter(as_much).collect();
+    // a round number stands for a fitted one that is hardly better
     order.sort_by(|a, b| fitted(a).cmp(&fitted(b)).then(b.worth.total_cmp(&a.worth)));
+    let mut tied: Vec<Change> = Vec::new();
     for change in order.into_iter().filter_map(|j| j.change.clone()) {
         let there = |other: &Change| same_place(&Some(change.clone()), &Some(other.clone()));
         if !tied.iter().any(there) && !chosen.change.as_ref().is_some_and(there) {
             tied.push(change);
         }
     }
-    // another factor of the same channel, a round one first
-    let beside = list
-        .iter()
-        .filter(|j| j.worth >= chosen.worth - TIED && other_factor(chosen, j))
-        .max_by(|a, b| fitted(b).cmp(&fitted(a)).then(a.worth.total_cmp(&b.worth)));
-    if let Some(change) = beside
-        .and_then(|j| j.change.clone())
-        .filter(|_| tied.is_empty())
-    {
-        tied.push(change);
+    if tied.is_empty() {
+        // a round one first
+        let others = list
+            .iter()
+            .filter(|j| as_much(j) && other_factor(chosen, j));
+        let beside =
+            others.max_by(|a, b| fitted(b).cmp(&fitted(a)).then(a.worth.total_cmp(&b.worth)));
+        tied.extend(beside.and_then(|j| j.change.clone()));
     }
     tied.truncate(3);
-    Some(Found {
-        tied,
-        change: chosen.change.clone()?,
-        // of a direction there is none
-        std: chosen.std.filter(|std| *std < UNKNOWN),
-        error,
-        gain,
-        needed,
-        tried,
-        violated: [violated(&declared.positives), violated(&chosen.positives)],
-        sure,
-    })
+    tied
 }
 
 /// Whether two changes are of the same kind and channels, with other numbers.

@@ -4,7 +4,7 @@
 //! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried.
 
 use std::cell::OnceCell;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::DMatrix;
 
@@ -13,6 +13,7 @@ use super::confirm;
 use super::correction::{Change, Correction};
 use super::finding::ChannelKind::{Both, Position};
 use super::fit::Fit;
+use super::fitted::CALIBRATION;
 use super::hypotheses;
 use super::normal::{Normal, Problem, own_column};
 use super::physics::{Positive, credit, positives};
@@ -29,16 +30,24 @@ const BELOW: f64 = -3.0;
 const LARGE: f64 = 0.25;
 /// .. though its own rows alone leave less than this share of it, contradicts the others.
 const ALONE: f64 = 0.6;
-/// Zeros that would be moved by less are no fault \[rad\].
-const MOVED: f64 = 0.02;
+/// Zeros that would be moved by less are calibration and not told in the end \[rad\].
+const MOVED: f64 = 0.9 * CALIBRATION;
 /// A zero is not told by its derivative beyond this \[rad\].
 const FAR: f64 = 0.5;
 /// An error that a zero moves by less than this ratio is not told in the end.
 const SHIFTED: f64 = 1.1;
-/// Rows that positions are tried on.
+/// Rows that positions are tried on first, at least, and for each unknown of a joint ..
+const FIRST: [usize; 2] = [40, 3];
+/// .. rows on which those that do well there are tried again ..
 const FEWER: usize = 100;
-/// .. and rows on which those that do well there are tried again.
+/// .. and those that do well there too.
 const MORE: usize = 500;
+/// Difference of scores below which a zero is a turned axis of the link's own description.
+const SAME: f64 = 1e-3;
+/// Ratio of factors that leave a joint to itself where both gain as much.
+const FLATTER: f64 = 10.0;
+/// Log-likelihood within which they do.
+const AS_MUCH: f64 = 3.0;
 /// Blocks of time of these.
 const BLOCKS: usize = 12;
 /// Log-likelihood that a right change may lose by few rows.
@@ -63,8 +72,11 @@ pub(super) fn doubtful(
         || implausible(problem, moving)
         || contradicts(declared)
         || torques(problem, declared, credit(positives), rows, moving)
-        || zeros(problem, declared, rows)
-        || positions(problem, &declared.by, moving)
+        || {
+            let race = Race::new(problem, &declared.by);
+            zeros(problem, declared, rows, race.as_ref())
+                || race.is_some_and(|race| positions(problem, &race, moving))
+        }
 }
 
 /// Whether a joint moves farther, or less, than a log that excites it can.
@@ -143,13 +155,71 @@ fn torques(
         Fit::new(&shared, targets, &power).map_or(f64::NEG_INFINITY, |fit| fit.score)
     };
     let before = score(&declared.by);
-    changes
-        .iter()
-        .any(|change| score(&declared.by.with(change)) > before + GAIN && gains(change))
+    let better = |change: &Change| {
+        let after = score(&declared.by.with(change));
+        after > before + GAIN
+            && !flat(change, after, &|c| score(&declared.by.with(c)))
+            && gains(change)
+    };
+    changes.iter().any(better)
 }
 
-/// Whether a joint's zero elsewhere gains, by the derivative of the torques with it.
-fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
+/// Whether a factor does no better than one ten times as far from 1: it only takes the joint's torque out of the fit
+/// of the others, and the truth would not.
+fn flat(change: &Change, score: f64, score_of: &dyn Fn(&Change) -> f64) -> bool {
+    let Change::Scale(channel, joints, factor) = change else {
+        return false;
+    };
+    let far = if *factor > 1.0 {
+        FLATTER
+    } else {
+        FLATTER.recip()
+    };
+    score_of(&Change::Scale(*channel, joints.clone(), factor * far)) > score - AS_MUCH
+}
+
+/// Whether a joint's zero elsewhere gains, by the derivative of the torques with it: on few rows, then on more.
+fn zeros(problem: &Problem, declared: &Trial, rows: &[usize], race: Option<&Race>) -> bool {
+    let robot = problem.robot;
+    if !robot.knows_links()
+        || robot.joints() < 2
+        || problem.channels.drive == Drive::Motors
+        || !zero_gains(problem, declared, rows, 1.0)
+    {
+        return false;
+    }
+    race.and_then(Race::more).is_none_or(|more| {
+        // as many of them as the few are nearly independent
+        let share = rows.len() as f64 / more.rows.len() as f64;
+        zero_gains(problem, &more.declared, &more.rows, share.min(1.0))
+    })
+}
+
+fn zero_gains(problem: &Problem, declared: &Trial, rows: &[usize], share: f64) -> bool {
+    let fit = &declared.fit;
+    slopes(problem, declared, rows)
+        .into_iter()
+        .any(|(z, moved, gain)| {
+            if share * gain < GAIN || moved.abs() < MOVED {
+                return false;
+            }
+            // far away the derivative tells no more than that something is wrong
+            if moved.abs() > FAR {
+                return true;
+            }
+            let there = declared.by.with(&Change::Zero(z, moved));
+            let trial = Trial::new(problem, there, rows, 1, Some(declared));
+            trial.is_some_and(|trial| {
+                let pairs = fit.left.iter().zip(&trial.fit.left);
+                let ratios = pairs.filter(|(_, a)| **a > 0.0);
+                ratios.map(|(b, a)| (b / a).sqrt()).fold(0.0, f64::max) > SHIFTED
+            })
+        })
+}
+
+/// Of each joint whose zero leaves a trace, how far it is moved by these rows and the log-likelihood that this
+/// gains, to first order.
+fn slopes(problem: &Problem, declared: &Trial, rows: &[usize]) -> Vec<(usize, f64, f64)> {
     let Trial {
         robot,
         by,
@@ -158,9 +228,6 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
         ..
     } = declared;
     let (n, p) = (robot.joints(), robot.parameters().len());
-    if !robot.knows_links() || n < 2 || problem.channels.drive == Drive::Motors {
-        return false;
-    }
     let theta: Vec<f64> = fit.theta.iter().take(p).copied().collect();
     let mut carried = Carried::new(n);
     let mut y = vec![0.0; n * p];
@@ -201,35 +268,23 @@ fn zeros(problem: &Problem, declared: &Trial, rows: &[usize]) -> bool {
         }
     }
     let solved = fit.solve(&with_unknowns);
-    (0..n).any(|z| {
+    let of = |z: usize| {
         let own = with_itself[z] - with_unknowns.column(z).dot(&solved.column(z));
-        // nothing of it is left where the parameters take it
-        if own <= 1e-6 * with_itself[z] || own <= 0.0 {
-            return false;
-        }
-        let moved = with_residual[z] / own;
-        if 0.5 * with_residual[z] * moved < GAIN || moved.abs() < MOVED {
-            return false;
-        }
-        // far away the derivative tells no more than that something is wrong
-        if moved.abs() > FAR {
-            return true;
-        }
-        let there = by.with(&Change::Zero(z, moved));
-        let trial = Trial::new(problem, there, rows, 1, Some(declared));
-        trial.is_some_and(|trial| {
-            let ratios = fit
-                .left
-                .iter()
-                .zip(&trial.fit.left)
-                .filter(|(_, a)| **a > 0.0);
-            ratios.map(|(b, a)| (b / a).sqrt()).fold(0.0, f64::max) > SHIFTED
+        // nothing of it is left where the parameters take it, or where no turn of it moves a torque
+        let told = own > 1e-6 * with_itself[z] && 0.5 * own * PI * PI > GAIN;
+        told.then(|| {
+            (
+                z,
+                with_residual[z] / own,
+                0.5 * with_residual[z].powi(2) / own,
+            )
         })
-    })
+    };
+    (0..n).filter_map(of).collect()
 }
 
 /// Whether turned positions, joints in each other's place, or zeros a quarter turn away gain.
-fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
+fn positions(problem: &Problem, race: &Race, moving: &[usize]) -> bool {
     if moving.len() < 2 {
         return false;
     }
@@ -250,64 +305,97 @@ fn positions(problem: &Problem, by: &Correction, moving: &[usize]) -> bool {
         _ => false,
     };
     changes.extend(hypotheses::of_zeros(problem).into_iter().filter(quarter));
-    Race::new(problem, by).is_some_and(|race| changes.iter().any(|change| race.won(change)))
+    changes.iter().any(|change| race.won(change))
 }
 
-/// Rows of the second look at what a first one on few rows does not refuse.
+/// Rows and the declared set-up's trial on them.
+struct Heat {
+    rows: Vec<usize>,
+    declared: Trial,
+    /// Of the declared set-up's physics; where it has a say.
+    credit: f64,
+}
+
+/// Hypotheses are tried on few rows, and those that do well there on more.
 struct Race<'a> {
     problem: &'a Problem<'a>,
     by: &'a Correction,
-    few: (Vec<usize>, Trial),
-    more: OnceCell<Option<SecondLook>>,
+    few: [Heat; 2],
+    more: OnceCell<Option<Heat>>,
 }
 
-/// Rows, the declared set-up's trial on them, its credit by physics, and the share of the rows that counts.
-type SecondLook = (Vec<usize>, Trial, f64, f64);
+impl Heat {
+    fn new(problem: &Problem, by: &Correction, rows: usize, blocks: usize) -> Option<Self> {
+        let rows = problem.sample.spread(rows);
+        let declared = Trial::new(problem, by.clone(), &rows, blocks, None)?;
+        Some(Self {
+            rows,
+            declared,
+            credit: 0.0,
+        })
+    }
+
+    /// The trial of a change and what it gains.
+    fn of(&self, problem: &Problem, by: &Correction, blocks: usize) -> Option<(Trial, f64)> {
+        let trial = Trial::new(
+            problem,
+            by.clone(),
+            &self.rows,
+            blocks,
+            Some(&self.declared),
+        )?;
+        let gain = trial.fit.score - self.declared.fit.score;
+        Some((trial, gain))
+    }
+}
 
 impl<'a> Race<'a> {
     fn new(problem: &'a Problem<'a>, by: &'a Correction) -> Option<Self> {
-        let few = problem.sample.spread(FEWER);
-        let declared = Trial::new(problem, by.clone(), &few, 1, None)?;
+        let n = problem.robot.joints();
+        let first = FIRST[0].max(FIRST[1] * problem.first_own(problem.robot, n) / n);
         Some(Self {
             problem,
             by,
-            few: (few, declared),
+            few: [
+                Heat::new(problem, by, first.min(FEWER), 1)?,
+                Heat::new(problem, by, FEWER, 1)?,
+            ],
             more: OnceCell::new(),
         })
     }
 
-    fn more(&self) -> Option<&SecondLook> {
+    fn more(&self) -> Option<&Heat> {
         let begin = || {
-            let rows = self.problem.sample.spread(MORE);
-            let trial = Trial::new(self.problem, self.by.clone(), &rows, BLOCKS, None)?;
-            let before = credit(&of(self.problem, &trial));
-            // as many of them as the few are nearly independent
-            let share = (FEWER as f64 / rows.len() as f64).min(1.0);
-            Some((rows, trial, before, share))
+            let mut heat = Heat::new(self.problem, self.by, MORE, BLOCKS)?;
+            heat.credit = credit(&of(self.problem, &heat.declared));
+            Some(heat)
         };
         self.more.get_or_init(begin).as_ref()
     }
 
     /// Whether a change gains on few rows, then on more, where physics has its say.
     fn won(&self, change: &Change) -> bool {
-        let by = self.by.with(change);
-        let (rows, declared) = &self.few;
-        let Some(trial) = Trial::new(self.problem, by.clone(), rows, 1, Some(declared)) else {
-            return false;
-        };
-        let first = trial.fit.score - declared.fit.score;
-        if first < PROMISING {
-            return false;
+        let (problem, by) = (self.problem, self.by.with(change));
+        for heat in &self.few {
+            let Some((_, gain)) = heat.of(problem, &by, 1) else {
+                return false;
+            };
+            // a zero that parameters take is no other set-up
+            let same = matches!(change, Change::Zero(..)) && gain.abs() < SAME;
+            if gain < PROMISING || same {
+                return false;
+            }
         }
-        let Some((rows, declared, before, share)) = self.more() else {
+        let Some(more) = self.more() else {
             return true;
         };
-        let Some(trial) = Trial::new(self.problem, by, rows, BLOCKS, Some(declared)) else {
+        let Some((trial, gain)) = more.of(problem, &by, BLOCKS) else {
             return false;
         };
-        let gain = share * (trial.fit.score - declared.fit.score);
-        let after = credit(&of(self.problem, &trial));
-        gain.min(gain + after - before) > GAIN
+        // as many of them as the few are nearly independent
+        let share = (FEWER as f64 / more.rows.len() as f64).min(1.0);
+        let gain = share * gain;
+        gain > GAIN && gain + credit(&of(problem, &trial)) - more.credit > GAIN
     }
 }
 

@@ -13,7 +13,7 @@ const STEP: f64 = 0.06;
 /// A zero that is looked for from the declared one is not farther from it \[rad\].
 const NEAR: f64 = 0.8;
 /// Smaller zeros are calibration, and no fault of a set-up \[rad\].
-const CALIBRATION: f64 = 2.5 * std::f64::consts::PI / 180.0;
+pub(super) const CALIBRATION: f64 = 2.5 * std::f64::consts::PI / 180.0;
 /// Gravity that is off by less is a tilt, and no fault of a set-up \[rad\].
 const TILT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Logarithm of a factor below which a torque constant is badly known, and no unit mistaken.

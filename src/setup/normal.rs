@@ -1,5 +1,7 @@
 //! Normal equations of a sample under a correction, by joint and by block of time.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Channels, Drive};
@@ -21,6 +23,12 @@ pub struct Problem<'a> {
     /// Friction terms of each joint, fitted or known.
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
+    /// The robot as it is declared, for every fit that takes it so.
+    declared: Arc<Robot>,
+    /// Joints that move, and whose torques are not all zero.
+    moving: Vec<bool>,
+    /// Of each joint, the unknowns of the declared robot that its rows are about.
+    places: Vec<Vec<usize>>,
 }
 
 /// Sums of products by block and joint. Of joint j the columns are its shared parameters, its own terms, the
@@ -38,10 +46,39 @@ pub(super) struct Normal {
     pub rows: usize,
 }
 
-impl Problem<'_> {
-    /// Joints that move, and whose torques are not all zero. In a log that moves one joint the others stand
-    /// still; where several move, one that seems not to may be in thousandths of its unit.
-    pub(super) fn moving(&self) -> Vec<bool> {
+impl<'a> Problem<'a> {
+    /// A robot, the channels of its logs, its friction terms and a sample. `in_gravity` is the same robot in
+    /// another gravity \[m/s^2\]; none where gravity is not declared by the file.
+    pub fn new(
+        robot: &'a Robot,
+        in_gravity: Option<&'a (dyn Fn([f64; 3]) -> Option<Robot> + Sync)>,
+        channels: Channels,
+        columns: &'a RegressorColumns,
+        sample: Sample,
+    ) -> Self {
+        let mut out = Self {
+            robot,
+            in_gravity,
+            channels,
+            columns,
+            sample,
+            declared: Arc::new(robot.clone()),
+            moving: Vec::new(),
+            places: Vec::new(),
+        };
+        out.moving = out.joints_that_move();
+        out.places = out.places_of(robot);
+        out
+    }
+
+    /// Joints that move, and whose torques are not all zero.
+    pub(super) fn moving(&self) -> &[bool] {
+        &self.moving
+    }
+
+    /// In a log that moves one joint the others stand still; where several move, one that seems not to may be in
+    /// thousandths of its unit.
+    fn joints_that_move(&self) -> Vec<bool> {
         let n = self.sample.joints;
         let travels = |j: usize| {
             let q = self.sample.q.iter().skip(j).step_by(n.max(1));
@@ -54,7 +91,7 @@ impl Problem<'_> {
             high - low > least
         };
         let moved: Vec<bool> = (0..n).map(travels).collect();
-        let alone = n > 1 && moved.iter().filter(|m| **m).count() < 2;
+        let alone = n > 1 && moved.iter().filter(|m| **m).count() == 1;
         let torques = self.sample.rms(&self.sample.tau);
         let speeds = self.sample.rms(&self.sample.v);
         let moving = |j: usize| torques[j] > 0.0 && speeds[j] > 0.0 && (moved[j] || !alone);
@@ -80,10 +117,13 @@ impl Problem<'_> {
     }
 
     /// The robot in the gravity of a correction.
-    pub(super) fn robot_under(&self, by: &Correction) -> Option<Robot> {
+    pub(super) fn robot_under(&self, by: &Correction) -> Option<Arc<Robot>> {
         match by.gravity {
-            None => Some(self.robot.clone()),
-            Some(gravity) => self.in_gravity.and_then(|robot| robot(gravity)),
+            None => Some(Arc::clone(&self.declared)),
+            Some(gravity) => self
+                .in_gravity
+                .and_then(|robot| robot(gravity))
+                .map(Arc::new),
         }
     }
 
@@ -92,7 +132,7 @@ impl Problem<'_> {
         robot.parameters().len() + self.columns.own[..j].iter().map(Vec::len).sum::<usize>()
     }
 
-    fn places(&self, robot: &Robot, moving: &[bool]) -> Vec<Vec<usize>> {
+    fn places_of(&self, robot: &Robot) -> Vec<Vec<usize>> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let mut seen = vec![false; n * p];
         let mut y = vec![0.0; n * p];
@@ -109,7 +149,7 @@ impl Problem<'_> {
             }
         }
         let of = |j: usize| -> Vec<usize> {
-            if !moving[j] {
+            if !self.moving[j] {
                 return Vec::new();
             }
             let shared = (0..p).filter(|c| seen[j * p + c]);
@@ -132,7 +172,10 @@ impl Problem<'_> {
     ) -> Option<Normal> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let moving = self.moving();
-        let places = self.places(robot, &moving);
+        let places = match std::ptr::eq(robot, &*self.declared) {
+            true => self.places.clone(),
+            false => self.places_of(robot),
+        };
         let widths: Vec<usize> = places.iter().map(|c| c.len() + n + 1).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];

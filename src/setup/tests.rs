@@ -75,13 +75,13 @@ fn searched(declared: [f64; 3], alter: &dyn Fn(&mut [f64])) -> Searched {
         rest_speed: Default::default(),
     };
     let in_gravity = |gravity: [f64; 3]| Some(robot(gravity));
-    let problem = Problem {
-        robot: &robot_here,
-        in_gravity: Some(&in_gravity),
-        channels: Channels::of_joints(2),
-        columns: &columns,
-        sample: sample(alter),
-    };
+    let problem = Problem::new(
+        &robot_here,
+        Some(&in_gravity),
+        Channels::of_joints(2),
+        &columns,
+        sample(alter),
+    );
     search(&problem, &|| false)
 }
 
@@ -146,6 +146,15 @@ fn two_faults_are_found_one_after_the_other() {
     assert_eq!(found.correction.torque_factor, [-1.0, 1.0]);
     let factor = found.correction.position_factor[1];
     assert!((factor.to_degrees() - 1.0).abs() < 1e-12, "{factor}");
+}
+
+#[test]
+fn all_positions_in_thousandths_are_no_robot_at_rest() {
+    let found = searched(DOWN, &|row| {
+        row[..6].iter_mut().for_each(|x| *x *= 1e-3);
+    });
+    let all = Change::Scale(ChannelKind::Position, vec![0, 1], 1e3);
+    assert_eq!(*first(&found), all);
 }
 
 #[test]

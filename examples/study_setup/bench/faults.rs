@@ -127,6 +127,16 @@ impl Fault {
         }
     }
 
+    /// Of which of `n` joints the torque is that joint `j` is declared to have.
+    pub fn torque_of(&self, j: usize, n: usize) -> usize {
+        match self {
+            Self::Exchange(Side::Torque | Side::Both, a, b) if j == *a => *b,
+            Self::Exchange(Side::Torque | Side::Both, a, b) if j == *b => *a,
+            Self::Reverse => n - 1 - j,
+            _ => j,
+        }
+    }
+
     /// Whether it is in the rows of a log and not in what is declared of its channels.
     pub fn in_rows(&self) -> bool {
         matches!(

@@ -118,16 +118,19 @@ fn wrong(clean: &Clean, fault: &Fault, folder: &Path) -> Option<Value> {
     let words = write(machine, &given, folder);
     // speeds of the unchanged logs, for the friction's power: an encoder that wraps has none of its own
     let logs = &machine.logs;
+    let (mended, fit) = fitted(machine, logs, folder, &words, "--fix-setup", "mended.toml");
+    // nothing was put right: the fit is that of the set-up as it is declared
+    let kept = mended.status == 0 && !folder.join("mended.toml").exists();
     let declared = match fault.in_rows() {
-        true => as_it_stands(machine, &given, folder, &words),
-        false => fitted(machine, logs, folder, &words, "--as-declared", ""),
+        true => as_it_stands(machine, &given, folder, &words).1,
+        false if kept => fit.clone(),
+        false => fitted(machine, logs, folder, &words, "--as-declared", "").1,
     };
     let (matters, why) = match fault {
         // inertias of a model in A are told in kg
         Fault::Gains => (true, "units".to_owned()),
-        _ => matters(&clean.fit, declared.1.as_ref()),
+        _ => matters(fault, &clean.fit, declared.as_ref()),
     };
-    let (mended, fit) = fitted(machine, logs, folder, &words, "--fix-setup", "mended.toml");
     let mut setup = mended.document["setup"].clone();
     let mut kinds = Vec::new();
     if mended.status != 0 || fault.in_rows() {
@@ -149,8 +152,9 @@ fn wrong(clean: &Clean, fault: &Fault, folder: &Path) -> Option<Value> {
         "matters": matters,
         "why": why,
         "error_unchanged": clean.fit.error(),
-        "error_declared": declared.1.as_ref().map(Fit::error),
+        "error_declared": declared.as_ref().map(Fit::error),
         "named": heard.named,
+        "sure": entries.iter().any(|entry| is(entry, "sure")),
         "first": heard.first,
         "tied": heard.tied,
         "right_joint": heard.right_joint,
@@ -169,15 +173,18 @@ fn wrong(clean: &Clean, fault: &Fault, folder: &Path) -> Option<Value> {
     }))
 }
 
-/// Whether a fault matters, and by what.
-fn matters(clean: &Fit, declared: Option<&Fit>) -> (bool, String) {
+/// Whether a fault matters, and by what. Errors are those of a torque channel, whichever joint it is taken for.
+fn matters(fault: &Fault, clean: &Fit, declared: Option<&Fit>) -> (bool, String) {
     let Some(declared) = declared else {
         return (true, "no fit".to_owned());
     };
-    let moved = clean
-        .errors
-        .iter()
-        .zip(&declared.errors)
+    let moved = (0..declared.errors.len())
+        .map(|j| {
+            (
+                clean.errors[fault.torque_of(j, clean.errors.len())],
+                declared.errors[j],
+            )
+        })
         .map(|(before, after)| (after - before).abs() / before)
         .fold(0.0, f64::max);
     let new = |what: &&String| !clean.impossible.contains(what);
