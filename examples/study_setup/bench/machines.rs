@@ -280,6 +280,7 @@ fn arm(folder: &Path) -> Machine {
                 ("drive_inertia", 0.3 * size * size),
                 ("viscous", 3.0 * size),
                 ("coulomb", 2.0 * size),
+                ("offset", 0.0),
             ] {
                 truth += &format!(
                     "\n[[parameter]]\nname = \"{name}\"\njoint = \"{joint}\"\nvalue = {value:?}\nunit = \"SI\"\n"
