@@ -20,7 +20,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("effect", "math number robot motion"),
     ("export", "number robot config motion effect"),
     ("band", "math number robot config motion effect"),
-    ("observe", "math robot log config motion effect band"),
+    ("observe", "math robot log config motion effect band export"),
     ("open_loop", "robot motion effect"),
     ("friction", "math robot log motion verdict"),
     ("inertia", "math robot log motion verdict"),
@@ -36,7 +36,7 @@ const ROOMS: &[(&str, &str)] = &[
     (
         "identify",
         "math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup compare band observe open_loop track",
+         inspect setup compare band observe open_loop track export",
     ),
     (
         "report",

@@ -74,6 +74,12 @@ pub struct Args {
     /// Rust module to write
     #[arg(long, value_name = "FILE.rs", group = "into", value_parser = arguments::rust_file)]
     pub rust: Option<PathBuf>,
+    /// Rate at which rows arrive [Hz]: header and module get the observer of `watch` for it
+    #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
+    pub observer: Option<f64>,
+    /// False alarms an hour that the limits of the observer are for
+    #[arg(long, value_name = "PER_HOUR", default_value_t = 1.0, requires = "observer", value_parser = arguments::positive)]
+    pub false_alarms: f64,
     /// Leave out the [[effect]] tables of the model; the files say so
     #[arg(long)]
     pub without_effects: bool,
@@ -348,6 +354,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let failed = |error: ExportError| CliError::input(format!("{}: {error}", given.name));
     let mut program = Program::with_effects(&refined).map_err(failed)?;
     program.rest = rest_speeds(&given.value, &program.rest);
+    if let Some(rate_hz) = args.observer {
+        if args.c.is_none() && args.rust.is_none() {
+            return Err(CliError::usage("--observer belongs to --c and --rust"));
+        }
+        if args.without_effects && !left_out.is_empty() {
+            return Err(CliError::usage(
+                "the limits of --observer are those of the model with its effects",
+            )
+            .hint("leave --without-effects out, or fit a model without effects"));
+        }
+        let machine = LoggedRobot::new(&given.name, given.value.robot.clone());
+        let of = (given.name.as_str(), &given.value, &refined);
+        let recipe = identify::watch_recipe(&machine, of, 1.0 / rate_hz, args.false_alarms)?;
+        program.observer = Some(recipe);
+    }
     let mut lines = vec![
         format!(
             "Dynamic model written by cft-ident {} from {} (SHA-256 {}).",

@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::robot_file::{FilterKind, FrictionLawKind, ModelKind, RobotFile};
-use super::{ConfigError, check_log, limits as places, serial_chain};
+use super::{ConfigError, check_limits, check_log, serial_chain};
 
 /// Checks a robot file that was read from `document`.
 pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
@@ -201,7 +201,7 @@ fn limits(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             }
         }
     }
-    places::check_places(file, document)
+    check_limits::check(file, document)
 }
 
 fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {

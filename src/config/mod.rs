@@ -8,6 +8,7 @@ pub mod campaign;
 pub mod candidates;
 mod channels;
 mod check;
+mod check_limits;
 mod check_log;
 mod contents;
 pub mod correction;

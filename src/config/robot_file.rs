@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::is_default;
+pub use super::limits::CoordinateLimits;
 use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::log::LogSection;
@@ -214,27 +215,6 @@ pub struct NoiseSection {
     /// Overrides by joint.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub joint: BTreeMap<String, JointNoise>,
-}
-
-/// `[limits.NAME]` of a joint or an actuator coordinate.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CoordinateLimits {
-    /// Lower and upper end [m or rad].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub position: Option<[f64; 2]>,
-    /// Largest speed [m/s or rad/s].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed: Option<f64>,
-    /// Largest acceleration [m/s^2 or rad/s^2].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub acceleration: Option<f64>,
-    /// Largest torque [N or Nm].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub torque: Option<f64>,
-    /// Largest voltage [V].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub volts: Option<f64>,
 }
 
 /// `[control]` of the simulator: u = kp (x_d - x) + kd (v_d - v) per actuator coordinate, saturated.

@@ -62,7 +62,13 @@ impl Language {
         format!("{}{}{}", self.open, parts.join(between), self.close)
     }
 
-    fn numbers(&self, name: &str, sizes: &[usize], values: impl Iterator<Item = f64>) -> String {
+    /// A table of numbers.
+    pub(super) fn numbers(
+        &self,
+        name: &str,
+        sizes: &[usize],
+        values: impl Iterator<Item = f64>,
+    ) -> String {
         let values: Vec<String> = values.map(exact).collect();
         (self.table)("f64", name, sizes, &self.nested(&values, sizes))
     }
@@ -104,11 +110,8 @@ impl Language {
                 (slides, false) => slides.to_string(),
             })
             .collect();
-        let words = |name: &str, kind: &str, values: &[String]| {
-            (self.table)(kind, name, &[l], &self.nested(values, &[l]))
-        };
-        out += &words("PARENT", "Option<usize>", &parents);
-        out += &words("SLIDES", "bool", &slides);
+        out += &self.words("PARENT", "Option<usize>", &parents);
+        out += &self.words("SLIDES", "bool", &slides);
         let rotations = links.iter().flat_map(|link| link.rotation).flatten();
         out += &self.numbers("ROTATION", &[l, 3, 3], rotations);
         out += &self.numbers("ORIGIN", &[l, 3], links.iter().flat_map(|link| link.origin));
@@ -127,6 +130,16 @@ impl Language {
             out += &self.numbers("SINE_K", &[s, n], factors);
         }
         out
+    }
+
+    /// A list of what are no numbers with a point.
+    pub(super) fn words(&self, name: &str, kind: &str, values: &[String]) -> String {
+        (self.table)(
+            kind,
+            name,
+            &[values.len()],
+            &self.nested(values, &[values.len()]),
+        )
     }
 
     /// The standard parameters of every link.

@@ -7,6 +7,7 @@ use super::Program;
 use super::code::{self, C, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
+use super::recipe::Recipe;
 use crate::effect::as_code::{Effects, INERTIA};
 use crate::effect::law_text::exact;
 use crate::robot::model::JointFriction;
@@ -80,7 +81,12 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
             "    @name@_beside(q, none, none, tau);",
         ),
     };
+    let observer = program.observer.as_ref();
     TEMPLATE
+        .replace(
+            "@OBSERVER@\n",
+            &observer.map_or(String::new(), Recipe::in_c),
+        )
         .replace("@TABLES@", tables.trim_end())
         .replace("@BODY@", C.bodies("BODY", &program.bodies).trim_end())
         .replace("@FALL@", C.vector("FALL", &fall(program)).trim_end())

@@ -7,6 +7,8 @@
 //! | `functions` | small functions that the statements call |
 //! | [`header`] | the C99 header |
 //! | [`module`] | the Rust module |
+//! | [`recipe`] | an observer of external torques as numbers |
+//! | `observer` | the same in C and Rust |
 //! | [`standard`] | standard parameters of links from base parameters |
 //! | [`dissipative`] | friction and drive inertias below zero |
 //! | `single` | a single joint as a chain of one link |
@@ -27,8 +29,10 @@ pub mod left_out;
 pub mod mjcf;
 pub mod module;
 pub mod note;
+mod observer;
 mod prepared;
 pub mod program;
+pub mod recipe;
 pub mod sdf;
 mod single;
 pub mod standard;

@@ -6,6 +6,7 @@ use super::Program;
 use super::code::{self, RUST, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
+use super::recipe::Recipe;
 use crate::effect::as_code::{Effects, INERTIA, Memory};
 
 const TEMPLATE: &str = include_str!("module.rs.in");
@@ -79,7 +80,12 @@ pub fn module(program: &Program, note: &Note) -> String {
         true => String::new(),
         false => text + "\n",
     };
+    let observer = program.observer.as_ref();
     TEMPLATE
+        .replace(
+            "@OBSERVER@\n",
+            &observer.map_or(String::new(), Recipe::in_rust),
+        )
         .replace("@TABLES@\n", &tables)
         .replace("@BESIDE@", &beside)
         .replace("@WEIGHT@\n", weight)

@@ -1,6 +1,7 @@
 //! A model as the numbers of a recursion: what generated code is written from.
 
 use super::error::ExportError;
+use super::recipe::Recipe;
 use crate::effect::AugmentedModel;
 use crate::effect::as_code::Effects;
 use crate::robot::JointKind;
@@ -30,6 +31,8 @@ pub struct Program {
     pub offset: Vec<f64>,
     /// What effects add.
     pub effects: Effects,
+    /// The observer of external torques, where one is asked for.
+    pub observer: Option<Recipe>,
     /// Speed of each joint below which it may be at rest [m/s or rad/s].
     pub rest: Vec<f64>,
 }
@@ -73,6 +76,7 @@ impl Program {
                 lead_s: vec![0.0; robot.joints()],
                 ..Effects::default()
             },
+            observer: None,
             rest: (0..robot.joints())
                 .map(|j| slow(robot.joint_kind(j)))
                 .collect(),

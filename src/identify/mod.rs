@@ -110,5 +110,7 @@ pub use track::{
 pub use track_error::TrackError;
 pub use unknowns::Unknown;
 pub use validate::{Validated, validate};
-pub use watch::{STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch};
+pub use watch::{
+    STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,
+};
 pub use weakest::WeakestPart;

@@ -16,7 +16,7 @@ use crate::config::held_out::Excesses;
 use crate::effect::AugmentedModel;
 use crate::log::{Block, Instant, LogSpec, Provenance, Reader};
 use crate::motion::{FilterSettings, ZeroOrderHold};
-use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer};
+use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, Recipe, recipe};
 
 /// Name of a stream in messages and results.
 pub const STREAM: &str = "-";
@@ -90,6 +90,36 @@ pub struct Watched {
     pub warnings: Vec<String>,
 }
 
+/// Filters of an observer: positions of all joints come through one, as external torques were learnt.
+fn processing(machine: &LoggedRobot, excesses: &Excesses) -> FilterSettings {
+    FilterSettings {
+        q_cutoff_hz: Some(excesses.position_cutoff_hz),
+        joint_q_cutoffs_hz: Vec::new(),
+        ..machine.settings()
+    }
+}
+
+/// The observer of [`watch`] as numbers, for rows `step_s` seconds apart and so many false alarms an hour.
+///
+/// # Errors
+/// A model without data set aside, filters that the rate does not carry.
+pub fn watch_recipe(
+    machine: &LoggedRobot,
+    (name, file, refined): (&str, &ModelFile, &AugmentedModel),
+    step_s: f64,
+    per_hour: f64,
+) -> Result<Recipe, IdentifyError> {
+    let held = &file.held_out;
+    let Some(excesses) = file.excesses.as_ref().filter(|_| !held.is_empty()) else {
+        return Err(IdentifyError::NothingHeldOut {
+            model: name.to_owned(),
+        });
+    };
+    let settings = processing(machine, excesses);
+    recipe(refined, &settings, (held, excesses), step_s, per_hour)
+        .map_err(|error| IdentifyError::motion(name, error))
+}
+
 /// Watches rows as they come; `line` gets what each shows and says whether to go on. `refined` is what the model
 /// `file`, called `name`, stands for.
 ///
@@ -119,11 +149,7 @@ pub fn watch(
             model: name.to_owned(),
         });
     };
-    let processing = FilterSettings {
-        q_cutoff_hz: Some(excesses.position_cutoff_hz),
-        joint_q_cutoffs_hz: Vec::new(),
-        ..machine.settings()
-    };
+    let processing = processing(machine, &excesses);
     let (cutoff, threshold) = (processing.cutoff_hz, excesses.threshold(settings.per_hour));
     let mut observer = Observer::new(refined.clone(), &processing)
         .map_err(|error| IdentifyError::motion(name, error))?;

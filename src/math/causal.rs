@@ -18,14 +18,7 @@ impl Causal {
     /// The same filter for `channels` channels; none lets them through as they are.
     pub fn new(sos: Option<&Sos>, channels: usize) -> Self {
         let sections = sos.map_or(Vec::new(), |sos| sos.sections().to_vec());
-        let mut gain = 1.0;
-        let steady: Vec<[f64; 2]> = (sections.iter())
-            .map(|section| {
-                let state = section.steady_state().map(|s| s * gain);
-                gain *= section.dc_gain();
-                state
-            })
-            .collect();
+        let steady = steady(&sections);
         Self {
             states: vec![[0.0; 2]; sections.len() * channels],
             sections,
@@ -63,6 +56,17 @@ impl Causal {
             }
         }
     }
+}
+
+/// State of each section of a cascade after a long constant input of 1 to it.
+pub fn steady(sections: &[Section]) -> Vec<[f64; 2]> {
+    let mut gain = 1.0;
+    let of = |section: &Section| {
+        let state = section.steady_state().map(|s| s * gain);
+        gain *= section.dc_gain();
+        state
+    };
+    sections.iter().map(of).collect()
 }
 
 /// Time by which slow signals leave a cascade late, in samples: its group delay at zero frequency.

@@ -10,6 +10,7 @@ use super::time_base::{Event, SampleClock, TimeBase};
 use super::{MotionError, MotionSample};
 use crate::log::Block;
 use crate::math::causal::{Causal, delay_samples};
+use crate::math::sos::Sos;
 
 /// Rows from which the sampling step is found.
 const CLOCK_ROWS: usize = 256;
@@ -28,6 +29,38 @@ pub struct CausalMotion {
     /// Times of the first rows, until the step is known.
     first: Vec<f64>,
     chain: Option<Chain>,
+}
+
+/// The filter of positions and torques for one sampling step.
+pub struct CausalFilter {
+    /// None where raw positions are differentiated.
+    pub sos: Option<Sos>,
+    /// Rows before the first sample.
+    pub settle: usize,
+    /// Time by which samples are late, the differences' own included \[s\].
+    pub delay_s: f64,
+}
+
+impl CausalFilter {
+    /// The narrowest position filter of `settings` for rows `dt` seconds apart.
+    ///
+    /// # Errors
+    /// [`MotionError`] for a filter that the sampling rate does not carry.
+    pub fn design(settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
+        let rate = 1.0 / dt;
+        let mut cutoffs = settings.position_cutoffs_hz(rate);
+        // one that was found at another rate
+        let most = HIGHEST_SHARE * rate;
+        cutoffs.iter_mut().for_each(|hz| *hz = hz.min(most));
+        let filter = PositionFilter::design(settings.q_order, cutoffs, rate)?;
+        let sos = filter.map(|f| f.narrowest().sos().clone());
+        let late = sos.as_ref().map_or(0.0, delay_samples) + REACH as f64;
+        Ok(Self {
+            settle: sos.as_ref().map_or(0, |sos| sos.settle_samples(SETTLED)) + POINTS,
+            delay_s: late * dt,
+            sos,
+        })
+    }
 }
 
 /// The filters for one sampling step.
@@ -113,19 +146,16 @@ impl CausalMotion {
 
 impl Chain {
     fn design(joints: usize, settings: &FilterSettings, dt: f64) -> Result<Self, MotionError> {
-        let rate = 1.0 / dt;
-        let mut cutoffs = settings.position_cutoffs_hz(rate);
-        // one that was found at another rate
-        let most = HIGHEST_SHARE * rate;
-        cutoffs.iter_mut().for_each(|hz| *hz = hz.min(most));
-        let filter = PositionFilter::design(settings.q_order, cutoffs, rate)?;
-        let slowest = filter.as_ref().map(|f| f.narrowest().sos());
-        let late = slowest.map_or(0.0, delay_samples) + REACH as f64;
+        let CausalFilter {
+            sos,
+            settle,
+            delay_s,
+        } = CausalFilter::design(settings, dt)?;
         Ok(Self {
             dt,
-            delay_s: late * dt,
-            settle: slowest.map_or(0, |sos| sos.settle_samples(SETTLED)) + POINTS,
-            filter: Causal::new(slowest, 2 * joints),
+            delay_s,
+            settle,
+            filter: Causal::new(sos.as_ref(), 2 * joints),
             ring: vec![0.0; 2 * joints * POINTS],
             at: 0,
             count: 0,

@@ -46,7 +46,7 @@ mod time_base;
 mod window;
 mod zero_order_hold;
 
-pub use causal::{CausalMotion, CausalSample};
+pub use causal::{CausalFilter, CausalMotion, CausalSample};
 pub use cutter::Skipped;
 pub use full_rate::{Smooth, full_rate, segments};
 pub use run::{RunError, Summary, run};

@@ -15,14 +15,17 @@
 //! | `observer` | from rows to external torques |
 //! | `alarms` | their deviations, alarms with joints, size, begin and end |
 //! | `excesses` | from torques of an untouched robot to thresholds |
+//! | `recipe` | the same as numbers for generated code |
 //! | `explain` | a payload or a change of friction behind what was left |
 
 mod alarms;
 mod excesses;
 mod explain;
 mod observer;
+mod recipe;
 
 pub use alarms::{Alarm, Alarms, JointOfAlarm};
 pub use excesses::{KEPT, Quiet, QuietSample, hold_s};
 pub use explain::{Change, Explainer, Explanation};
 pub use observer::{Observed, Observer};
+pub use recipe::{Recipe, recipe};

@@ -7,9 +7,9 @@ use crate::math::sos::Sos;
 use crate::motion::{CausalMotion, FilterSettings, MotionError, MotionSample};
 
 /// Order of the last low-pass.
-const ORDER: usize = 2;
+pub(super) const ORDER: usize = 2;
 /// Time constants after which it has forgotten its start.
-const SETTLED: f64 = 6.0;
+pub(super) const SETTLED: f64 = 6.0;
 /// Points that a torque between two samples is interpolated from.
 const NODES: usize = 4;
 
@@ -53,12 +53,13 @@ struct Core {
 }
 
 /// Torques of the last samples, where the model's come late or early.
-struct Late {
+pub(super) struct Late {
     /// Samples by which the torque of each joint is late.
-    by: Vec<f64>,
+    pub by: Vec<f64>,
     /// Samples that are waited for.
-    lead: usize,
-    size: usize,
+    pub lead: usize,
+    /// Samples that are kept.
+    pub size: usize,
     measured: Vec<f64>,
     model: Vec<f64>,
 }
@@ -127,8 +128,7 @@ impl Core {
     fn design(model: &AugmentedModel, cutoff_hz: f64, dt: f64) -> Result<Self, MotionError> {
         let n = model.model.robot.joints();
         let sos = Sos::butterworth(ORDER, cutoff_hz, 1.0 / dt)?;
-        let by: Vec<f64> = (0..n).map(|j| model.shift(j) / dt).collect();
-        let late = by.iter().any(|d| *d != 0.0).then(|| Late::new(by));
+        let late = Late::of(model, dt);
         let lead = late.as_ref().map_or(0, |late| late.lead);
         Ok(Self {
             plant: Sampled::new(model.clone(), dt),
@@ -194,6 +194,13 @@ impl Core {
 }
 
 impl Late {
+    /// For the shifts of a model; none where it has none.
+    pub(super) fn of(model: &AugmentedModel, dt: f64) -> Option<Self> {
+        let joints = 0..model.model.robot.joints();
+        let by: Vec<f64> = joints.map(|j| model.shift(j) / dt).collect();
+        by.iter().any(|d| *d != 0.0).then(|| Late::new(by))
+    }
+
     fn new(by: Vec<f64>) -> Self {
         let early = by.iter().fold(0.0f64, |m, d| m.max(-d)).ceil() as usize;
         let late = by.iter().fold(0.0f64, |m, d| m.max(*d)).ceil() as usize;
