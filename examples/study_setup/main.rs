@@ -9,6 +9,7 @@
 mod bench;
 mod summary;
 
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -103,7 +104,11 @@ fn finished(path: &Path) -> Vec<Value> {
         return Vec::new();
     };
     let lines = BufReader::new(file).lines().map_while(Result::ok);
-    lines
+    let mut rows: Vec<Value> = lines
         .filter_map(|line| serde_json::from_str(&line).ok())
-        .collect()
+        .collect();
+    // two studies that run side by side may both have judged a case
+    let mut seen = BTreeSet::new();
+    rows.retain(|row| seen.insert((row["machine"].to_string(), row["case"].to_string())));
+    rows
 }

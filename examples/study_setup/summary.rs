@@ -122,7 +122,19 @@ pub fn summary(rows: &[Value], all: usize) -> Value {
         .collect();
     misses.sort_by_key(|m| m["case"].as_str().map(str::to_owned));
     let wrongly = |r: &&&Value| is(r, "false");
-    let mut false_cases: Vec<String> = clean.iter().filter(wrongly).map(|r| label(r)).collect();
+    let by_what = |r: &Value| {
+        let kinds: Vec<&str> = (r["kinds"].as_array().into_iter().flatten())
+            .filter_map(Value::as_str)
+            .collect();
+        let entries = |key: &str| r[key].as_array().is_some_and(|list| !list.is_empty());
+        match (entries("setup") || entries("inspected"), kinds.is_empty()) {
+            (true, _) => "by the check of the set-up".to_owned(),
+            (false, true) => "by the look at its rows".to_owned(),
+            (false, false) => format!("by the look at its rows: {}", kinds.join(", ")),
+        }
+    };
+    let accused = |r: &&Value| format!("{} ({})", label(r), by_what(r));
+    let mut false_cases: Vec<String> = clean.iter().filter(wrongly).map(accused).collect();
     false_cases.sort();
     let seconds: f64 = rows.iter().filter_map(|r| r["seconds"].as_f64()).sum();
     json!({
