@@ -192,7 +192,7 @@ fn what_a_narrow_position_filter_makes_is_no_effect() {
         c["reason"]
             .as_str()
             .unwrap()
-            .starts_with("processing makes")
+            .starts_with("filtering and noise of the positions")
     };
     let processed: Vec<_> = candidates.iter().filter(processed).collect();
     let memory = |c: &&Value| c["family"] == "memory";
