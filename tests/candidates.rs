@@ -229,6 +229,12 @@ fn formulas_in_the_plant_are_the_torque_that_the_tool_reckons_along_its_log() {
         "{floor} {without} {with}"
     );
 
+    let bad = |own: &[&str]| {
+        let words = "simulate -r robot.toml -m truth.toml -o bad.csv".split(' ');
+        let words: Vec<&str> = words.chain(own.iter().copied()).collect();
+        let (status, message, _) = run(at, &words);
+        (status, message)
+    };
     for (effect, says) in [
         ("all-signals:shoulder:inertia=1", "`w` has no number"),
         ("all-signals:elbow:w=9", "its `joints` do not name it"),
@@ -236,17 +242,7 @@ fn formulas_in_the_plant_are_the_torque_that_the_tool_reckons_along_its_log() {
         ("all-signals:shoulder:x=1", "no key `x`"),
         ("all-signal:shoulder:w=9", "no effect `all-signal`"),
     ] {
-        let words = [
-            "simulate",
-            "-r",
-            "robot.toml",
-            "-m",
-            "truth.toml",
-            "-o",
-            "bad.csv",
-        ];
-        let own = ["--candidates", "own.toml", "--effect", effect];
-        let (status, message, _) = run(at, &[&words[..], &own].concat());
+        let (status, message) = bad(&["--candidates", "own.toml", "--effect", effect]);
         assert!(status == 2 && message.contains(says), "{status} {message}");
     }
     fs::write(
@@ -254,16 +250,7 @@ fn formulas_in_the_plant_are_the_torque_that_the_tool_reckons_along_its_log() {
         ALL_SIGNALS.replace("a_elbow", "a_wrist"),
     )
     .unwrap();
-    let words = [
-        "simulate",
-        "-r",
-        "robot.toml",
-        "-m",
-        "truth.toml",
-        "-o",
-        "bad.csv",
-    ];
-    let (status, message, _) = run(at, &[&words[..], &own].concat());
+    let (status, message) = bad(&own);
     assert!(
         status == 3 && message.contains("`a_wrist` is no signal") && !at.join("bad.csv").exists(),
         "{status} {message}"

@@ -1,21 +1,15 @@
 //! `excite` at the boundary of the process: files, streams, statuses.
 
+mod excite_support;
+
 use std::fs;
-use std::path::Path;
 
 use assert_cmd::Command;
 use cft_ident::config::Trajectory;
 use predicates::str::{contains, is_empty};
 use serde_json::Value;
 
-fn excite(folder: &Path, line: &str) -> Command {
-    let mut command = Command::cargo_bin("cft-ident").unwrap();
-    command
-        .current_dir(folder)
-        .arg("excite")
-        .args(line.split_whitespace());
-    command
-}
+use excite_support::excite;
 
 /// Options of a search that takes a moment.
 const QUICK: &str = "--starts 2 --evaluations 60";

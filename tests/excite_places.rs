@@ -1,11 +1,13 @@
 //! `excite` keeps points above a floor and in a box, and links apart from each other.
 
-use std::fs;
-use std::path::Path;
+mod excite_support;
 
-use assert_cmd::Command;
+use std::fs;
+
 use predicates::str::{contains, starts_with};
 use serde_json::Value;
+
+use excite_support::excite;
 
 /// Two links of 1 m and 0.5 m that turn about y on a post of 0.5 m; a positive angle lowers them.
 const ARM: &str = "[robot]\nmodel = \"serial\"\n\
@@ -22,15 +24,6 @@ const CAPSULES: &str = "[[limits.capsule]]\nlink = \"base\"\nfrom = [0.0, 0.0, 0
 const NOD: &str = "kind = \"fourier\"\ncoordinates = \"joint\"\nfundamental_hz = 0.2\nperiods = 2\nblend_s = 5.0\n\
     [[coordinate]]\nname = \"q1\"\noffset = 0.0\na = [0.3769911184307752]\nb = [0.0]\n\
     [[coordinate]]\nname = \"q2\"\noffset = 0.0\na = [0.0]\nb = [0.0]\n";
-
-fn excite(folder: &Path, line: &str) -> Command {
-    let mut command = Command::cargo_bin("cft-ident").unwrap();
-    command
-        .current_dir(folder)
-        .arg("excite")
-        .args(line.split_whitespace());
-    command
-}
 
 fn limit<'a>(document: &'a Value, list: &str, name: &str) -> &'a Value {
     let all = document[list].as_array().unwrap();

@@ -245,9 +245,9 @@ fn add(
         .model
         .robot
         .parameters_by_joint()
-        .iter()
+        .into_iter()
         .enumerate()
-        .map(|(j, held)| OfJoint::new(model, layout, &scene, (j, held)))
+        .map(|(j, theta)| OfJoint::new(model, layout, &scene, (j, theta)))
         .collect();
     let p = layout.theta;
     let mut regressor = vec![0.0; n * p];
@@ -325,9 +325,8 @@ impl OfJoint {
         model: &AugmentedModel,
         layout: &Layout,
         scene: &Scene,
-        (j, held): (usize, &Vec<bool>),
+        (j, theta): (usize, Vec<usize>),
     ) -> Self {
-        let theta: Vec<usize> = (0..layout.theta).filter(|i| held[*i]).collect();
         let mut places = theta.clone();
         let (first, friction) = layout.friction[j];
         places.extend(first..first + friction);

@@ -56,8 +56,7 @@ impl<'a> Deviation<'a> {
         let (covariance, u) = (file.model_covariance(model), model.parameters());
         let (mut friction, offset) = (model.theta.len(), u - model.offset.len());
         let mut joints = Vec::new();
-        for (j, held) in model.robot.parameters_by_joint().iter().enumerate() {
-            let theta: Vec<usize> = (0..held.len()).filter(|i| held[*i]).collect();
+        for (j, theta) in model.robot.parameters_by_joint().into_iter().enumerate() {
             let own = friction..friction + model.friction[j].parameters();
             friction = own.end;
             let places: Vec<usize> = theta

@@ -159,18 +159,19 @@ pub fn check_pose(machine: &Machine, from: &[f64]) -> Result<(), ExciteError> {
     let mut here = Kinematics::REST;
     here.x[..from.len()].copy_from_slice(from);
     let uses = along_way(machine, &machine.channels, from, &here);
-    let worst = uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
-    match worst.filter(|found| found.share > 1.0) {
+    match most_broken(uses) {
         None => Ok(()),
         Some(found) => Err(ExciteError::BrokenPose {
-            what: format!(
-                "{} of {}",
-                found.channel.quantity.name(),
-                found.channel.name
-            ),
+            what: found.what(),
             value: found.range[0],
         }),
     }
+}
+
+/// The limit that is broken most; none where all hold.
+fn most_broken(uses: Vec<Use>) -> Option<Use> {
+    let worst = uses.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
+    worst.filter(|found| found.share > 1.0)
 }
 
 /// Durations that are tried, in periods.
@@ -211,22 +212,17 @@ impl Blend {
             for (_, blend) in tried.into_iter().filter(|(share, _)| *share <= 1.0) {
                 let Some(from) = from else { return Ok(blend) };
                 let way = along_way(machine, channels, from, &blend.at(series, 0.0));
-                let nearest = way.into_iter().max_by(|a, b| a.share.total_cmp(&b.share));
-                match nearest {
-                    Some(broken) if broken.share > 1.0 => {
+                match most_broken(way) {
+                    Some(broken) => {
                         last.1.get_or_insert(broken);
                     }
-                    _ => return Ok(blend),
+                    None => return Ok(blend),
                 }
             }
         }
         Err(match last {
             (_, Some(broken)) => ExciteError::NoWay {
-                what: format!(
-                    "{} of {}",
-                    broken.channel.quantity.name(),
-                    broken.channel.name
-                ),
+                what: broken.what(),
                 percent: (100.0 * broken.t).round(),
             },
             (share, None) => ExciteError::NoBlend {
@@ -238,6 +234,11 @@ impl Blend {
 }
 
 impl Use {
+    /// What is bounded, and of what.
+    fn what(&self) -> String {
+        format!("{} of {}", self.channel.quantity.name(), self.channel.name)
+    }
+
     /// The same channel along two motions.
     pub fn joined(self, other: Self) -> Self {
         let range = [

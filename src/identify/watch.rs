@@ -12,7 +12,7 @@ use super::hold_out::{Held, on_other_logs};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
-use crate::config::held_out::Excesses;
+use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
 use crate::log::{Block, Instant, LogSpec, Provenance, Reader};
 use crate::motion::{FilterSettings, ZeroOrderHold};
@@ -99,6 +99,18 @@ fn processing(machine: &LoggedRobot, excesses: &Excesses) -> FilterSettings {
     }
 }
 
+/// What untouched motion showed of external torques, where data were set aside for it.
+fn learnt<'a>(
+    model: &str,
+    held: &[HeldOut],
+    excesses: Option<&'a Excesses>,
+) -> Result<&'a Excesses, IdentifyError> {
+    let learnt = excesses.filter(|_| !held.is_empty());
+    learnt.ok_or_else(|| IdentifyError::NothingHeldOut {
+        model: model.to_owned(),
+    })
+}
+
 /// The observer of [`watch`] as numbers, for rows `step_s` seconds apart and so many false alarms an hour.
 ///
 /// # Errors
@@ -110,11 +122,7 @@ pub fn watch_recipe(
     per_hour: f64,
 ) -> Result<Recipe, IdentifyError> {
     let held = &file.held_out;
-    let Some(excesses) = file.excesses.as_ref().filter(|_| !held.is_empty()) else {
-        return Err(IdentifyError::NothingHeldOut {
-            model: name.to_owned(),
-        });
-    };
+    let excesses = learnt(name, held, file.excesses.as_ref())?;
     let settings = processing(machine, excesses);
     recipe(refined, &settings, (held, excesses), step_s, per_hour)
         .map_err(|error| IdentifyError::motion(name, error))
@@ -144,12 +152,8 @@ pub fn watch(
         ),
         logs => on_other_logs(machine, (file, refined), logs, control)?,
     };
-    let Some(excesses) = held.excesses.filter(|_| !held.joints.is_empty()) else {
-        return Err(IdentifyError::NothingHeldOut {
-            model: name.to_owned(),
-        });
-    };
-    let processing = processing(machine, &excesses);
+    let excesses = learnt(name, &held.joints, held.excesses.as_ref())?;
+    let processing = processing(machine, excesses);
     let (cutoff, threshold) = (processing.cutoff_hz, excesses.threshold(settings.per_hour));
     let mut observer = Observer::new(refined.clone(), &processing)
         .map_err(|error| IdentifyError::motion(name, error))?;
@@ -222,7 +226,7 @@ pub fn watch(
     }
     inputs.insert(0, reader.provenance()?);
     let mut warnings = reader.warnings();
-    warnings.extend(far(&excesses, settings.per_hour));
+    warnings.extend(far(excesses, settings.per_hour));
     let names = held.joints.iter().enumerate();
     let joints = names.map(|(j, held)| {
         let sizes = held.external_std.iter();

@@ -1,6 +1,6 @@
 //! A section cascade run forward alone, sample by sample, over several channels.
 
-use super::sos::{Section, Sos};
+use super::sos::{Section, Sos, steady};
 
 /// A causal filter of some channels with their states; each starts in the steady state of its first value.
 #[derive(Debug, Clone)]
@@ -56,17 +56,6 @@ impl Causal {
             }
         }
     }
-}
-
-/// State of each section of a cascade after a long constant input of 1 to it.
-pub fn steady(sections: &[Section]) -> Vec<[f64; 2]> {
-    let mut gain = 1.0;
-    let of = |section: &Section| {
-        let state = section.steady_state().map(|s| s * gain);
-        gain *= section.dc_gain();
-        state
-    };
-    sections.iter().map(of).collect()
 }
 
 /// Time by which slow signals leave a cascade late, in samples: its group delay at zero frequency.

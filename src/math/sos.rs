@@ -19,12 +19,12 @@ pub struct Section {
 
 impl Section {
     /// Gain at zero frequency.
-    pub(super) fn dc_gain(&self) -> f64 {
+    fn dc_gain(&self) -> f64 {
         (self.b[0] + self.b[1] + self.b[2]) / (1.0 + self.a[0] + self.a[1])
     }
 
     /// State of the transposed direct form after a long constant input of 1.
-    pub(super) fn steady_state(&self) -> [f64; 2] {
+    fn steady_state(&self) -> [f64; 2] {
         let y = self.dc_gain();
         let s2 = self.b[2] - self.a[1] * y;
         [self.b[1] - self.a[0] * y + s2, s2]
@@ -40,6 +40,17 @@ impl Section {
             a1.abs() / 2.0 + discriminant.sqrt()
         }
     }
+}
+
+/// State of each section of a cascade after a long constant input of 1 to it.
+pub fn steady(sections: &[Section]) -> Vec<[f64; 2]> {
+    let mut gain = 1.0;
+    let of = |section: &Section| {
+        let state = section.steady_state().map(|s| s * gain);
+        gain *= section.dc_gain();
+        state
+    };
+    sections.iter().map(of).collect()
 }
 
 /// A cascade of sections.

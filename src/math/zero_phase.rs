@@ -7,7 +7,7 @@
 
 use super::MathError;
 use super::lanes::{LaneWork, Simd, widest};
-use super::sos::Sos;
+use super::sos::{Sos, steady};
 
 /// Sections of the highest order that [`Sos`] offers.
 const MAX_SECTIONS: usize = 8;
@@ -23,16 +23,7 @@ pub struct ZeroPhase {
 impl ZeroPhase {
     /// Prepares a cascade for forward-backward filtering.
     pub fn new(sos: Sos) -> Self {
-        let mut gain = 1.0;
-        let steady = sos
-            .sections()
-            .iter()
-            .map(|section| {
-                let state = section.steady_state().map(|s| s * gain);
-                gain *= section.dc_gain();
-                state
-            })
-            .collect();
+        let steady = steady(sos.sections());
         Self { sos, steady }
     }
 

@@ -5,8 +5,8 @@ use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
 pub use crate::export::recipe::Recipe;
 use crate::export::recipe::{Cascade, Late as LateOf, Untouched};
-use crate::math::causal::{delay_samples, steady};
-use crate::math::sos::Sos;
+use crate::math::causal::delay_samples;
+use crate::math::sos::{Section, Sos, steady};
 use crate::motion::{CausalFilter, FilterSettings, MotionError};
 
 fn cascade(sos: Option<&Sos>, settle: usize) -> Cascade {
@@ -19,7 +19,7 @@ fn cascade(sos: Option<&Sos>, settle: usize) -> Cascade {
         };
     };
     let sections = sos.sections();
-    let flat = |s: &crate::math::sos::Section| [s.b[0], s.b[1], s.b[2], s.a[0], s.a[1]];
+    let flat = |s: &Section| [s.b[0], s.b[1], s.b[2], s.a[0], s.a[1]];
     Cascade {
         sections: sections.iter().map(flat).collect(),
         steady: steady(sections),

@@ -267,11 +267,11 @@ impl Robot {
         }
     }
 
-    /// Whether the torque of each joint holds each inertial parameter, `[joint][parameter]`: the last joints of an arm
-    /// are told nothing of its first links.
-    pub(crate) fn parameters_by_joint(&self) -> Vec<Vec<bool>> {
+    /// Inertial parameters that the torque of each joint holds, by their places: the last joints of an arm are told
+    /// nothing of its first links.
+    pub(crate) fn parameters_by_joint(&self) -> Vec<Vec<usize>> {
         let (n, p) = (self.joints(), self.parameters().len());
-        let mut held = vec![vec![false; p]; n];
+        let mut held = vec![false; n * p];
         let mut y = vec![0.0; n * p];
         for state in 0..STATES {
             // numbers without a pattern, in which nothing is zero by chance
@@ -282,13 +282,12 @@ impl Robot {
                 (0..n).map(of).collect()
             };
             self.regressor(&at(0), &at(1), &at(2), &mut y);
-            for (held, row) in held.iter_mut().zip(y.chunks_exact(p.max(1))) {
-                for (held, y) in held.iter_mut().zip(row) {
-                    *held |= *y != 0.0;
-                }
+            for (held, y) in held.iter_mut().zip(&y) {
+                *held |= *y != 0.0;
             }
         }
-        held
+        let of = |j: usize| (0..p).filter(|i| held[j * p + i]).collect();
+        (0..n).map(of).collect()
     }
 
     /// Writes Y(q, v, a) theta: the torque of every joint \[N or N m\], friction aside. Does not allocate.

@@ -1,7 +1,5 @@
 //! Normal equations of a sample under a correction, by joint and by block of time.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Channels, Drive};
@@ -23,8 +21,6 @@ pub struct Problem<'a> {
     /// Friction terms of each joint, fitted or known.
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
-    /// The robot as it is declared, for every fit that takes it so.
-    declared: Arc<Robot>,
     /// Joints that move, and whose torques are not all zero.
     moving: Vec<bool>,
     /// Of each joint, the unknowns of the declared robot that its rows are about.
@@ -62,7 +58,6 @@ impl<'a> Problem<'a> {
             channels,
             columns,
             sample,
-            declared: Arc::new(robot.clone()),
             moving: Vec::new(),
             places: Vec::new(),
         };
@@ -117,13 +112,10 @@ impl<'a> Problem<'a> {
     }
 
     /// The robot in the gravity of a correction.
-    pub(super) fn robot_under(&self, by: &Correction) -> Option<Arc<Robot>> {
+    pub(super) fn robot_under(&self, by: &Correction) -> Option<Robot> {
         match by.gravity {
-            None => Some(Arc::clone(&self.declared)),
-            Some(gravity) => self
-                .in_gravity
-                .and_then(|robot| robot(gravity))
-                .map(Arc::new),
+            None => Some(self.robot.clone()),
+            Some(gravity) => self.in_gravity.and_then(|robot| robot(gravity)),
         }
     }
 
@@ -133,32 +125,16 @@ impl<'a> Problem<'a> {
     }
 
     fn places_of(&self, robot: &Robot) -> Vec<Vec<usize>> {
-        let (n, p) = (robot.joints(), robot.parameters().len());
-        let mut seen = vec![false; n * p];
-        let mut y = vec![0.0; n * p];
-        for s in 0..3 {
-            // no state in which entries cancel
-            let state = |k: usize| -> Vec<f64> {
-                (0..n)
-                    .map(|j| (1.7 + k as f64 + 3.1 * j as f64 + 5.3 * s as f64).sin())
-                    .collect()
-            };
-            robot.regressor(&state(1), &state(2), &state(3), &mut y);
-            for (seen, y) in seen.iter_mut().zip(&y) {
-                *seen |= *y != 0.0;
-            }
-        }
-        let of = |j: usize| -> Vec<usize> {
+        let all = robot.parameters_by_joint().into_iter().enumerate();
+        let of = |(j, shared): (usize, Vec<usize>)| -> Vec<usize> {
             if !self.moving[j] {
                 return Vec::new();
             }
-            let shared = (0..p).filter(|c| seen[j * p + c]);
             let first = self.first_own(robot, j);
-            shared
-                .chain(first..first + self.columns.own[j].len())
-                .collect()
+            let own = first..first + self.columns.own[j].len();
+            shared.into_iter().chain(own).collect()
         };
-        (0..n).map(of).collect()
+        all.map(of).collect()
     }
 
     /// Sums over the rows of these numbers, in `blocks` blocks; none where most of the rows are no pose of
@@ -172,9 +148,9 @@ impl<'a> Problem<'a> {
     ) -> Option<Normal> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let moving = self.moving();
-        let places = match std::ptr::eq(robot, &*self.declared) {
-            true => self.places.clone(),
-            false => self.places_of(robot),
+        let places = match by.gravity {
+            None => self.places.clone(),
+            Some(_) => self.places_of(robot),
         };
         let widths: Vec<usize> = places.iter().map(|c| c.len() + n + 1).collect();
         let mut carried = Carried::new(n);

@@ -13,7 +13,7 @@ use crate::robot::Robot;
 /// A hypothesis as it was fitted.
 pub(super) struct Trial {
     pub by: Correction,
-    pub robot: Arc<Robot>,
+    pub robot: Robot,
     pub normal: Arc<Normal>,
     pub fit: Fit,
     pub power: Vec<f64>,
@@ -29,7 +29,7 @@ impl Trial {
     ) -> Option<Self> {
         let same = shared.filter(|s| problem.channels.same_rows(&s.by, &by));
         let (robot, normal) = match same {
-            Some(s) => (Arc::clone(&s.robot), Arc::clone(&s.normal)),
+            Some(s) => (s.robot.clone(), Arc::clone(&s.normal)),
             None => {
                 let robot = problem.robot_under(&by)?;
                 let normal = problem.normal(&robot, &by, rows, blocks)?;

@@ -89,7 +89,7 @@ pub struct Args {
     pub margin: f64,
     /// Pose from which the robot goes straight to the first point, coordinate by coordinate [m or rad]: limits are
     /// kept on the way too
-    #[arg(long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "X,X,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = arguments::finite)]
     pub from: Option<Vec<f64>>,
     /// Log or trajectory (.toml) that is used together with the design; may be given more than once
     #[arg(long, value_name = "LOG|TRAJECTORY.toml")]
@@ -157,13 +157,6 @@ fn seconds(text: &str) -> Result<f64, String> {
         value if value <= 1e5 => Ok(value),
         _ => Err("must be at most 100000 s".into()),
     }
-}
-
-/// A coordinate of a pose.
-fn finite(text: &str) -> Result<f64, String> {
-    let value = text.trim().parse::<f64>().ok();
-    let usable = value.filter(|value| crate::number::is_usable(*value));
-    usable.ok_or_else(|| "is no finite number".into())
 }
 
 /// A frequency of a machine's motion: a robot follows some Hz.

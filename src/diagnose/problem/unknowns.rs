@@ -61,7 +61,7 @@ impl Unknowns {
         }
         let held = plain.robot.parameters_by_joint();
         let touches = |u: &Unknown, j: usize| match *u {
-            Unknown::Theta(i) => held[j][i],
+            Unknown::Theta(i) => held[j].contains(&i),
             Unknown::Friction { joint, .. } | Unknown::Offset(joint) => joint == j,
             Unknown::Linear { effect, .. } | Unknown::Shape { effect, .. } => {
                 model.effects[effect].place.touches(j)
