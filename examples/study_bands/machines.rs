@@ -10,6 +10,7 @@ use cft_ident::log::LogSpec;
 use cft_ident::motion::FilterSettings;
 use serde_json::{Value, json};
 
+use super::forces::{Forces, Shown};
 use super::pulses::Pulses;
 
 pub struct Machine {
@@ -98,6 +99,7 @@ pub struct Scored {
     pub alarms: u64,
     pub watched_s: f64,
     pub pulses: Vec<Pulses>,
+    forces: Forces,
 }
 
 impl Scored {
@@ -110,6 +112,7 @@ impl Scored {
             alarms: 0,
             watched_s: 0.0,
             pulses: (0..joints).map(|_| Pulses::default()).collect(),
+            forces: Forces::default(),
         }
     }
 
@@ -119,9 +122,12 @@ impl Scored {
         let control = Control::default();
         let given = (&numbers, Some(model));
         let mut band = vec![[0.0; 3]; self.band.len()];
+        // times and positions, by which forces act
+        let mut positions: Vec<(f64, Vec<f64>)> = Vec::new();
         let errors = &mut self.errors;
         errors.iter_mut().for_each(Vec::clear);
         validate(&machine, given, logs, &control, &mut |r, _| {
+            positions.push((r.t, r.q.to_vec()));
             for (j, band) in band.iter_mut().enumerate() {
                 let error = (r.measured[j] - r.reconstructed[j]).abs();
                 band[0] += 1.0;
@@ -165,6 +171,22 @@ impl Scored {
                 q_cutoff_hz: Some(excesses.position_cutoff_hz),
                 ..machine.settings()
             };
+            if machine.robot.joints() > 1 {
+                let limits: Vec<f64> = (model.held_out.iter())
+                    .map(|held| threshold * held.external_99)
+                    .collect();
+                let shown = rows.iter().map(|(t, external, std)| {
+                    let at = positions.partition_point(|(own, _)| own < t);
+                    Shown {
+                        t: *t,
+                        q: positions[at.min(positions.len() - 1)].1.clone(),
+                        external: external.clone(),
+                        limit: std.iter().zip(&limits).map(|(s, x)| s * x).collect(),
+                    }
+                });
+                let shown: Vec<Shown> = shown.collect();
+                self.forces.take(&machine.robot, &shown, &settings);
+            }
             for (j, pulses) in self.pulses.iter_mut().enumerate() {
                 let limit = threshold * model.held_out[j].external_99;
                 let of = rows.iter().map(|(t, x, std)| (*t, x[j], limit * std[j]));
@@ -184,6 +206,7 @@ impl Scored {
             "alarms": self.alarms,
             "watched_s": self.watched_s,
             "pulses": pulses.collect::<Vec<_>>(),
+            "forces": self.forces.told(),
         })
     }
 }

@@ -8,6 +8,7 @@
 //! simulated motion to target/study_bands.jsonl as it goes, so that a stopped study goes on where it was, and at the
 //! end the summaries into FOLDER that docs/how-to-watch.md is generated from.
 
+mod forces;
 mod machines;
 mod pulses;
 mod simulated;
@@ -63,6 +64,9 @@ fn main() {
     found.extend(pulses::of_minutes(&simulated));
     let title = "smallest torque pulse that is found 95 % of the time";
     write(&folder, "study_pulses", title, &command, found);
+    let found: Vec<Value> = measured.iter().flat_map(forces::rows).collect();
+    let title = "smallest force on the last link that is found 95 % of the time";
+    write(&folder, "study_forces", title, &command, found);
 }
 
 fn write(folder: &Path, name: &str, title: &str, command: &str, rows: Vec<Value>) {

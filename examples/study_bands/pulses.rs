@@ -13,7 +13,7 @@ use cft_ident::robot::{JointKind, Robot};
 use serde_json::{Value, json};
 
 /// Durations \[s\].
-const DURATIONS: [f64; 4] = [0.05, 0.2, 0.5, 2.0];
+pub const DURATIONS: [f64; 4] = [0.05, 0.2, 0.5, 2.0];
 /// Pulses along a log.
 const PLACES: usize = 60;
 
@@ -24,8 +24,13 @@ pub struct Pulses {
     delays: [Vec<f64>; 4],
 }
 
-/// What an observer shows of a pulse of size 1 that begins at 0.
-fn response(seconds: f64, step: f64, settings: &FilterSettings) -> Vec<f64> {
+/// What an observer shows of a torque that is on from 0 for so many seconds, from 0 to a second later.
+pub fn shown(
+    torque: &dyn Fn(f64) -> f64,
+    seconds: f64,
+    step: f64,
+    settings: &FilterSettings,
+) -> Vec<f64> {
     let model = AugmentedModel::plain(Model {
         robot: Robot::single_joint("q", JointKind::Revolute),
         theta: vec![0.0],
@@ -41,7 +46,7 @@ fn response(seconds: f64, step: f64, settings: &FilterSettings) -> Vec<f64> {
         block.t.push(t);
         block.q.push(0.0);
         let on = t >= -1e-9 && t < seconds - 1e-9;
-        block.tau.push(f64::from(u8::from(on)));
+        block.tau.push(if on { torque(t.max(0.0)) } else { 0.0 });
     }
     let mut out = Vec::new();
     let mut take = |o: &cft_ident::observe::Observed| {
@@ -53,6 +58,14 @@ fn response(seconds: f64, step: f64, settings: &FilterSettings) -> Vec<f64> {
     out
 }
 
+/// The value that the share `p` of the numbers lies at or below; none of none.
+pub fn quantile(x: &[f64], p: f64) -> Option<f64> {
+    let mut x = x.to_vec();
+    x.sort_by(f64::total_cmp);
+    x.get(((p * x.len() as f64).ceil() as usize).max(1) - 1)
+        .copied()
+}
+
 impl Pulses {
     /// Takes a log: times, external torques, and thresholds.
     pub fn take(&mut self, rows: &[(f64, f64, f64)], settings: &FilterSettings) {
@@ -62,7 +75,7 @@ impl Pulses {
         let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
         let step = (last - first) / (rows.len() - 1) as f64;
         for (i, seconds) in DURATIONS.into_iter().enumerate() {
-            let shape = response(seconds, step, settings);
+            let shape = shown(&|_| 1.0, seconds, step, settings);
             let room = rows.len().saturating_sub(shape.len());
             if room == 0 {
                 continue;
@@ -88,15 +101,9 @@ impl Pulses {
     }
 
     pub fn told(&self) -> Value {
-        let of = |x: &Vec<f64>, p: f64| {
-            let mut x = x.clone();
-            x.sort_by(f64::total_cmp);
-            x.get(((p * x.len() as f64).ceil() as usize).max(1) - 1)
-                .copied()
-        };
         let each = DURATIONS.iter().zip(&self.smallest).zip(&self.delays);
         let each = each.map(|((seconds, sizes), delays)| {
-            json!({"seconds": seconds, "size": of(sizes, 0.95), "delay_s": of(delays, 0.5)})
+            json!({"seconds": seconds, "size": quantile(sizes, 0.95), "delay_s": quantile(delays, 0.5)})
         });
         each.collect()
     }

@@ -12,14 +12,17 @@
 //! | file | what |
 //! |---|---|
 //! | `folds` | blocks, and models without each |
+//! | `directions` | the deviation by the parameters that logs tell least of, for observers |
 //! | `quantiles` | from errors to [`HeldOut`] |
 //! | this one | the band at a sample; motions that leave what was seen |
 
+mod directions;
 mod folds;
 mod quantiles;
 
 use std::cell::RefCell;
 
+pub use directions::{Direction, Directions};
 pub use folds::{Folds, FreeColumns, without_each};
 pub use quantiles::{Error, edges, held_out, quantile};
 

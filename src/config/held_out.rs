@@ -28,8 +28,8 @@ pub struct HeldOut {
     pub speed_seen: f64,
     /// Greatest modulus of the model's torque [N or Nm].
     pub torque_seen: f64,
-    /// Standard deviation of the external torque where nothing touched the robot, by ranges of speed
-    /// [N or Nm].
+    /// Standard deviation of the external torque where nothing touched the robot, by ranges of speed, the parameters'
+    /// own deviation aside [N or Nm].
     pub external_std: Vec<f64>,
     /// Deviations that 99 % of those external torques stay within.
     pub external_99: f64,
@@ -47,9 +47,11 @@ impl HeldOut {
         row[Self::range(&self.torque_edges, torque.abs())]
     }
 
-    /// Standard deviation of the external torque at a speed.
-    pub fn external_std(&self, speed: f64) -> f64 {
-        self.external_std[Self::range(&self.speed_edges, speed.abs())]
+    /// Standard deviation of the external torque at a speed where parameters make the model's torque uncertain by
+    /// `variance`.
+    pub fn external_std(&self, speed: f64, variance: f64) -> f64 {
+        let own = self.external_std[Self::range(&self.speed_edges, speed.abs())];
+        (own * own + variance).sqrt()
     }
 
     /// What does not fit together, where something does not.
@@ -169,7 +171,8 @@ mod tests {
         assert_eq!(held.fault(), None);
         assert_eq!(held.half_width(-0.3, -5.0), 4.0);
         assert_eq!(held.half_width(0.05, 1.0), 1.0);
-        assert_eq!(held.external_std(-2.0), 0.3);
+        assert_eq!(held.external_std(-2.0, 0.0), 0.3);
+        assert!((held.external_std(-2.0, 0.16) - 0.5).abs() < 1e-15);
         let lacking = HeldOut {
             external_std: vec![0.1],
             ..held

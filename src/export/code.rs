@@ -8,7 +8,7 @@ use crate::effect::as_code::Effects;
 use crate::effect::law_text::{exact, law};
 use crate::robot::JointKind;
 use crate::robot::standard::STANDARD;
-use crate::robot::tree::{Coordinate, Dependence};
+use crate::robot::tree::{Coordinate, Coupling, Dependence};
 
 /// The words of a language.
 pub(super) struct Language {
@@ -62,6 +62,11 @@ impl Language {
         format!("{}{}{}", self.open, parts.join(between), self.close)
     }
 
+    /// Whether it is C.
+    pub(super) fn is_c(&self) -> bool {
+        self.open == '{'
+    }
+
     /// A table of numbers.
     pub(super) fn numbers(
         &self,
@@ -93,7 +98,7 @@ impl Language {
             }
         }
         let mut out = String::new();
-        let is_c = self.open == '{';
+        let is_c = self.is_c();
         let parents: Vec<String> = links
             .iter()
             .map(|link| match (link.parent, is_c) {
@@ -215,20 +220,24 @@ pub(super) fn drives(program: &Program) -> Vec<String> {
             out.push(format!("tau[{j}] += {} * a[{j}];", exact(*drive)));
         }
     }
-    for (k, (c, [inertia, viscous, coulomb])) in program.couplings.iter().enumerate() {
-        let (m, o, ratio) = (c.motor, c.other, exact(c.ratio));
-        let [inertia, viscous, coulomb] = [inertia, viscous, coulomb].map(|x| exact(*x));
-        out.extend([
-            format!("let turning_{k} = {coulomb} * $sign(v[{m}] + {ratio} * v[{o}]);"),
-            format!(
-                "tau[{m}] += {ratio} * ({inertia} * a[{o}] + {viscous} * v[{o}]) + turning_{k};"
-            ),
-            format!(
-                "tau[{o}] += {ratio} * ({inertia} * a[{m}] + {viscous} * v[{m}] + turning_{k});"
-            ),
-        ]);
+    for (k, (c, numbers)) in program.couplings.iter().enumerate() {
+        out.extend(train(k, c, numbers.map(exact)));
     }
     out
+}
+
+/// Statements for a coupled gear train with these texts for inertia, viscous and Coulomb part.
+pub(super) fn train(
+    k: usize,
+    c: &Coupling,
+    [inertia, viscous, coulomb]: [String; 3],
+) -> [String; 3] {
+    let (m, o, ratio) = (c.motor, c.other, exact(c.ratio));
+    [
+        format!("let turning_{k} = {coulomb} * $sign(v[{m}] + {ratio} * v[{o}]);"),
+        format!("tau[{m}] += {ratio} * ({inertia} * a[{o}] + {viscous} * v[{o}]) + turning_{k};"),
+        format!("tau[{o}] += {ratio} * ({inertia} * a[{m}] + {viscous} * v[{m}] + turning_{k});"),
+    ]
 }
 
 /// Statements for offsets and for effects without memory.

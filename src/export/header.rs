@@ -7,7 +7,6 @@ use super::Program;
 use super::code::{self, C, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
-use super::recipe::Recipe;
 use crate::effect::as_code::{Effects, INERTIA};
 use crate::effect::law_text::exact;
 use crate::robot::model::JointFriction;
@@ -85,7 +84,7 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
     TEMPLATE
         .replace(
             "@OBSERVER@\n",
-            &observer.map_or(String::new(), Recipe::in_c),
+            &observer.map_or(String::new(), |recipe| recipe.in_c(program)),
         )
         .replace("@TABLES@", tables.trim_end())
         .replace("@BODY@", C.bodies("BODY", &program.bodies).trim_end())

@@ -6,7 +6,6 @@ use super::Program;
 use super::code::{self, RUST, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
-use super::recipe::Recipe;
 use crate::effect::as_code::{Effects, INERTIA, Memory};
 
 const TEMPLATE: &str = include_str!("module.rs.in");
@@ -84,7 +83,7 @@ pub fn module(program: &Program, note: &Note) -> String {
     TEMPLATE
         .replace(
             "@OBSERVER@\n",
-            &observer.map_or(String::new(), Recipe::in_rust),
+            &observer.map_or(String::new(), |recipe| recipe.in_rust(program)),
         )
         .replace("@TABLES@\n", &tables)
         .replace("@BESIDE@", &beside)

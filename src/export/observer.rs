@@ -1,9 +1,11 @@
 //! The observer of external torques in generated code: filters of one sampling step, deviations and limits as tables.
 
-use super::code::{C, Language, RUST};
+use super::Program;
+use super::code::{C, Language, RUST, fall, train};
 use super::recipe::{Late, Recipe};
 use crate::effect::law_text::exact;
 use crate::number;
+use crate::robot::standard::STANDARD;
 
 const IN_C: &str = include_str!("observer.h.in");
 const IN_RUST: &str = include_str!("observer.rs.in");
@@ -59,9 +61,10 @@ const LATE_IN_RUST: &str = "\
 
 impl Recipe {
     /// Type, functions and tables in C.
-    pub(super) fn in_c(&self) -> String {
+    pub(super) fn in_c(&self, program: &Program) -> String {
         let plain = "    for (j = 0; j < N; j++) y[j] = r[2][N + j] - model[j];";
         self.text(
+            program,
             (IN_C, &C),
             (plain, LATE_IN_C),
             [
@@ -73,18 +76,20 @@ impl Recipe {
     }
 
     /// The same in Rust.
-    pub(super) fn in_rust(&self) -> String {
+    pub(super) fn in_rust(&self, program: &Program) -> String {
         let plain = "        for j in 0..JOINTS {\n            y[j] = r[2][JOINTS + j] - model[j];\n        }";
         let fields = "    measured: [[f64; JOINTS]; @D@],\n    modelled: [[f64; JOINTS]; @D@],\n    late: usize,\n";
         let first = "            measured: [[0.0; JOINTS]; @D@],\n            modelled: [[0.0; JOINTS]; @D@],\n            \
                      late: 0,\n";
-        self.text((IN_RUST, &RUST), (plain, LATE_IN_RUST), [fields, first, ""])
+        let of_late = [fields, first, ""];
+        self.text(program, (IN_RUST, &RUST), (plain, LATE_IN_RUST), of_late)
     }
 
     /// The template with its marks filled in: the statements of the residual without and with a delay, and what
     /// is there for a delay alone.
     fn text(
         &self,
+        program: &Program,
         (template, language): (&str, &Language),
         (plain, late): (&str, &str),
         of_late: [&str; 3],
@@ -99,6 +104,9 @@ impl Recipe {
         let edges = each.max().unwrap_or(0).max(1);
         template
             .replace("@TABLES@\n", &self.tables(language, edges))
+            .replace("@UNCERTAIN@\n", &self.of_parameters(language, program))
+            .replace("@TRAINS@\n", &self.trains(language, program))
+            .replace("@U@", &self.uncertain.len().to_string())
             .replace("@RESIDUAL@", residual)
             .replace("@LATE_FIELDS@\n", of_late[0])
             .replace("@LATE_INIT@\n", of_late[1])
@@ -114,6 +122,43 @@ impl Recipe {
             .replace("@STEP@", &exact(self.step_s))
             .replace("@DELAY_S@", &number::significant(self.delay_s, 4))
             .replace("@RATE@", &number::significant(self.per_hour, 4))
+    }
+
+    /// Tables of the parameters' deviations.
+    fn of_parameters(&self, language: &Language, program: &Program) -> String {
+        let (u, n) = (self.uncertain.len(), program.joints.len());
+        let (links, trains) = (program.tree.links().len(), program.couplings.len());
+        // a module of Rust has it already
+        let mut out = match language.is_c() {
+            true => language.vector("FALL", &fall(program)),
+            false => String::new(),
+        };
+        let each = || self.uncertain.iter();
+        let bodies = each().flat_map(|of| of.bodies.iter().flatten().copied());
+        out += &language.numbers("UNCERTAIN", &[u, links, STANDARD], bodies);
+        let drives = each().flat_map(|of| of.drives.iter().copied());
+        out += &language.numbers("UNCERTAIN_DRIVE", &[u, n], drives);
+        let offsets = each().flat_map(|of| of.offset.iter().copied());
+        out += &language.numbers("UNCERTAIN_OFFSET", &[u, n], offsets);
+        if trains > 0 {
+            let numbers = each().flat_map(|of| of.couplings.iter().flatten().copied());
+            out += &language.numbers("UNCERTAIN_TRAIN", &[u, trains, 3], numbers);
+        }
+        out
+    }
+
+    /// Statements for what coupled gear trains add to a deviation.
+    fn trains(&self, language: &Language, program: &Program) -> String {
+        let trains = program.couplings.iter().enumerate();
+        let lines = trains.flat_map(|(k, (coupling, _))| {
+            train(
+                k,
+                coupling,
+                [0, 1, 2].map(|i| format!("UNCERTAIN_TRAIN[k][{k}][{i}]")),
+            )
+        });
+        let text = language.statements(&lines.collect::<Vec<_>>());
+        if text.is_empty() { text } else { text + "\n" }
     }
 
     fn tables(&self, language: &Language, edges: usize) -> String {

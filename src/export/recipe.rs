@@ -1,5 +1,7 @@
 //! All that the observer in generated code is written from.
 
+use crate::robot::standard::STANDARD;
+
 /// A cascade of second-order sections.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cascade {
@@ -27,12 +29,25 @@ pub struct Late {
 pub struct Untouched {
     /// Edges of ranges of speed [m/s or rad/s].
     pub speed_edges: Vec<f64>,
-    /// Deviation in each range \[N or Nm\].
+    /// Deviation in each range, that by the parameters aside \[N or Nm\].
     pub std: Vec<f64>,
     /// What 99 % stay within, in deviations.
     pub band: f64,
     /// The threshold of alarms, in deviations.
     pub limit: f64,
+}
+
+/// Parameters whose torque is one deviation of the model's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertain {
+    /// Standard parameters of each link.
+    pub bodies: Vec<[f64; STANDARD]>,
+    /// Drive inertia of each joint [kg or kg m^2].
+    pub drives: Vec<f64>,
+    /// Inertia, viscous and Coulomb part of each coupled gear train.
+    pub couplings: Vec<[f64; 3]>,
+    /// Constant torque of each joint [N or Nm].
+    pub offset: Vec<f64>,
 }
 
 /// All that an observer is written from.
@@ -50,4 +65,6 @@ pub struct Recipe {
     pub smooth: Cascade,
     pub late: Option<Late>,
     pub joints: Vec<Untouched>,
+    /// Deviations of the model's torque by its parameters.
+    pub uncertain: Vec<Uncertain>,
 }

@@ -6,7 +6,7 @@ use super::error::IdentifyError;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
-use crate::band::{self, Deviation, Error, Folds, FreeColumns, held_out, without_each};
+use crate::band::{self, Deviation, Directions, Error, Folds, FreeColumns, held_out, without_each};
 use crate::config::ModelFile;
 use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
@@ -75,6 +75,8 @@ pub(super) fn hold_out(
     (logs, inputs): (&[Log], &[Provenance]),
     control: &Control,
 ) -> Result<Held, IdentifyError> {
+    // by what these logs call for together: a validation goes through others by the same
+    let machine = &machine.with_position_cutoffs(logs, &known(&model.model), control)?;
     Trial::new(machine, (file, model), (logs, inputs), control).run(FOLDS)
 }
 
@@ -248,12 +250,12 @@ impl<'a> Trial<'a> {
         let independent = (2.0 * self.settings.cutoff_hz * dt * every as f64).min(1.0);
         let names = self.machine.robot.joint_names().iter();
         let plain = self.settings.plain_q_cutoff_hz(1.0 / dt);
-        let cutoffs = &self.settings.joint_q_cutoffs_hz;
         let all = names.zip(&errors).enumerate();
         all.map(|(j, (joint, errors))| {
             let mut held = held_out(joint, errors, errors.len() as u64, independent);
             held.samples = samples as u64;
-            held.position_cutoff_hz = cutoffs.get(j).copied().unwrap_or(plain);
+            let own = self.settings.joint_q_cutoffs_hz.get(j);
+            held.position_cutoff_hz = own.copied().unwrap_or(plain);
             held
         })
         .collect()
@@ -267,12 +269,15 @@ impl<'a> Trial<'a> {
         held: &mut [HeldOut],
     ) -> Result<Option<Excesses>, IdentifyError> {
         let cutoff = self.settings.cutoff_hz;
+        let uncertain = Directions::of(self.file, &self.model.model, held);
         let mut quiet: Option<Quiet> = None;
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = self.machine.open(log, self.control)?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
-                .map(|(fold, model)| Watched::new((index, fold), model, &self.settings))
+                .map(|(fold, model)| {
+                    Watched::new((index, fold), (model, &uncertain), &self.settings)
+                })
                 .collect::<Result<_, _>>()
                 .map_err(failed)?;
             let (mut block, mut first, mut more) = (Block::default(), None, true);
@@ -292,12 +297,8 @@ impl<'a> Trial<'a> {
                 }
             }
         }
-        let lowest = self
-            .settings
-            .joint_q_cutoffs_hz
-            .iter()
-            .copied()
-            .reduce(f64::min);
+        let each = self.settings.joint_q_cutoffs_hz.iter();
+        let lowest = each.copied().reduce(f64::min);
         let position = lowest.unwrap_or_else(|| self.settings.plain_q_cutoff_hz(f64::INFINITY));
         let learnt = quiet.and_then(|quiet| quiet.learn(held, cutoff, position));
         if learnt.is_none() {
@@ -332,13 +333,13 @@ struct Watched {
 impl Watched {
     fn new(
         (log, fold): (usize, usize),
-        model: &AugmentedModel,
+        (model, uncertain): (&AugmentedModel, &Directions),
         settings: &FilterSettings,
     ) -> Result<Self, MotionError> {
         Ok(Self {
             log,
             fold,
-            observer: Observer::new(model.clone(), settings)?,
+            observer: Observer::new(model.clone(), settings)?.with_uncertain(uncertain.clone()),
             every: 1.0 / (KEPT * settings.cutoff_hz),
             lead: LEAD / settings.cutoff_hz,
             next: f64::NEG_INFINITY,
@@ -375,6 +376,7 @@ impl Watched {
                 begins: std::mem::take(&mut self.begins),
                 external: o.external.to_vec(),
                 speed: o.speed.to_vec(),
+                variance: o.variance.to_vec(),
             });
         })?;
         Ok(taken)

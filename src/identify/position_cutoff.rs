@@ -240,19 +240,16 @@ impl LoggedRobot {
         machine
     }
 
-    /// The same robot with position cut-offs of at most those by which a model's band was found: more noise comes
-    /// through others than the band holds. None where its own are no higher.
+    /// The same robot with the position cut-offs by which a model's band was found: through others comes another noise
+    /// than the band holds. None where they are its own.
     pub(super) fn as_held(&self, held: &[HeldOut]) -> Option<LoggedRobot> {
         if held.len() != self.position_cutoffs_hz.len() {
             return None;
         }
-        let own = self.position_cutoffs_hz.iter().zip(held);
-        let least: Vec<f64> = own
-            .map(|(hz, held)| hz.min(held.position_cutoff_hz))
-            .collect();
-        (least != *self.position_cutoffs_hz).then(|| {
+        let cutoffs: Vec<f64> = held.iter().map(|held| held.position_cutoff_hz).collect();
+        (cutoffs != *self.position_cutoffs_hz).then(|| {
             let mut machine = self.clone();
-            machine.position_cutoffs_hz = Arc::new(least);
+            machine.position_cutoffs_hz = Arc::new(cutoffs);
             machine
         })
     }

@@ -40,8 +40,8 @@ pub struct Validated {
 /// Reconstructs the torque of logs, with a band where the model's `file` holds what it takes; `row` gets every raw
 /// sample, and the instant from which its time is counted.
 ///
-/// Band and rows are of positions that came through a filter no wider than that by which the band was found: where
-/// these logs call for a wider one, they are gone through once more.
+/// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
+/// another, they are gone through once more.
 ///
 /// # Errors
 /// Logs that cannot be used.

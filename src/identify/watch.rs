@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::hold_out::{Held, on_other_logs};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use crate::band::Directions;
 use crate::config::ModelFile;
 use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
@@ -58,7 +59,7 @@ pub struct WatchLine<'a> {
 pub struct WatchedJoint {
     pub joint: String,
     pub unit: String,
-    /// Least and greatest threshold over the ranges of speed \[unit\].
+    /// Least and greatest threshold over the ranges of speed, where the logs of the fit tell the parameters \[unit\].
     pub threshold: [f64; 2],
 }
 
@@ -124,7 +125,9 @@ pub fn watch_recipe(
     let held = &file.held_out;
     let excesses = learnt(name, held, file.excesses.as_ref())?;
     let settings = processing(machine, excesses);
-    recipe(refined, &settings, (held, excesses), step_s, per_hour)
+    let uncertain = Directions::of(file, &refined.model, held);
+    let model = (refined, &uncertain);
+    recipe(model, &settings, (held, excesses), step_s, per_hour)
         .map_err(|error| IdentifyError::motion(name, error))
 }
 
@@ -156,7 +159,8 @@ pub fn watch(
     let processing = processing(machine, excesses);
     let (cutoff, threshold) = (processing.cutoff_hz, excesses.threshold(settings.per_hour));
     let mut observer = Observer::new(refined.clone(), &processing)
-        .map_err(|error| IdentifyError::motion(name, error))?;
+        .map_err(|error| IdentifyError::motion(name, error))?
+        .with_uncertain(Directions::of(file, &refined.model, &held.joints));
     let layout = machine.file.layout();
     let (mut reader, of) = match input {
         Watchable::Stream(stream) => (

@@ -63,7 +63,7 @@ impl<'a> Alarms<'a> {
         self.samples += 1;
         let mut any = false;
         for (j, held) in self.held.iter().enumerate() {
-            let (std, x) = (held.external_std(o.speed[j]), o.external[j]);
+            let (std, x) = (held.external_std(o.speed[j], o.variance[j]), o.external[j]);
             self.std[j] = std;
             if x.abs() <= self.threshold * std * held.external_99 {
                 continue;
@@ -134,6 +134,7 @@ mod tests {
             over.extend(alarms.take(&Observed {
                 t,
                 external: &[a, b],
+                variance: &zero,
                 speed: &zero,
                 q: &zero,
                 v: &zero,

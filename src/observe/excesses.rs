@@ -11,6 +11,8 @@ const SHAPED: usize = 50;
 const ENOUGH: usize = 40;
 /// Levels to try: shares of the samples below.
 const LEVELS: [f64; 6] = [0.995, 0.99, 0.98, 0.96, 0.93, 0.9];
+/// Share of the external torques' mean square that the parameters' deviation leaves at least.
+const LEFT: f64 = 0.04;
 /// Samples that a deviation of its own takes.
 const LEAST: usize = 40;
 
@@ -26,6 +28,8 @@ pub struct QuietSample {
     pub begins: bool,
     pub external: Vec<f64>,
     pub speed: Vec<f64>,
+    /// Variance of the model's torque by its parameters \[N^2 or Nm^2\].
+    pub variance: Vec<f64>,
 }
 
 /// External torques of a robot that nothing touched.
@@ -68,9 +72,12 @@ impl Quiet {
                     range.is_none_or(|range| range == at)
                 };
                 let chosen = self.samples.iter().filter(own);
-                chosen.fold((0.0, 0usize), |(sum, n), s| {
-                    (sum + s.external[j] * s.external[j], n + 1)
-                })
+                let (sum, own, count) = chosen.fold((0.0, 0.0, 0usize), |(sum, own, n), s| {
+                    let square = s.external[j] * s.external[j];
+                    (sum + square, own + square - s.variance[j], n + 1)
+                });
+                // what the parameters' deviation leaves, of which something always is there
+                (own.max(LEFT * sum), count)
             };
             let (all, count) = squares(None);
             let all = (all / count as f64).sqrt().max(f64::MIN_POSITIVE);
@@ -79,13 +86,16 @@ impl Quiet {
                 _ => all,
             });
             held.external_std = each.collect();
-            let share = |s: &QuietSample| s.external[j].abs() / held.external_std(s.speed[j]);
+            let share = |s: &QuietSample| {
+                s.external[j].abs() / held.external_std(s.speed[j], s.variance[j])
+            };
             let mut shares: Vec<f64> = self.samples.iter().map(share).collect();
             held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
         }
         let greatest = |s: &QuietSample| {
             let each = held.iter().enumerate().map(|(j, held)| {
-                s.external[j].abs() / (held.external_std(s.speed[j]) * held.external_99)
+                s.external[j].abs()
+                    / (held.external_std(s.speed[j], s.variance[j]) * held.external_99)
             });
             each.fold(0.0, f64::max)
         };
@@ -193,6 +203,7 @@ mod tests {
                 0.01
             }],
             speed: vec![0.1],
+            variance: vec![0.0],
         };
         let mut quiet = Quiet::new(0.01);
         (0..200_000).for_each(|k| quiet.push(sample(k)));

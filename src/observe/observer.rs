@@ -1,5 +1,6 @@
 //! From rows to external torques.
 
+use crate::band::Directions;
 use crate::effect::{AugmentedModel, Sampled};
 use crate::log::Block;
 use crate::math::causal::{Causal, delay_samples};
@@ -22,6 +23,8 @@ pub struct Observed<'a> {
     pub external: &'a [f64],
     /// Moduli of the speeds behind the same filter [m/s or rad/s].
     pub speed: &'a [f64],
+    /// Variance of the model's torque by its parameters, as far as the observer knows of it \[N^2 or Nm^2\].
+    pub variance: &'a [f64],
     pub q: &'a [f64],
     pub v: &'a [f64],
     pub a: &'a [f64],
@@ -33,6 +36,7 @@ pub struct Observed<'a> {
 pub struct Observer {
     motion: CausalMotion,
     model: AugmentedModel,
+    uncertain: Option<Directions>,
     cutoff_hz: f64,
     core: Option<Core>,
     first: Option<f64>,
@@ -50,6 +54,7 @@ struct Core {
     tau: Vec<f64>,
     /// External torques, then speeds.
     row: Vec<f64>,
+    variance: Vec<f64>,
 }
 
 /// Torques of the last samples, where the model's come late or early.
@@ -73,10 +78,20 @@ impl Observer {
         Ok(Self {
             motion: CausalMotion::new(model.model.robot.joints(), settings)?,
             model,
+            uncertain: None,
             cutoff_hz: settings.cutoff_hz,
             core: None,
             first: None,
         })
+    }
+
+    /// The same observer, which knows how uncertain the parameters make the model's torque.
+    #[must_use]
+    pub fn with_uncertain(self, directions: Directions) -> Self {
+        Self {
+            uncertain: Some(directions),
+            ..self
+        }
     }
 
     /// Time by which external torques are late, once the sampling step is known \[s\].
@@ -103,6 +118,7 @@ impl Observer {
         self.first = self.first.or(rows.t.first().copied());
         let (core, model, cutoff) = (&mut self.core, &self.model, self.cutoff_hz);
         let first = self.first.unwrap_or(0.0);
+        let uncertain = &mut self.uncertain;
         let mut failed = None;
         self.motion.push(rows, last, &mut |dt, sample| {
             if failed.is_some() {
@@ -118,7 +134,7 @@ impl Observer {
                     }
                 },
             };
-            core.take(first, &sample.motion, sample.begins, out);
+            core.take(first, &sample.motion, sample.begins, uncertain, out);
         })?;
         failed.map_or(Ok(()), Err)
     }
@@ -139,6 +155,7 @@ impl Core {
             count: 0,
             tau: vec![0.0; n],
             row: vec![0.0; 2 * n],
+            variance: vec![0.0; n],
         })
     }
 
@@ -147,6 +164,7 @@ impl Core {
         first: f64,
         sample: &MotionSample,
         begins: bool,
+        uncertain: &mut Option<Directions>,
         out: &mut dyn FnMut(&Observed),
     ) {
         let n = self.tau.len();
@@ -181,10 +199,14 @@ impl Core {
         if self.count <= self.settle + waited {
             return;
         }
+        if let Some(directions) = uncertain {
+            directions.variances(motion, &mut self.variance);
+        }
         out(&Observed {
             t: sample.t,
             external: &self.row[..n],
             speed: &self.row[n..],
+            variance: &self.variance,
             q: sample.q,
             v: sample.v,
             a: sample.a,

@@ -1,10 +1,11 @@
 //! An observer for one sampling step as numbers, for generated code.
 
 use super::observer::{Late, ORDER, SETTLED};
+use crate::band::{Direction, Directions};
 use crate::config::held_out::{Excesses, HeldOut};
 use crate::effect::AugmentedModel;
 pub use crate::export::recipe::Recipe;
-use crate::export::recipe::{Cascade, Late as LateOf, Untouched};
+use crate::export::recipe::{Cascade, Late as LateOf, Uncertain, Untouched};
 use crate::math::causal::delay_samples;
 use crate::math::sos::{Section, Sos, steady};
 use crate::motion::{CausalFilter, FilterSettings, MotionError};
@@ -33,7 +34,7 @@ fn cascade(sos: Option<&Sos>, settle: usize) -> Cascade {
 /// # Errors
 /// [`MotionError`] for filters that the sampling rate does not carry.
 pub fn recipe(
-    model: &AugmentedModel,
+    (model, uncertain): (&AugmentedModel, &Directions),
     settings: &FilterSettings,
     (held, excesses): (&[HeldOut], &Excesses),
     step_s: f64,
@@ -54,6 +55,19 @@ pub fn recipe(
         band: held.external_99,
         limit: threshold * held.external_99,
     };
+    let robot = uncertain.robot();
+    let none = Direction::none(robot);
+    let each = match uncertain.each() {
+        // tables of C have at least one entry
+        [] => std::slice::from_ref(&none),
+        each => each,
+    };
+    let uncertain = each.iter().map(|of| Uncertain {
+        bodies: robot.link_parameters(&of.theta),
+        drives: robot.drive_parameters(&of.theta),
+        couplings: robot.coupling_parameters(&of.theta),
+        offset: of.offset.clone(),
+    });
     Ok(Recipe {
         step_s,
         delay_s: delay_s + step_s * (delay_samples(&smooth) + lead as f64),
@@ -66,5 +80,6 @@ pub fn recipe(
             by: late.by,
         }),
         joints: held.iter().map(untouched).collect(),
+        uncertain: uncertain.collect(),
     })
 }
