@@ -1,6 +1,6 @@
 #!/bin/bash
-# CPU time of a call of exported C for the Panda: seven joints alone, and with four effects at each, one of
-# which remembers the motion.
+# CPU time of a call of exported C for the Panda: its torque with seven joints alone, and with four effects at each, one
+# of which remembers the motion; and a row of the observer of external torques. Writes docs/results/exported.json.
 #   benches/exported/run.sh [TOOL]        (target/release/cft-ident where absent)
 set -euo pipefail
 tool=$(realpath "${1:-target/release/cft-ident}")
@@ -28,8 +28,10 @@ awk '
   { print }
 ' "$work/alone.toml" > "$work/effects.toml"
 
-for name in alone effects; do
-  "$tool" export -q -m "$work/$name.toml" --c "$work/$name.h" > /dev/null
+# NAME FUNCTION: a program that calls it a million times along a motion; the median of five runs in microseconds
+measure() {
+  local name=$1
+  shift
   cat > "$work/$name.c" <<END
 #define _POSIX_C_SOURCE 199309L
 #include <stdio.h>
@@ -38,11 +40,11 @@ for name in alone effects; do
 int main(void)
 {
     enum { CALLS = 1000000 };
-    double q[7] = {0.1, 0.2, -0.3, -1.2, 0.4, 1.1, 0.3}, v[7], a[7], tau[7], sum = 0.0;
+    double q[7] = {0.1, 0.2, -0.3, -1.2, 0.4, 1.1, 0.3}, v[7] = {0.0}, a[7] = {0.0}, tau[7] = {0.0}, sum = 0.0;
     struct timespec begin, end;
-    ${name}_state state;
+    $1
     int k, j;
-    ${name}_init(&state, q);
+    $2
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &begin);
     for (k = 0; k < CALLS; k++) {
         for (j = 0; j < 7; j++) {
@@ -50,15 +52,31 @@ int main(void)
             v[j] = 0.001 * (k % 500 - 250);
             a[j] = 0.01 * j + 1e-5 * k;
         }
-        ${name}_step(&state, 1e-3, q, v, a, tau);
-        sum += tau[0];
+        $3
     }
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &end);
-    printf("$name: %.3f us a call (sum %g)\n",
-           ((end.tv_sec - begin.tv_sec) * 1e9 + (end.tv_nsec - begin.tv_nsec)) / 1e3 / CALLS, sum);
+    fprintf(stderr, "$name: sum %g\n", sum + v[0] + a[0]);
+    printf("%.4f\n", ((end.tv_sec - begin.tv_sec) * 1e9 + (end.tv_nsec - begin.tv_nsec)) / 1e3 / CALLS);
     return 0;
 }
 END
   cc -std=c99 -O2 -o "$work/$name" "$work/$name.c" -lm
-  "$work/$name"
-done
+  for _ in 1 2 3 4 5; do "$work/$name" 2>> "$work/sums"; done | sort -n | sed -n 3p
+}
+
+"$tool" export -q -m "$work/alone.toml" --c "$work/alone.h" > /dev/null
+"$tool" export -q -m "$work/effects.toml" --c "$work/effects.h" > /dev/null
+"$tool" export -q -m "$work/effects.toml" --c "$work/observer.h" --observer 1000 > /dev/null
+step='_step(&state, 1e-3, q, v, a, tau); sum += tau[0];'
+alone=$(measure alone 'alone_state state;' 'alone_init(&state, q);' "alone$step")
+effects=$(measure effects 'effects_state state;' 'effects_init(&state, q);' "effects$step")
+observer=$(measure observer 'observer_observer o; observer_observed out;' 'observer_observer_init(&o);' \
+  'if (observer_observe(&o, q, tau, &out)) sum += out.std[0];')
+jq -n --argjson alone "$alone" --argjson effects "$effects" --argjson observer "$observer" '
+  def row($what; $us): {"exported C, seven joints, one core": $what, "a call [us]": $us,
+    "ratio to the arm alone": ($us / $alone)};
+  {study: "time of a call of exported C", command: "benches/exported/run.sh",
+   rows: [row("torque of the arm alone"; $alone),
+          row("torque with four effects at each joint, one with memory"; $effects),
+          row("row of the observer by that model, deviations of the parameters in it"; $observer)]}
+' | tee docs/results/exported.json
