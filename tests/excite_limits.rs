@@ -56,8 +56,9 @@ fn on_a_grid(
     let mut most = 0.0_f64;
     for m in 0..steps {
         let state = machine.state(&at(m)).expect("reachable");
+        let quantities = machine.quantities(&state);
         for channel in channels {
-            most = most.max(channel.used(machine.quantity(channel, &state)));
+            most = most.max(channel.used(quantities.of(channel)));
         }
     }
     most

@@ -1,10 +1,13 @@
 //! A machine as a design sees it: designed coordinates to joints, torques and volts, and what a fit
 //! would estimate from them.
 
+use std::cell::OnceCell;
+
 use crate::config::trajectory::Coordinates;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::RobotError;
 use crate::robot::model::{JointFriction, Model};
+use crate::robot::tree::pose::{Frame, frames};
 use crate::simulate::Mechanism;
 
 use super::limits::{Channel, Quantity};
@@ -286,10 +289,33 @@ impl Machine {
         }
     }
 
-    /// The quantity of a channel at a state.
+    /// What channels bound at a state.
     #[inline]
-    pub fn quantity(&self, channel: &Channel, state: &State) -> f64 {
-        let i = channel.index;
+    pub fn quantities<'a>(&'a self, state: &'a State) -> Quantities<'a> {
+        Quantities {
+            machine: self,
+            state,
+            frames: OnceCell::new(),
+        }
+    }
+}
+
+/// What channels bound at one state.
+#[derive(Debug)]
+pub struct Quantities<'a> {
+    machine: &'a Machine,
+    state: &'a State,
+    /// Of the links, for the first channel that asks where they are and all after it.
+    frames: OnceCell<Vec<Frame>>,
+}
+
+impl Quantities<'_> {
+    /// The quantity of a channel.
+    #[inline]
+    pub fn of(&self, channel: &Channel) -> f64 {
+        let (i, machine, state) = (channel.index, self.machine, self.state);
+        let robot = &machine.model.robot;
+        let q = &state.q[..machine.coordinates()];
         match channel.quantity {
             Quantity::Position => state.k.x[i],
             Quantity::Speed => state.k.xd[i],
@@ -299,14 +325,10 @@ impl Machine {
             Quantity::JointPosition => state.q[i],
             Quantity::JointSpeed => state.v[i],
             Quantity::JointAcceleration => state.a[i],
-            Quantity::Clearance => {
-                let transmission = self.model.robot.transmission();
-                let clearance = transmission.clearance(&state.q[..self.coordinates()]);
-                clearance.unwrap_or(1.0)
-            }
+            Quantity::Clearance => robot.transmission().clearance(q).unwrap_or(1.0),
             place => {
-                let q = &state.q[..self.coordinates()];
-                self.space.value(place, i, &self.model.robot, q)
+                let frames = self.frames.get_or_init(|| frames(robot.tree(), q));
+                machine.space.value(place, i, frames)
             }
         }
     }

@@ -290,10 +290,10 @@ impl<'a> Objective<'a> {
         for m in 0..self.fine.samples {
             let k = self.kinematics(&self.fine, &work.series, m);
             self.machine.fill(&k, &mut state)?;
-            let mut pressed = false;
+            let (mut pressed, quantities) = (false, self.machine.quantities(&state));
             for (channel, sum) in self.curved.iter().zip(&mut work.kappas) {
                 *sum = 0.0;
-                let value = self.machine.quantity(channel, &state);
+                let value = quantities.of(channel);
                 for (g, slope) in channel.constraints(value) {
                     let (penalty, kappa) = multipliers.penalty(at, g);
                     total += penalty;
@@ -359,8 +359,9 @@ impl<'a> Objective<'a> {
             for m in 0..self.fine.samples {
                 let k = self.kinematics(&self.fine, &work.series, m);
                 self.machine.fill(&k, &mut state)?;
+                let quantities = self.machine.quantities(&state);
                 for channel in &self.curved {
-                    renew(&mut at, channel, self.machine.quantity(channel, &state));
+                    renew(&mut at, channel, quantities.of(channel));
                 }
             }
         }
@@ -425,9 +426,10 @@ impl Local<'_> {
                 .map(|(y, w)| y * w)
                 .sum::<f64>();
         }
+        let quantities = machine.quantities(state);
         for (channel, kappa) in self.objective.curved.iter().zip(self.kappas) {
             if *kappa != 0.0 {
-                sum += kappa * machine.quantity(channel, state);
+                sum += kappa * quantities.of(channel);
             }
         }
         Ok(sum)

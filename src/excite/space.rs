@@ -7,7 +7,7 @@ use crate::config::limits::link_of;
 use crate::log::escape;
 use crate::robot::Robot;
 use crate::robot::tree::capsule::Capsule;
-use crate::robot::tree::pose::frame;
+use crate::robot::tree::pose::{BASE, Frame, frames};
 use crate::robot::tree::space::{Vector, add, dot, times, turn};
 
 use super::limits::{Channel, Quantity};
@@ -60,17 +60,19 @@ pub fn always_touching(file: &RobotFile) -> Vec<[String; 2]> {
     });
     let spans: Vec<[f64; 2]> = spans.collect();
     // poses spread evenly: multiples of the square roots of primes, less whole numbers (Kronecker)
-    let pose = |k: u32| -> Vec<f64> {
+    let pose = |k: u32| -> Vec<Frame> {
         let shares = (2..).filter(|n| (2..*n).all(|d| n % d != 0));
         let shares = shares.map(|prime: u32| (f64::from(k) * f64::from(prime).sqrt()).fract());
         let of = |([low, high], share): (&[f64; 2], f64)| low + share * (high - low);
-        spans.iter().zip(shares).map(of).collect()
+        let q: Vec<f64> = spans.iter().zip(shares).map(of).collect();
+        frames(robot.tree(), &q)
     };
-    let poses: Vec<Vec<f64>> = (0..POSES).map(pose).collect();
+    let poses: Vec<Vec<Frame>> = (0..POSES).map(pose).collect();
     let apart = channels.iter().filter(|c| c.quantity == Quantity::Distance);
     let touching = apart.filter(|channel| {
-        let near =
-            |q: &Vec<f64>| space.value(channel.quantity, channel.index, &robot, q) < channel.lower;
+        let near = |frames: &Vec<Frame>| {
+            space.value(channel.quantity, channel.index, frames) < channel.lower
+        };
         poses.iter().all(near)
     });
     let names = touching.map(|channel| space.pairs[channel.index].names.clone());
@@ -161,11 +163,10 @@ impl Space {
         (space, channels)
     }
 
-    /// The value of a channel of places where the joints are at `q` \[m\].
-    pub(super) fn value(&self, quantity: Quantity, index: usize, robot: &Robot, q: &[f64]) -> f64 {
-        let tree = robot.tree();
+    /// The value of a channel of places where the links' frames are `frames` \[m\].
+    pub(super) fn value(&self, quantity: Quantity, index: usize, frames: &[Frame]) -> f64 {
         let place = |point: &Point| {
-            let (rotation, origin) = frame(tree, q, point.link);
+            let (rotation, origin) = point.link.map_or(BASE, |link| frames[link]);
             add(&origin, &turn(&rotation, &point.xyz))
         };
         match quantity {
@@ -177,7 +178,7 @@ impl Space {
             _ => {
                 let Pair { one, other, .. } = &self.pairs[index];
                 let pairs = one.iter().flat_map(|a| other.iter().map(move |b| (a, b)));
-                let apart = pairs.map(|(a, b)| a.distance(b, tree, q));
+                let apart = pairs.map(|(a, b)| a.distance(b, frames));
                 apart.fold(f64::INFINITY, f64::min)
             }
         }
@@ -254,7 +255,8 @@ mod tests {
             let (a, b): (f64, f64) = (q[0], q[0] + q[1]);
             let elbow = [a.cos(), 0.5 - a.sin()];
             let tip = [elbow[0] + 0.5 * b.cos(), elbow[1] - 0.5 * b.sin()];
-            let value = |k: usize| space.value(channels[k].quantity, channels[k].index, &robot, &q);
+            let frames = frames(robot.tree(), &q);
+            let value = |k: usize| space.value(channels[k].quantity, channels[k].index, &frames);
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{q:?}: {a} {b}");
             close(value(0), tip[0]);
             close(value(1), 0.0);

@@ -324,10 +324,11 @@ fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance:
     for m in 0..=path.parts {
         let k = (path.at)(from + (to - from) * m as f64 / path.parts as f64);
         let reached = machine.fill(&k, &mut state).is_ok();
+        let quantities = machine.quantities(&state);
         for (channel, values) in channels.iter().zip(&mut grid) {
             values.push(match (channel.quantity.is_linear(), reached) {
                 (true, _) => of_kinematics(channel, &k),
-                (false, true) => machine.quantity(channel, &state),
+                (false, true) => quantities.of(channel),
                 (false, false) => f64::NAN,
             });
         }
@@ -338,7 +339,7 @@ fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance:
             return of_kinematics(channel, &k);
         }
         let reached = machine.fill(&k, &mut state);
-        reached.map_or(f64::NAN, |()| machine.quantity(channel, &state))
+        reached.map_or(f64::NAN, |()| machine.quantities(&state).of(channel))
     };
     channels
         .iter()

@@ -296,7 +296,7 @@ pub fn figure(machine: &Machine, motion: &Motion, judged: &Judgement, title: &st
     let panel = |kind: Quantity, (i, name): (usize, &str), unit: String| {
         let found = judged.limit(name, kind);
         let of = Channel::symmetric(kind, i, "", "", 1.0);
-        let value = |state| machine.quantity(&of, state);
+        let value = |state| machine.quantities(state).of(&of);
         MotionPanel {
             quantity: quantity(kind, &unit).into(),
             unit,

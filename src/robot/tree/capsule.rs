@@ -1,7 +1,6 @@
 //! Capsules: all that is within a radius of a straight piece, and how far two of them are apart.
 
-use super::links::Tree;
-use super::pose::frame;
+use super::pose::{BASE, Frame};
 use super::space::{Vector, add, dot, times, turn};
 
 /// A capsule that is fixed to a link.
@@ -16,15 +15,15 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// Ends of the piece in the base frame \[m\] where the independent joints are at `q` \[m or rad\].
-    pub fn placed(&self, tree: &Tree, q: &[f64]) -> [Vector; 2] {
-        let (rotation, origin) = frame(tree, q, self.link);
+    /// Ends of the piece in the base frame \[m\] where the links' frames are `frames`.
+    pub fn placed(&self, frames: &[Frame]) -> [Vector; 2] {
+        let (rotation, origin) = self.link.map_or(BASE, |link| frames[link]);
         self.ends.map(|end| add(&origin, &turn(&rotation, &end)))
     }
 
     /// Distance of the surfaces of two capsules \[m\]; below 0 where they overlap.
-    pub fn distance(&self, other: &Self, tree: &Tree, q: &[f64]) -> f64 {
-        let apart = of_pieces(&self.placed(tree, q), &other.placed(tree, q));
+    pub fn distance(&self, other: &Self, frames: &[Frame]) -> f64 {
+        let apart = of_pieces(&self.placed(frames), &other.placed(frames));
         apart - self.radius - other.radius
     }
 }

@@ -4,32 +4,38 @@ use super::links::{Coordinate, MOST_JOINTS, Tree};
 use super::space::{Rotation, UNTURNED, Vector, about, add, product, times, turn};
 use crate::robot::joint::JointKind;
 
-/// Orientation and origin \[m\] of link i's frame in the base frame where the independent joints are at `q`
-/// \[m or rad\]; of the base itself for `None`. Does not allocate.
-pub fn frame(tree: &Tree, q: &[f64], i: Option<usize>) -> (Rotation, Vector) {
-    let Some(link) = i.map(|i| &tree.links()[i]) else {
-        return (UNTURNED, [0.0; 3]);
-    };
-    let (rotation, origin) = frame(tree, q, link.parent);
-    let at = add(&origin, &turn(&rotation, &link.origin));
-    let joint = product(&rotation, &link.rotation);
+/// Orientation of a frame and its origin \[m\], in the base frame.
+pub type Frame = (Rotation, Vector);
+
+/// The frame of the base.
+pub const BASE: Frame = (UNTURNED, [0.0; 3]);
+
+/// The links' frames in the order of the tree, where the independent joints are at `q` \[m or rad\].
+pub fn frames(tree: &Tree, q: &[f64]) -> Vec<Frame> {
     let (still, mut slope) = ([0.0; MOST_JOINTS], [0.0; MOST_JOINTS]);
     let (v, a) = (&still[..q.len()], &still[..q.len()]);
-    let [moved, ..] = link.coordinate.motion(q, v, a, &mut slope);
-    match link.kind {
-        JointKind::Revolute => (product(&joint, &about(&link.axis, moved)), at),
-        JointKind::Prismatic => {
-            let slid = turn(&joint, &times(moved, &link.axis));
-            (joint, add(&at, &slid))
-        }
+    let mut frames: Vec<Frame> = Vec::with_capacity(tree.links().len());
+    for link in tree.links() {
+        let (rotation, origin) = link.parent.map_or(BASE, |parent| frames[parent]);
+        let at = add(&origin, &turn(&rotation, &link.origin));
+        let joint = product(&rotation, &link.rotation);
+        let [moved, ..] = link.coordinate.motion(q, v, a, &mut slope);
+        frames.push(match link.kind {
+            JointKind::Revolute => (product(&joint, &about(&link.axis, moved)), at),
+            JointKind::Prismatic => {
+                let slid = turn(&joint, &times(moved, &link.axis));
+                (joint, add(&at, &slid))
+            }
+        });
     }
+    frames
 }
 
 /// Origins of the links' frames in the base frame \[m\], in the order of the tree, where the independent joints are
 /// at `q` \[m or rad\].
 pub fn origins(tree: &Tree, q: &[f64]) -> Vec<Vector> {
-    let links = 0..tree.links().len();
-    links.map(|i| frame(tree, q, Some(i)).1).collect()
+    let frames = frames(tree, q).into_iter();
+    frames.map(|(_, origin)| origin).collect()
 }
 
 /// The link that each independent joint drives itself, or moves first.
