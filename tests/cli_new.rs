@@ -254,7 +254,9 @@ fn capsules_hold_the_collision_shapes_of_a_urdf_and_meshes_are_told() {
         .assert()
         .success();
     let text = std::fs::read_to_string(folder.path().join("r.toml")).unwrap();
-    assert!(text.contains("meshes are not read; give [[limits.capsule]] tables for hand:"));
+    assert!(
+        text.contains("not all collision shapes of hand could be read; give [[limits.capsule]]")
+    );
     let file = cft_ident::config::RobotFile::load(&folder.path().join("r.toml")).unwrap();
     let limits = &file.limits;
     let found: Vec<(&str, [f64; 3], [f64; 3], f64)> = (limits.capsule.iter())

@@ -7,7 +7,7 @@ use super::{ConfigError, RobotFile};
 use crate::log::{list, nearest};
 
 /// Most capsules: a motion is looked through for every pair of links.
-const MOST_CAPSULES: usize = 64;
+pub(super) const MOST_CAPSULES: usize = 64;
 /// Most points.
 const MOST_POINTS: usize = 64;
 

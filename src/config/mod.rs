@@ -38,4 +38,6 @@ pub use robot_file::RobotFile;
 pub use trajectory::Trajectory;
 pub use urdf::UrdfChain;
 pub use urdf::beside::DRIVE_INERTIA;
+pub use urdf::capsules::Capsules;
+pub use urdf::mesh::vertices as vertices_of_mesh;
 pub use urdf::source::{Replacement as UrdfReplacement, replaced as replaced_in_urdf};

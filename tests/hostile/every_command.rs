@@ -19,6 +19,10 @@ enum Kind {
     Trajectory,
     Campaign,
     Urdf,
+    Stl,
+    StlText,
+    Obj,
+    Collada,
 }
 
 /// Lines, `{}` where the bad file stands. What they write begins with `out`.
@@ -92,6 +96,11 @@ const LINES: &[(Kind, &str)] = &[
     ),
     (Kind::Campaign, "identify {} -o out-run"),
     (Kind::Urdf, "new out --urdf {}"),
+    // their URDF names the mesh
+    (Kind::Stl, "new out --urdf of_stl.urdf"),
+    (Kind::StlText, "new out --urdf of_stl.urdf"),
+    (Kind::Obj, "new out --urdf of_obj.urdf"),
+    (Kind::Collada, "new out --urdf of_dae.urdf"),
 ];
 
 const TRAJECTORY: &str = "kind = \"points\"\ncoordinates = \"joint\"\n\n[[point]]\nt = 0.0\nposition = [0.0]\n\n\
@@ -104,6 +113,30 @@ const URDF: &str = "<robot name=\"arm\">\n<link name=\"base\"/>\n<link name=\"up
     <inertia ixx=\"0.1\" ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial>\n</link>\n\
     <joint name=\"shoulder\" type=\"revolute\">\n<parent link=\"base\"/>\n<child link=\"upper\"/>\n\
     <axis xyz=\"0 0 1\"/>\n<limit lower=\"-1\" upper=\"1\" effort=\"10\" velocity=\"2\"/>\n</joint>\n</robot>\n";
+
+const STL: &str = "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0.5\nendloop\n\
+    endfacet\nendsolid s\n";
+
+const OBJ: &str = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0.5\nvn 0 0 1\nf 1//1 2//1 3//1\n";
+
+const COLLADA: &str = "<COLLADA>\n<library_geometries><geometry id=\"g\"><mesh>\n<source id=\"p\">\
+    <float_array count=\"9\">0 0 0 1 0 0 0 1 0.5</float_array></source>\n<vertices id=\"v\">\
+    <input semantic=\"POSITION\" source=\"#p\"/></vertices>\n</mesh></geometry></library_geometries>\n\
+    <library_visual_scenes><visual_scene id=\"s\">\n<node><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>\n\
+    <instance_geometry url=\"#g\"/></node>\n</visual_scene></library_visual_scenes>\n\
+    <scene><instance_visual_scene url=\"#s\"/></scene>\n</COLLADA>\n";
+
+/// A binary STL file of one triangle.
+fn binary_stl() -> Vec<u8> {
+    let mut out = vec![b' '; 80];
+    out.extend(1_u32.to_le_bytes());
+    let numbers = [
+        0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.5,
+    ];
+    out.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+    out.extend([0; 2]);
+    out
+}
 
 /// Numbers of a fixed series (Knuth's multiplier for 64 bits).
 struct Series(u64);
@@ -249,6 +282,9 @@ fn ending(kind: Kind) -> &'static str {
         Kind::Log => "csv",
         Kind::Recording => "mcap",
         Kind::Urdf => "urdf",
+        Kind::Stl | Kind::StlText => "stl",
+        Kind::Obj => "obj",
+        Kind::Collada => "dae",
         _ => "toml",
     }
 }
@@ -263,6 +299,13 @@ fn every_command_ends_well_on_every_kind_of_bad_file() {
         bench.file("other.csv", slide_log(400, |_, q, _| *q += 1e-4));
         let converted = bench.run("convert good.csv good.mcap -r slide.toml");
         assert_eq!(converted.status, Some(0), "{}", converted.stderr);
+        for format in ["stl", "obj", "dae"] {
+            let shape = format!(
+                "<link name=\"upper\"><collision><geometry><mesh filename=\"bad.{format}\"/></geometry></collision>"
+            );
+            let urdf = URDF.replace("<link name=\"upper\">", &shape);
+            bench.file(&format!("of_{format}.urdf"), urdf);
+        }
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some((kind, line)) = LINES.get(at) else {
@@ -276,6 +319,10 @@ fn every_command_ends_well_on_every_kind_of_bad_file() {
                 Kind::Trajectory => TRAJECTORY.as_bytes().to_vec(),
                 Kind::Campaign => CAMPAIGN.as_bytes().to_vec(),
                 Kind::Urdf => URDF.as_bytes().to_vec(),
+                Kind::Stl => binary_stl(),
+                Kind::StlText => STL.as_bytes().to_vec(),
+                Kind::Obj => OBJ.as_bytes().to_vec(),
+                Kind::Collada => COLLADA.as_bytes().to_vec(),
             };
             let name = format!("bad.{}", ending(*kind));
             let files = spoiled(&good, 1 + at as u64);
@@ -288,6 +335,10 @@ fn every_command_ends_well_on_every_kind_of_bad_file() {
                 let ended = bench.run(&line.replace("{}", &name));
                 cases.fetch_add(1, Ordering::Relaxed);
                 let mut complaint = complaint(line, &name, &ended);
+                // a mesh that cannot be read spoils no robot file
+                if line.contains("urdf of_") && ended.status != Some(0) {
+                    complaint = Some(format!("status {:?}", ended.status));
+                }
                 let path = bench.path(&name);
                 match fs::symlink_metadata(&path) {
                     Ok(about) if about.is_dir() => fs::remove_dir(&path).unwrap(),

@@ -53,3 +53,38 @@ fn a_log_and_a_model_that_were_exchanged_cost_no_memory() {
     }
     bench.refuses("validate slide.toml -m good.csv", 3, &log);
 }
+
+#[test]
+fn meshes_without_end_and_without_number_leave_links_without_capsules_and_memory_bounded() {
+    let bench = Bench::new();
+    symlink("/dev/zero", bench.path("zero.stl")).unwrap();
+    let huge = File::create(bench.path("huge.obj")).unwrap();
+    huge.set_len(2 << 30).unwrap();
+    // 56 MB of vertices and blanks, named again and again
+    let line = format!("v 1 2 3{}\n", " ".repeat(120));
+    bench.file("dense.obj", line.repeat(56 << 13));
+    let told = |files: &[&str]| {
+        let shape = |file| {
+            format!("<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>")
+        };
+        let shapes: String = files.iter().map(shape).collect();
+        let urdf = format!(
+            "<robot name=\"arm\"><link name=\"base\"/><link name=\"upper\">{shapes}</link>\
+             <joint name=\"q\" type=\"continuous\"><parent link=\"base\"/><child link=\"upper\"/></joint></robot>"
+        );
+        bench.file("arm.urdf", urdf);
+        let ended = bench.run("new arm --urdf arm.urdf");
+        assert_eq!(ended.status, Some(0), "{}", ended.stderr);
+        std::fs::remove_file(bench.path("arm.toml")).unwrap();
+        ended.stderr
+    };
+    let odd = told(&["zero.stl", "huge.obj"]);
+    assert!(odd.contains("there is no file zero.stl"), "{odd}");
+    assert!(odd.contains("huge.obj: more than 64 MB"), "{odd}");
+    let many = told(&["dense.obj"; 1000]);
+    let too_much = "dense.obj: the meshes of this URDF have more than 128 MB";
+    assert!(
+        many.contains(too_much) && many.contains("and 996 more of the kind"),
+        "{many}"
+    );
+}

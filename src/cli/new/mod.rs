@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, inspect};
-use crate::config::{RobotFile, UrdfChain};
+use crate::config::{Capsules, RobotFile, UrdfChain};
 use crate::excite::space::always_touching;
 use crate::identify::LoggedRobot;
 use crate::inspect::{LogFault, Severity};
@@ -118,10 +118,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     .flatten()
     .collect();
     context.check_outputs(&inputs, &[&target])?;
-    let chain = match &args.urdf {
-        Some(path) => Some(UrdfChain::load(path, args.tip.as_deref())?),
-        None => None,
-    };
+    let (mut chain, mut capsules) = (None, Capsules::default());
+    if let Some(path) = &args.urdf {
+        let found = UrdfChain::load(path, args.tip.as_deref())?;
+        capsules = found.capsules(path);
+        chain = Some(found);
+    }
     let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
     let asked = Asked {
         rate_hz: args.rate,
@@ -152,6 +154,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         mapping: &mapping,
         seen: seen.as_ref(),
         chain: chain.as_ref(),
+        capsules,
         touching: Vec::new(),
     };
     // what is written must be readable, and the log by it
@@ -168,6 +171,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let text = draft.text();
     let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
+    warnings.extend(unheld(&draft.capsules));
     if let Some(seen) = &seen
         && args.topic.is_none()
         && let Some(topic) = &seen.topic
@@ -260,6 +264,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         text: format!("{table}{checks}{found}{next}"),
         document: Document::new("new", &provenance, &warnings, &result)?,
         missed: Vec::new(),
+    })
+}
+
+/// The collision shapes that no capsule holds, in one sentence.
+fn unheld(capsules: &Capsules) -> Option<String> {
+    let (first, more) = capsules.reasons.split_at(capsules.reasons.len().min(2));
+    let more = match more.len() {
+        0 => String::new(),
+        more => format!("; and {more} more of the kind"),
+    };
+    (!first.is_empty()).then(|| {
+        format!(
+            "collision shapes that no capsule holds: {}{more}; put the files where they are named, or give [[limits.capsule]] tables",
+            first.join("; ")
+        )
     })
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::Shape;
-use crate::config::UrdfChain;
+use crate::config::{Capsules, UrdfChain};
 use crate::log::{escape, list};
 use crate::mapping::{Clock, JointColumns, Mapping, Seen};
 use crate::number;
@@ -16,6 +16,8 @@ pub(super) struct Draft<'a> {
     pub mapping: &'a Mapping,
     pub seen: Option<&'a Seen>,
     pub chain: Option<&'a UrdfChain>,
+    /// About the collision shapes of the URDF.
+    pub capsules: Capsules,
     /// Pairs of links whose capsules overlap in every pose.
     pub touching: Vec<[String; 2]>,
 }
@@ -104,15 +106,17 @@ impl Draft<'_> {
         if let Some(name) = chain.links.last().and_then(|link| link.name.as_deref()) {
             let _ = writeln!(out, "# link = {}\n# xyz = [0.0, 0.0, 0.1]", quoted(name));
         }
-        if !chain.meshes.is_empty() {
-            let links = chain.meshes.iter().map(String::as_str);
+        let Capsules {
+            sections, without, ..
+        } = &self.capsules;
+        if !without.is_empty() {
             let _ = writeln!(
                 out,
-                "# CHECK IT: meshes are not read; give [[limits.capsule]] tables for {}: link, from, to, radius.",
-                escape(&list(links))
+                "# CHECK IT: not all collision shapes of {} could be read; give [[limits.capsule]] tables: link, from, to, radius.",
+                escape(&list(without.iter().map(String::as_str)))
             );
         }
-        if chain.capsules.is_empty() {
+        if sections.is_empty() {
             return;
         }
         out.push_str(
@@ -129,7 +133,7 @@ impl Draft<'_> {
                 pairs.join(", ")
             );
         }
-        for capsule in &chain.capsules {
+        for capsule in sections {
             let rounded = |x: [f64; 3]| x.map(|x| (x * 1e6).round() / 1e6 + 0.0);
             let _ = writeln!(
                 out,

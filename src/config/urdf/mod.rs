@@ -4,16 +4,22 @@
 //! |---|---|
 //! | `xml` | the text as elements with lines; the door to the XML reader |
 //! | `parts` | elements as links and joints |
-//! | `shapes` | collision shapes as capsules |
+//! | `shapes` | collision shapes |
+//! | [`mesh`] | files of meshes: where they are, and their vertices; COLLADA in `collada` |
+//! | [`capsules`] | capsules that hold the shapes |
 //! | [`source`] | a URDF with other inertials and friction |
 //! | `beside` | model files that leave links and inertials to a URDF |
 //! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
 //!
 //! Only what torques depend on is read: placements, axes, kinds, mimic joints, inertials (as a
-//! prior), limits, and capsules about collision shapes for `new`. The crate urdf-rs was tried and not taken: its errors name no line, and a
-//! file of some thousand nested elements ends the process.
+//! prior), limits, and collision shapes for the capsules of `new`. The crate urdf-rs was tried and not taken: its errors
+//! name no line, and a file of some thousand nested elements ends the process. Nor was stl_io: it takes a binary file
+//! whose head begins with `solid` for a text.
 
 pub(super) mod beside;
+pub mod capsules;
+mod collada;
+pub mod mesh;
 mod parts;
 mod shapes;
 pub(super) mod source;
@@ -24,12 +30,12 @@ use std::path::Path;
 
 use super::ConfigError;
 use super::document::Document;
-use super::limits::CapsuleSection;
 use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
 use super::serial_section::{FrameSection, LinkSection};
 use super::text_file::text_of;
 use crate::log::{named_beside, remedy, shown};
 use crate::robot::tree::space::{Rotation, product};
+use shapes::Shape;
 
 /// What a URDF gives to a robot file.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,12 +46,21 @@ pub struct UrdfChain {
     pub limits: Vec<(String, CoordinateLimits)>,
     /// Links that fixed joints hang on moving ones, by their placement alone.
     pub frames: Vec<FrameSection>,
-    /// Capsules that hold the collision shapes, in the order of the links.
-    pub capsules: Vec<CapsuleSection>,
-    /// Links of the URDF with shapes that none holds: meshes.
-    pub meshes: Vec<String>,
+    /// Collision shapes, for [`capsules`].
+    collisions: Vec<Collision>,
     /// What was taken otherwise than it is written, one sentence each.
     pub notes: Vec<String>,
+}
+
+/// A collision shape of a link.
+#[derive(Debug, Clone, PartialEq)]
+struct Collision {
+    /// The link of the URDF.
+    of: String,
+    /// The moving link, or the base, that it belongs to.
+    on: String,
+    /// In the frame of that; `None` where it cannot be read.
+    shape: Option<Shape>,
 }
 
 /// How angles and axes are taken.

@@ -28,7 +28,7 @@ pub(super) struct Link {
     pub name: String,
     pub line: usize,
     pub body: Option<Body>,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<Option<Shape>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

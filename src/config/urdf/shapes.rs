@@ -1,28 +1,62 @@
-//! Collision shapes of a URDF as capsules that hold them.
+//! Collision shapes of a URDF.
 
 use super::xml::Element;
 use crate::number::is_usable;
-use crate::robot::tree::space::{Vector, add, of_roll_pitch_yaw, turn};
+use crate::robot::tree::enclosing::Piece;
+use crate::robot::tree::space::{Rotation, Vector, add, of_roll_pitch_yaw, product, turn};
 
 /// A shape in the frame of its link.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Shape {
-    /// Ends of the piece and radius \[m\] of a capsule that holds it.
-    Within([Vector; 2], f64),
-    /// A mesh, or what cannot be read: collision shapes decide no torque, and spoil no file.
-    Unknown,
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shape {
+    pub form: Form,
+    pub rotation: Rotation,
+    pub origin: Vector,
 }
 
-/// The shapes of a `<link>`.
-pub(super) fn of_link(link: Element) -> Vec<Shape> {
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Form {
+    /// A capsule that holds it.
+    Within(Piece),
+    /// The mesh of a file, as the URDF names it, and the factors of its coordinates.
+    Mesh(String, Vector),
+}
+
+impl Shape {
+    /// The same shape seen from a frame in which its own lies so.
+    pub(super) fn seen_from(&self, rotation: &Rotation, origin: &Vector) -> Self {
+        Self {
+            form: self.form.clone(),
+            rotation: product(rotation, &self.rotation),
+            origin: add(origin, &turn(rotation, &self.origin)),
+        }
+    }
+
+    /// Where a point of the shape's own frame is.
+    pub(super) fn place(&self, point: &Vector) -> Vector {
+        add(&self.origin, &turn(&self.rotation, point))
+    }
+}
+
+/// The shapes of a `<link>`; `None` stands for what cannot be read: collision shapes decide no torque, and spoil no
+/// file.
+pub(super) fn of_link(link: Element) -> Vec<Option<Shape>> {
     let collisions = link.children().filter(|c| c.name() == "collision");
-    let within = |collision| within(collision).unwrap_or(Shape::Unknown);
-    collisions.map(within).collect()
+    collisions.map(shape).collect()
 }
 
-fn within(collision: Element) -> Option<Shape> {
-    let geometry = collision.child("geometry")?;
-    let shape = geometry.children().next()?;
+fn shape(collision: Element) -> Option<Shape> {
+    let at = |key: &str| match collision.child("origin").and_then(|o| o.attribute(key)) {
+        Some(text) => numbers(text),
+        None => Some([0.0; 3]),
+    };
+    Some(Shape {
+        form: form(collision.child("geometry")?.children().next()?)?,
+        rotation: of_roll_pitch_yaw(&at("rpy")?),
+        origin: at("xyz")?,
+    })
+}
+
+fn form(shape: Element) -> Option<Form> {
     let size = |key: &str| {
         let value = shape.attribute(key)?.trim().parse::<f64>().ok();
         value.filter(|x| is_usable(*x) && *x > 0.0)
@@ -39,19 +73,18 @@ fn within(collision: Element) -> Option<Shape> {
             let radius = 0.5 * one.hypot(other);
             (axis, 0.5 * sides[axis], Some(radius).filter(|r| *r > 0.0)?)
         }
+        "mesh" => {
+            let scale = shape.attribute("scale").map_or(Some([1.0; 3]), numbers);
+            return Some(Form::Mesh(shape.attribute("filename")?.to_owned(), scale?));
+        }
         _ => return None,
     };
-    let at = |key: &str| match collision.child("origin").and_then(|o| o.attribute(key)) {
-        Some(text) => numbers(text),
-        None => Some([0.0; 3]),
-    };
-    let (origin, rotation) = (at("xyz")?, of_roll_pitch_yaw(&at("rpy")?));
     let end = |along: f64| {
         let mut end = [0.0; 3];
         end[axis] = along;
-        add(&origin, &turn(&rotation, &end))
+        end
     };
-    Some(Shape::Within([end(-half), end(half)], radius))
+    Some(Form::Within(([end(-half), end(half)], radius)))
 }
 
 fn numbers(text: &str) -> Option<Vector> {

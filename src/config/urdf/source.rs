@@ -55,8 +55,8 @@ pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, Co
         }
         if let Some(anew) = left {
             let whole = element.range();
-            let (end, closed) = opening(&plain, whole.start);
-            edits.push(match closed {
+            let end = xml::tag_end(&plain, whole.start);
+            edits.push(match plain[..end].ends_with("/>") {
                 true => (
                     end - 2..end,
                     format!(">\n    {anew}\n  </{}>", element.name()),
@@ -75,23 +75,6 @@ pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, Co
         out.replace_range(range, &anew);
     }
     Ok(out)
-}
-
-/// End of the opening tag that begins at `start`, and whether it closes its element too.
-fn opening(text: &str, start: usize) -> (usize, bool) {
-    let mut quote = None;
-    for (at, c) in text[start..].char_indices() {
-        match (quote, c) {
-            (None, '"' | '\'') => quote = Some(c),
-            (Some(open), c) if c == open => quote = None,
-            (None, '>') => {
-                let end = start + at + 1;
-                return (end, text[..end].ends_with("/>"));
-            }
-            _ => {}
-        }
-    }
-    (text.len(), false)
 }
 
 #[cfg(test)]

@@ -3,11 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::parts::{Body, Joint, Kind, Parts};
-use super::shapes::Shape;
-use super::{Place, UrdfChain, turned};
+use super::{Collision, Place, UrdfChain, turned};
 use crate::config::ConfigError;
 use crate::config::document::is_plain_name;
-use crate::config::limits::CapsuleSection;
 use crate::config::robot_file::CoordinateLimits;
 use crate::config::serial_section::{
     BASE, FollowsSection, FrameSection, InertialSection, LinkSection, MOST_LINKS,
@@ -56,7 +54,7 @@ pub(super) fn chain(
     let mut reached = vec![false; parts.links.len()];
     let mut moving: Vec<Moving> = Vec::new();
     let mut fixed: Vec<(&str, Seat)> = Vec::new();
-    let (mut capsules, mut meshes) = (Vec::new(), Vec::new());
+    let mut collisions = Vec::new();
     // links to visit, the next one last; a link stands here once, for it has one joint before it
     let mut next: Vec<(Option<usize>, usize, Seat)> = vec![(
         None,
@@ -81,20 +79,12 @@ pub(super) fn chain(
             });
         }
         let on = hangs_on(&moving, seat.on);
-        for shape in &parts.links[link].shapes {
-            match shape {
-                Shape::Within(ends, radius) => {
-                    let [from, to] = ends.map(|e| add(&seat.origin, &turn(&seat.rotation, &e)));
-                    capsules.push(CapsuleSection {
-                        link: on.clone(),
-                        from,
-                        to,
-                        radius: *radius,
-                    });
-                }
-                Shape::Unknown => meshes.push(parts.links[link].name.clone()),
-            }
-        }
+        let shapes = parts.links[link].shapes.iter();
+        collisions.extend(shapes.map(|shape| Collision {
+            of: parts.links[link].name.clone(),
+            on: on.clone(),
+            shape: (shape.as_ref()).map(|shape| shape.seen_from(&seat.rotation, &seat.origin)),
+        }));
         if joint.is_some_and(|j| parts.joints[j].kind == Kind::Fixed) && seat.on.is_some() {
             fixed.push((&parts.links[link].name, seat));
         }
@@ -127,8 +117,7 @@ pub(super) fn chain(
     let frames = frames(&fixed, &moving);
     Ok(UrdfChain {
         notes: parts.changes.told(place.file).into_iter().collect(),
-        capsules,
-        meshes,
+        collisions,
         ..finish(moving, frames, place)?
     })
 }
@@ -380,8 +369,7 @@ fn finish(
         links: moving.into_iter().map(|m| m.section).collect(),
         limits,
         frames,
-        capsules: Vec::new(),
-        meshes: Vec::new(),
+        collisions: Vec::new(),
         notes: Vec::new(),
     })
 }

@@ -73,10 +73,9 @@ impl<'t> Tree<'t> {
             line: last,
             message: message.to_owned(),
         };
-        if text.split('<').any(|tag| tag.len() > LONGEST_TAG) {
-            return Err(refused(
-                "a tag or text of more than 64 kB; no URDF needs that",
-            ));
+        let long = |(start, _)| tag_end(text, start) - start > LONGEST_TAG;
+        if text.match_indices('<').any(long) {
+            return Err(refused("a tag of more than 64 kB; no robot needs that"));
         }
         if text.matches("xmlns").count() > MOST_NAMESPACES {
             return Err(refused(
@@ -108,7 +107,7 @@ impl<'t> Tree<'t> {
             open.push(node);
             elements += 1;
             let message = if open.len() > DEEPEST {
-                format!("elements are nested more than {DEEPEST} deep; no URDF needs that")
+                format!("elements are nested more than {DEEPEST} deep; no robot needs that")
             } else if elements > MOST_ELEMENTS {
                 format!(
                     "more than {MOST_ELEMENTS} elements; leave out what is no link and no joint"
@@ -148,12 +147,23 @@ impl<'a> Element<'a, '_> {
         self.node.range()
     }
 
+    /// Its text, up to the first element in it.
+    pub(super) fn text(&self) -> &'a str {
+        self.node.text().unwrap_or_default()
+    }
+
+    /// Itself and all elements in it, however deep.
+    pub(super) fn descendants(self) -> impl Iterator<Item = Self> {
+        let elements = self.node.descendants().filter(Node::is_element);
+        elements.map(move |node| Self { node, ..self })
+    }
+
     /// Value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         self.node.attribute(name)
     }
 
-    /// The elements in it; text is left out: URDF has none.
+    /// The elements in it.
     pub(super) fn children(self) -> impl Iterator<Item = Self> {
         let elements = self.node.children().filter(Node::is_element);
         elements.map(move |node| Self { node, ..self })
@@ -163,6 +173,21 @@ impl<'a> Element<'a, '_> {
     pub(super) fn child(self, name: &str) -> Option<Self> {
         self.children().find(|child| child.name() == name)
     }
+}
+
+/// End of the tag that begins at `start`: in quotes it may have a `>`, and nowhere another `<`.
+pub(super) fn tag_end(text: &str, start: usize) -> usize {
+    let mut quote = None;
+    for (at, byte) in text.bytes().enumerate().skip(start + 1) {
+        match (quote, byte) {
+            (_, b'<') => return at,
+            (None, b'>') => return at + 1,
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), byte) if byte == open => quote = None,
+            _ => {}
+        }
+    }
+    text.len()
 }
 
 /// What the reader says of a text with `last` lines, with the line and the way out.

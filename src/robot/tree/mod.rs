@@ -8,10 +8,12 @@
 //! | [`base`] | which combinations of them torques can tell |
 //! | [`pose`] | where the links are |
 //! | [`capsule`] | how far their shapes are from each other |
+//! | [`enclosing`] | a capsule about points |
 //! | [`parameters`] | these, drive inertias and couplings as parameters with names |
 
 pub mod base;
 pub mod capsule;
+pub mod enclosing;
 pub mod links;
 pub mod newton_euler;
 pub mod parameters;

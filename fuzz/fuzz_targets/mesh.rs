@@ -1,0 +1,25 @@
+//! Any bytes as a mesh, of the format that the first one chooses, and the capsule about it.
+#![no_main]
+
+use cft_ident::config::vertices_of_mesh;
+use cft_ident::robot::tree::capsule::of_pieces;
+use cft_ident::robot::tree::enclosing::{Ball, enclosing};
+use cft_ident::robot::tree::space::UNTURNED;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let Some((first, bytes)) = bytes.split_first() else {
+        return;
+    };
+    let format = ["stl", "obj", "dae"][usize::from(first % 3)];
+    let Ok(vertices) = vertices_of_mesh(format, bytes) else {
+        return;
+    };
+    let balls: Vec<Ball> = vertices.iter().map(|x| (*x, 0.0)).collect();
+    let (ends, radius) = enclosing(&balls, &UNTURNED).expect("a mesh has a vertex");
+    let largest = vertices.iter().flatten().fold(1.0, |most: f64, x| most.max(x.abs()));
+    for vertex in &vertices {
+        let off = of_pieces(&ends, &[*vertex; 2]) - radius;
+        assert!(off <= 1e-6 + 1e-9 * largest, "a vertex is outside: {off}");
+    }
+});
