@@ -2,7 +2,7 @@
 
 use cft_ident::motion::FilterSettings;
 use cft_ident::robot::Robot;
-use cft_ident::robot::tree::pose::frame;
+use cft_ident::robot::tree::pose::origins;
 use serde_json::{Value, json};
 
 use super::pulses::{DURATIONS, quantile, shown};
@@ -32,11 +32,11 @@ pub struct Shown {
 /// Torque of each joint by a force of 1 N at the origin of the last link's frame, along a direction of the base.
 fn torques(robot: &Robot, q: &[f64], direction: usize) -> Vec<f64> {
     let tree = robot.tree();
-    let last = Some(tree.links().len() - 1);
+    let last = tree.links().len() - 1;
     let at = |j: usize, by: f64| {
         let mut q = q.to_vec();
         q[j] += by;
-        frame(tree, &q, last).1[direction]
+        origins(tree, &q)[last][direction]
     };
     let of = |j: usize| (at(j, STEP) - at(j, -STEP)) / (2.0 * STEP);
     (0..q.len()).map(of).collect()
