@@ -9,7 +9,7 @@ use crate::robot::model::{JointFriction, Model};
 /// Samples that are looked at together.
 const PIECE: usize = 16_384;
 /// Share of what all blocks tell that holds a model to itself: no direction is left without it that one
-/// block alone tells of.
+/// block alone determines.
 const HOLD: f64 = 0.01;
 
 /// Blocks of the same number of samples, one behind the other through all logs.
@@ -50,7 +50,7 @@ impl Folds {
     }
 }
 
-/// Which columns the logs told of beside the inertial parameters and the effects.
+/// Which columns the logs determined beside the inertial parameters and the effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeColumns {
     pub friction: Vec<bool>,
@@ -157,7 +157,7 @@ pub fn without_each(
     let solve = |h: &DMatrix<f64>, g: &DVector<f64>| -> DVector<f64> {
         let scaled = DMatrix::from_fn(u, u, |i, k| {
             let x = h[(i, k)] * scale[i] * scale[k];
-            // what no row tells of stays as it is
+            // what no row determines stays as it is
             if i == k { x.max(1e-12) + 1e-9 } else { x }
         });
         match scaled.cholesky() {

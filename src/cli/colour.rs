@@ -27,15 +27,19 @@ pub(super) fn wanted() -> bool {
     !set("NO_COLOR") && (forced || !dumb && std::io::stdout().is_terminal())
 }
 
-/// A text with its first paragraph in bold and the words of verdicts in their colours.
-pub(super) fn coloured(text: &str) -> String {
+/// A text with its first paragraph in bold, red where a limit is missed, and the words of verdicts in their colours.
+pub(super) fn coloured(text: &str, met: bool) -> String {
     let (first, rest) = match text.find("\n\n") {
         Some(end) => text.split_at(end),
         None => ("", text),
     };
     let mut out = String::with_capacity(2 * text.len());
+    let style = match met {
+        true => BOLD.to_owned(),
+        false => format!("{BOLD};{RED}"),
+    };
     for line in first.lines() {
-        out += &format!("\u{1b}[{BOLD}m{line}\u{1b}[0m\n");
+        out += &format!("\u{1b}[{style}m{line}\u{1b}[0m\n");
     }
     // the line end is there already
     let rest = rest
@@ -78,9 +82,10 @@ mod tests {
     fn the_verdict_is_bold_and_the_verdicts_of_a_table_have_their_colours() {
         let text = "2 of 3 identified.\n\n-----\nq1 12 Nm identified\nq2 weak\n\nno weak\n";
         assert_eq!(
-            coloured(text),
+            coloured(text, true),
             "\u{1b}[1m2 of 3 identified.\u{1b}[0m\n\n-----\nq1 12 Nm \u{1b}[32midentified\u{1b}[0m\n\
              q2 \u{1b}[33mweak\u{1b}[0m\n\nno weak\n"
         );
+        assert!(coloured(text, false).starts_with("\u{1b}[1;31m2 of 3"));
     }
 }

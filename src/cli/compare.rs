@@ -74,9 +74,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let names = names_of(&args.logs);
     let shown: Vec<String> = names.iter().map(|name| escape(name)).collect();
     let mut report = stages::compare::compare(&of, &shown.join(", "));
+    let drawn = args.report.is_some() || !args.plot.is_empty();
+    let in_memory = of.tried.as_ref().filter(|_| drawn).map(|t| &t.in_memory);
+    let look = pictures::look(&of.machine, in_memory, &names)?;
     if args.report.is_some() {
-        let in_memory = of.tried.as_ref().map(|tried| &tried.in_memory);
-        let look = pictures::look(&of.machine, in_memory, &names)?;
         let quality = pictures::inspected(&args.logs, &of.machine, context)?;
         let (mut page, command) = (report.page(), context.command());
         stages::compare::pictures(&mut page, &of, &read, look.as_ref(), &quality, command)
@@ -87,7 +88,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         context.write_text(path, &report.html())?;
     }
     for path in &args.plot {
-        context.write_picture(path, &stages::compare::figure(&of).svg())?;
+        let figure = stages::compare::figure(&of, look.as_ref()).map_err(CliError::input)?;
+        context.write_picture(path, &figure.svg())?;
     }
     Ok(Outcome {
         text: report.text_for(context.detail()),

@@ -88,6 +88,14 @@ impl Context {
         self.detail
     }
 
+    /// What is shown of a result that is no report: all of it, or `brief` where little is asked for.
+    pub(super) fn text(&self, all: String, brief: &str) -> String {
+        match self.detail {
+            Detail::Brief => format!("{brief}\n"),
+            Detail::Usual | Detail::Full => all,
+        }
+    }
+
     /// The same for a command whose document goes to standard output.
     pub(super) fn printing(self, prints: bool) -> Self {
         Context { prints, ..self }

@@ -304,14 +304,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     if let Some(writer) = target.writer {
         context.files().add_log(writer)?;
     }
+    let written = format!("written: {}", args.output.display());
+    let all = format!(
+        "{} rows of {} columns, {} s\n{written}\n",
+        result.samples,
+        result.columns.len(),
+        number::significant(duration, 5),
+    );
     Ok(Outcome {
-        text: format!(
-            "{} rows of {} columns, {} s\nwritten: {}\n",
-            result.samples,
-            result.columns.len(),
-            number::significant(duration, 5),
-            args.output.display()
-        ),
+        text: context.text(all, &written),
         document,
         missed: Vec::new(),
     })

@@ -197,7 +197,7 @@ struct Written {
 /// # Errors
 /// A folder that cannot be made or written to, or holds other files of these names.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let mut text;
+    let text;
     let mut written = None;
     match args.name {
         None => text = list(),
@@ -210,8 +210,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             let shown = folder.display().to_string();
             let next = machine.measured().map_or(CFT_NEXT, |machine| machine.next);
             let next = next.replace("{}", shown.trim_end_matches('/'));
-            text = format!("written to {shown}: {}\n\n", files.join(", "));
-            text += &format!("go on with:\n  {}\n", next.trim_end().replace('\n', "\n  "));
+            let listed = format!("written to {shown}: {}", files.join(", "));
+            let then = next.trim_end().replace('\n', "\n  ");
+            text = context.text(format!("{listed}\n\ngo on with:\n  {then}\n"), &listed);
             written = Some(Written {
                 name: machine.name(),
                 folder: shown,

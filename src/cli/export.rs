@@ -508,8 +508,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     warnings.extend(along.warnings);
     let mut text = table.to_string();
     text += &beyond_table(&result.beyond);
+    let files: Vec<&str> = result.files.iter().map(|of| of.file.as_str()).collect();
+    let brief = format!("written: {}", files.join(", "));
     Ok(Outcome {
-        text,
+        text: context.text(text, &brief),
         document: Document::new("export", &inputs, &warnings, &result)?,
         missed: Vec::new(),
     })

@@ -41,7 +41,7 @@ pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
     })
 }
 
-/// A model file; what is told of it becomes a warning of the command.
+/// A model file; what is reported of it becomes a warning of the command.
 pub fn model(path: &Path, context: &Context) -> Result<Given<ModelFile>, CliError> {
     let model = read(path, Wanted::Own, |name, text| {
         ModelFile::parse_in(name, text, path.parent())

@@ -266,12 +266,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let mut text = stages::inspect::inspect(&logs);
     stages::setup::section(&mut text.everywhere(), &report);
+    for finding in &report.findings {
+        text.brief().verdict(&finding.meaning, false);
+    }
     let result = Inspected {
         inspection: Inspection::of(&logs),
         setup: report.findings,
     };
     Ok(Outcome {
-        text: text.text(),
+        text: text.text_for(context.detail()),
         document: Document::new("inspect", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })

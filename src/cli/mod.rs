@@ -182,7 +182,7 @@ pub fn main() -> ExitCode {
         if flag.swap(true, Ordering::Relaxed) {
             stop();
         }
-        context::above_bars("stopping; once more to stop at once");
+        context::above_bars("stopping; press again to stop at once");
         std::thread::spawn(|| {
             std::thread::sleep(match KEEPS.load(Ordering::Relaxed) {
                 true => KEEPING,

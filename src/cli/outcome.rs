@@ -59,9 +59,9 @@ pub(super) fn show(
         Some(Destination::Stdout) => write(stdout, &outcome.document.text())?,
         Some(Destination::File(path)) => {
             files.write(path, outcome.document.text().as_bytes())?;
-            write_for_a_person(stdout, &outcome.text)?;
+            write_for_a_person(stdout, outcome)?;
         }
-        None => write_for_a_person(stdout, &outcome.text)?,
+        None => write_for_a_person(stdout, outcome)?,
     }
     files.commit()?;
     for limit in &outcome.missed {
@@ -100,17 +100,17 @@ fn write(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
 }
 
 /// Like [`write`], but a reader that has seen enough (`| head`) is no error.
-fn write_for_a_person(stdout: &mut dyn Write, text: &str) -> Result<(), CliError> {
+fn write_for_a_person(stdout: &mut dyn Write, outcome: &Outcome) -> Result<(), CliError> {
     // Names come from files and folders.
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
+    let mut shown = String::with_capacity(outcome.text.len());
+    for c in outcome.text.chars() {
         match is_hidden(c) && !matches!(c, '\n' | '\t') {
             true => shown.extend(c.escape_default()),
             false => shown.push(c),
         }
     }
     if colour::wanted() {
-        shown = colour::coloured(&shown);
+        shown = colour::coloured(&shown, outcome.missed.is_empty());
     }
     let written = stdout
         .write_all(shown.as_bytes())

@@ -175,10 +175,9 @@ fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
          models that are linear in their columns; irls, iv, oe and everything that looks at single rows \
          need the logs.",
     );
-    terminal.line(&format!(
-        "written: {} ({} kB)",
-        args.output.display(),
-        result.bytes.div_ceil(1000)
-    ));
+    let (file, size) = (args.output.display(), result.bytes.div_ceil(1000));
+    let written = format!("written: {file} ({size} kB)");
+    terminal.line(&written);
+    report.brief().verdict(&written, true);
     report
 }

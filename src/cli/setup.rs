@@ -59,7 +59,7 @@ pub fn checked(
         false => machine,
     };
     machine.check_gains()?;
-    // a set-up that is kept whatever the torques say is not asked about: that reads all logs once more
+    // a set-up that is kept whatever the torques say is not asked about: that reads all logs again
     let asked = if args.as_declared { &[] } else { logs };
     let CheckedSetup {
         report,

@@ -155,7 +155,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = Simulated::of(&simulated, args.seed, &log, &names);
     let told = [robot.notes.0.clone(), warnings(&simulated)].concat();
     Ok(Outcome {
-        text: render(&robot, &log, &names.0),
+        text: context.text(
+            render(&robot, &log, &names.0),
+            &format!("written: {}", names.0),
+        ),
         document: Document::new("simulate", &inputs, &told, &result)?,
         missed: Vec::new(),
     })
@@ -266,7 +269,7 @@ impl simulate::Rows for ToFile<'_> {
     }
 }
 
-/// What is told of a log that is on its way to the file.
+/// What is reported of a log that is on its way to the file.
 #[derive(Debug, Default)]
 pub(super) struct LogFigures {
     columns: Vec<ColumnFigures>,

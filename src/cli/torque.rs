@@ -92,8 +92,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     let document = Document::new("torque", &found.inputs, &found.warnings, &found.along)?;
     context.files().add_log(out)?;
+    let written = format!("written: {}", args.output.display());
     Ok(Outcome {
-        text: format!("{table}written: {}\n", args.output.display()),
+        text: context.text(format!("{table}{written}\n"), &written),
         document,
         missed: Vec::new(),
     })

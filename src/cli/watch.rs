@@ -170,7 +170,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         return Err(error);
     }
     context.check()?;
-    let text = told(&found, &args.log.name());
+    let verdict = verdict(&found);
+    let text = context.text(told(&found, &args.log.name()), &verdict);
     let document = Document::new("watch", &found.inputs, &found.warnings, &found)?;
     if let Some(error) = found.error.take() {
         let error = CliError::from(error).hint("the results before it are printed above");
@@ -219,6 +220,18 @@ fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
     }
 }
 
+/// How much was seen, in a line.
+fn verdict(found: &Watched) -> String {
+    format!(
+        "{} rows, {:.1} s; {} alarm{}, {} of the rows beyond the threshold",
+        found.samples,
+        found.duration_s,
+        found.alarms.len(),
+        if found.alarms.len() == 1 { "" } else { "s" },
+        number::percent(found.beyond)
+    )
+}
+
 /// What was seen, for a person.
 fn told(found: &Watched, log: &str) -> String {
     let mut table = Table::new(&[
@@ -239,14 +252,8 @@ fn told(found: &Watched, log: &str) -> String {
     if let Some(delay) = found.delay_s {
         text += &format!("late by {:.1} ms\n", 1e3 * delay);
     }
-    text += &format!(
-        "{} rows, {:.1} s; {} alarm{}, {} of the rows beyond the threshold\n",
-        found.samples,
-        found.duration_s,
-        found.alarms.len(),
-        if found.alarms.len() == 1 { "" } else { "s" },
-        number::percent(found.beyond)
-    );
+    text += &verdict(found);
+    text.push('\n');
     for alarm in found.alarms.iter().take(20) {
         let joints = alarm.joints.iter().map(|of| {
             let [size, std] = [of.external, of.std].map(|x| number::significant(x, 3));

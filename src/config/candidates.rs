@@ -87,7 +87,7 @@ pub fn parse(file: &str, text: &str) -> Result<Vec<Candidate>, ConfigError> {
     Ok(raw.candidate)
 }
 
-/// Checks what can be told without a robot.
+/// Checks what needs no robot.
 pub(super) fn check(candidates: &[Candidate], document: &Document) -> Result<(), ConfigError> {
     if candidates.len() > MOST {
         let problem = format!("has {} tables", candidates.len());

@@ -57,13 +57,28 @@ impl Parameter {
         self.verdict == Some(Verdict::Identified) && self.std.is_some_and(uncertain)
     }
 
-    /// What is told of it: its verdict, or that it is negligible; nothing where it was not estimated.
+    /// Whether it is below zero by more than two deviations where friction and inertia are positive.
+    pub fn is_below_zero(&self) -> bool {
+        let below = self.std.is_some_and(|std| self.value < -2.0 * std);
+        below && is_positive(&self.name, self.joint.is_some())
+    }
+
+    /// Its verdict in a word, or that it is negligible; nothing where it was not estimated.
     pub fn verdict_word(&self) -> &'static str {
         match self.verdict {
             Some(_) if self.is_negligible() => "negligible",
             verdict => verdict.map_or("", Verdict::word),
         }
     }
+}
+
+/// Whether a parameter of this name is positive in every machine: inertia of a drive or of a single joint, viscous
+/// and Coulomb friction of a joint.
+pub fn is_positive(name: &str, of_joint: bool) -> bool {
+    let of_drive = name
+        .strip_prefix("Ia")
+        .is_some_and(|joint| joint.parse::<u32>().is_ok());
+    of_drive || of_joint && matches!(name, "viscous" | "coulomb") || name == "inertia"
 }
 
 /// Covariance of the parameters, in the order of `names`.
@@ -93,7 +108,7 @@ pub struct EffectParameter {
     pub bound: bool,
 }
 
-/// What the one-joint logs of a joint told of its friction, before a fit of other logs refined it.
+/// The friction of a joint by its one-joint logs, before a fit of other logs refined it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionPrior {
@@ -174,7 +189,7 @@ pub struct ModelFile {
     pub covariance: Option<Covariance>,
     /// Standard deviation of the torque residual by joint [N or Nm], for prediction bands.
     pub residual_std: BTreeMap<String, f64>,
-    /// What one-joint logs told of the friction, joint by joint.
+    /// The friction by one-joint logs, joint by joint.
     pub friction_prior: Vec<FrictionPrior>,
     /// What was left of torques that were set aside, of every joint in their order; empty where nothing was.
     pub held_out: Vec<HeldOut>,

@@ -131,8 +131,8 @@ impl Diagnosis {
         self.candidates.iter().filter(|c| c.significant)
     }
 
-    /// Whether what was added leaves nothing that is told from noise on any joint. Otherwise it lowers the
-    /// error and may stand in for an effect that the catalogue does not have: joints share inertial
+    /// Whether what was added leaves nothing above noise on any joint. Otherwise it lowers the
+    /// error and may take the place of an effect that the catalogue does not have: joints share inertial
     /// parameters, and what is missing on one forges effects on the others.
     pub fn assured(&self) -> bool {
         !self.structured() && self.remainder().next().is_none()

@@ -18,16 +18,17 @@ pub static ENTRY: Entry = Entry {
     formula: "(coulomb + viscous v) H(v)",
     source: "gears and seals that run differently in the two directions",
     said: |f| {
-        let way = if f.value("coulomb") < 0.0 {
-            "backward"
-        } else {
-            "forward"
+        let way = |key: &str| match f.value(key) < 0.0 {
+            true => "backward",
+            false => "forward",
         };
-        format!(
-            "friction of {} that is {} higher {way}",
-            f.at,
-            f.size("coulomb")
-        )
+        // the two halves are found apart, and either may be nothing
+        let (key, kind) = match f.value("coulomb") == 0.0 {
+            true => ("viscous", "viscous friction"),
+            false => ("coulomb", "friction"),
+        };
+        let (size, way) = (f.size(key), way(key));
+        format!("{kind} of {} that is {size} higher {way}", f.at)
     },
     remedy: "look for a seal, a brake or a gear that rubs in one direction; the refined model compensates it",
     ..Entry::USUAL

@@ -27,8 +27,8 @@ pub static ENTRY: Entry = Entry {
     ],
     otherwise: Some(Signal::Way),
     ladder: Some(Ladder::NARROW),
-    separate_by: "reversals with a ladder of amplitudes: a gap keeps its width, a presliding loop \
-                  shrinks with the amplitude",
+    separate_by: "log reversals at several amplitudes (a gap keeps its width, a presliding loop shrinks \
+                  with the amplitude)",
     formula: "-c sgn(v) inside the play operator's gap",
     source: "play between gear teeth: what lies behind it is not felt until it is used up",
     said: |f| format!("play in the gear of {}, {} wide", f.at, f.size("gap")),

@@ -42,7 +42,7 @@ pub static ENTRY: Entry = Entry {
     )],
     otherwise: Some(Signal::Position),
     ladder: Some(Ladder::USUAL),
-    separate_by: "a slow sweep over the whole travel, both ways, with two payloads",
+    separate_by: "log a slow sweep over the whole travel, both ways, with two payloads",
     formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \
                 axis; or a cubic B-spline on three pieces between from and to",
     source: "a spring or gas cylinder between two fixed points",

@@ -11,7 +11,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("c", Unit::TorqueRate),
         Key::size("walk", Unit::TorqueWalk),
     ],
-    separate_by: "hold the joint still at one pose at the begin and at the end of the log",
+    separate_by: "hold the joint still at one pose at the start and at the end of the log",
     formula: "c t + a random walk of rms walk sqrt(t)",
     source: "a torque sensor or an amplifier that warms up",
     at_rest: true,

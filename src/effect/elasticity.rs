@@ -38,8 +38,8 @@ pub static ENTRY: Entry = Entry {
             "its frequency lies within the motion's band, where a delay or a coupling does the same",
         ),
     ],
-    separate_by: "reversals with high jerk at two poses of different inertia: the ringing keeps its \
-                  frequency at any speed",
+    separate_by: "log reversals with high jerk at two poses of different inertia (the ringing keeps its \
+                  frequency at any speed)",
     formula: "a spring between motor and link of that inertia, four fifths of the joint's by \
                 default; encoder and friction on the motor's side; damping ratio of the link on it",
     source: "harmonic drives, belts and long shafts (Spong 1987)",

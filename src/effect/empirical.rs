@@ -45,7 +45,7 @@ pub static ENTRY: Entry = Entry {
     ],
     role: Role::StandIn,
     search: Search::Grid,
-    separate_by: "the same motion with another payload, another routing of the cables, or a second sensor",
+    separate_by: "log the same motion with another payload, another routing of the cables, or a second sensor",
     formula: "a natural cubic spline through m_1..m_6 at six equal steps between from and to of q (signal \
               1), q by direction (2), v (3), tau_l by direction (4) or the way since the last reversal by \
               direction (5); constant beyond them",
@@ -232,7 +232,7 @@ pub(super) fn cubes(values: &[f64]) -> Vec<f64> {
 }
 
 impl Added {
-    /// Signal and greatest torque of a curve that stands in for a law; none of a named effect.
+    /// Signal and greatest torque of a curve in place of a law; none of a named effect.
     pub fn curve(&self) -> Option<(Signal, f64)> {
         if self.law.entry.role != Role::StandIn {
             return None;

@@ -208,7 +208,7 @@ pub struct Entry {
     pub otherwise: Option<Signal>,
     /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
     pub ladder: Option<Ladder>,
-    /// The experiment that separates it, in words.
+    /// The experiment that separates it, as what to do.
     pub separate_by: &'static str,
     /// Torque that it adds, or what it does to a log.
     pub formula: &'static str,

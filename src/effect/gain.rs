@@ -11,7 +11,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Load],
     keys: &[Key::size("k", Unit::One).within(-0.9, 9.0, "must lie in -0.9..9")],
     role: Role::Kept,
-    separate_by: "a known payload, the model held by --keep",
+    separate_by: "log a known payload and diagnose with --keep",
     formula: "k times the acting torque: logged is (1 + k) times that",
     source: "a wrong torque constant or gear ratio",
     at_rest: true,

@@ -18,7 +18,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("gy", Unit::Fixed("m/s^2")),
     ],
     places: Places::Whole,
-    separate_by: "the same motion with the arm turned by a quarter and by half a turn about q2",
+    separate_by: "log the same motion with the arm turned by a quarter and by half a turn about q2",
     formula: "slope of -sum m_i (gx p_x + gy p_y) over the chain; a sliding axis along x: \
                 -inertia gx",
     source: "a base that stands askew",

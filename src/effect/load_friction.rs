@@ -21,7 +21,7 @@ pub static ENTRY: Entry = Entry {
     must: &[Rule::not_negative("mu_c", LOADED).or_zero()],
     otherwise: Some(Signal::Load),
     friction: true,
-    separate_by: "the same path at the same speed with and without a known payload",
+    separate_by: "log the same path at the same speed with and without a known payload",
     formula: "(mu_c + mu_v abs(v)) abs(tau_l) tanh(w v)",
     source: "gear teeth and bearings under load (Hamon, Gautier and Garrec 2010)",
     said: |f| {

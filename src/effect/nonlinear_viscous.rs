@@ -22,7 +22,7 @@ pub static ENTRY: Entry = Entry {
     ladder: Some(Ladder::USUAL),
     friction: true,
     otherwise: Some(Signal::Speed),
-    separate_by: "plateaus of constant speed, both ways, up to the top speed",
+    separate_by: "log constant speeds, both ways, up to the top speed",
     formula: "c sgn(v) abs(v)^p",
     source: "lubricants that shear thin, or churn at speed",
     said: |f| {

@@ -72,7 +72,7 @@ fn leaked(definition: &Definition, formula: Formulas) -> &'static Law {
         },
         at_rest: definition.at_rest,
         friction: definition.friction,
-        separate_by: "a motion along which its formula changes while position, speed and load stay as they are",
+        separate_by: "log a motion along which its formula changes while position, speed and load stay as they are",
         formula: text(&formulas.join(" + ")),
         source: match definition.meaning.is_empty() {
             true => "a formula of the user's own",

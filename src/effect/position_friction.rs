@@ -26,7 +26,7 @@ pub static ENTRY: Entry = Entry {
     otherwise: Some(Signal::Friction),
     ladder: Some(Ladder::USUAL),
     friction: true,
-    separate_by: "the same stretch of travel in both directions at one speed",
+    separate_by: "log the same stretch of travel in both directions at one speed",
     formula: "sgn(v) (sin sin(order q) + cos cos(order q))",
     source: "a bent screw or an eccentric gear that rubs more at some positions (Remark 1 of the \
                report)",

@@ -37,7 +37,7 @@ pub static ENTRY: Entry = Entry {
     ],
     otherwise: Some(Signal::Way),
     ladder: Some(Ladder::NARROW),
-    separate_by: "slow reversals with a ladder of amplitudes below and above breakaway",
+    separate_by: "log slow reversals at several amplitudes below and above breakaway",
     formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",
     source: "bristles that bend before they slip (Dahl 1968; Canudas de Wit et al. 1995)",
     said: |f| {

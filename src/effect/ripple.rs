@@ -25,13 +25,13 @@ pub static ENTRY: Entry = Entry {
     ],
     search: Search::Orders,
     ladder: Some(Ladder::USUAL),
-    separate_by: "the same stretch of travel at two constant speeds: the order stays, the \
-                  frequency moves",
+    separate_by: "log the same stretch of travel at two constant speeds (the order stays, the \
+                  frequency moves)",
     formula: "sin sin(order q) + cos cos(order q), and harmonics 2 and 3",
     source: "cogging of a motor, teeth of a gear, an eccentric encoder",
     at_rest: true,
     said: |f| format!("ripple of {}, {}, {}", f.at, f.wave(), f.amplitude()),
-    remedy: "compare it with the poles of the motor, the teeth of the gear and, on a linear axis, the lead of the screw; compensate it over position with the refined model",
+    remedy: "compare its period with the parts of the drive that repeat, such as motor poles, gear teeth and bearings; compensate it over position with the refined model",
     ..Entry::USUAL
 };
 

@@ -16,7 +16,7 @@ pub static ENTRY: Entry = Entry {
     places: Places::JointsAndActuators,
     must: &[Rule::not_negative("J", "a rotor has mass")],
     ladder: Some(Ladder::USUAL),
-    separate_by: "fast reversals of one actuator at several poses of the arm",
+    separate_by: "log fast reversals of one actuator at several poses of the arm",
     formula: "J a; at a screw J_a' J (J_a a + dJ_a/dt v)",
     source: "a rotor or screw that the links' inertias do not hold",
     at_rest: true,

@@ -27,8 +27,8 @@ pub static ENTRY: Entry = Entry {
     ],
     otherwise: Some(Signal::Speed),
     ladder: Some(Ladder::NARROW),
-    separate_by: "slow reversals with a ladder of amplitudes: a law of speed is the same at each, a \
-                  presliding loop shrinks with the amplitude",
+    separate_by: "log slow reversals at several amplitudes (friction that depends on speed stays the \
+                  same, a presliding loop shrinks with the amplitude)",
     formula: "fc tanh(v/vs) for F - viscous v",
     source: "lubricated contacts and elastic seals, which creep before they slip (Andersson, Soderberg \
              and Bjorklund 2007)",

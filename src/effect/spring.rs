@@ -14,8 +14,8 @@ pub static ENTRY: Entry = Entry {
     ],
     search: Search::Refined,
     ladder: Some(Ladder::USUAL),
-    separate_by: "a slow sweep over the whole travel with two payloads: gravity scales, a spring \
-                  does not",
+    separate_by: "log a slow sweep over the whole travel with two payloads (gravity scales, a spring \
+                  does not)",
     formula: "k (q - q0) + k3 (q - q0)^3",
     source: "a cable, a hose or a return spring",
     at_rest: true,

@@ -30,7 +30,7 @@ pub static ENTRY: Entry = Entry {
     otherwise: Some(Signal::Speed),
     ladder: Some(Ladder::USUAL),
     friction: true,
-    separate_by: "a ladder of slow constant speeds, both ways, from a hundredth of the top speed up",
+    separate_by: "log slow constant speeds, both ways, from a hundredth of the top speed up",
     formula: "c sgn(v) exp(-(v/vs)^2)",
     source: "a lubricant film that builds up with speed (Armstrong-Helouvry, Dupont and Canudas \
                de Wit 1994)",

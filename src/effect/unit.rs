@@ -50,7 +50,7 @@ impl Unit {
         let (position, other) = (kind.position_unit(), from.position_unit());
         match self {
             Self::One => "1".to_owned(),
-            // a body's numbers count in the unit of the torques that tell of it
+            // a body's numbers count in the unit of the torques that show it
             Self::Fixed(text) => kind.inertial_unit(text, torque),
             Self::Torque => torque.to_owned(),
             Self::TorqueRate => format!("{torque}/s"),

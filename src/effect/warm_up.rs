@@ -37,7 +37,7 @@ pub static ENTRY: Entry = Entry {
     ],
     ladder: Some(Ladder::LONG),
     friction: true,
-    separate_by: "the same segment of motion at the begin and at the end of an hour",
+    separate_by: "log the same segment of motion at the start and at the end of an hour",
     formula: "F(v) k (1 - exp(-t/T))",
     source: "grease that warms up",
     said: |f| {

@@ -49,7 +49,7 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// The two unknowns whose expected errors are most alike.
+/// The two unknowns whose expected errors are most correlated.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Pair {
     pub first: String,

@@ -19,7 +19,7 @@ const NARROWEST: f64 = 1e-9;
 ///
 /// Between two samples h apart a function exceeds the larger by h^2/8 times the most of its second
 /// derivative. With that number given (`curvature`) the bound is certain; without, the second
-/// difference at the part's middle stands in for it, 16 times as large as a parabola would need,
+/// difference at the part's middle estimates it, 16 times as large as a parabola would need,
 /// and the first parts must be fine enough to meet every bend.
 pub fn highest(
     f: &mut dyn FnMut(f64) -> f64,

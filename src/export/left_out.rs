@@ -129,7 +129,7 @@ fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<
         }
     }
     for (i, effect) in refined.effects.iter().enumerate() {
-        // a drive's inertia is told with that of its joint
+        // a drive's inertia is named with that of its joint
         if arm.held.iter().any(|(held, _)| *held == i) {
             continue;
         }

@@ -11,7 +11,7 @@ use crate::config::serial_section::InertialSection;
 use crate::robot::Robot;
 use crate::robot::standard::STANDARD;
 
-/// What torques tell of a standard parameter.
+/// What torques determine of a standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Identifiability {
     /// Its value.
@@ -70,7 +70,7 @@ pub fn nearest(
     let gram = &b * b.transpose();
     let mut told = vec![Identifiability::Nothing; p];
     if let Some(factor) = gram.cholesky() {
-        // once more, for the last digits
+        // a second step, for the last digits
         for _ in 0..2 {
             let rest = &theta - &b * &x;
             x += b.transpose() * factor.solve(&rest);

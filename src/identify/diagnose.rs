@@ -473,7 +473,7 @@ impl Diagnosed {
 }
 
 /// Gives a parameter the value and the standard deviation that were found, and says by how much the
-/// latter is widened; none where others stand in for the parameter in these logs.
+/// latter is widened; none where other parameters explain the same torque in these logs.
 fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
     if !found.is_finite() {
         p.value = value;

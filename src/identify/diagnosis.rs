@@ -154,7 +154,7 @@ pub struct Unexplained {
     pub joint: String,
     /// Fraction of the torque's power that is residual above the noise floor.
     pub share: f64,
-    /// Power of the residual over that of the floor; null where nothing tells of the noise.
+    /// Power of the residual over that of the floor; null where nothing shows the noise.
     pub over_floor: Option<f64>,
 }
 
@@ -166,7 +166,7 @@ pub struct ResidualDependence {
     pub signals: Vec<String>,
     /// Fraction of the residual's square that means over them take up, beyond what chance takes up.
     pub share: f64,
-    /// Chance of as much among all signals where the residual depends on none of them.
+    /// Chance of a dependence as large among all signals where the residual depends on none of them.
     pub p_value: f64,
 }
 

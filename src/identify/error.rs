@@ -41,7 +41,7 @@ pub enum IdentifyError {
         second: String,
         second_role: &'static str,
     },
-    /// A fault of the data for which a fit refuses a log; its remedy is told apart.
+    /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
     Refused { log: String, fault: Box<LogFault> },
     /// The motion of a log, or the processing that a robot file asks for.

@@ -303,8 +303,11 @@ fn joint_warnings(found: &FrictionOfJoint) -> Vec<String> {
     let mut out = Vec::new();
     if e.ending != Ending::Converged {
         out.push(format!(
-            "{joint}: the search ended without converging ({:?})",
-            e.ending
+            "{joint}: the search ended without converging ({})",
+            match e.ending {
+                Ending::IterationLimit => "at the limit of iterations",
+                _ => "it diverged",
+            }
         ));
     }
     let Nis {
@@ -399,7 +402,10 @@ fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
         let v = &e.values[k];
         let mut meaning = friction_meaning(name).to_owned();
         if v.verdict == Verdict::LowerBound {
-            meaning += &format!("; only known to be above {:e} (95 %)", v.value);
+            meaning += &format!(
+                "; only known to be above {} (95 %)",
+                number::significant(v.value, 3)
+            );
         }
         Parameter {
             name: name.to_owned(),

@@ -41,7 +41,7 @@ pub fn read_whole(
     )
 }
 
-/// The motion of logs that were read before with `settings` once more, each position cut-off so many `times` as high; nothing of logs
+/// The motion of logs that were read before, again with `settings`, each position cut-off so many `times` as high; nothing of logs
 /// whose positions are not filtered.
 ///
 /// # Errors

@@ -28,7 +28,7 @@ use super::weakest::{WeakestPart, weakest};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
 use crate::config::identified::friction_meaning;
-use crate::config::model_file::{FrictionPrior, Parameter};
+use crate::config::model_file::{FrictionPrior, Parameter, is_positive};
 use crate::config::robot_file::FrictionLawKind;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::essential::{Essential, essential};
@@ -77,13 +77,13 @@ pub struct IdentifiedDynamics {
     #[serde(rename = "feasible")]
     pub consistent: Option<ConsistentLinks>,
     pub condition: ConditionNumbers,
-    /// Directions of the parameters that the rows tell of.
+    /// Directions of the parameters that the rows determine.
     pub rank: usize,
     /// The combination of parameters that they tell least about.
     pub weakest_direction: Vec<WeakestPart>,
     /// Rows of all joints.
     pub samples: u64,
-    /// Independent rows that they are worth, of all joints.
+    /// Effective sample size, of all joints.
     pub effective_samples: f64,
     /// Residual of the fit.
     pub joints: Vec<JointResidual>,
@@ -374,14 +374,7 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
 
 /// Friction and inertias that are below zero by more than two deviations, as a warning.
 fn negative(unknowns: &[Unknown]) -> Option<String> {
-    let positive = |u: &&Unknown| {
-        let key = u.key.as_str();
-        let of_drive = key
-            .strip_prefix("Ia")
-            .is_some_and(|joint| joint.parse::<u32>().is_ok());
-        let of_joint = u.joint.is_some() && matches!(key, "viscous" | "coulomb");
-        of_drive || of_joint || key == "inertia"
-    };
+    let positive = |u: &&Unknown| is_positive(&u.key, u.joint.is_some());
     let below = |u: &&Unknown| u.fitted < -2.0 * u.fitted_std;
     let names: Vec<String> = unknowns
         .iter()
@@ -394,13 +387,13 @@ fn negative(unknowns: &[Unknown]) -> Option<String> {
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not tell these parameters from others",
+            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not separate these parameters from others",
             names.join(", ")
         )
     })
 }
 
-/// What the data do not tell apart, as warnings.
+/// What the data do not separate, as warnings.
 fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
     let sentence = |c: &Confounded| {
         let most = || c.terms.iter().take(6);
@@ -409,7 +402,7 @@ fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
             .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].key))
             .collect();
         format!(
-            "these data cannot tell apart what {} share: their combination {} (columns scaled to norm 1) changes nothing",
+            "these data cannot separate {}: their combination {} (columns scaled to norm 1) changes nothing",
             names.join(", "),
             words.join(" ")
         )

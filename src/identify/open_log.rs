@@ -132,8 +132,11 @@ fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<Strin
             .map(|[a, b]| format!("{}..{} s", clock(zero + a), clock(zero + b)))
             .collect();
         out.push(format!(
-            "{name}: {} stretch(es) between gaps are too short to filter and are left out ({} samples; {})",
-            summary.skipped.segments,
+            "{name}: {} between gaps, too short to filter, left out ({} samples; {})",
+            match summary.skipped.segments {
+                1 => "1 stretch".to_owned(),
+                many => format!("{many} stretches"),
+            },
             summary.skipped.samples,
             spans.join(", ")
         ));
@@ -146,7 +149,7 @@ fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<Strin
     }
     if summary.interpolated > 0 {
         out.push(format!(
-            "{name}: the clock is uneven; its {} samples were put on an even one, with {} points interpolated",
+            "{name}: the clock is uneven; its {} samples were resampled to an even one, with {} points interpolated",
             summary.samples, summary.interpolated
         ));
     }

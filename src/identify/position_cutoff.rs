@@ -25,7 +25,7 @@ use crate::robot::model::{JointFriction, Model};
 /// Rows from which a cut-off is found, of all logs together, and of one at least.
 const MOST_ROWS: usize = 120_000;
 const LEAST_ROWS: usize = 20_000;
-/// A declared cut-off is told as wrong where it costs more than this many times the best one ..
+/// A declared cut-off is reported as wrong where it costs more than this many times the best one ..
 const WRONG: f64 = 1.3;
 /// .. and more than this part of the residual.
 const TOLD: f64 = 0.5;
@@ -64,7 +64,7 @@ impl CutoffCosts {
     }
 
     /// The cut-offs of a fit of logs with these costs, whose friction scales those of joints without a known law, and
-    /// what is wrong with them, as warnings. Where logs call for several cut-offs the lowest is told, and of the costs
+    /// what is wrong with them, as warnings. Where logs call for several cut-offs the lowest is reported, and of the costs
     /// the root of the mean square.
     pub(super) fn told(
         logs: &[&CutoffCosts],

@@ -1,4 +1,4 @@
-//! How fast the joints of a log move, by which a rest is told from a slow motion.
+//! How fast the joints of a log move, by which a rest is distinguished from a slow motion.
 
 use crate::log::{Block, Conversion};
 

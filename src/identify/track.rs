@@ -17,7 +17,7 @@ use crate::config::ModelFile;
 use crate::log::Provenance;
 use crate::track::{Change, ChangeKind, Course, Estimate, Level, apart, follow_together};
 
-/// Probability at which changes are told of a robot that has none, all its parameters together, at one look. A robot is
+/// Probability at which changes are reported of a robot that has none, all its parameters together, at one look. A robot is
 /// looked at after each of its logs, and payloads follow no normal law: over fifty logs there are more
 /// (`examples/study_track`).
 const ALARMS: f64 = 0.0002;
@@ -185,7 +185,7 @@ impl TrackSource {
         }
     }
 
-    /// The logs that it tells of; the model file itself where it names none.
+    /// The logs that it is from; the model file itself where it names none.
     fn rows(&self) -> &[Provenance] {
         match self {
             Self::Model { file, .. } if !file.provenance.inputs.is_empty() => {
@@ -195,7 +195,7 @@ impl TrackSource {
         }
     }
 
-    /// Whether both tell of the same rows: parts of any, models of all.
+    /// Whether both are from the same rows: parts of any, models of all.
     fn same_rows(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Part { log: a, .. }, Self::Part { log: b, .. }) => a.shares_rows(b),
@@ -434,7 +434,7 @@ fn correlation(told: &[Source], keys: &[&Told]) -> Option<Vec<f64>> {
     pairs.collect()
 }
 
-/// Sizes of a joint's friction that are less than so many deviations from none are not told of a change that others
+/// Sizes of a joint's friction that are less than so many deviations from none are not named in a change that others
 /// show.
 const SHOWN: f64 = 2.0;
 

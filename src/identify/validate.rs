@@ -41,7 +41,7 @@ pub struct Validated {
 /// sample, and the instant from which its time is counted.
 ///
 /// Band and rows are of positions that came through the filter by which the band was found: where these logs call for
-/// another, they are gone through once more.
+/// another, they are read again.
 ///
 /// # Errors
 /// Logs that cannot be used.

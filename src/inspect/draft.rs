@@ -20,7 +20,7 @@ pub(super) struct FaultList {
     pub(super) stalls: Vec<[f64; 2]>,
     /// Rows for which each sample was held.
     pub(super) held: Option<usize>,
-    /// Kinds that are told but not acted upon.
+    /// Kinds that are reported but not acted upon.
     pub(super) keep: Vec<RowFault>,
     first: f64,
     last: f64,

@@ -42,7 +42,7 @@ pub struct Gate {
 
 impl Gate {
     /// Reads a log to its end, its channels as logged; `None` where `stop` asks for it. It is read
-    /// once more where the first look found what hides the rest: positions that begin anew, samples
+    /// again where the first look found what hides the rest: positions that begin anew, samples
     /// that were held; `also` gets every block, and the layout that it was read
     /// by, of the last reading after the blocks of any before it.
     ///

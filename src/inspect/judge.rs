@@ -265,7 +265,7 @@ impl LogJudge {
         }
     }
 
-    /// The same, with kinds of findings that are told but not acted upon.
+    /// The same, with kinds of findings that are reported but not acted upon.
     pub fn keeping(mut self, keep: &[RowFault]) -> Self {
         self.keep = keep.to_vec();
         self

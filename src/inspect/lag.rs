@@ -15,7 +15,7 @@ const STRETCHES: usize = 8;
 const LEAST: usize = 3;
 /// A delay of fewer rows is none: the time of a torque is not known better than its row.
 const ROWS: f64 = 2.0;
-/// A shorter one is not told without a model: what other joints do to a joint looks like one [s].
+/// A shorter one is not reported without a model: what other joints do to a joint looks like one [s].
 const SHORTEST: f64 = 0.01;
 /// Deviations from 0 at which a delay is believed.
 const SURE: f64 = 6.0;

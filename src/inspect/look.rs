@@ -29,7 +29,7 @@ pub struct ColumnPlan {
     pub time: Option<(usize, f64)>,
     /// The other columns.
     pub channels: Vec<ChannelColumn>,
-    /// Kinds of findings that are told but not acted upon.
+    /// Kinds of findings that are reported but not acted upon.
     pub keep: Vec<RowFault>,
     /// Rows for which each sample was held: only fresh rows are looked at.
     pub held: Option<usize>,
@@ -37,7 +37,7 @@ pub struct ColumnPlan {
     pub band_hz: Option<f64>,
 }
 
-/// Looks at a log once more where the first look found what hides the rest: positions that begin
+/// Looks at a log again where the first look found what hides the rest: positions that begin
 /// anew, samples that were held. `None` where there is none of it, or `stop` asks for it.
 ///
 /// # Errors

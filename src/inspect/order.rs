@@ -1,7 +1,7 @@
 //! Joints that are swapped or have the other sign, by a model of the robot.
 //!
 //! The torque that a model gives for the motion as logged is compared with the torque as logged, and
-//! once more with each joint turned, and each two joints exchanged, in the positions, in the torques
+//! again with each joint turned, and each two joints exchanged, in the positions, in the torques
 //! and in both. Where one such change explains what was not explained without it, it is told.
 
 use super::draft::seconds;

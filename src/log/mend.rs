@@ -60,7 +60,7 @@ pub struct Mending {
     pub bridges: Arc<[Bridge]>,
 }
 
-/// Knows rows that are the one before once more, in a log that holds its samples.
+/// Finds rows that repeat the one before, in a log that holds its samples.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Held {
     /// Rows for which a sample is held; 0 where none is.

@@ -206,14 +206,14 @@ impl Reader {
         let mut found = self.pass.warnings();
         if self.duplicates > 0 {
             found.push(format!(
-                "{} messages are the message before once more, time included, and are left out",
+                "{} messages repeat the message before, time included, and are left out",
                 self.duplicates
             ));
         }
         if self.held.dropped > 0 {
             let rows = self.pass.samples + self.held.dropped;
             found.push(format!(
-                "sample-and-hold: {} of {rows} rows ({:.0} %) are the row before once more; only fresh rows are used",
+                "sample-and-hold: {} of {rows} rows ({:.0} %) repeat the row before; only fresh rows are used",
                 self.held.dropped,
                 100.0 * self.held.dropped as f64 / rows as f64
             ));

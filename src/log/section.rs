@@ -308,7 +308,7 @@ pub struct LogSection {
     /// Rate of a text log that has no column of times [Hz]: its rows lie evenly, the first at 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// Kinds of findings about rows that are told but not acted upon: the rows stay in a fit as they
+    /// Kinds of findings about rows that are reported but not acted upon: the rows stay in a fit as they
     /// were logged.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keep: Vec<RowFault>,

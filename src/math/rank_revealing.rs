@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Inverse of a positive semidefinite matrix over the unknowns that it determines, by a Cholesky factor that
-/// reveals its rank. Columns are taken in their order: one that those before it stand in for is redundant, and
+/// reveals its rank. Columns are taken in their order: one that depends on those before it is redundant, and
 /// its row and column of the inverse are zero.
 #[derive(Debug, Clone)]
 pub struct RankRevealingInverse {
@@ -11,7 +11,7 @@ pub struct RankRevealingInverse {
     redundant: Vec<bool>,
 }
 
-/// Least part of an unknown's squared column that those before it do not stand in for.
+/// Least part of an unknown's squared column that those before it do not explain.
 const LEAST_OWN: f64 = 1e-9;
 
 impl RankRevealingInverse {
@@ -51,7 +51,7 @@ impl RankRevealingInverse {
         RankRevealingInverse { matrix, redundant }
     }
 
-    /// Whether the matrix says nothing of unknown `i` that those before it do not stand in for.
+    /// Whether the matrix says nothing of unknown `i` beyond those before it.
     pub fn redundant(&self, i: usize) -> bool {
         self.redundant[i]
     }

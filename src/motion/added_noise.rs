@@ -8,7 +8,7 @@ use super::MotionError;
 use super::stretch::{Parallel, Stretch};
 
 impl Parallel {
-    /// The stretch with its motion through the position filter once more; none where there is no such
+    /// The stretch with its motion through the position filter a second time; none where there is no such
     /// filter. To leading order this doubles what the filter took (Tukey's twicing, Exploratory Data Analysis, 1977).
     ///
     /// # Errors

@@ -9,7 +9,7 @@
 //! A corner of v is rounded off in proportion to the width of the filter's response, 1 / cut-off; of a friction that
 //! turns more slowly the filter takes less, as a higher power of it. At 0.6 of the cut-off the change is 0.7 times
 //! what the filter itself took for the first power and 1.8 times for the second: about the smear, in either case. The
-//! same filter once more would not tell, for its pass band is flat and its edge steep.
+//! same filter a second time would not show it, for its pass band is flat and its edge steep.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

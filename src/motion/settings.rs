@@ -82,7 +82,7 @@ pub enum ParallelFilter {
 /// Difference formula for velocity and acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
-    /// Three points, once for the velocity and once more for the acceleration.
+    /// Three points, once for the velocity and once for the acceleration.
     Central,
     /// Nine points, exact for polynomials of degree 8 (velocity) and 9 (acceleration).
     HighOrder,

@@ -148,7 +148,7 @@ pub fn stretches<E>(
         stretch.dt = summary.dt;
         stretch.began -= first.unwrap_or(0.0);
     }
-    // what was done to the log is told with its own decimation
+    // what was done to the log is reported with its own decimation
     let declared = FilterChain::design(settings, summary.dt)?;
     Ok((
         found,

@@ -70,7 +70,7 @@ impl Sums {
     }
 
     /// Numbers, their covariance for rows of deviation 1, and the power that they take away. Directions that no
-    /// row tells of stay at 0.
+    /// row determines stay at 0.
     fn solve(&self) -> (DVector<f64>, DMatrix<f64>, f64) {
         let u = self.right.len();
         let scale = DVector::from_fn(u, |i, _| {

@@ -133,7 +133,7 @@ impl AtomicFile {
             None => Ok(None),
             Some(Err(error)) => {
                 let (error, writer) = error.into_parts();
-                // Dropping the writer would try the same write once more.
+                // Dropping the writer would try the same write again.
                 let (target, _) = writer.into_parts();
                 forget(&target);
                 Err(error)

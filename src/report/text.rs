@@ -15,13 +15,13 @@ impl Report {
             let parts = self.parts(&[Shown::Terminal, Shown::Detail]);
             return parts.map(shown).collect();
         }
-        let parts = self.parts(&[Shown::Terminal]);
-        let verdicts = parts.clone();
+        let verdicts = self.parts(&[Shown::Terminal, Shown::Brief]);
         let verdicts = verdicts.filter(|part| matches!(part, Part::Verdict { .. }));
         let brief: String = verdicts.map(shown).collect();
         if detail == Detail::Brief && !brief.is_empty() {
             return brief;
         }
+        let parts = self.parts(&[Shown::Terminal]);
         let mut text: String = parts.map(shown).collect();
         if self.parts(&[Shown::Detail]).count() > self.parts(&[]).count() {
             text += "--verbose shows more\n";
@@ -129,6 +129,9 @@ mod tests {
             report.text_for(Detail::Full),
             "it holds\nall 58 parameters\nwritten: a.toml\n"
         );
+        report.brief().verdict("in short", true);
+        assert_eq!(report.text_for(Detail::Brief), "it holds\nin short\n");
+        assert!(!report.text().contains("in short"));
         let mut plain = Report::new("title");
         plain.terminal().line("no verdict");
         assert_eq!(plain.text_for(Detail::Brief), "no verdict\n");

@@ -11,6 +11,8 @@ use super::traces::Traces;
 pub enum Shown {
     Everywhere,
     Terminal,
+    /// On a terminal that is to show little.
+    Brief,
     /// On a terminal that is to show everything.
     Detail,
     Page,
@@ -54,7 +56,7 @@ pub enum Part {
     /// Small pictures that belong together.
     Figures(Cells),
     /// Series over time that can be zoomed, as the page's viewer reads them, and the SVG document that
-    /// stands in for them.
+    /// is shown without a script.
     Traces {
         data: String,
         still: String,
@@ -103,6 +105,11 @@ impl Report {
     /// Adds parts that only a terminal shows.
     pub fn terminal(&mut self) -> Writer<'_> {
         self.shown(Shown::Terminal)
+    }
+
+    /// Adds a verdict that a terminal shows where little is asked for, and others have said in more words.
+    pub fn brief(&mut self) -> Writer<'_> {
+        self.shown(Shown::Brief)
     }
 
     /// Adds parts that a terminal shows where everything is asked for.
@@ -184,7 +191,7 @@ impl Writer<'_> {
         self.push(Part::Figures(cells.clone()));
     }
 
-    /// Series over time, and the still picture that stands in for them.
+    /// Series over time, and the still picture that is shown without a script.
     pub fn traces(&mut self, traces: &Traces, still: &str) {
         self.push(Part::Traces {
             data: traces.data(),

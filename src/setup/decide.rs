@@ -17,7 +17,7 @@ const LIKELY: f64 = 3.0;
 const FORCED: f64 = 2.0;
 /// Share of the most that any reading gains, below which another one is not looked at.
 const SHADOW: f64 = 0.5;
-/// Readings that are as likely to within e^3, 20 to 1, are told as tied.
+/// Readings that are as likely to within e^3, 20 to 1, are reported as tied.
 const TIED: f64 = 3.0;
 /// The error must move by more than a tenth..
 const TENTH: f64 = 1.1;
@@ -52,7 +52,7 @@ const CALIBRATION: f64 = 0.25;
 const MOST: f64 = 0.7;
 /// A deviation that says nothing.
 const UNKNOWN: f64 = 1e5;
-/// A quantity is told as negative beyond so many deviations.
+/// A quantity is reported as negative beyond so many deviations.
 pub(super) const NEGATIVE: f64 = -2.0;
 
 /// A correction that was found.

@@ -1,4 +1,4 @@
-//! What is told of a set-up: the entries of the key `setup` in the documents of the commands.
+//! What is reported of a set-up: the entries of the key `setup` in the documents of the commands.
 
 use schemars::JsonSchema;
 use serde::Serialize;

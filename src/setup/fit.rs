@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::normal::Normal;
 
-/// Rounding of a normal matrix whose columns are scaled to norm 1: what the rows do not tell of is kept
+/// Rounding of a normal matrix whose columns are scaled to norm 1: what the rows do not determine is kept
 /// small by it.
 const RIDGE: f64 = 1e-10;
 /// Times that the weights of the joints are found anew from the residual.

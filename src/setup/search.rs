@@ -1,4 +1,4 @@
-//! Which correction of a set-up is told, if any.
+//! Which correction of a set-up is reported, if any.
 //!
 //! Every hypothesis is fitted to few rows; those that do best, and those that put right what physics
 //! forbids, are fitted to all of them, and the best one is judged on blocks that did not choose it. What is

@@ -74,7 +74,7 @@ impl<const J: usize> Moving<'_, J> {
         let torque = self.plant.mechanism.torque(&q, &self.volts);
         let (mass, bias) = self.body(t, link, speed, z);
         let symmetric = (1..J).all(|i| (0..i).all(|j| mass[i][j] == mass[j][i]));
-        // net torque, load and acceleration, once more torque is taken
+        // net torque, load and acceleration, when more torque is taken
         let respond = |taken: &[f64; J]| {
             let mut net: [f64; J] =
                 std::array::from_fn(|i| acting[i] * torque[i] - friction[i] - added[i] - taken[i]);

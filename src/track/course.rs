@@ -5,7 +5,7 @@ use super::local_level::{Variances, smooth};
 use super::together::{About, Member};
 use super::walk::{Sizes, median};
 
-/// What one log tells of a parameter.
+/// What one log says of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Time, by a clock that runs through all logs \[s\], or the log's number.
@@ -39,7 +39,7 @@ const ALONE: f64 = 5.0;
 /// Neighbours on each side: a payload may stay for some logs.
 const NEIGHBOURS: usize = 5;
 
-/// The course of a parameter from estimates in order of time. `level` is the probability at which a change is told
+/// The course of a parameter from estimates in order of time. `level` is the probability at which a change is reported
 /// where there is none.
 pub fn follow(estimates: &[Estimate], level: f64) -> Course {
     let mut courses = follow_together(&[estimates], None, level);

@@ -260,8 +260,12 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         checks: mapping.checks.clone(),
         faults,
     };
+    let brief = match mapping.checks.len() {
+        0 => format!("written: {}", target.display()),
+        n => format!("written: {}, {n} to look at (CHECK IT)", target.display()),
+    };
     Ok(Outcome {
-        text: format!("{table}{checks}{found}{next}"),
+        text: context.text(format!("{table}{checks}{found}{next}"), &brief),
         document: Document::new("new", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })

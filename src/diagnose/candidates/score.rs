@@ -26,7 +26,7 @@ pub struct CandidateScore {
     pub beta: Vec<f64>,
     /// Fraction of the weighted squared residual that it removes in the fit.
     pub gain: f64,
-    /// Share of its torque that nothing declared can stand in for.
+    /// Share of its torque that nothing declared can explain.
     pub unique_share: f64,
     /// Chance of a test value as large without the effect, one candidate alone.
     pub p_value: f64,

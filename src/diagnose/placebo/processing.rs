@@ -4,7 +4,7 @@
 //! The motion through a filter several times as wide keeps what the model's filter can spoil. The model's torque
 //! along it, less that along the motion as it was processed, is what smearing leaves in the residual. The wide
 //! motion holds noise of its own, and so the processed motion is given as much before the two are compared; what
-//! noise makes of the processed motion itself is told by giving it that once more (Cook and Stefanski 1994). The
+//! noise makes of the processed motion itself is found by adding noise of the same level (Cook and Stefanski 1994). The
 //! difference goes through the parallel filter as a residual does.
 
 use nalgebra::DVector;
@@ -19,7 +19,7 @@ use crate::diagnose::problem::wide_motion::WideMotion;
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 
-/// Most of what processing makes that a residual may hold, over what it was found to make.
+/// Most of an artefact of processing that a residual may hold, over its size as found.
 const MOST: f64 = 2.0;
 
 /// What processing alone leaves in the residual.
@@ -56,7 +56,7 @@ impl Artefact {
     }
 }
 
-/// What is to be taken from the pull of a log because processing makes it: as much of the artefact's as is most
+/// What is to be taken from the pull of a log because processing causes it: as much of the artefact's as is most
 /// like it, within bounds. `like` is the product of two pulls in the metric of the fit.
 pub fn taken(
     right: &DVector<f64>,

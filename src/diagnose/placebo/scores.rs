@@ -8,7 +8,7 @@ use super::processing::taken;
 use crate::diagnose::problem::cross_products::CrossProducts;
 use crate::math::rank_revealing::RankRevealingInverse;
 
-/// Least part of what tells of a candidate that must be the other blocks'.
+/// Least part of the evidence for a candidate that must be the other blocks'.
 const LEAST_OTHERS: f64 = 0.1;
 /// Least degrees of freedom of the scores' covariance.
 const LEAST_FREEDOM: f64 = 2.0;

@@ -15,7 +15,7 @@ pub struct Case {
     pub prior: ParameterPrior,
     pub open: FreeParameters,
     pub stretches: Vec<Stretch>,
-    /// Their motion through a wider filter, from which it is told what processing makes; none where that is not
+    /// Their motion through a wider filter, from which what processing adds is found; none where that is not
     /// asked for.
     pub wide: Option<WideMotion>,
     /// Role of each log.
@@ -44,7 +44,7 @@ pub struct Case {
 pub struct SelectionLimits {
     /// Chance of one false effect or more among all candidates, where nothing is missing.
     pub false_alarm: f64,
-    /// Least share of the effect's torque that nothing declared can stand in for.
+    /// Least share of the effect's torque that nothing declared can explain.
     pub unique_share: f64,
     /// Least fraction of cross-validated squared error removed.
     pub cv_gain: f64,

@@ -1,4 +1,4 @@
-//! The logs once more, through a position filter several times as wide as the model's.
+//! The logs again, through a position filter several times as wide as the model's.
 
 use crate::motion::{FilterSettings, MotionError, ParallelFilters, Stretch};
 

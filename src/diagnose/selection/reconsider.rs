@@ -145,7 +145,7 @@ fn instead(
     let same = |law: &Law, place: Place| {
         gone.len() == 1 && gone[0].name() == law.entry.name && gone[0].place == place
     };
-    // an order is not simpler than what it would stand in for
+    // an order is not simpler than what it would replace
     let open = |law: &Law| law.entry.search != Search::Orders && fewer(law);
     let wanted = |law: &Law, place: Place| open(law) && moved(place) && !same(law, place);
     let of = (&wanted as &(dyn Fn(&Law, Place) -> bool + Sync), needed);

@@ -1,4 +1,4 @@
-//! The curve that stands in for an effect whose numbers no machine has.
+//! The curve that takes the place of an effect whose numbers no machine has.
 
 use crate::diagnose::candidates::candidate::Candidate;
 use crate::diagnose::candidates::columns::columns;

@@ -11,7 +11,7 @@ use crate::diagnose::problem::rests::near_rests;
 use crate::math::rank_revealing::RankRevealingInverse;
 use crate::motion::{MotionError, Stretch};
 
-/// How far the unknowns move where the motion goes through the position filter once more: to leading order
+/// How far the unknowns move where the motion goes through the position filter a second time: to leading order
 /// what the filter's own distortion, at reversals above all, has made of them. Zero without such a filter.
 ///
 /// # Errors
@@ -35,7 +35,7 @@ pub(crate) fn from_smoothing(
     refitted(at, &problem.along(&at.model.model.robot, &again)?)
 }
 
-/// How far the unknowns move in a fit where the positions get noise of their own level once more: to leading order
+/// How far the unknowns move in a fit where the positions get noise of their own level added: to leading order
 /// what that noise, a regressor's, has made of them already. A resonance within reach of the band feels it most.
 /// What is of first order in the noise is left out, for the residual's covariance holds it.
 ///

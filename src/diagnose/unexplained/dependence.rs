@@ -19,7 +19,7 @@ pub struct Dependence {
     pub signals: Vec<Signal>,
     /// Share of the residual's square that it takes up, beyond what it takes up of placebos.
     pub share: f64,
-    /// Chance of as much among all signals where the residual depends on none.
+    /// Chance of a dependence as large among all signals where the residual depends on none.
     pub p_value: f64,
     /// Of the strongest of each joint: the residual over the two signals on which it depends most.
     pub map: Option<ResidualMap>,
@@ -33,7 +33,7 @@ const PAIRED: usize = 6;
 const LEAST_SHARE: f64 = 0.02;
 /// Chance above which a dependence is not told.
 const SURE: f64 = 0.01;
-/// Dependences told of one joint.
+/// Dependences reported of one joint.
 const TOLD: usize = 4;
 /// Part by which two signals must take up more than the better of them alone.
 const TOGETHER: f64 = 1.2;

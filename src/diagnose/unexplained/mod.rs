@@ -20,7 +20,7 @@ pub struct Unexplained {
     /// Fraction of the torque's power that is residual above the noise floor.
     pub share: f64,
     /// Power of the residual over that of the floor; none where the torque was filtered before it was logged,
-    /// so that nothing beyond the band tells of its noise.
+    /// so that nothing beyond the band shows its noise.
     pub over_floor: Option<f64>,
 }
 

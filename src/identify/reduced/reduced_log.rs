@@ -138,7 +138,7 @@ pub struct ReducedLog {
     pub provenance: Provenance,
     /// First and last time of its rows, by the log's own clock [s].
     pub bounds_s: [f64; 2],
-    /// What was left out of it or mended, and what else was told of it.
+    /// What was left out of it or mended, and what else was reported of it.
     pub warnings: Vec<String>,
     pub summary: Summary,
     pub(in crate::identify) own: OwnSettings,

@@ -20,7 +20,7 @@ const OPEN: f64 = 1e-4;
 
 /// Inverse of the weighted normal matrix, and the directions that it leaves open.
 struct Solved {
-    /// Directions that the rows tell of, unknowns x their number: the normal matrix is 1 in them, and its
+    /// Directions that the rows determine, unknowns x their number: the normal matrix is 1 in them, and its
     /// inverse is their square.
     told: DMatrix<f64>,
     /// Columns in scaled unknowns.
@@ -47,9 +47,9 @@ impl Solved {
         })
     }
 
-    /// Whether a function of this gradient is told by the rows.
+    /// Whether a function of this gradient is determined by the rows.
     fn determines(&self, gradient: &DVector<f64>) -> bool {
-        // an unknown of a zero column is told by nothing
+        // an unknown of a zero column is determined by nothing
         let told = gradient.iter().zip(&self.scale);
         if told.clone().any(|(g, s)| *g != 0.0 && *s <= 0.0) {
             return false;
@@ -192,7 +192,7 @@ pub(super) fn certain(problem: &Problem, found: Found) -> Result<GainFit, FitErr
     })
 }
 
-/// The joint beside which most others are told, and best; and the gradients of their differences to it.
+/// The joint beside which most others are determined, and best; and the gradients of their differences to it.
 fn beside_one(
     gradients: &[DVector<f64>],
     solved: &Solved,

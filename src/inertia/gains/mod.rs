@@ -41,7 +41,7 @@ pub struct GainRows<'a> {
     pub loaded: Option<(&'a BlockFactors, &'a PayloadColumns)>,
 }
 
-/// What the rows tell of the gains.
+/// What the rows say of the gains.
 #[derive(Debug, Clone)]
 pub struct GainFit {
     /// Channel per torque of each joint: with a payload c_j mu, which is 1/g_j for a load of 1 kg;
@@ -52,7 +52,7 @@ pub struct GainFit {
     pub covariance: DMatrix<f64>,
     /// Whether the rows tell it of this joint: by itself with a payload, else beside the reference.
     pub determined: Vec<bool>,
-    /// The joint beside which the others are told, where there is no payload.
+    /// The joint beside which the others are determined, where there is no payload.
     pub reference: Option<usize>,
     /// Residual of each joint in the channel's unit.
     pub residual_std: Vec<f64>,

@@ -116,7 +116,7 @@ impl<'a> Problem<'a> {
                 (square / counts[j].max(1.0)).sqrt()
             })
             .collect();
-        // each set must tell of its own unknowns, and each joint of its gain
+        // each set must determine its own unknowns, and each joint its gain
         for set in &sets {
             let rows = set.factors.moving.iter().map(|rows| rows.count).max();
             let (rows, unknowns) = (rows.unwrap_or(0), columns.unknowns());

@@ -87,7 +87,7 @@ impl DelayEstimator {
             if least > 1.0 - EXPLAINED {
                 continue;
             }
-            // A joint says as much about the delay as its residual rises away from it.
+            // A joint weighs by how its residual rises away from the delay.
             let most = found.iter().copied().fold(0.0, f64::max);
             for (sum, value) in residuals.iter_mut().zip(&found) {
                 *sum += value / least.max(1e-12);

@@ -8,16 +8,17 @@ use super::svg::Svg;
 pub(super) const WIDTH: f64 = 380.0;
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 12.0;
-/// Room above a panel for its name, and below it for numbers and the name of its axis [px].
+/// Room above a panel for its name, or for marks alone, and below it for numbers and the name of its axis [px].
 const NAME: f64 = 24.0;
+const MARKS: f64 = 14.0;
 const BELOW: f64 = 40.0;
 
 /// Pictures that belong together, with what is said of them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cells {
     pub title: String,
-    /// What the colours mean, an SVG document; may be empty.
-    pub key: String,
+    /// What the colours mean, an SVG document each.
+    pub key: Vec<String>,
     /// SVG documents.
     pub pictures: Vec<String>,
     /// Sentences below.
@@ -32,12 +33,31 @@ pub(super) fn cell(
     height: f64,
     draw: impl FnOnce(&mut Svg, [f64; 4]),
 ) -> String {
-    let mut svg = Svg::new(WIDTH, NAME + height + BELOW, title, told);
-    draw(&mut svg, [LEFT, NAME, WIDTH - LEFT - RIGHT, height]);
+    below(NAME, [title, told], height, draw)
+}
+
+/// The same of a panel that bears no name.
+pub(super) fn nameless(
+    title: &str,
+    told: &str,
+    height: f64,
+    draw: impl FnOnce(&mut Svg, [f64; 4]),
+) -> String {
+    below(MARKS, [title, told], height, draw)
+}
+
+fn below(
+    above: f64,
+    [title, told]: [&str; 2],
+    height: f64,
+    draw: impl FnOnce(&mut Svg, [f64; 4]),
+) -> String {
+    let mut svg = Svg::new(WIDTH, above + height + BELOW, title, told);
+    draw(&mut svg, [LEFT, above, WIDTH - LEFT - RIGHT, height]);
     svg.finish()
 }
 
-/// The legend of all pictures, by itself.
-pub(super) fn key(entries: &[(Key, &str)]) -> String {
-    legend::alone(entries, WIDTH)
+/// The legend of all pictures.
+pub(super) fn key(entries: &[(Key, &str)]) -> Vec<String> {
+    entries.iter().map(|entry| legend::alone(*entry)).collect()
 }

@@ -1,11 +1,12 @@
 //! Parameters over time: estimates of single logs, the smoothed course with its band, and changes.
 
 use super::axis;
+use super::cell::{self, Cells};
 use super::colour;
-use super::joint_grid::{self, Heading};
 use super::legend::Key;
 use super::panel::Panel;
 use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use crate::number;
 
 /// One parameter over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +24,7 @@ pub struct CoursePanel {
     pub changes: Vec<f64>,
 }
 
-/// A figure of one panel per parameter, two beside each other.
+/// A figure of one panel per parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CourseFigure {
     pub title: String,
@@ -34,30 +35,55 @@ pub struct CourseFigure {
 
 const COURSE: Stroke = Stroke::solid(colour::BLUE, 1.8);
 const CHANGE: Stroke = Stroke::dashed(colour::VERMILLION, 1.4, "5 3");
+/// Height of a panel [px].
+const HEIGHT: f64 = 150.0;
 /// Half width of the band of 95 % in standard deviations.
 const BAND: f64 = 1.96;
 
 impl CourseFigure {
-    /// The figure as an SVG document.
-    pub fn svg(&self) -> String {
-        let names: Vec<&str> = self.panels.iter().map(|p| p.name.as_str()).collect();
-        let description = format!("Course over time with 95 % bands of {}", names.join(", "));
-        let heading = Heading {
-            title: &self.title,
-            description: &description,
-            legend: &[
-                (Key::Dot(colour::MUTED), "estimate of one log"),
-                (Key::Band(COURSE), "smoothed, 95 %"),
-                (Key::Line(CHANGE), "change"),
-            ],
+    /// The panels as pictures of their own.
+    pub fn cells(&self) -> Cells {
+        let mut key = vec![
+            (Key::Spot(colour::MUTED), "estimate of one log"),
+            (Key::Band(COURSE), "smoothed, 95 %"),
+        ];
+        if self.panels.iter().any(|panel| !panel.changes.is_empty()) {
+            key.push((Key::Line(CHANGE), "change"));
+        }
+        let picture = |panel: &CoursePanel| {
+            cell::cell(&panel.name, &panel.words(), HEIGHT, |svg, frame| {
+                panel.draw(svg, frame, &self.time_unit)
+            })
         };
-        let draw =
-            |panel: &CoursePanel, svg: &mut Svg, frame| panel.draw(svg, frame, &self.time_unit);
-        joint_grid::draw(&heading, &self.panels, draw)
+        Cells {
+            title: self.title.clone(),
+            key: cell::key(&key),
+            pictures: self.panels.iter().map(picture).collect(),
+            words: Vec::new(),
+        }
     }
 }
 
 impl CoursePanel {
+    /// What a screen reader says: the ends of the course and its changes.
+    fn words(&self) -> String {
+        let known: Vec<[f64; 2]> = self.course.iter().flatten().copied().collect();
+        let (Some(first), Some(last)) = (known.first(), known.last()) else {
+            return format!("no log determines {}", self.name);
+        };
+        let of = |[value, std]: [f64; 2]| {
+            let (value, std) = number::value_and_std(value, std);
+            format!("{value} ± {std} {}", self.unit)
+        };
+        let changes = match self.changes.len() {
+            0 => "no change".to_owned(),
+            1 => "one change".to_owned(),
+            many => format!("{many} changes"),
+        };
+        let (first, last) = (of(*first), of(*last));
+        format!("{}: {first} at first, {last} at last; {changes}", self.name)
+    }
+
     fn draw(&self, svg: &mut Svg, frame: [f64; 4], time_unit: &str) {
         let [left, top, width, height] = frame;
         let name = fitted(&self.name, 11.5, width);
@@ -124,11 +150,14 @@ mod tests {
             time_unit: "d".into(),
             panels: vec![panel.clone()],
         };
-        let svg = figure(&panel).svg();
+        let cells = figure(&panel).cells();
+        let svg = &cells.pictures[0];
         assert!(svg.contains("coulomb of q2") && svg.contains(CHANGE.colour));
+        assert!(svg.contains("1.50 ± 0.10 Nm at last; one change"), "{svg}");
+        assert_eq!(cells.key.len(), 3);
         panel.course = vec![None; 3];
         panel.estimates = vec![None; 3];
-        let none = figure(&panel).svg();
+        let none = &figure(&panel).cells().pictures[0];
         assert!(none.contains("no log determines it") && !none.contains("NaN"));
     }
 }

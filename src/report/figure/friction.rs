@@ -374,11 +374,11 @@ mod tests {
         let cells = figure.cells();
         assert_eq!(circles(&figure), 2);
         assert!(
-            cells.key.contains("model with every effect"),
+            cells.key.concat().contains("model with every effect"),
             "{}",
-            cells.key
+            cells.key.concat()
         );
-        assert!(!cells.key.contains("95 % band"));
+        assert!(!cells.key.concat().contains("95 % band"));
         assert!(cells.pictures[0].contains("q1: 7.00 N at 0.500 m/s, 2.00 N at 1.00 m/s"));
     }
 

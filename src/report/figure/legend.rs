@@ -23,31 +23,12 @@ const SAMPLE: f64 = 26.0;
 const APART: f64 = 14.0;
 const LINE: f64 = 18.0;
 
-/// The legend as a picture of its own, in as many lines as `width` takes.
-pub(super) fn alone(entries: &[(Key, &str)], width: f64) -> String {
-    let mut lines: Vec<Vec<(Key, &str)>> = vec![Vec::new()];
-    let mut at = 0.0;
-    let mut most: f64 = 0.0;
-    for (key, name) in entries {
-        let own = SAMPLE + 6.0 + width_of(name, SIZE) + APART;
-        if at + own > width
-            && let Some(last) = lines.last()
-            && !last.is_empty()
-        {
-            lines.push(Vec::new());
-            at = 0.0;
-        }
-        if let Some(line) = lines.last_mut() {
-            line.push((*key, *name));
-        }
-        at += own;
-        most = most.max(at);
-    }
-    let names: Vec<&str> = entries.iter().map(|(_, name)| *name).collect();
-    let mut svg = Svg::new(most, LINE * lines.len() as f64, "legend", &names.join(", "));
-    for (k, line) in lines.iter().enumerate() {
-        draw(&mut svg, [0.0, LINE * (k as f64 + 0.72)], line);
-    }
+/// One entry as a picture of its own: a page sets as many beside each other as its width takes.
+pub(super) fn alone(entry: (Key, &str)) -> String {
+    let (_, name) = entry;
+    let width = SAMPLE + 6.0 + width_of(name, SIZE) + APART;
+    let mut svg = Svg::new(width, LINE, "legend", name);
+    draw(&mut svg, [0.0, 0.72 * LINE], &[entry]);
     svg.finish()
 }
 

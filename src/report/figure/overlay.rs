@@ -1,6 +1,7 @@
 //! Friction curves of two models over each other, joint by joint.
 
 use super::axis;
+use super::cell::{self, Cells};
 use super::colour;
 use super::friction::{band, lines, runs, spread};
 use super::joint_grid::{self, Heading};
@@ -21,9 +22,12 @@ pub struct OverlayPanel {
     /// Both curves in order of `v`; a point that is not finite splits one, and a model without
     /// friction there has none.
     pub curves: [Vec<FrictionCurvePoint>; 2],
+    /// Velocity and friction along the logs, of a model whose effects make its friction differ from a
+    /// curve over velocity; it has no curve then.
+    pub clouds: [Vec<[f64; 2]>; 2],
 }
 
-/// A figure of one panel per joint, two beside each other.
+/// A figure of one panel per joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OverlayFigure {
     /// Heading.
@@ -36,6 +40,9 @@ pub struct OverlayFigure {
 
 /// Room for one name in the legend [px].
 const LABEL: f64 = 250.0;
+/// Height of a panel by itself [px], and most rows of a cloud.
+const ALONE: f64 = 180.0;
+const ROWS: usize = 500;
 
 /// Told apart by dashes as well as by colour.
 const STROKES: [Stroke; 2] = [
@@ -44,6 +51,25 @@ const STROKES: [Stroke; 2] = [
 ];
 
 impl OverlayFigure {
+    /// The panels as pictures of their own.
+    pub fn cells(&self) -> Cells {
+        let picture = |panel: &OverlayPanel| {
+            let title = format!("friction of {}", panel.joint);
+            let told = format!("{title} by {} and {}", self.names[0], self.names[1]);
+            cell::cell(&title, &told, ALONE, |svg, frame| panel.draw(svg, frame))
+        };
+        let keys = STROKES.iter().zip(&self.names);
+        let keys: Vec<(Key, &str)> = keys
+            .map(|(stroke, name)| (Key::Band(*stroke), name.as_str()))
+            .collect();
+        Cells {
+            title: self.title.clone(),
+            key: cell::key(&keys),
+            pictures: self.panels.iter().map(picture).collect(),
+            words: Vec::new(),
+        }
+    }
+
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
         let joints: Vec<&str> = self.panels.iter().map(|p| p.joint.as_str()).collect();
@@ -68,8 +94,10 @@ impl OverlayPanel {
         let style = Type::new(11.5, Anchor::Start);
         svg.heading([left, top - 7.0], &self.joint, "", style);
         let points = || self.curves.iter().flatten();
-        let speeds = axis::interval(points().map(|p| p.v), 0.03);
-        let torques = axis::interval(points().flat_map(spread), 0.06);
+        let rows = || self.clouds.iter().flatten();
+        let speeds = axis::interval(points().map(|p| p.v).chain(rows().map(|r| r[0])), 0.03);
+        let torques = points().flat_map(spread).chain(rows().map(|r| r[1]));
+        let torques = axis::interval(torques, 0.06);
         let (Some(speeds), Some(torques)) = (speeds, torques) else {
             Panel::empty(svg, frame, "no friction in either model");
             return;
@@ -80,6 +108,13 @@ impl OverlayPanel {
         for (curve, stroke) in self.curves.iter().zip(STROKES) {
             for run in runs(curve, |point| point.std.is_finite()) {
                 svg.area(&band(&panel, &run), stroke.colour, 0.18);
+            }
+        }
+        for (cloud, stroke) in self.clouds.iter().zip(STROKES) {
+            let every = cloud.len().div_ceil(ROWS).max(1);
+            let shown = cloud.iter().step_by(every);
+            for [v, torque] in shown.filter(|row| row.iter().all(|x| x.is_finite())) {
+                svg.dot([panel.x.px(*v), panel.y.px(*torque)], 1.3, stroke.colour);
             }
         }
         for (curve, stroke) in self.curves.iter().zip(STROKES) {
@@ -116,6 +151,7 @@ mod tests {
                 speed_unit: "m/s".into(),
                 torque_unit: "N".into(),
                 curves,
+                clouds: [Vec::new(), vec![[0.3, 1.5], [0.4, f64::NAN]]],
             }],
         }
     }
@@ -138,7 +174,11 @@ mod tests {
     fn numbers_that_are_not_finite_never_reach_the_picture() {
         let svg = figure([curve(f64::NAN, 0.1), curve(1.0, f64::NAN)]).svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
-        let none = figure([Vec::new(), Vec::new()]).svg();
+        let cloud = figure([Vec::new(), Vec::new()]);
+        assert_eq!(cloud.cells().pictures[0].matches("<circle").count(), 1);
+        let mut none = cloud;
+        none.panels[0].clouds[1].clear();
+        let none = none.svg();
         assert!(none.contains("no friction in either model"));
     }
 }

@@ -110,7 +110,7 @@ impl ResidualFigure {
         let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
             let picture = |panel: &ResidualPanel| {
                 let title = format!("residual of {name} over {}", panel.over.0);
-                cell::cell(&title, &panel.words(name), PLOT, |svg, frame| {
+                cell::nameless(&title, &panel.words(name), PLOT, |svg, frame| {
                     panel.draw(svg, frame)
                 })
             };

@@ -251,7 +251,11 @@ mod tests {
             assert!(picture.contains("that of q3, 12.0 %"), "{picture}");
             assert!(picture.contains(">q1 1.00 %<"), "{picture}");
         }
-        assert!(cells.key.contains("above 8.00 %"), "{}", cells.key);
+        assert!(
+            cells.key.concat().contains("above 8.00 %"),
+            "{:?}",
+            cells.key
+        );
     }
 
     #[test]

@@ -89,7 +89,7 @@ fn shown(part: &Part) -> String {
              <script type=\"application/json\" class=\"traces\">{data}</script></figure>\n",
             inline(still)
         ),
-        Part::Code(text) => format!("<pre>{}</pre>\n", escaped(text)),
+        Part::Code(text) => format!("<pre>{}</pre>\n", whole_words(text)),
         Part::Details { summary, text } => format!(
             "<details><summary>{}</summary><pre>{}</pre></details>\n",
             escaped(summary),
@@ -110,7 +110,11 @@ fn figures(cells: &Cells) -> String {
         escaped(&capital(&cells.title))
     );
     if !cells.key.is_empty() {
-        let _ = write!(out, "<div class=\"legend\">{}</div>", inline(&cells.key));
+        out.push_str("<div class=\"legend\">");
+        for entry in &cells.key {
+            out.push_str(inline(entry));
+        }
+        out.push_str("</div>");
     }
     out.push_str("<div class=\"still cells\">");
     for picture in &cells.pictures {
@@ -137,6 +141,13 @@ fn capital(title: &str) -> String {
     }
 }
 
+/// A command, whose words a line end does not part where a line holds them.
+fn whole_words(text: &str) -> String {
+    let word = |word: &str| format!("<span>{}</span>", escaped(word));
+    let line = |line: &str| line.split(' ').map(word).collect::<Vec<_>>().join(" ");
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
 /// A table; the first column holds names. A column of words is set to the left.
 fn table_of(table: &Table) -> String {
     let (caption, _, rows) = table.parts();
@@ -160,11 +171,13 @@ fn open_table(table: &Table) -> String {
         .map(|c| Column::of(c, rows.iter().filter_map(|row| row.get(c))))
         .collect();
     let class = |c: usize| columns.get(c).map_or("", |column| column.class());
+    let cards = needs(&head, rows) > PHONE;
     let mut out = String::from("<div class=\"wide\" tabindex=\"0\" role=\"region\"");
     let _ = write!(
         out,
-        " aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
-        escaped(caption)
+        " aria-label=\"{0}\"><table{1}><caption>{0}</caption><thead><tr>",
+        escaped(caption),
+        if cards { " class=\"cards\"" } else { "" }
     );
     for (c, name) in head.iter().enumerate() {
         let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(c), escaped(name));
@@ -173,12 +186,31 @@ fn open_table(table: &Table) -> String {
     for row in rows {
         out.push_str("<tr>");
         for (c, cell) in row.iter().enumerate() {
-            let _ = write!(out, "<td{}>{}</td>", class(c), escaped(cell));
+            let name = head.get(c).filter(|_| cards && c > 0);
+            let name = name.map_or(String::new(), |n| format!(" data-of=\"{}\"", escaped(n)));
+            let _ = write!(out, "<td{}{name}>{}</td>", class(c), escaped(cell));
         }
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody></table></div>\n");
     out
+}
+
+/// Characters beside each other that a phone has room for.
+const PHONE: usize = 34;
+
+/// Characters that the rows of a table need beside each other, with a gap of two between columns.
+fn needs(head: &[&str], rows: &[Vec<String>]) -> usize {
+    let width = |text: &str| text.chars().count();
+    let column = |c: usize| {
+        let cells = rows
+            .iter()
+            .filter_map(|row| row.get(c))
+            .map(|cell| width(cell));
+        let name = head[c].split(' ').map(width).max();
+        cells.chain(name).max().unwrap_or(0) + 2
+    };
+    (0..head.len()).map(column).sum()
 }
 
 /// What a column of a table holds.

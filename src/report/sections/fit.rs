@@ -33,7 +33,7 @@ pub fn section(page: &mut Writer, found: &IdentifiedDynamics, model: &ModelFile)
             ],
             vec!["rows per joint".into(), fit.rows.to_string()],
             vec![
-                "independent rows that they are worth".into(),
+                "effective sample size".into(),
                 number::significant(fit.effective_rows, 3),
             ],
         ],
@@ -62,7 +62,7 @@ fn weakest(page: &mut Writer, found: &IdentifiedDynamics) {
     );
 }
 
-/// Parameters of a model whose errors are alike.
+/// Parameters of a model whose estimates are correlated.
 pub fn pairs(page: &mut Writer, model: &ModelFile) {
     let Some(covariance) = &model.covariance else {
         return;
@@ -76,13 +76,13 @@ pub fn pairs(page: &mut Writer, model: &ModelFile) {
         .collect();
     if rows.is_empty() {
         page.paragraph(&format!(
-            "No two parameters have errors that correlate by {ALIKE} or more."
+            "No two estimates are correlated by {ALIKE} or more."
         ));
         return;
     }
     page.rows(
         &format!(
-            "errors most alike, {} of {count} pairs beyond {ALIKE}",
+            "most correlated estimates, {} of {count} pairs beyond {ALIKE}",
             rows.len()
         ),
         &["parameter", "and", "correlation"],

@@ -2,7 +2,7 @@
 
 use super::look::Look;
 use crate::config::ModelFile;
-use crate::effect::AugmentedModel;
+use crate::effect::{Added, AugmentedModel};
 use crate::identify::friction_curve;
 use crate::motion::MotionError;
 use crate::report::Writer;
@@ -28,10 +28,7 @@ pub fn figure(
         .filter_map(|(j, joint)| {
             let law = model.model.friction.get(j)?;
             let [low, high] = look.velocities(j)?;
-            let effects = model.effects.iter();
-            let beyond_curve = effects
-                .clone()
-                .any(|e| is_friction(e) && e.place.touches(j));
+            let beyond_curve = is_beyond_curve(model, j);
             if *law == JointFriction::None && !beyond_curve {
                 return None;
             }
@@ -61,12 +58,18 @@ pub fn figure(
     })
 }
 
-fn is_friction(effect: &crate::effect::Added) -> bool {
+fn is_friction(effect: &Added) -> bool {
     effect.law.entry.friction
 }
 
+/// Whether effects make the friction of a joint differ from its law over velocity.
+pub fn is_beyond_curve(model: &AugmentedModel, joint: usize) -> bool {
+    let mut effects = model.effects.iter();
+    effects.any(|e| is_friction(e) && e.place.touches(joint))
+}
+
 /// Velocity, measured torque less all that is no friction, and friction of the model, row by row of every joint.
-fn clouds(look: &Look, model: &AugmentedModel) -> Result<Vec<Vec<[f64; 3]>>, MotionError> {
+pub fn clouds(look: &Look, model: &AugmentedModel) -> Result<Vec<Vec<[f64; 3]>>, MotionError> {
     let mut bare = model.clone();
     bare.model.friction.fill(JointFriction::None);
     bare.effects.retain(|effect| !is_friction(effect));

@@ -81,7 +81,10 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) 
                     false => number::ABSENT.to_owned(),
                 });
             }
-            let verdict = p.verdict_word().to_owned();
+            let verdict = match p.is_below_zero() && !unknown {
+                true => format!("{}, below zero", p.verdict_word()),
+                false => p.verdict_word().to_owned(),
+            };
             row.extend([p.unit.clone(), verdict, p.meaning.clone()]);
             row
         })
@@ -91,6 +94,19 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) 
         &head,
         rows,
     );
+    let known = |p: &&Parameter| p.verdict != Some(Verdict::NotIdentifiable);
+    if model
+        .parameters
+        .iter()
+        .filter(known)
+        .any(Parameter::is_below_zero)
+    {
+        page.paragraph(
+            "Below zero: friction and inertia are positive in every machine. The cause may be a torque that \
+             the model lacks, or a motion that does not separate these parameters from others; `lsq \
+             --feasible` fits physically consistent links and drives.",
+        );
+    }
     effects(page, model);
 }
 
@@ -114,14 +130,7 @@ fn effects(page: &mut Writer, model: &ModelFile) {
         })
         .collect();
     if !rows.is_empty() {
-        let head = [
-            "effect",
-            "joint",
-            "parameter",
-            "value",
-            "standard deviation",
-            "unit",
-        ];
+        let head = ["effect", "joint", "parameter", "value", "std", "unit"];
         page.rows("effects that were added to the declared model", &head, rows);
     }
 }

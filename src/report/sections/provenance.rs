@@ -50,9 +50,12 @@ pub fn section(
     files(page, "what the model was made from", model_inputs);
     if let Some(s) = summary {
         page.paragraph(&format!(
-            "Parallel filter {} Hz, every {} samples; position filter {}.",
+            "Parallel filter {} Hz, {}; position filter {}.",
             number::significant(s.cutoff_hz, 4),
-            s.decimation,
+            match s.decimation {
+                1 => "every sample".to_owned(),
+                many => format!("one in {many} samples"),
+            },
             s.q_cutoff_hz.map_or("none".to_owned(), |f| format!(
                 "{} Hz",
                 number::significant(f, 4)

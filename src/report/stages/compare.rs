@@ -1,12 +1,12 @@
 //! The report of `compare`.
 
 use crate::compare::{Apart, Difference, ParameterEstimate, ParameterPair, Reason, SideBySide};
-use crate::identify::{Compared, DIFFERENT, Tried};
+use crate::identify::{Compared, Curves, DIFFERENT, Side, Tried};
 use crate::log::{Provenance, escape};
 use crate::motion::MotionError;
 use crate::number;
 use crate::report::figure::{OverlayFigure, OverlayPanel};
-use crate::report::sections::friction::speeds;
+use crate::report::sections::friction::{clouds, is_beyond_curve, speeds};
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::{self, Drawn};
 use crate::report::sections::{Look, provenance};
@@ -63,10 +63,6 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
     for table in parameters.into_iter().chain(apart()) {
         page.table(table);
     }
-    if !of.curves.is_empty() {
-        page.heading("Friction");
-        page.figure(&figure(of).svg());
-    }
     report
 }
 
@@ -83,6 +79,10 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) -> Result<(), MotionError> {
+    if !of.curves.is_empty() {
+        page.heading("Friction");
+        page.figures(&figure(of, look)?.cells());
+    }
     if let Some(look) = look {
         let models = [
             Drawn {
@@ -109,24 +109,56 @@ pub fn pictures(
     Ok(())
 }
 
-/// Friction curves over each other.
-pub fn figure(of: &Compared) -> OverlayFigure {
-    let panels = of.curves.iter().map(|curves| OverlayPanel {
-        joint: curves.joint.clone(),
-        speed_unit: curves.speed_unit.clone(),
-        torque_unit: curves.torque_unit.clone(),
-        curves: of.at(curves, speeds(curves.most).collect::<Vec<_>>().into_iter()),
-    });
+/// Friction of both over each other: a curve over velocity, or along the logs where effects make it depend on
+/// more; of such a model without logs the declared law alone.
+///
+/// # Errors
+/// Stretches that are too short for the filter.
+pub fn figure(of: &Compared, look: Option<&Look>) -> Result<OverlayFigure, MotionError> {
+    let names = of.machine.robot.joint_names();
+    let along = |side: &Side| match look {
+        Some(look) if !side.model.effects.is_empty() => clouds(look, &side.model).map(Some),
+        _ => Ok(None),
+    };
+    let along = [along(&of.sides[0])?, along(&of.sides[1])?];
+    let panel = |shown: &Curves| {
+        let speeds: Vec<f64> = speeds(shown.most).collect();
+        let mut curves = of.at(shown, speeds.into_iter());
+        let joint = names.iter().position(|name| *name == shown.joint);
+        let clouds = [0, 1].map(|k| {
+            let (Some(rows), Some(j)) = (&along[k], joint) else {
+                return Vec::new();
+            };
+            if !is_beyond_curve(&of.sides[k].model, j) {
+                return Vec::new();
+            }
+            curves[k].clear();
+            rows[j].iter().map(|[v, _, model]| [*v, *model]).collect()
+        });
+        OverlayPanel {
+            joint: shown.joint.clone(),
+            speed_unit: shown.speed_unit.clone(),
+            torque_unit: shown.torque_unit.clone(),
+            curves,
+            clouds,
+        }
+    };
     let range = match of.curves.first().map(|c| c.speeds_from) {
         Some("logs") => "up to the fastest of the logs",
         Some("limits") => "up to the speed limit",
         _ => "speeds assumed, no log is given",
     };
-    OverlayFigure {
-        title: format!("Friction of two models, {range}"),
+    let declared = match look {
+        None if of.sides.iter().any(|side| !side.model.effects.is_empty()) => {
+            ", without their effects"
+        }
+        _ => "",
+    };
+    Ok(OverlayFigure {
+        title: format!("Friction of two models{declared}, {range}"),
         names: [0, 1].map(|k| format!("{}: {}", LETTERS[k], of.name(k))),
-        panels: panels.collect(),
-    }
+        panels: of.curves.iter().map(panel).collect(),
+    })
 }
 
 /// The verdict in words.
@@ -229,15 +261,18 @@ fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
         return None;
     }
     let caption = format!("only in {letter}, {name}");
-    let mut table = Table::new(&[
+    let mut columns = vec![
         ("joint", Align::Left),
         ("parameter", Align::Left),
         ("value", Align::Decimal),
         ("std", Align::Decimal),
         ("unit", Align::Left),
-        ("in the other", Align::Left),
-    ])
-    .caption(&caption);
+    ];
+    let reasons = only.iter().any(|p| p.reason != Reason::Absent);
+    if reasons {
+        columns.push(("in the other", Align::Left));
+    }
+    let mut table = Table::new(&columns).caption(&caption);
     for p in only {
         let (value, std) = number::value_and_std(p.value, p.std.unwrap_or(f64::NAN));
         let reason = match p.reason {
@@ -246,6 +281,7 @@ fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
             Reason::OtherMeaning => "of another meaning",
         };
         let joint = p.joint.as_deref().unwrap_or("");
+        // a table takes as many cells as it has columns
         table.row([joint, &p.name, &value, &std, &p.unit, reason]);
     }
     Some(table)

@@ -171,7 +171,7 @@ fn step_told(
     let names = step.alternatives.iter();
     let names: Vec<String> = names.map(|c| c.effect.title(&machine.robot)).collect();
     let told = format!(
-        "these data do not separate it from {}; {} would",
+        "these data do not separate it from {}; to tell them apart, {}",
         names.join(", "),
         effect.law.entry.separate_by
     );

@@ -20,6 +20,8 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
     report.terminal().paragraph(&judged.not_checked);
+    report.brief().verdict(&judged.not_checked, false);
+    report.brief().verdict(&text, good);
     report.page().verdict(&text, good);
     report.page().paragraph(&judged.not_checked);
     report.terminal().table(limits(judged, path));
@@ -202,12 +204,12 @@ fn apart(report: &mut Report, judged: &Judgement) {
         rows,
     );
     if let Some(pair) = &judged.confounded {
-        let told = format!(
-            "most alike: {} and {}, correlation {:.2}",
-            pair.first, pair.second, pair.correlation
-        );
-        report.terminal().line(&format!("errors {told}"));
-        report.page().paragraph(&format!("Errors {told}."));
+        let (first, second) = (&pair.first, &pair.second);
+        let told = format!("{first} and {second}, correlation {:.2}", pair.correlation);
+        report.terminal().line(&format!("most correlated: {told}"));
+        report
+            .page()
+            .paragraph(&format!("Most correlated: {told}."));
     }
 }
 

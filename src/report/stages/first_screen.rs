@@ -42,7 +42,7 @@ pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
     if let Some(step) = open {
         let effect = &d.model.effects[step.effect];
         return format!(
-            "Next: log {}. That separates {} from {}.",
+            "Next: {}. That separates {} from {}.",
             effect.law.entry.separate_by,
             effect.title(&machine.robot),
             step.alternatives[0].effect.title(&machine.robot)

@@ -48,7 +48,7 @@ fn words(machine: &LoggedRobot, found: &Diagnosed, step: &AcceptedEffect) -> Vec
         let names = step.alternatives.iter();
         let names: Vec<String> = names.map(|c| c.effect.title(&machine.robot)).collect();
         words.push(format!(
-            "These data do not separate it from {}. To tell them apart: {}.",
+            "These data do not separate it from {}. To tell them apart, {}.",
             names.join(", "),
             effect.law.entry.separate_by
         ));

@@ -54,9 +54,9 @@ pub fn pictures(
     command: &str,
 ) {
     page.heading("Friction");
-    page.figure(&figure(of.machine, of.found).svg());
+    page.figures(&figure(of.machine, of.found).cells());
     parameters::section(page, of.file, &|_| None);
-    nuisance(page, of.found);
+    nuisance(page, of.machine, of.found);
     page.heading("Correlated parameters");
     fit::pairs(page, of.file);
     quality::section(page, quality, &of.found.warnings);
@@ -161,22 +161,29 @@ fn filter(page: &mut Writer, of: &Friction) {
     );
 }
 
-/// What was estimated along, and is no friction.
-fn nuisance(page: &mut Writer, found: &IdentifiedFriction) {
+/// What was estimated beside the friction.
+fn nuisance(page: &mut Writer, machine: &LoggedRobot, found: &IdentifiedFriction) {
     let of_joint = |found: &FrictionOfJoint| {
         let joint = found.joint.clone();
+        let torque = machine.file.torque_unit(found.index);
+        let position = machine.robot.joint_kind(found.index).position_unit();
         let each = found.estimate.nuisance.iter();
-        let rows = each.map(move |n| {
+        let rows = each.map(|n| {
             let (value, std) = number::value_and_std(n.value, n.std);
-            vec![n.name.clone(), joint.clone(), value, std, n.unit.clone()]
+            let unit = match n.unit.as_str() {
+                "torque" => torque.to_owned(),
+                "torque/acceleration" => format!("{torque} s^2/{position}"),
+                unit => unit.to_owned(),
+            };
+            vec![n.name.clone(), joint.clone(), value, std, unit]
         });
         rows.collect::<Vec<_>>()
     };
     let rows: Vec<Vec<String>> = found.joints.iter().flat_map(of_joint).collect();
     if !rows.is_empty() {
-        page.heading("Estimated along");
+        page.heading("Other quantities estimated");
         page.paragraph(
-            "Inertia, gravity and what the other joints' motion adds; not part of the model.",
+            "Inertia, gravity and the torque from the motion of the other joints; not part of the model.",
         );
         let head = ["quantity", "joint", "value", "std", "unit"];
         page.rows("nuisance quantities", &head, rows);

@@ -11,7 +11,7 @@ pub fn inspect(logs: &[(String, Findings)]) -> Report {
     let mut report = Report::new("Logs");
     for (name, found) in logs {
         let mut out = report.everywhere();
-        out.note("", &head(name, found), 2);
+        out.verdict(&head(name, found), found.faults.is_empty());
         out.line("");
         out.table(channels(found));
         if !found.joints.is_empty() {
@@ -19,25 +19,45 @@ pub fn inspect(logs: &[(String, Findings)]) -> Report {
             out.table(joints(found));
         }
         out.line("");
-        faults(&mut out, found);
-        out.line("");
+        if !found.faults.is_empty() {
+            faults(&mut out, found);
+            out.line("");
+        }
     }
     report
 }
 
 fn head(name: &str, found: &Findings) -> String {
+    let count = |severity, one: &str| match found.of(severity).count() {
+        0 => format!("no {one}s"),
+        1 => format!("1 {one}"),
+        many => format!("{many} {one}s"),
+    };
+    let faults = [
+        count(Severity::Error, "error"),
+        count(Severity::Warning, "warning"),
+        count(Severity::Info, "note"),
+    ];
     let mut head = format!(
-        "{}: {} rows in {} s",
+        "{}: {}. {} rows in {} s",
         escape(name),
+        match found.faults.is_empty() {
+            true => "no faults found".to_owned(),
+            false => faults.join(", "),
+        },
         found.rows,
         number::significant(found.duration_s, 5)
     );
     if let (Some(rate), Some(jitter)) = (found.rate_hz, found.jitter) {
         head += &format!(
-            ", {} Hz, jitter {}, {} gap(s)",
+            ", {} Hz, jitter {}, {}",
             number::significant(rate, 5),
             number::percent(jitter),
-            found.gaps.len()
+            match found.gaps.len() {
+                0 => "no gaps".to_owned(),
+                1 => "1 gap".to_owned(),
+                many => format!("{many} gaps"),
+            }
         );
     }
     head
@@ -119,16 +139,6 @@ fn joints(found: &Findings) -> Table {
 }
 
 fn faults(out: &mut Writer, found: &Findings) {
-    if found.faults.is_empty() {
-        return out.line("no faults found");
-    }
-    let count = |severity| found.of(severity).count();
-    out.line(&format!(
-        "{} error(s), {} warning(s), {} note(s)",
-        count(Severity::Error),
-        count(Severity::Warning),
-        count(Severity::Info)
-    ));
     if !found.costs.is_empty() {
         let causes: Vec<String> = found.costs.iter().map(RowCost::text).collect();
         out.note(
@@ -168,7 +178,9 @@ fn faults(out: &mut Writer, found: &Findings) {
         let channels = distinct(channels.map(escape).collect());
         let spans = distinct(all.iter().map(|fault| fault.span()).collect());
         let head = [fault.severity.word(), fault.kind.word(), &channels].join(" ");
-        out.line("");
+        if told.len() > 1 || !found.costs.is_empty() {
+            out.line("");
+        }
         out.note("", &format!("{}: {spans} s", head.trim_end()), 0);
         out.note("    ", &fault.effect, 4);
         out.note("    ", &format!("-> {}", fault.remedy), 4);

@@ -226,5 +226,5 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
         time_unit: unit.to_owned(),
         panels: ordered.take(DRAWN).map(panel).collect(),
     };
-    page.figure(&figure.svg());
+    page.figures(&figure.cells());
 }
