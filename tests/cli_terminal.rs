@@ -145,7 +145,7 @@ fn verdicts_have_colour_where_it_is_taken_and_the_words_are_the_same_without() {
     let piped = said(&[]);
     assert!(!piped.contains('\u{1b}'), "{piped:?}");
     let forced = said(&[("CLICOLOR_FORCE", "1")]);
-    assert!(forced.starts_with("\u{1b}[1m"), "{forced:?}");
+    assert!(forced.starts_with("\u{1b}[1;31m"), "{forced:?}");
     assert_eq!(plain(&forced), piped);
     assert_eq!(said(&[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]), piped);
 }
@@ -176,6 +176,32 @@ fn the_verdict_comes_first_quiet_says_it_alone_and_verbose_says_more() {
         // the line that says there is more is not in it
         let left = usual.replace("--verbose shows more\n", "");
         assert!(verbose.lines().count() >= left.lines().count(), "{line}");
+    }
+}
+
+#[test]
+fn quiet_prints_a_line_or_two_of_every_result() {
+    let folder = copy();
+    let lines = [
+        "inspect unseen.csv",
+        "convert unseen.csv other.csv",
+        "torque unseen.csv -m model.toml -o torque.csv",
+        "reduce identification.csv -r configs/cft.toml -m friction.toml -o part.cfi",
+        "excite --check configs/table3.toml",
+        "export -m model.toml --c tau.h",
+        "simulate -r configs/cft.toml --move q4 --seconds 2 -o moved.csv",
+    ];
+    for line in lines {
+        let said = |detail: &str| {
+            let run = tool(folder.path(), &format!("{line} {detail}"))
+                .assert()
+                .code(0);
+            String::from_utf8(run.get_output().stdout.clone()).unwrap()
+        };
+        let (quiet, usual) = (said("-q"), said(""));
+        let lines = |text: &str| text.lines().count();
+        assert!((1..=4).contains(&lines(&quiet)), "{line}:\n{quiet}");
+        assert!(lines(&quiet) < lines(&usual), "{line}:\n{usual}");
     }
 }
 

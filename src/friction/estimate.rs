@@ -14,7 +14,6 @@ use super::problem::{FRICTION, FrictionProblem};
 use super::slope::{open_above, profile_slope};
 use super::start::{FilterStart, constant_inertia, from_log};
 use super::thinned::thinned;
-use crate::number;
 use crate::robot::friction::DoubleTanh;
 use crate::verdict::{Verdict, verdict_of};
 
@@ -342,8 +341,7 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
             .filter(|i| column[**i] != 0.0)
             .map(|i| {
                 let name = names.get(*i).map_or("offset", String::as_str);
-                let sign = if column[*i] < 0.0 { '-' } else { '+' };
-                format!("{sign}{} {name}", number::significant(column[*i].abs(), 3))
+                format!("{:+.2} {name}", column[*i])
             })
             .collect();
         out.push(Nuisance {

@@ -21,6 +21,8 @@ pub struct Cells {
     pub key: Vec<String>,
     /// SVG documents.
     pub pictures: Vec<String>,
+    /// Whether each picture is of something of its own, so that paper may have them on several sheets.
+    pub apart: bool,
     /// Sentences below.
     pub words: Vec<String>,
 }

@@ -59,6 +59,7 @@ impl CourseFigure {
             title: self.title.clone(),
             key: cell::key(&key),
             pictures: self.panels.iter().map(picture).collect(),
+            apart: true,
             words: Vec::new(),
         }
     }

@@ -81,6 +81,7 @@ impl EffectFigure {
         Cells {
             title: self.title.clone(),
             key: cell::key(&key),
+            apart: false,
             pictures: pictures.map(picture).collect(),
             words,
         }

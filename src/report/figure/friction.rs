@@ -91,6 +91,7 @@ impl FrictionFigure {
             title: self.title.clone(),
             key: cell::key(&self.entries()),
             pictures: self.panels.iter().map(cell).collect(),
+            apart: true,
             words: Vec::new(),
         }
     }

@@ -65,6 +65,7 @@ impl MapFigure {
                 (Key::Band(CURVE), "mean, 95 %"),
             ]),
             pictures: vec![map, curve],
+            apart: false,
             words,
         }
     }

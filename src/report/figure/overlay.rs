@@ -66,6 +66,7 @@ impl OverlayFigure {
             title: self.title.clone(),
             key: cell::key(&keys),
             pictures: self.panels.iter().map(picture).collect(),
+            apart: true,
             words: Vec::new(),
         }
     }

@@ -118,6 +118,7 @@ impl ResidualFigure {
                 title: format!("{}, {name}", self.title),
                 key: cell::key(&entries),
                 pictures: panels.iter().map(picture).collect(),
+                apart: false,
                 words: Vec::new(),
             }
         };

@@ -67,6 +67,7 @@ impl Sketch {
         Cells {
             title: self.title.clone(),
             key: cell::key(&key),
+            apart: false,
             pictures: views.into_iter().map(picture).collect(),
             words: Vec::new(),
         }

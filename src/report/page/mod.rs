@@ -102,10 +102,10 @@ fn shown(part: &Part) -> String {
 fn figures(cells: &Cells) -> String {
     let mut out = format!(
         "<figure class=\"{}\"><figcaption>{}</figcaption>",
-        if cells.pictures.len() > 2 {
-            "card many"
-        } else {
-            "card"
+        match (cells.apart, cells.pictures.len() > 2) {
+            (true, _) => "card apart",
+            (false, true) => "card many",
+            (false, false) => "card",
         },
         escaped(&capital(&cells.title))
     );

@@ -13,16 +13,16 @@ pub fn inspect(logs: &[(String, Findings)]) -> Report {
         let mut out = report.everywhere();
         out.verdict(&head(name, found), found.faults.is_empty());
         out.line("");
+        if !found.faults.is_empty() {
+            faults(&mut out, found);
+            out.line("");
+        }
         out.table(channels(found));
         if !found.joints.is_empty() {
             out.line("");
             out.table(joints(found));
         }
         out.line("");
-        if !found.faults.is_empty() {
-            faults(&mut out, found);
-            out.line("");
-        }
     }
     report
 }
