@@ -9,7 +9,7 @@ use super::robot_file::RobotFile;
 use super::text_file::text_of;
 use super::trajectory::Trajectory;
 use super::{ConfigError, check, serial_chain, urdf};
-use crate::log::{did_you_mean, list, named_beside, remedy, shown};
+use crate::log::{did_you_mean, list, named_beside_of, remedy, shown};
 
 /// The files that come with the tool, by the path under which they are asked for.
 pub const EMBEDDED: [(&str, &str); 13] = [
@@ -71,6 +71,17 @@ pub enum Wanted {
 }
 
 impl Wanted {
+    /// Whether a file of the user's may be one: a robot file is no model, and neither is a trajectory.
+    fn may_be(self, path: &Path) -> bool {
+        let Ok(text) = text_of(path) else {
+            return false;
+        };
+        match self {
+            Wanted::Robot | Wanted::Trajectory => self.is(&text) && !text.contains("[contents]"),
+            Wanted::Own | Wanted::Any => true,
+        }
+    }
+
     /// Whether a file that comes with the tool is one.
     fn is(self, text: &str) -> bool {
         match self {
@@ -114,7 +125,11 @@ pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> 
         };
         return Err(ConfigError::Read {
             file: shown(path),
-            remedy: format!("{}{}{more}", remedy(&error), named_beside(path, &["toml"])),
+            remedy: format!(
+                "{}{}{more}",
+                remedy(&error),
+                named_beside_of(path, &["toml"], &|beside| wanted.may_be(beside))
+            ),
             source: error,
         });
     }
@@ -236,5 +251,18 @@ mod tests {
         assert!(motion.contains("configs/cft-excitation.toml"), "{motion}");
         assert!(!motion.contains("configs/ur10.toml"), "{motion}");
         assert!(!said(Wanted::Own).contains("come with the tool"));
+
+        let folder = tempfile::tempdir().unwrap();
+        let write =
+            |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("arm_model.toml", "[contents]\n[robot]\n");
+        write("arm_robot.toml", "[robot]\n");
+        let missing = folder.path().join("arm_mobel.toml");
+        let said = text_of_kind(&missing, Wanted::Robot).unwrap_err();
+        let said = said.to_string();
+        assert!(
+            said.contains("arm_robot.toml") && !said.contains("arm_model.toml"),
+            "{said}"
+        );
     }
 }

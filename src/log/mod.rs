@@ -55,4 +55,4 @@ pub(crate) use columns::unit_of;
 pub(crate) use content::unpacked;
 pub(crate) use layout::channel;
 pub(crate) use names::{did_you_mean, is_hidden, list};
-pub(crate) use source::{bytes, named_beside, remedy, sha256_of_bytes, shown};
+pub(crate) use source::{bytes, named_beside, named_beside_of, remedy, sha256_of_bytes, shown};

@@ -144,6 +144,15 @@ pub(super) fn open(path: &Path) -> Result<File, LogError> {
 /// "; the nearest is `x`", or "; there are x, y" of the files of these kinds in the folder of one that is
 /// not there; empty where there are none.
 pub(crate) fn named_beside(path: &Path, ends: &[&str]) -> String {
+    named_beside_of(path, ends, &|_| true)
+}
+
+/// The same of those files of which `wanted` holds.
+pub(crate) fn named_beside_of(
+    path: &Path,
+    ends: &[&str],
+    wanted: &dyn Fn(&Path) -> bool,
+) -> String {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -154,6 +163,7 @@ pub(crate) fn named_beside(path: &Path, ends: &[&str]) -> String {
     let is = |name: &String| ends.iter().any(|end| name.ends_with(&format!(".{end}")));
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     let mut names: Vec<String> = names.filter(is).collect();
+    names.retain(|name| wanted(&folder.join(name)));
     names.sort();
     let known = || names.iter().map(String::as_str);
     match nearest(&file_name(path), known()) {
