@@ -109,11 +109,15 @@ impl ErrorFigure {
                     }
                     end = end.max(x(high));
                 }
-                svg.text(
-                    [end + 6.0, y + 10.0],
-                    &told(bar),
-                    Type::new(10.5, Anchor::Start),
-                );
+                let (mut at, words) = (end + 6.0, told(bar));
+                // no number stands on the line of the limit
+                let limit = self.limit.map(x);
+                if let Some(line) =
+                    limit.filter(|x| (at - 4.0..at + width_of(&words, 10.5)).contains(x))
+                {
+                    at = line + 6.0;
+                }
+                svg.text([at, y + 10.0], &words, Type::new(10.5, Anchor::Start));
             }
         }
         if let Some(limit) = self.limit {
