@@ -189,7 +189,7 @@ fn quiet_prints_a_line_or_two_of_every_result() {
         "reduce identification.csv -r configs/cft.toml -m friction.toml -o part.cfi",
         "excite --check configs/table3.toml",
         "export -m model.toml --c tau.h",
-        "simulate -r configs/cft.toml --move q4 --seconds 2 -o moved.csv",
+        "simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv",
     ];
     for line in lines {
         let said = |detail: &str| {
