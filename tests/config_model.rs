@@ -104,6 +104,7 @@ fn model(values: &[f64]) -> ModelFile {
             clusters: 12,
             scale: 0.0625,
             shape: -0.125,
+            largest: vec![1.7, 1.3],
         }),
         effects: vec![Effect {
             name: "ripple".to_owned(),

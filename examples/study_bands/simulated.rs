@@ -1,4 +1,4 @@
-//! The simulated CFT robot: a model of ten minutes, and minutes that it did not see.
+//! The simulated CFT robot: a model of half an hour, and minutes that it did not see.
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq};
@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use super::machines::{Scored, list};
 use super::study::{along, block, noisy, series};
 
-/// Minutes that the model is fitted to.
-const FITTED: u64 = 10;
+/// Minutes that the model is fitted to: by how many alarms a rate is learnt, by so many it is known.
+const FITTED: u64 = 30;
 
 pub struct Campaign {
     machine: LoggedRobot,

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use crate::config::ModelFile;
 use crate::config::held_out::HeldOut;
 use crate::robot::Robot;
-use crate::robot::model::Model;
+use crate::robot::model::{JointFriction, Model};
 
 /// Directions that are kept at most ..
 const MOST: usize = 8;
@@ -18,21 +18,27 @@ const ENOUGH: f64 = 0.98;
 /// States within reach.
 const STATES: usize = 256;
 
-/// One deviation of the parameters of links, drives and offsets.
+/// One deviation of a model's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
     /// Inertial parameters, in the robot's order.
     pub theta: Vec<f64>,
+    /// Those of every joint's friction, one joint after the other, in the order of its law.
+    pub friction: Vec<f64>,
     /// Offset of each joint [N or Nm].
     pub offset: Vec<f64>,
 }
 
 impl Direction {
     /// Nothing of each.
-    pub fn none(robot: &Robot) -> Self {
+    /// Of all of them, in the order of [`ModelFile::model_covariance`].
+    pub fn of(model: &Model, all: &[f64]) -> Self {
+        let (theta, rest) = all.split_at(model.theta.len());
+        let (friction, offset) = rest.split_at(rest.len() - model.offset.len());
         Self {
-            theta: vec![0.0; robot.parameters().len()],
-            offset: vec![0.0; robot.joints()],
+            theta: theta.to_vec(),
+            friction: friction.to_vec(),
+            offset: offset.to_vec(),
         }
     }
 }
@@ -41,6 +47,7 @@ impl Direction {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Directions {
     robot: Robot,
+    friction: Vec<JointFriction>,
     each: Vec<Direction>,
     tau: Vec<f64>,
 }
@@ -48,15 +55,18 @@ pub struct Directions {
 impl Directions {
     /// Those of a model within the positions and speeds that were seen; none where the file has no covariance.
     pub fn of(file: &ModelFile, model: &Model, seen: &[HeldOut]) -> Self {
-        let robot = model.robot.clone();
-        let each = match seen.len() == robot.joints() {
-            true => least_told(&robot, &covariance(file, model), seen),
+        let u = model.parameters();
+        let covariance = DMatrix::from_row_slice(u, u, &file.model_covariance(model));
+        let n = model.robot.joints();
+        let each = match seen.len() == n {
+            true => least_told(model, &covariance, seen),
             false => Vec::new(),
         };
         Self {
-            tau: vec![0.0; robot.joints()],
-            robot,
+            robot: model.robot.clone(),
+            friction: model.friction.clone(),
             each,
+            tau: vec![0.0; n],
         }
     }
 
@@ -74,30 +84,27 @@ impl Directions {
         out.fill(0.0);
         for direction in &self.each {
             self.robot.torque(&direction.theta, q, v, a, &mut self.tau);
-            let deviations = self.tau.iter().zip(&direction.offset);
-            for (out, (tau, offset)) in out.iter_mut().zip(deviations) {
-                *out += (tau + offset).powi(2);
+            let mut own = direction.friction.as_slice();
+            for (j, law) in self.friction.iter().enumerate() {
+                let mut slopes = [0.0; 5];
+                law.gradient(v[j], &mut slopes);
+                let (of, rest) = own.split_at(law.parameters());
+                own = rest;
+                let friction: f64 = of.iter().zip(&slopes).map(|(x, slope)| x * slope).sum();
+                out[j] += (self.tau[j] + friction + direction.offset[j]).powi(2);
             }
         }
     }
 }
 
-/// Covariance of the inertial parameters and the offsets.
-fn covariance(file: &ModelFile, model: &Model) -> DMatrix<f64> {
-    let (u, p, n) = (model.parameters(), model.theta.len(), model.robot.joints());
-    let all = file.model_covariance(model);
-    let place = |i: usize| if i < p { i } else { u - n + (i - p) };
-    DMatrix::from_fn(p + n, p + n, |i, k| all[place(i) * u + place(k)])
-}
-
-/// Means over states within reach of what a parameter, or two together, do to the torques: a matrix for each joint,
-/// offsets last.
-fn within_reach(robot: &Robot, seen: &[HeldOut]) -> Vec<DMatrix<f64>> {
-    let (n, p) = (robot.joints(), robot.parameters().len());
-    let mut sums = vec![DMatrix::zeros(p + n, p + n); n];
+/// Means over states within reach of what a parameter, or two together, do to the torques: a matrix for each joint.
+fn within_reach(model: &Model, seen: &[HeldOut]) -> Vec<DMatrix<f64>> {
+    let robot = &model.robot;
+    let (n, p, u) = (robot.joints(), model.theta.len(), model.parameters());
+    let mut sums = vec![DMatrix::zeros(u, u); n];
     let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let mut y = vec![0.0; n * p];
-    let mut row = DVector::zeros(p + n);
+    let mut row = DVector::zeros(u);
     for state in 0..STATES {
         for (j, seen) in seen.iter().enumerate() {
             let [low, high] = seen.positions_seen;
@@ -114,10 +121,14 @@ fn within_reach(robot: &Robot, seen: &[HeldOut]) -> Vec<DMatrix<f64>> {
             a[j] = most * (2.0 * draw(2) - 1.0);
         }
         robot.regressor(&q, &v, &a, &mut y);
+        let mut first = p;
         for (j, sum) in sums.iter_mut().enumerate() {
+            let law = &model.friction[j];
             row.fill(0.0);
             row.rows_mut(0, p).copy_from_slice(&y[j * p..(j + 1) * p]);
-            row[p + j] = 1.0;
+            law.gradient(v[j], &mut row.as_mut_slice()[first..]);
+            first += law.parameters();
+            row[u - n + j] = 1.0;
             sum.ger(1.0 / STATES as f64, &row, &row, 1.0);
         }
     }
@@ -125,11 +136,10 @@ fn within_reach(robot: &Robot, seen: &[HeldOut]) -> Vec<DMatrix<f64>> {
 }
 
 /// Directions by the share of the torques' variance within reach that they make, each joint's by its own.
-fn least_told(robot: &Robot, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec<Direction> {
-    let p = robot.parameters().len();
-    let u = covariance.nrows();
+fn least_told(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec<Direction> {
+    let u = model.parameters();
     let mut reach = DMatrix::zeros(u, u);
-    for of in within_reach(robot, seen) {
+    for of in within_reach(model, seen) {
         let variance = covariance.component_mul(&of).sum();
         if variance > 0.0 && variance.is_finite() {
             reach += of / variance;
@@ -160,10 +170,7 @@ fn least_told(robot: &Robot, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec
         }
         held += shares.eigenvalues[k];
         let direction = (&root * shares.eigenvectors.column(k)).component_mul(&scale);
-        out.push(Direction {
-            theta: direction.rows(0, p).iter().copied().collect(),
-            offset: direction.rows(p, u - p).iter().copied().collect(),
-        });
+        out.push(Direction::of(model, direction.as_slice()));
     }
     out
 }
@@ -172,10 +179,11 @@ fn least_told(robot: &Robot, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec
 mod tests {
     use super::*;
     use crate::robot::JointKind;
+    use crate::robot::friction::ViscousCoulomb;
     use crate::robot::tree::{Coordinate, Link, Tree, space};
 
     /// Two links in a vertical plane, 0.4 m between the axes.
-    fn double_pendulum() -> Robot {
+    fn double_pendulum() -> Model {
         let link = |name: &str, parent, origin, joint| Link {
             name: name.to_owned(),
             parent,
@@ -190,7 +198,20 @@ mod tests {
             link("lower", Some(0), [0.4, 0.0, 0.0], 1),
         ];
         let tree = Tree::new(links, 2, [0.0, -9.81, 0.0]).unwrap();
-        Robot::of_tree(tree, vec!["q1".into(), "q2".into()], true, Vec::new())
+        let robot = Robot::of_tree(tree, vec!["q1".into(), "q2".into()], true, Vec::new());
+        let viscous_coulomb = ViscousCoulomb {
+            viscous: 1.0,
+            coulomb: 2.0,
+        };
+        Model {
+            theta: vec![1.0; robot.parameters().len()],
+            friction: vec![
+                JointFriction::None,
+                JointFriction::ViscousCoulomb(viscous_coulomb),
+            ],
+            offset: vec![0.0; 2],
+            robot,
+        }
     }
 
     fn seen() -> Vec<HeldOut> {
@@ -204,20 +225,20 @@ mod tests {
 
     #[test]
     fn few_directions_give_the_deviation_of_a_torque_that_all_parameters_give() {
-        let robot = double_pendulum();
-        let (n, p) = (2, robot.parameters().len());
-        let u = p + n;
+        let model = double_pendulum();
+        let (n, p, u) = (2, model.theta.len(), model.parameters());
         // two combinations that hardly anything is known of, beside what is known well
         let vector = |k: usize| DVector::from_fn(u, |i, _| ((3 * i + 7 * k + 1) as f64).sin());
         let covariance = vector(1) * vector(1).transpose() * 4.0
             + vector(2) * vector(2).transpose() * 9.0
             + DMatrix::identity(u, u) * 1e-4;
-        let each = least_told(&robot, &covariance, &seen());
+        let each = least_told(&model, &covariance, &seen());
         assert!((2..=MOST).contains(&each.len()), "{}", each.len());
         let mut few = Directions {
-            tau: vec![0.0; n],
-            robot,
+            robot: model.robot,
+            friction: model.friction,
             each,
+            tau: vec![0.0; n],
         };
         let mut y = vec![0.0; n * p];
         let mut found = [0.0; 2];
@@ -231,9 +252,11 @@ mod tests {
             few.variances([&q, &v, &a], &mut found);
             few.robot.regressor(&q, &v, &a, &mut y);
             for j in 0..n {
+                let friction = [v[1], v[1].signum()];
                 let g = DVector::from_fn(u, |i, _| match i {
                     i if i < p => y[j * p + i],
-                    i => f64::from(u8::from(i - p == j)),
+                    i if i < p + 2 => friction[i - p] * f64::from(u8::from(j == 1)),
+                    i => f64::from(u8::from(i - p - 2 == j)),
                 });
                 let whole = g.dot(&(&covariance * &g));
                 assert!(found[j] <= whole * (1.0 + 1e-9), "{} {whole}", found[j]);
@@ -244,8 +267,8 @@ mod tests {
 
     #[test]
     fn parameters_without_a_covariance_have_no_directions() {
-        let robot = double_pendulum();
-        let u = robot.parameters().len() + 2;
-        assert!(least_told(&robot, &DMatrix::zeros(u, u), &seen()).is_empty());
+        let model = double_pendulum();
+        let u = model.parameters();
+        assert!(least_told(&model, &DMatrix::zeros(u, u), &seen()).is_empty());
     }
 }

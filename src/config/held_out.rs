@@ -105,7 +105,14 @@ pub struct Excesses {
     pub clusters: u64,
     pub scale: f64,
     pub shape: f64,
+    /// The largest of the clusters, from the largest on: what crosses a threshold now and then is counted, and the law
+    /// stands for what is rarer. A motion that comes again errs at the same places each time, which no smooth law has.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub largest: Vec<f64>,
 }
+
+/// Clusters from which on a threshold is one of them.
+const COUNTED: f64 = 5.0;
 
 impl Excesses {
     /// The threshold that is crossed so often an hour.
@@ -114,7 +121,26 @@ impl Excesses {
         if self.clusters == 0 || rate <= per_hour {
             return self.level;
         }
-        let more = rate / per_hour;
+        let expected = per_hour * self.observed_s / 3600.0;
+        if let Some(counted) = self.counted(expected.max(COUNTED)) {
+            return match expected >= COUNTED {
+                true => counted,
+                false => counted.max(self.by_law(rate / per_hour)),
+            };
+        }
+        self.by_law(rate / per_hour)
+    }
+
+    /// What so many clusters of those observed go beyond; none where fewer are kept.
+    fn counted(&self, clusters: f64) -> Option<f64> {
+        let (whole, part) = (clusters as usize, clusters.fract());
+        let above = self.largest.get(whole.checked_sub(1)?)?;
+        let below = self.largest.get(whole)?;
+        Some(above + part * (below - above))
+    }
+
+    /// The threshold that the law crosses `more` times as rarely as the level.
+    fn by_law(&self, more: f64) -> f64 {
         let excess = match self.shape.abs() < 1e-6 {
             true => more.ln(),
             false => (more.powf(self.shape) - 1.0) / self.shape,
@@ -129,6 +155,8 @@ impl Excesses {
             && above(self.position_cutoff_hz)
             && above(self.level)
             && above(self.scale)
+            && self.largest.iter().all(|x| above(*x))
+            && self.largest.is_sorted_by(|a, b| a >= b)
             && (-1.0..1.0).contains(&self.shape)
     }
 }
@@ -146,6 +174,7 @@ mod tests {
             clusters: 100,
             scale: 0.1,
             shape: 0.0,
+            largest: Vec::new(),
         };
         // 200 an hour beyond the level
         assert_eq!(law.threshold(300.0), 0.9);
@@ -155,6 +184,11 @@ mod tests {
         let bounded = law.threshold(60.0);
         assert!(bounded < wanted && bounded > 0.9);
         assert!(law.threshold(1.0) > bounded && law.threshold(1e-9) < 0.9 + 0.1 / 0.2 + 1e-9);
+        // 30 of half an hour are 60 an hour, and the law never brings a rarer one below five of half an hour
+        law.largest = (0..100).map(|k| 2.0 - 0.01 * f64::from(k)).collect();
+        assert!((law.threshold(60.0) - 1.71).abs() < 1e-12);
+        assert!((law.threshold(61.0) - 1.705).abs() < 1e-12);
+        assert!(law.threshold(1.0) >= law.threshold(10.0) && law.threshold(10.0) == 1.96);
     }
 
     #[test]

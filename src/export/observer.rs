@@ -3,8 +3,9 @@
 use super::Program;
 use super::code::{C, Language, RUST, fall, train};
 use super::recipe::{Late, Recipe};
-use crate::effect::law_text::exact;
+use crate::effect::law_text::{exact, slopes};
 use crate::number;
+use crate::robot::model::JointFriction;
 use crate::robot::standard::STANDARD;
 
 const IN_C: &str = include_str!("observer.h.in");
@@ -105,7 +106,7 @@ impl Recipe {
         template
             .replace("@TABLES@\n", &self.tables(language, edges))
             .replace("@UNCERTAIN@\n", &self.of_parameters(language, program))
-            .replace("@TRAINS@\n", &self.trains(language, program))
+            .replace("@BESIDE@\n", &self.beside_links(language, program))
             .replace("@U@", &self.uncertain.len().to_string())
             .replace("@RESIDUAL@", residual)
             .replace("@LATE_FIELDS@\n", of_late[0])
@@ -140,6 +141,11 @@ impl Recipe {
         out += &language.numbers("UNCERTAIN_DRIVE", &[u, n], drives);
         let offsets = each().flat_map(|of| of.offset.iter().copied());
         out += &language.numbers("UNCERTAIN_OFFSET", &[u, n], offsets);
+        let friction = each().flat_map(|of| of.friction.iter().copied());
+        let count = program.friction.iter().map(JointFriction::parameters).sum();
+        if count > 0 {
+            out += &language.numbers("UNCERTAIN_FRICTION", &[u, count], friction);
+        }
         if trains > 0 {
             let numbers = each().flat_map(|of| of.couplings.iter().flatten().copied());
             out += &language.numbers("UNCERTAIN_TRAIN", &[u, trains, 3], numbers);
@@ -147,17 +153,23 @@ impl Recipe {
         out
     }
 
-    /// Statements for what coupled gear trains add to a deviation.
-    fn trains(&self, language: &Language, program: &Program) -> String {
-        let trains = program.couplings.iter().enumerate();
-        let lines = trains.flat_map(|(k, (coupling, _))| {
-            train(
-                k,
-                coupling,
-                [0, 1, 2].map(|i| format!("UNCERTAIN_TRAIN[k][{k}][{i}]")),
-            )
-        });
-        let text = language.statements(&lines.collect::<Vec<_>>());
+    /// Statements for what friction and coupled gear trains add to a deviation.
+    fn beside_links(&self, language: &Language, program: &Program) -> String {
+        let mut lines = Vec::new();
+        for (k, (coupling, _)) in program.couplings.iter().enumerate() {
+            let numbers = [0, 1, 2].map(|i| format!("UNCERTAIN_TRAIN[k][{k}][{i}]"));
+            lines.extend(train(k, coupling, numbers));
+        }
+        let mut at = 0;
+        for (j, law) in program.friction.iter().enumerate() {
+            for slope in slopes(law, &format!("v[{j}]")) {
+                lines.push(format!(
+                    "tau[{j}] += UNCERTAIN_FRICTION[k][{at}] * ({slope});"
+                ));
+                at += 1;
+            }
+        }
+        let text = language.statements(&lines);
         if text.is_empty() { text } else { text + "\n" }
     }
 

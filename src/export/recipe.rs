@@ -46,6 +46,8 @@ pub struct Uncertain {
     pub drives: Vec<f64>,
     /// Inertia, viscous and Coulomb part of each coupled gear train.
     pub couplings: Vec<[f64; 3]>,
+    /// Parameters of every joint's friction, one joint after the other.
+    pub friction: Vec<f64>,
     /// Constant torque of each joint [N or Nm].
     pub offset: Vec<f64>,
 }

@@ -65,7 +65,8 @@ impl Pieces {
     }
 }
 
-/// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs.
+/// Sets blocks of the logs that a model was fitted to aside, one after the other. `inputs` are those logs, and `machine`
+/// has the position cut-offs of the fit: the model without a block is then fitted as the model was.
 ///
 /// # Errors
 /// Logs that are too short for it, and interruption.
@@ -75,8 +76,6 @@ pub(super) fn hold_out(
     (logs, inputs): (&[Log], &[Provenance]),
     control: &Control,
 ) -> Result<Held, IdentifyError> {
-    // by what these logs call for together: a validation goes through others by the same
-    let machine = &machine.with_position_cutoffs(logs, &known(&model.model), control)?;
     Trial::new(machine, (file, model), (logs, inputs), control).run(FOLDS)
 }
 
@@ -269,15 +268,22 @@ impl<'a> Trial<'a> {
         held: &mut [HeldOut],
     ) -> Result<Option<Excesses>, IdentifyError> {
         let cutoff = self.settings.cutoff_hz;
+        // what knows the past alone gains nothing by a wide filter, and accelerations take its noise
+        let plain = self.settings.plain_q_cutoff_hz(f64::INFINITY);
+        let each = self.settings.joint_q_cutoffs_hz.iter();
+        let position = each.copied().fold(plain, f64::min);
+        let settings = FilterSettings {
+            q_cutoff_hz: Some(position),
+            joint_q_cutoffs_hz: Vec::new(),
+            ..self.settings.clone()
+        };
         let uncertain = Directions::of(self.file, &self.model.model, held);
         let mut quiet: Option<Quiet> = None;
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = self.machine.open(log, self.control)?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
-                .map(|(fold, model)| {
-                    Watched::new((index, fold), (model, &uncertain), &self.settings)
-                })
+                .map(|(fold, model)| Watched::new((index, fold), (model, &uncertain), &settings))
                 .collect::<Result<_, _>>()
                 .map_err(failed)?;
             let (mut block, mut first, mut more) = (Block::default(), None, true);
@@ -297,9 +303,6 @@ impl<'a> Trial<'a> {
                 }
             }
         }
-        let each = self.settings.joint_q_cutoffs_hz.iter();
-        let lowest = each.copied().reduce(f64::min);
-        let position = lowest.unwrap_or_else(|| self.settings.plain_q_cutoff_hz(f64::INFINITY));
         let learnt = quiet.and_then(|quiet| quiet.learn(held, cutoff, position));
         if learnt.is_none() {
             // torques of too few samples: those of the band stand for them

@@ -283,8 +283,9 @@ pub fn lsq(
     // what is set aside is looked at row by row
     if reduced.is_empty() {
         let file = found.model(machine, friction.map(|(_, file)| file));
+        let smoothed = machine.smoothed_as(&found.position_cutoffs);
         let tried = refined(&file, &machine.name)
-            .and_then(|model| hold_out(machine, (&file, &model), (logs, &found.inputs), control));
+            .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));
         found.held = or_warning(tried, &mut found.warnings)?;
     }
     Ok(found)

@@ -240,6 +240,21 @@ impl LoggedRobot {
         machine
     }
 
+    /// The same robot with the position cut-offs that a fit took, where it found them.
+    pub(super) fn smoothed_as(&self, fit: &[PositionCutoff]) -> LoggedRobot {
+        let mut machine = self.clone();
+        if self.finds_cutoffs() {
+            let plain = self.settings().plain_q_cutoff_hz(f64::INFINITY);
+            let of = |joint: &String| {
+                let own = fit.iter().find(|of| of.joint == *joint);
+                own.map_or(plain, |of| of.cutoff_hz)
+            };
+            machine.position_cutoffs_hz =
+                Arc::new(self.robot.joint_names().iter().map(of).collect());
+        }
+        machine
+    }
+
     /// The same robot with the position cut-offs by which a model's band was found: through others comes another noise
     /// than the band holds. None where they are its own.
     pub(super) fn as_held(&self, held: &[HeldOut]) -> Option<LoggedRobot> {

@@ -11,6 +11,8 @@ const SHAPED: usize = 50;
 const ENOUGH: usize = 40;
 /// Levels to try: shares of the samples below.
 const LEVELS: [f64; 6] = [0.995, 0.99, 0.98, 0.96, 0.93, 0.9];
+/// Peaks that are kept at most.
+const PEAKS: usize = 256;
 /// Share of the external torques' mean square that the parameters' deviation leaves at least.
 const LEFT: f64 = 0.04;
 /// Samples that a deviation of its own takes.
@@ -122,6 +124,7 @@ impl Quiet {
             clusters: peaks.len() as u64,
             scale,
             shape,
+            largest: largest(peaks),
         })
     }
 
@@ -144,6 +147,14 @@ impl Quiet {
         }
         peaks
     }
+}
+
+/// The largest of some peaks, from the largest on.
+fn largest(peaks: &[f64]) -> Vec<f64> {
+    let mut peaks = peaks.to_vec();
+    peaks.sort_by(|a, b| b.total_cmp(a));
+    peaks.truncate(PEAKS);
+    peaks
 }
 
 /// Scale and shape of the generalised Pareto law of excesses by probability-weighted moments (Hosking and Wallis

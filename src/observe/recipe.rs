@@ -56,16 +56,19 @@ pub fn recipe(
         limit: threshold * held.external_99,
     };
     let robot = uncertain.robot();
-    let none = Direction::none(robot);
-    let each = match uncertain.each() {
+    let mut each = uncertain.each().to_vec();
+    if each.is_empty() {
         // tables of C have at least one entry
-        [] => std::slice::from_ref(&none),
-        each => each,
-    };
+        each.push(Direction::of(
+            &model.model,
+            &vec![0.0; model.model.parameters()],
+        ));
+    }
     let uncertain = each.iter().map(|of| Uncertain {
         bodies: robot.link_parameters(&of.theta),
         drives: robot.drive_parameters(&of.theta),
         couplings: robot.coupling_parameters(&of.theta),
+        friction: of.friction.clone(),
         offset: of.offset.clone(),
     });
     Ok(Recipe {
