@@ -45,6 +45,11 @@ pub struct Args {
     /// Only parameters of links that can exist; the model file then holds the links too
     #[arg(long)]
     pub feasible: bool,
+    /// Then fit a single axis to the motion that its torques make, in windows of so many seconds that begin
+    /// at measured states [default: blocks set aside choose the length]
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,
+          value_parser = arguments::positive, conflicts_with_all = ["model", "feasible", "fit_gains"])]
+    pub open_loop: Option<Option<f64>>,
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
     pub output: PathBuf,
@@ -119,6 +124,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let checked = setup::checked(machine, (robot, &edits), &logs, known, &args.setup, context)?;
     let machine = &checked.machine;
     let mut found = identify::lsq(machine, &logs, &settings, context.control())?;
+    if let Some(window) = args.open_loop {
+        identify::by_motion(machine, &mut found, &logs, window, context.control())?;
+    }
     found
         .setup
         .splice(0..0, checked.report.findings.iter().cloned());

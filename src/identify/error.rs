@@ -13,6 +13,7 @@ use crate::inertia::solution::FitError;
 use crate::inspect::LogFault;
 use crate::log::{LogError, did_you_mean, escape};
 use crate::motion::{MotionError, RunError};
+use crate::open_loop::AxisError;
 
 /// An error of a stage. Its text reads `what is wrong; what to do`.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +83,13 @@ pub enum IdentifyError {
         joints: String,
         unit: &'static str,
     },
+    /// No axis that is fitted to its motion.
+    #[error(
+        "--open-loop fits single axes whose robot file says `law = \"viscous-coulomb\"` and `fitted_with_inertias = true` in [friction]; fit this robot without it"
+    )]
+    NotByMotion,
+    #[error(transparent)]
+    ByMotion(#[from] AxisError),
     #[error(transparent)]
     Gains(#[from] GainError),
     #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
@@ -126,9 +134,13 @@ impl IdentifyError {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Interrupted => ErrorKind::Interrupted,
-            Self::NoLog | Self::NoJoint { .. } | Self::LawIsNotLinear { .. } => ErrorKind::Usage,
+            Self::NoLog
+            | Self::NoJoint { .. }
+            | Self::LawIsNotLinear { .. }
+            | Self::NotByMotion => ErrorKind::Usage,
             Self::Fit(FitError::TooFewRows { .. } | FitError::NothingExcited)
             | Self::Friction { .. }
+            | Self::ByMotion(_)
             | Self::NothingDetermined => ErrorKind::Undetermined,
             Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
             Self::Diagnose(_) => ErrorKind::Undetermined,

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::by_motion::MotionFit;
 use super::consistent::{ConsistentLinks, consistent};
 use super::control::Control;
 use super::error::IdentifyError;
@@ -87,6 +88,9 @@ pub struct IdentifiedDynamics {
     pub effective_samples: f64,
     /// Residual of the fit.
     pub joints: Vec<JointResidual>,
+    /// The fit to the motion, where one was asked for; `parameters` and `joints` are its own then.
+    #[serde(rename = "open_loop", skip_serializing_if = "Option::is_none")]
+    pub by_motion: Option<MotionFit>,
     /// By which filter positions became velocities; joints that never move are left out.
     pub position_cutoffs: Vec<PositionCutoff>,
     #[serde(rename = "estimator")]
@@ -255,6 +259,7 @@ pub fn lsq(
     });
     let mut found = IdentifiedDynamics {
         held: Held::default(),
+        by_motion: None,
         essential: EssentialFit {
             count: essential.essential.iter().filter(|e| **e).count(),
             joints: RelativeError::each(machine, &essential_error),
@@ -472,6 +477,9 @@ impl IdentifiedDynamics {
             }
             model.effects = friction.effects.clone();
             model.friction_prior.clone_from(&self.friction_prior);
+        }
+        if let Some(by_motion) = &self.by_motion {
+            model.effects.clone_from(&by_motion.effects);
         }
         let fit = &self.fit;
         model.replace_covariance(&keys, &|a, b| self.covariance[(a, b)]);

@@ -18,6 +18,7 @@
 //! | [`watch()`] | rows as they come, a model | [`Watched`]: external torques, alarms |
 //! | [`identify()`] | logs by role | [`Campaigned`]: all of it, one after the other |
 
+mod by_motion;
 mod campaign;
 mod compare;
 mod consistent;
@@ -66,6 +67,7 @@ mod validate;
 mod watch;
 mod weakest;
 
+pub use by_motion::{MotionFit, by_motion};
 pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
 pub use compare::{Compared, Comparison, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
 pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};

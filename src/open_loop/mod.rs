@@ -5,9 +5,16 @@
 //! dF/dv), and friction that jumps at rest as an impulse of at most Fc dt against the motion, joint after joint
 //! until all agree (Moreau 1988): a joint that rests stays at rest, however long the step. A model is told by it
 //! where torques alone hardly tell: errors of slow friction and of gravity add up.
+//!
+//! [`fit_axis`] moves the numbers of a single axis until its motion is that of the log.
 
+mod choose;
+mod fit;
+mod numbers;
 mod stepper;
 mod windows;
+
+pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, Tried, fit_axis};
 
 pub use stepper::Stepper;
 pub use windows::{JointDrift, OpenLoop, WindowLength, along};

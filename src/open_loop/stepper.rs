@@ -24,6 +24,10 @@ pub struct Stepper {
     bias: Vec<f64>,
     with: Vec<f64>,
     plain: Vec<f64>,
+    force: Vec<f64>,
+    /// Greatest impulse of friction that jumps.
+    limit: Vec<f64>,
+    change: Vec<f64>,
 }
 
 impl Stepper {
@@ -48,6 +52,9 @@ impl Stepper {
             bias: vec![0.0; n],
             with: vec![0.0; n],
             plain: vec![0.0; n],
+            force: vec![0.0; n],
+            limit: vec![0.0; n],
+            change: vec![0.0; n],
             model: model.clone(),
         }
     }
@@ -72,28 +79,63 @@ impl Stepper {
             self.effects.torque(since, motion, &mut self.with);
             model.torque(&self.q, &self.v, &self.a, &mut self.plain);
         }
-        let mut implicit = DMatrix::from_row_slice(n, n, &self.mass);
-        let mut force = DVector::zeros(n);
-        let mut limit = vec![0.0; n];
         for j in 0..n {
             let v = self.v[j];
+            self.limit[j] = 0.0;
             let (friction, slope) = match &model.friction[j] {
                 JointFriction::None => (0.0, 0.0),
                 JointFriction::DoubleTanh(law) => (law.torque(v), law.slope(v).max(0.0)),
+                // what is proportional to the speed by the trapezoidal rule: its error falls with dt^2
                 JointFriction::ViscousCoulomb(law) if self.jumps[j] => {
-                    limit[j] = law.coulomb.max(0.0) * dt;
-                    (law.viscous * v, law.viscous.max(0.0))
+                    self.limit[j] = law.coulomb.max(0.0) * dt;
+                    (law.viscous * v, 0.5 * law.viscous.max(0.0))
                 }
-                JointFriction::ViscousCoulomb(law) => (law.torque(v), law.viscous.max(0.0)),
+                JointFriction::ViscousCoulomb(law) => (law.torque(v), 0.5 * law.viscous.max(0.0)),
             };
             let added = self.with[j] - self.plain[j];
-            force[j] = tau[j] - self.bias[j] - friction - model.offset[j] - added;
-            implicit[(j, j)] += dt * slope;
+            self.force[j] = tau[j] - self.bias[j] - friction - model.offset[j] - added;
+            self.mass[j * n + j] += dt * slope;
         }
+        let found = match n {
+            1 => self.change_of_one(),
+            _ => self.change_of_all(),
+        };
+        if !found {
+            return false;
+        }
+        let change = &self.change;
+        for j in 0..n {
+            // constant acceleration over the step
+            self.q[j] += dt * (self.v[j] + 0.5 * change[j]);
+            self.v[j] += change[j];
+            self.a[j] = change[j] / dt;
+        }
+        self.q.iter().chain(&self.v).all(|x| x.is_finite())
+    }
+
+    /// Change of the speed of a single axis; false where it has no mass.
+    fn change_of_one(&mut self) -> bool {
+        let (mass, limit) = (self.mass[0], self.limit[0]);
+        if mass.is_nan() || mass <= 0.0 {
+            return false;
+        }
+        let free = self.force[0] * self.dt / mass;
+        // as much as stops it, where friction is as much
+        let impulse = (-(self.v[0] + free) * mass).clamp(-limit, limit);
+        self.change[0] = free + impulse / mass;
+        true
+    }
+
+    /// Changes of all speeds; false where the inertia matrix is none.
+    fn change_of_all(&mut self) -> bool {
+        let n = self.v.len();
+        let implicit = DMatrix::from_row_slice(n, n, &self.mass);
         let Some(factor) = implicit.cholesky() else {
             return false;
         };
-        let mut change = factor.solve(&(force * dt));
+        let force = DVector::from_column_slice(&self.force);
+        let mut change = factor.solve(&(force * self.dt));
+        let limit = &self.limit;
         if limit.iter().any(|limit| *limit > 0.0) {
             let inverse = factor.inverse();
             let mut impulse = vec![0.0; n];
@@ -115,13 +157,8 @@ impl Stepper {
                 }
             }
         }
-        for j in 0..n {
-            // constant acceleration over the step
-            self.q[j] += dt * (self.v[j] + 0.5 * change[j]);
-            self.v[j] += change[j];
-            self.a[j] = change[j] / dt;
-        }
-        self.q.iter().chain(&self.v).all(|x| x.is_finite())
+        self.change.copy_from_slice(change.as_slice());
+        true
     }
 }
 

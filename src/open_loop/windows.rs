@@ -83,7 +83,14 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
         while begin + size <= stretch.len() {
             windows += 1;
             let window = (begin, begin + size);
-            astray += u64::from(!run(&mut stepper, stretch, &tau, window, parts, &mut sums));
+            astray += u64::from(!score(
+                &mut stepper,
+                stretch,
+                &tau,
+                window,
+                parts,
+                &mut sums,
+            ));
             // the last sample of a window is the first of the next
             begin += size - 1;
         }
@@ -109,8 +116,8 @@ pub fn along(model: &AugmentedModel, stretches: &[Stretch], length: WindowLength
     }
 }
 
-/// Simulates one window; false where it goes astray.
-fn run(
+/// Simulates one window and adds up its errors; false where it goes astray.
+fn score(
     stepper: &mut Stepper,
     stretch: &Stretch,
     tau: &[Vec<f64>],
@@ -118,11 +125,43 @@ fn run(
     parts: f64,
     sums: &mut [Sums],
 ) -> bool {
-    let n = sums.len();
+    run(
+        stepper,
+        stretch,
+        tau,
+        (begin, end),
+        parts,
+        &mut |k, found| {
+            for (j, s) in sums.iter_mut().enumerate() {
+                let q = &stretch.q[j];
+                let e = found[j] - q[k];
+                s.square += e * e;
+                s.moved += (q[k] - q[begin]).powi(2);
+                s.samples += 1;
+                s.largest = s.largest.max(e.abs());
+                if k + 1 == end {
+                    s.at_end += e * e;
+                    s.ends += 1;
+                }
+            }
+        },
+    )
+}
+
+/// Simulates one window from its measured begin, each sample in so many parts: `each` gets the number of the sample
+/// and the positions that were found; false where it goes astray.
+pub(super) fn run(
+    stepper: &mut Stepper,
+    stretch: &Stretch,
+    tau: &[Vec<f64>],
+    (begin, end): (usize, usize),
+    parts: f64,
+    each: &mut dyn FnMut(usize, &[f64]),
+) -> bool {
+    let n = tau.len();
     let [mut q, mut v, mut a, mut now] = [(); 4].map(|()| vec![0.0; n]);
     stretch.at(begin, &mut q, &mut v, &mut a);
     stepper.begin(&q, &v);
-    let start = q.clone();
     for k in begin..end {
         if k > begin {
             for part in 0..parts as usize {
@@ -136,18 +175,7 @@ fn run(
                 }
             }
         }
-        stretch.at(k, &mut q, &mut v, &mut a);
-        for (j, s) in sums.iter_mut().enumerate() {
-            let e = stepper.q[j] - q[j];
-            s.square += e * e;
-            s.moved += (q[j] - start[j]).powi(2);
-            s.samples += 1;
-            s.largest = s.largest.max(e.abs());
-            if k + 1 == end {
-                s.at_end += e * e;
-                s.ends += 1;
-            }
-        }
+        each(k, &stepper.q);
     }
     true
 }

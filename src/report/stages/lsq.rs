@@ -4,6 +4,7 @@ use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::identify::{
     Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
+    MotionFit,
 };
 use crate::log::{Provenance, escape};
 use crate::math::descent::Ending;
@@ -45,6 +46,9 @@ pub fn lsq(of: &Lsq) -> Report {
     parameters.line("");
     fitted(&mut parameters, of.found);
     groupings(&mut parameters, of.found);
+    if let Some(fit) = &of.found.by_motion {
+        motion(&mut report.terminal(), fit);
+    }
     known_friction(&mut report.detail(), &of.found.friction);
     report.terminal().line("");
     condition(&mut report.terminal(), of.found);
@@ -55,6 +59,9 @@ pub fn lsq(of: &Lsq) -> Report {
     let mut page = report.page();
     gains(&mut page, &of.found.gains);
     known_friction(&mut page, &of.found.friction);
+    if let Some(fit) = &of.found.by_motion {
+        motion(&mut page, fit);
+    }
     residuals(&mut page, of.found);
     page.paragraph(
         "These errors are those of the data that were fitted; `validate` gives those of others.",
@@ -114,6 +121,54 @@ pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics) {
         ]);
     }
     writer.table(table);
+}
+
+/// The fit to the motion: what it added, and by how much simulated positions are off before and after.
+fn motion(writer: &mut Writer, fit: &MotionFit) {
+    writer.line("");
+    let chosen = match fit.window_given {
+        true => String::new(),
+        false => format!(", a length that {} blocks set aside chose", fit.blocks),
+    };
+    writer.paragraph(&format!(
+        "Fitted to the motion that the torques of {} make in windows of {} s{chosen}.",
+        fit.joint, fit.window_s
+    ));
+    let mut table = Table::new(&[
+        ("rms error of simulated positions", Align::Left),
+        ("least squares", Align::Decimal),
+        ("fit to the motion", Align::Decimal),
+        ("unit", Align::Left),
+    ]);
+    let (before, after) = (&fit.before, &fit.after);
+    let blocks = "blocks set aside, from begin to end".to_owned();
+    let windows = format!("windows of {} s", fit.window_s);
+    for (what, from, to) in [
+        (windows, before.windows, after.windows),
+        (blocks, before.blocks, after.blocks),
+    ] {
+        let [from, to] = [from, to].map(|x| number::significant(x, 3));
+        table.row([what.as_str(), &from, &to, fit.unit]);
+    }
+    writer.table(table);
+    let added = fit.effects.iter().flat_map(|effect| {
+        let numbers = effect.parameters.iter().filter(|(_, p)| !p.bound);
+        numbers.map(move |(key, p)| {
+            [effect.name.as_str(), key, &told(p.value, p.std), &p.unit].join(" ")
+        })
+    });
+    let added: Vec<String> = added.collect();
+    if !added.is_empty() {
+        writer.paragraph(&format!("Friction that was added: {}.", added.join(", ")));
+    }
+}
+
+/// A number with its deviation, where it has one.
+fn told(value: f64, std: Option<f64>) -> String {
+    match std {
+        Some(std) => number::plus_minus(value, std),
+        None => number::significant(value, 4),
+    }
 }
 
 /// Gains of the torque channels, where they were fitted.
