@@ -1,8 +1,6 @@
 //! A fit by least squares of torques refined by the motion that the torques make: single axes.
 
 use nalgebra::DMatrix;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::control::Control;
 use super::error::IdentifyError;
@@ -12,6 +10,7 @@ use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::lsq::IdentifiedDynamics;
 use super::model::{in_file, refined};
+use super::motion_fit::MotionFit;
 use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::residual::JointResidual;
@@ -21,39 +20,12 @@ use crate::effect::{Added, AugmentedModel};
 use crate::inertia::verdict::verdict;
 use crate::math::descent::Ending;
 use crate::motion::FilterSettings;
-use crate::open_loop::{AxisError, AxisFit, BLOCKS, PositionErrors, Tried, fit_axis};
+use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
 use crate::robot::model::JointFriction;
 use crate::verdict::Verdict;
 
 /// Windows for each number below which deviations are not trusted.
 const FEW: f64 = 4.0;
-
-/// What a fit to the motion of an axis came to.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct MotionFit {
-    pub joint: String,
-    /// Unit of positions.
-    pub unit: &'static str,
-    /// Length of the windows \[s\].
-    pub window_s: f64,
-    /// That length is the user's own; otherwise blocks set aside chose it.
-    pub window_given: bool,
-    /// Windows, which overlap.
-    pub windows: u64,
-    /// Windows that do not.
-    pub windows_apart: f64,
-    /// Blocks that were set aside one after the other.
-    pub blocks: u64,
-    /// The model of least squares.
-    pub before: PositionErrors,
-    pub after: PositionErrors,
-    pub status: Ending,
-    pub steps: u64,
-    /// Friction that was added.
-    pub effects: Vec<Effect>,
-    /// What was tried on the blocks, in order.
-    pub tried: Vec<Tried>,
-}
 
 /// Refines what `lsq` found on these logs by the motion that the torques make, in windows of so many seconds; without a
 /// length, blocks of the logs that are set aside choose it.

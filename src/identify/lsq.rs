@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::by_motion::MotionFit;
 use super::consistent::{ConsistentLinks, consistent};
 use super::control::Control;
 use super::error::IdentifyError;
@@ -17,6 +16,7 @@ use super::known_friction::{FrictionBefore, FrictionOfFit};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::model::{new_model, refined};
+use super::motion_fit::MotionFit;
 use super::own_settings::CutoffCosts;
 use super::passes::Passes;
 use super::position_cutoff::PositionCutoff;

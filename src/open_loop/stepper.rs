@@ -79,7 +79,7 @@ impl Stepper {
             self.effects.torque(since, motion, &mut self.with);
             model.torque(&self.q, &self.v, &self.a, &mut self.plain);
         }
-        for j in 0..n {
+        for (j, tau) in tau.iter().enumerate() {
             let v = self.v[j];
             self.limit[j] = 0.0;
             let (friction, slope) = match &model.friction[j] {
@@ -93,7 +93,7 @@ impl Stepper {
                 JointFriction::ViscousCoulomb(law) => (law.torque(v), 0.5 * law.viscous.max(0.0)),
             };
             let added = self.with[j] - self.plain[j];
-            self.force[j] = tau[j] - self.bias[j] - friction - model.offset[j] - added;
+            self.force[j] = tau - self.bias[j] - friction - model.offset[j] - added;
             self.mass[j * n + j] += dt * slope;
         }
         let found = match n {
@@ -103,12 +103,11 @@ impl Stepper {
         if !found {
             return false;
         }
-        let change = &self.change;
-        for j in 0..n {
+        for (j, change) in self.change.iter().enumerate() {
             // constant acceleration over the step
-            self.q[j] += dt * (self.v[j] + 0.5 * change[j]);
-            self.v[j] += change[j];
-            self.a[j] = change[j] / dt;
+            self.q[j] += dt * (self.v[j] + 0.5 * change);
+            self.v[j] += change;
+            self.a[j] = change / dt;
         }
         self.q.iter().chain(&self.v).all(|x| x.is_finite())
     }
