@@ -91,7 +91,8 @@ pub fn by_motion(
         };
     }
     let file = found.model(machine, None);
-    let held = hold_out(machine, (&file, &model), (logs, &found.inputs), control);
+    let smoothed = machine.smoothed_as(&found.position_cutoffs);
+    let held = hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control);
     found.held = or_warning(held, &mut found.warnings)?;
     Ok(())
 }
