@@ -1,4 +1,4 @@
-//! The simulated CFT robot: a model of half an hour, and minutes that it did not see.
+//! The simulated CFT robot: a model of twenty minutes, and minutes that it did not see.
 
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::identify::{Control, Log, LoggedRobot, LsqSettings, lsq};
@@ -13,7 +13,7 @@ use super::machines::{Scored, list};
 use super::study::{along, block, noisy, series};
 
 /// Minutes that the model is fitted to: by how many alarms a rate is learnt, by so many it is known.
-const FITTED: u64 = 30;
+const FITTED: u64 = 20;
 
 pub struct Campaign {
     machine: LoggedRobot,
