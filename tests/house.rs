@@ -21,7 +21,7 @@ const ROOMS: &[(&str, &str)] = &[
     ("export", "number robot config motion effect"),
     ("band", "math number robot config motion effect"),
     ("observe", "math robot log config motion effect band export"),
-    ("open_loop", "math robot motion effect"),
+    ("open_loop", "math number robot motion effect"),
     ("friction", "math robot log motion verdict"),
     ("inertia", "math robot log motion verdict"),
     ("diagnose", "math robot log motion effect"),

@@ -11,6 +11,7 @@ use super::numbers::{Columns, columns, numbers};
 use crate::effect::{Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search};
 use crate::math::descent::Ending;
 use crate::motion::Stretch;
+use crate::number;
 
 /// Blocks that are set aside one after the other.
 pub const BLOCKS: usize = 4;
@@ -28,7 +29,8 @@ const ALL: usize = usize::MAX;
 pub enum AxisError {
     /// Blocks that are set aside hold no window.
     #[error(
-        "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({block_s} s): give longer logs, or --open-loop=SECONDS with fewer seconds"
+        "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({} s): give longer logs, or --open-loop=SECONDS with fewer seconds",
+        number::significant(*block_s, 3)
     )]
     TooShort { window_s: f64, block_s: f64 },
     /// The motion that the model of the torques makes is none.
