@@ -20,6 +20,12 @@ fn tool(folder: &Path, line: &str) -> Command {
     tool
 }
 
+/// What a command that succeeds prints.
+fn printed(folder: &Path, line: &str) -> String {
+    let run = tool(folder, line).assert().code(0);
+    String::from_utf8(run.get_output().stdout.clone()).unwrap()
+}
+
 /// What the built-in campaign leaves and says; run once for all tests.
 fn campaign() -> (&'static Path, &'static str) {
     static RUN: OnceLock<(tempfile::TempDir, String)> = OnceLock::new();
@@ -160,12 +166,7 @@ fn the_verdict_comes_first_quiet_says_it_alone_and_verbose_says_more() {
         "compare model.toml refined.toml unseen.csv",
     ];
     for line in lines {
-        let said = |detail: &str| {
-            let run = tool(folder.path(), &format!("{line} {detail}"))
-                .assert()
-                .code(0);
-            String::from_utf8(run.get_output().stdout.clone()).unwrap()
-        };
+        let said = |detail: &str| printed(folder.path(), &format!("{line} {detail}"));
         let (quiet, usual, verbose) = (said("-q"), said(""), said("--verbose"));
         assert!(usual.starts_with(quiet.trim_end()), "{line}:\n{usual}");
         assert!(quiet.lines().count() < usual.lines().count(), "{line}");
@@ -192,12 +193,7 @@ fn quiet_prints_a_line_or_two_of_every_result() {
         "simulate -r configs/cft.toml --move q4 --seconds 20 -o moved.csv",
     ];
     for line in lines {
-        let said = |detail: &str| {
-            let run = tool(folder.path(), &format!("{line} {detail}"))
-                .assert()
-                .code(0);
-            String::from_utf8(run.get_output().stdout.clone()).unwrap()
-        };
+        let said = |detail: &str| printed(folder.path(), &format!("{line} {detail}"));
         let (quiet, usual) = (said("-q"), said(""));
         let lines = |text: &str| text.lines().count();
         assert!((1..=4).contains(&lines(&quiet)), "{line}:\n{quiet}");

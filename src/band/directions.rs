@@ -178,27 +178,12 @@ fn least_told(model: &Model, covariance: &DMatrix<f64>, seen: &[HeldOut]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::JointKind;
+    use crate::robot::double_pendulum::double_pendulum;
     use crate::robot::friction::ViscousCoulomb;
-    use crate::robot::tree::{Coordinate, Link, Tree, space};
 
-    /// Two links in a vertical plane, 0.4 m between the axes.
-    fn double_pendulum() -> Model {
-        let link = |name: &str, parent, origin, joint| Link {
-            name: name.to_owned(),
-            parent,
-            rotation: space::UNTURNED,
-            origin,
-            axis: [0.0, 0.0, 1.0],
-            kind: JointKind::Revolute,
-            coordinate: Coordinate::Joint(joint),
-        };
-        let links = vec![
-            link("upper", None, [0.0; 3], 0),
-            link("lower", Some(0), [0.4, 0.0, 0.0], 1),
-        ];
-        let tree = Tree::new(links, 2, [0.0, -9.81, 0.0]).unwrap();
-        let robot = Robot::of_tree(tree, vec!["q1".into(), "q2".into()], true, Vec::new());
+    /// A double pendulum in a vertical plane, with friction on its second joint.
+    fn pendulum() -> Model {
+        let robot = double_pendulum([0.0, -9.81, 0.0], true);
         let viscous_coulomb = ViscousCoulomb {
             viscous: 1.0,
             coulomb: 2.0,
@@ -225,7 +210,7 @@ mod tests {
 
     #[test]
     fn few_directions_give_the_deviation_of_a_torque_that_all_parameters_give() {
-        let model = double_pendulum();
+        let model = pendulum();
         let (n, p, u) = (2, model.theta.len(), model.parameters());
         // two combinations that hardly anything is known of, beside what is known well
         let vector = |k: usize| DVector::from_fn(u, |i, _| ((3 * i + 7 * k + 1) as f64).sin());
@@ -267,7 +252,7 @@ mod tests {
 
     #[test]
     fn parameters_without_a_covariance_have_no_directions() {
-        let model = double_pendulum();
+        let model = pendulum();
         let u = model.parameters();
         assert!(least_told(&model, &DMatrix::zeros(u, u), &seen()).is_empty());
     }

@@ -272,11 +272,7 @@ impl<'a> Trial<'a> {
         let plain = self.settings.plain_q_cutoff_hz(f64::INFINITY);
         let each = self.settings.joint_q_cutoffs_hz.iter();
         let position = each.copied().fold(plain, f64::min);
-        let settings = FilterSettings {
-            q_cutoff_hz: Some(position),
-            joint_q_cutoffs_hz: Vec::new(),
-            ..self.settings.clone()
-        };
+        let settings = self.settings.with_one_position_filter(position);
         let uncertain = Directions::of(self.file, &self.model.model, held);
         let mut quiet: Option<Quiet> = None;
         for (index, log) in self.logs.iter().enumerate() {

@@ -93,11 +93,8 @@ pub struct Watched {
 
 /// Filters of an observer: positions of all joints come through one, as external torques were learnt.
 fn processing(machine: &LoggedRobot, excesses: &Excesses) -> FilterSettings {
-    FilterSettings {
-        q_cutoff_hz: Some(excesses.position_cutoff_hz),
-        joint_q_cutoffs_hz: Vec::new(),
-        ..machine.settings()
-    }
+    let settings = machine.settings();
+    settings.with_one_position_filter(excesses.position_cutoff_hz)
 }
 
 /// What untouched motion showed of external torques, where data were set aside for it.

@@ -137,6 +137,15 @@ impl FilterSettings {
         self.q_cutoff_hz.unwrap_or_else(plain)
     }
 
+    /// The same with one position filter for all joints, of this cut-off \[Hz\].
+    pub fn with_one_position_filter(&self, cutoff_hz: f64) -> Self {
+        FilterSettings {
+            q_cutoff_hz: Some(cutoff_hz),
+            joint_q_cutoffs_hz: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// The same with position cut-offs so many times as high, as far as a sampling rate \[Hz\] carries them.
     pub fn widened(&self, times: f64, rate_hz: f64) -> Self {
         let highest = HIGHEST_SHARE * rate_hz;

@@ -239,7 +239,7 @@ impl Trial<'_> {
     /// Error on each block of a fit to the others; none where a motion goes astray.
     fn held_out(&self, model: &AugmentedModel, length: f64) -> Result<Option<f64>, AxisError> {
         let columns = self.columns(model);
-        // a start that is near saves steps, and decides nothing
+        // a start that is near saves steps, and changes no result
         let Some(near) = self.fit(model, &columns, (&self.whole(), length), false)? else {
             return Ok(None);
         };

@@ -54,6 +54,11 @@ pub(super) fn windows(stretches: &[Stretch], spans: &[Span], length_s: f64) -> V
     all
 }
 
+/// Every how many samples of a window a position counts, from its last one on.
+fn every(begin: usize, end: usize, positions: usize) -> usize {
+    ((end - begin) / positions).max(1)
+}
+
 /// Errors of simulated positions \[m or rad\] in windows, one after the other; none where a motion goes astray.
 pub(super) fn errors(
     model: &AugmentedModel,
@@ -70,7 +75,7 @@ pub(super) fn errors(
             stepper = Some((s, Stepper::new(model, stretch.dt / parts)));
         }
         let (_, stepper) = stepper.as_mut()?;
-        let every = ((end - begin) / positions).max(1);
+        let every = every(begin, end, positions);
         let mut keep = |k: usize, q: &[f64]| {
             if (end - 1 - k).is_multiple_of(every) {
                 out.push(q[0] - stretch.q[0][k]);
@@ -208,7 +213,7 @@ fn covariance(at: &At, stretches: &[Stretch], windows: &[Span], free: &[usize]) 
     let scores: Vec<(usize, DVector<f64>)> = windows
         .iter()
         .map(|&(s, begin, end)| {
-            let size = (end - begin - 1) / ((end - begin) / POSITIONS).max(1) + 1;
+            let size = (end - begin - 1) / every(begin, end, POSITIONS) + 1;
             let rows = at.slopes.rows(first, size);
             let score = rows.tr_mul(&at.errors.rows(first, size));
             first += size;

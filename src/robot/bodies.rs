@@ -175,27 +175,11 @@ mod tests {
     use crate::robot::cft::links::MassProperties;
     use crate::robot::cft::{Setup, Structure};
     use crate::robot::standard::standard_of;
-    use crate::robot::tree::{Coordinate, Link, Tree, space};
     use nalgebra::Matrix4;
 
-    /// Two links in a vertical plane, both about z, l = 0.4 m between the axes.
+    /// In a vertical plane.
     fn double_pendulum(drive_inertia: bool) -> Robot {
-        let link = |name: &str, parent, origin, joint| Link {
-            name: name.to_owned(),
-            parent,
-            rotation: space::UNTURNED,
-            origin,
-            axis: [0.0, 0.0, 1.0],
-            kind: JointKind::Revolute,
-            coordinate: Coordinate::Joint(joint),
-        };
-        let links = vec![
-            link("upper", None, [0.0; 3], 0),
-            link("lower", Some(0), [0.4, 0.0, 0.0], 1),
-        ];
-        let tree = Tree::new(links, 2, [0.0, -9.81, 0.0]).unwrap();
-        let names = vec!["q1".to_owned(), "q2".to_owned()];
-        Robot::of_tree(tree, names, drive_inertia, Vec::new())
+        crate::robot::double_pendulum::double_pendulum([0.0, -9.81, 0.0], drive_inertia)
     }
 
     #[test]

@@ -20,6 +20,8 @@
 
 pub mod bodies;
 pub mod cft;
+#[cfg(test)]
+pub(crate) mod double_pendulum;
 pub mod drive;
 pub mod dynamics;
 pub mod error;

@@ -2,27 +2,11 @@
 
 use super::*;
 use crate::inertia::columns::{Own, RegressorColumns};
-use crate::robot::tree::{Coordinate, Link, Tree, space};
-use crate::robot::{JointKind, Robot};
+use crate::robot::Robot;
+use crate::robot::double_pendulum::double_pendulum;
 
-/// Two links in a vertical plane, both about z, 0.4 m between the axes.
 fn robot(gravity: [f64; 3]) -> Robot {
-    let link = |name: &str, parent, origin, joint| Link {
-        name: name.to_owned(),
-        parent,
-        rotation: space::UNTURNED,
-        origin,
-        axis: [0.0, 0.0, 1.0],
-        kind: JointKind::Revolute,
-        coordinate: Coordinate::Joint(joint),
-    };
-    let links = vec![
-        link("upper", None, [0.0; 3], 0),
-        link("lower", Some(0), [0.4, 0.0, 0.0], 1),
-    ];
-    let tree = Tree::new(links, 2, gravity).unwrap();
-    let names = vec!["q1".to_owned(), "q2".to_owned()];
-    Robot::of_tree(tree, names, false, Vec::new())
+    double_pendulum(gravity, false)
 }
 
 const DOWN: [f64; 3] = [0.0, -9.81, 0.0];
