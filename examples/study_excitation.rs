@@ -35,7 +35,7 @@ fn main() {
     summarise(&rows, &folder);
 }
 
-/// What the one-joint logs of a plant tell of its friction.
+/// What the one-joint logs of a plant give of its friction.
 fn friction(robot: &Robot, truth: &CftTruth, seed: u64) -> Vec<Option<KnownFriction>> {
     let infos = robot.parameters();
     let names: Vec<String> = infos.iter().map(|p| p.name.to_string()).collect();

@@ -67,8 +67,8 @@
 //! blocks of t, q and tau; [`inspect`] looks for faults in them, [`mapping`] for the joints in a log that nobody described; [`motion`] turns them into filtered
 //! rows of q, v, a and tau; [`robot`] holds the physics, [`effect`] what a plain model lacks, [`math`]
 //! what is small and general, [`config`] the files. Beside them: [`simulate`] is a plant to test
-//! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`report`] tells
-//! results as text, page and JSON, and [`cli`] is the command line.
+//! against, [`excite`] designs motions, [`export`] writes a model as C, Rust or URDF, [`replay`] runs
+//! models along logs for the figures of a report, [`report`] tells results as text, page and JSON, and [`cli`] is the command line.
 
 #![forbid(unsafe_code)]
 
@@ -99,6 +99,7 @@ pub mod simulate;
 
 pub mod excite;
 
+pub mod replay;
 pub mod report;
 
 pub mod config;

@@ -85,7 +85,7 @@ fn the_page_tells_of_every_effect_whose_numbers_have_a_range() {
         .collect();
     held.dedup();
     for name in &held {
-        assert!(told.contains(name), "{name} is not told of");
+        assert!(told.contains(name), "{name} is not mentioned");
     }
     assert_eq!(told.len(), held.len(), "{told:?}");
 }

@@ -39,15 +39,19 @@ const ROOMS: &[(&str, &str)] = &[
          inspect setup compare band observe open_loop track export",
     ),
     (
+        "replay",
+        "robot log config motion effect friction diagnose identify",
+    ),
+    (
         "report",
         "math verdict number robot log config motion effect friction inertia diagnose validate \
-         inspect setup excite compare identify band observe open_loop track",
+         inspect setup excite compare identify band observe open_loop track replay",
     ),
     (
         "cli",
         "math verdict number robot log config output motion effect friction inertia diagnose \
          validate inspect mapping setup simulate excite compare identify report export band \
-         observe open_loop track",
+         observe open_loop track replay",
     ),
 ];
 
@@ -135,6 +139,7 @@ fn estimators_know_nothing_of_the_simulator() {
         "validate",
         "inspect",
         "log",
+        "replay",
         "report",
         "band",
         "observe",

@@ -85,7 +85,7 @@ fn summary(name: &str, rows: &[Value]) -> Value {
         "rows": quantile(numbers("rows"), 0.5),
         "within 3 % at every plateau": format!("{right} of {}", plateaus.len()),
         "refused": refused,
-        "told to miss a plateau": told,
+        "misses a plateau, and says so": told,
         "as many terms as the plant": format!("{terms} of {}", plateaus.len()),
         "largest error at a plateau": most(&plateaus),
         "largest error of a curve": most(&curve),

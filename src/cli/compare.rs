@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
 use crate::identify::{self, GivenModel};
 use crate::log::{LogSpec, escape};
+use crate::replay::ReplayedPair;
 use crate::report::json::Document;
 use crate::report::stages;
 
@@ -76,19 +77,21 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut report = stages::compare::compare(&of, &shown.join(", "));
     let drawn = args.report.is_some() || !args.plot.is_empty();
     let in_memory = of.tried.as_ref().filter(|_| drawn).map(|t| &t.in_memory);
-    let look = pictures::look(&of.machine, in_memory, &names)?;
+    let replay = pictures::replay(&of.machine, in_memory, &names)?;
+    let replayed = replay.map(|replay| ReplayedPair::new(&replay, &of));
+    let replayed = replayed.transpose().map_err(CliError::input)?;
     if args.report.is_some() {
         let quality = pictures::inspected(&args.logs, &of.machine, context)?;
         let (mut page, command) = (report.page(), context.command());
-        stages::compare::pictures(&mut page, &of, &read, look.as_ref(), &quality, command)
-            .map_err(CliError::input)?;
+        let replayed = replayed.as_ref();
+        stages::compare::pictures(&mut page, &of, &read, replayed, &quality, command);
     }
     context.check()?;
     if let Some(path) = &args.report {
         context.write_text(path, &report.html())?;
     }
     for path in &args.plot {
-        let figure = stages::compare::figure(&of, look.as_ref()).map_err(CliError::input)?;
+        let figure = stages::compare::figure(&of, replayed.as_ref());
         context.write_picture(path, &figure.svg())?;
     }
     Ok(Outcome {

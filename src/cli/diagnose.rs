@@ -7,8 +7,9 @@ use crate::identify::{
     self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult, LoggedRobot,
 };
 use crate::log::LogSpec;
+use crate::replay::ReplayedDiagnosis;
 use crate::report::json::Document;
-use crate::report::sections::{provenance, quality};
+use crate::report::sections::{provenance, quality, residual};
 use crate::report::stages;
 
 const EXAMPLE: &str = "\
@@ -142,9 +143,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let mut report = stages::diagnose::diagnose(&of);
     context.check()?;
     if !args.plot.is_empty() || args.report.is_some() {
-        let figure = stages::diagnose::figure(&machine, &found).map_err(CliError::input)?;
+        let refined = found.model(&machine, &file);
+        let replayed =
+            ReplayedDiagnosis::new(&machine, &found, &refined).map_err(CliError::input)?;
         if !args.plot.is_empty() {
-            let picture = figure.svg();
+            let picture = residual::figure(&machine, &replayed.residual).svg();
             for path in &args.plot {
                 context.write_picture(path, &picture)?;
             }
@@ -152,8 +155,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;
             let mut page = report.page();
-            stages::diagnose::pictures(&mut page, &of, &figure, &quality, context.command())
-                .map_err(CliError::input)?;
+            stages::diagnose::pictures(&mut page, &of, &replayed, &quality, context.command());
             context.write_text(path, &report.html())?;
         }
     }

@@ -14,8 +14,11 @@ use crate::identify::{
     LoggedRobot, RoleLogs, StageEnd, Validated,
 };
 use crate::log::LogSpec;
+use crate::replay::ReplayedDiagnosis;
 use crate::report::json::Document;
+use crate::report::sections::residual;
 use crate::report::stages;
+use crate::report::stages::identify::Shown;
 use crate::setup::Finding;
 use crate::simulate::TruthFile;
 use crate::simulate::effects::EffectValue;
@@ -159,13 +162,14 @@ fn execute(
         keep(end, &machine, &title, (folder, context), &mut files)
     })?;
     warnings.extend(found.warnings.iter().cloned());
-    let (mut diagnosis, mut residuals) = (None, None);
+    let (mut diagnosis, mut replayed_diagnosis) = (None, None);
     match &found.diagnosed {
         Ok(DiagnoseEnd::DataFault(fault)) => diagnosis = Some(fault.result()),
         Ok(DiagnoseEnd::Diagnosed(diagnosed)) => {
             diagnosis = Some(diagnosed.result(&machine));
-            let figure = stages::diagnose::figure(&machine, diagnosed).map_err(CliError::input)?;
-            residuals = Some(figure);
+            let refined = found.refined.as_ref().unwrap_or(&found.model);
+            let replayed = ReplayedDiagnosis::new(&machine, diagnosed, refined);
+            replayed_diagnosis = Some(replayed.map_err(CliError::input)?);
         }
         Err(error) => warnings.push(format!("no diagnosis: {}", CliError::from(error))),
     }
@@ -185,14 +189,21 @@ fn execute(
         limit: campaign.settings.max_relative_error,
     };
     let mut report = stages::identify::identify(&of);
-    let in_memory = match &residuals {
+    let in_memory = match &replayed_diagnosis {
         None if !unseen.is_empty() => {
             pictures::in_memory(&machine, &role_logs.validation, context)?
         }
         _ => None,
     };
-    let look = pictures::look(&machine, in_memory.as_ref(), &unseen_names)?;
-    let all = one_joint.iter().chain(&training).chain(&unseen);
+    let numbers = (&found.model, &found.numbers);
+    let replayed = pictures::replayed(&machine, in_memory.as_ref(), &unseen_names, numbers)?;
+    let shown = match (&replayed_diagnosis, &replayed) {
+        (Some(replayed), _) => Shown::Diagnosis(replayed),
+        (None, Some(replayed)) => Shown::Model(replayed),
+        (None, None) => Shown::Nothing,
+    };
+    // the logs of the set-up have the one-joint logs among them
+    let all = training.iter().chain(&unseen);
     let origin = stages::identify::Origin {
         campaign: &toml::to_string(campaign).unwrap_or_default(),
         inputs: &found.inputs,
@@ -201,11 +212,10 @@ fn execute(
         command: context.command(),
     };
     let mut page = report.page();
-    stages::identify::pictures(&mut page, &of, look.as_ref(), residuals.as_ref(), &origin)
-        .map_err(CliError::input)?;
+    stages::identify::pictures(&mut page, &of, shown, &origin);
     context.check()?;
-    if let Some(residuals) = &residuals {
-        let picture = residuals.svg();
+    if let Some(replayed) = &replayed_diagnosis {
+        let picture = residual::figure(&machine, &replayed.residual).svg();
         write((folder, context), "residual.svg", &picture, &mut files)?;
     }
     write((folder, context), "report.html", &report.html(), &mut files)?;

@@ -148,20 +148,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             true => None,
             false => pictures::in_memory(machine, &logs, context)?,
         };
-        let look = pictures::look(machine, in_memory.as_ref(), &names)?;
         let numbers = refined(&model, &args.output.to_string_lossy())?;
+        let replayed = pictures::replayed(machine, in_memory.as_ref(), &names, (&model, &numbers))?;
         let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
         let quality = pictures::inspected(files, machine, context)?;
         stages::lsq::pictures(
             &mut report.page(),
             &of,
-            &numbers,
-            look.as_ref(),
+            replayed.as_ref(),
             &given,
             &quality,
             context.command(),
-        )
-        .map_err(CliError::input)?;
+        );
         context.check()?;
         context.write_text(path, &report.html())?;
     }

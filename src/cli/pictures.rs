@@ -1,9 +1,11 @@
 //! What the page of a command needs besides its result: the logs in memory, and what is wrong with them.
 
 use super::{CliError, Context, Exit, inspect};
+use crate::config::ModelFile;
+use crate::effect::AugmentedModel;
 use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
 use crate::log::LogSpec;
-use crate::report::sections::Look;
+use crate::replay::{Replay, Replayed};
 use crate::report::sections::quality::Inspected;
 
 /// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
@@ -27,13 +29,28 @@ pub(super) fn in_memory(
 ///
 /// # Errors
 /// Settings that the sampling rate does not carry.
-pub(super) fn look<'a>(
+pub(super) fn replay<'a>(
     machine: &'a LoggedRobot,
     in_memory: Option<&'a InMemory>,
     names: &[String],
-) -> Result<Option<Look<'a>>, CliError> {
-    let look = in_memory.map(|in_memory| Look::new(machine, in_memory, names.iter().cloned()));
-    look.transpose().map_err(CliError::input)
+) -> Result<Option<Replay<'a>>, CliError> {
+    let new = |in_memory| Replay::new(machine, in_memory, names.iter().cloned());
+    in_memory.map(new).transpose().map_err(CliError::input)
+}
+
+/// A model and its file replayed along these logs.
+///
+/// # Errors
+/// Settings that the sampling rate does not carry; logs that are too short for the filter.
+pub(super) fn replayed(
+    machine: &LoggedRobot,
+    in_memory: Option<&InMemory>,
+    names: &[String],
+    (file, model): (&ModelFile, &AugmentedModel),
+) -> Result<Option<Replayed>, CliError> {
+    let replay = replay(machine, in_memory, names)?;
+    let replayed = replay.map(|replay| Replayed::new(&replay, file, model));
+    replayed.transpose().map_err(CliError::input)
 }
 
 /// What is wrong with logs, by the robot file.

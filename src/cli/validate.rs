@@ -213,11 +213,11 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     }
     if args.report.is_some() {
         let in_memory = pictures::in_memory(&machine, &logs, context)?;
-        let look = pictures::look(&machine, in_memory.as_ref(), &names)?;
+        let replayed = pictures::replayed(&machine, in_memory.as_ref(), &names, (&file, &model))?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();
-        stages::validate::pictures(&mut page, &of, look.as_ref(), &quality, context.command())
-            .map_err(CliError::input)?;
+        let replayed = replayed.as_ref();
+        stages::validate::pictures(&mut page, &of, replayed, &quality, context.command());
     }
     context.check()?;
     if let Some(path) = &args.report {

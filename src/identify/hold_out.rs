@@ -165,7 +165,7 @@ impl<'a> Trial<'a> {
         Ok(Held { joints, excesses })
     }
 
-    /// Whether the logs told of a joint's friction and offset: what one-joint logs told is not theirs.
+    /// Whether the logs gave a joint's friction and offset: what one-joint logs gave is not theirs.
     fn free(&self) -> FreeColumns {
         let joints = self.machine.robot.joint_names();
         let laws = joints.iter().zip(&self.model.model.friction);

@@ -1,4 +1,4 @@
-//! What one reduced log or model tells of a robot's parameters by itself.
+//! What one reduced log or model says about a robot's parameters by itself.
 
 use std::slice::from_ref;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::config::{ModelFile, RobotFile};
 use crate::inertia::solve::Fit;
 use crate::verdict::Verdict;
 
-/// What one source tells of one parameter.
+/// What one source says about one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Told {
     pub name: String,

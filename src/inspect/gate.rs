@@ -27,7 +27,7 @@ pub struct Gate {
     cuts: Vec<[f64; 2]>,
     /// Torques that are exactly 0 in motion, by their places: from, to [s].
     off: Vec<(usize, [f64; 2])>,
-    /// What is told of them, and whether the robot moves as without its motors there, once known.
+    /// What is reported of them, and whether the robot moves as without its motors there, once known.
     off_told: Vec<LogFault>,
     freely: Option<bool>,
     /// Positions among the channels.

@@ -39,9 +39,11 @@ fn shown(part: &Part) -> String {
         Part::List(items) => items.iter().map(|item| hanging("  ", item, 4)).collect(),
         Part::Table(table) => table.to_string(),
         Part::Code(command) => command_lines(command, CODE),
-        Part::Figure(_) | Part::Figures(_) | Part::Traces { .. } | Part::Details { .. } => {
-            String::new()
-        }
+        Part::Figure(_)
+        | Part::Figures(_)
+        | Part::Folded { .. }
+        | Part::Traces { .. }
+        | Part::Details { .. } => String::new(),
     }
 }
 

@@ -55,6 +55,11 @@ pub enum Part {
     Figure(String),
     /// Small pictures that belong together.
     Figures(Cells),
+    /// Small pictures that are folded away.
+    Folded {
+        summary: String,
+        cells: Cells,
+    },
     /// Series over time that can be zoomed, as the page's viewer reads them, and the SVG document that
     /// is shown without a script.
     Traces {
@@ -189,6 +194,14 @@ impl Writer<'_> {
     /// Small pictures that belong together.
     pub fn figures(&mut self, cells: &Cells) {
         self.push(Part::Figures(cells.clone()));
+    }
+
+    /// Small pictures that are folded away.
+    pub(crate) fn folded(&mut self, summary: &str, cells: &Cells) {
+        self.push(Part::Folded {
+            summary: summary.to_owned(),
+            cells: cells.clone(),
+        });
     }
 
     /// Series over time, and the still picture that is shown without a script.

@@ -1,6 +1,8 @@
 //! What a person looks at: the filtered residual over position, velocity, load and time, forward and
 //! backward apart, and its spectra over order and frequency, for a model before and after.
 
+use serde::Serialize;
+
 use crate::effect::AugmentedModel;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::JointKind;
@@ -9,7 +11,7 @@ use crate::robot::JointKind;
 pub type Line = Vec<[f64; 2]>;
 
 /// The residual of one joint by one model.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct JointEvidence {
     /// Mean residual over position, forward and backward.
     pub position: [Line; 2],

@@ -84,6 +84,11 @@ fn shown(part: &Part) -> String {
             format!("<figure><div class=\"still\">{svg}</div></figure>\n")
         }
         Part::Figures(cells) => figures(cells),
+        Part::Folded { summary, cells } => format!(
+            "<details><summary>{}</summary>{}</details>\n",
+            escaped(summary),
+            figures(cells)
+        ),
         Part::Traces { data, still } => format!(
             "<figure class=\"series\"><div class=\"still\">{}</div>\
              <script type=\"application/json\" class=\"traces\">{data}</script></figure>\n",

@@ -145,9 +145,14 @@ class Viewer {
       const choice = bar.appendChild(document.createElement('select'));
       choice.setAttribute('aria-label', 'what is shown');
       this.data.views.forEach((view, k) => choice.add(new Option(view.name, k)));
+      // a narrow screen cuts a long choice
+      const whole = box.appendChild(document.createElement('p'));
+      whole.className = 'what';
+      whole.textContent = this.view.name;
       choice.onchange = () => {
         const before = this.whole(), range = this.range;
         this.view = decoded(this.data.views[+choice.value]);
+        whole.textContent = this.view.name;
         const after = this.whole();
         const same = Math.abs(before[0] - after[0]) + Math.abs(before[1] - after[1])
           < 0.2 * (after[1] - after[0]);

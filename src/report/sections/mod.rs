@@ -3,7 +3,6 @@
 pub mod effects;
 pub mod fit;
 pub mod friction;
-mod look;
 pub mod parameters;
 pub mod provenance;
 pub mod quality;
@@ -11,4 +10,15 @@ pub mod residual;
 pub mod sketch;
 pub mod torque;
 
-pub use look::Look;
+/// The first few of many names.
+fn first_of(names: &[String]) -> String {
+    const MOST: usize = 3;
+    match names.len() > MOST {
+        true => format!(
+            "{} and {} more",
+            names[..MOST].join(", "),
+            names.len() - MOST
+        ),
+        false => names.join(", "),
+    }
+}

@@ -1,64 +1,32 @@
 //! What the residual depends on: over position, velocity, load and time, and its spectra.
 
-use super::look::Look;
+use super::first_of;
 use crate::diagnose::JointEvidence;
-use crate::effect::{AugmentedModel, Place, Search};
 use crate::identify::LoggedRobot;
-use crate::motion::MotionError;
 use crate::number;
+use crate::replay::{JointResidual, ResidualEvidence};
 use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 
-/// The residual of the first model, and of the second where there is one, over the logs of `wanted`.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
-pub fn figure(
-    look: &Look,
-    wanted: &dyn Fn(usize) -> bool,
-    before: &AugmentedModel,
-    after: Option<&AugmentedModel>,
-) -> Result<ResidualFigure, MotionError> {
-    let names = look.names.iter().enumerate();
-    let mut names: Vec<&str> = names
-        .filter(|(log, _)| wanted(*log))
-        .map(|(_, name)| name.as_str())
-        .collect();
-    names.dedup();
-    let found = after.unwrap_or(before);
-    let reach: Vec<f64> = (0..look.machine.robot.joints())
-        .map(|j| orders(found, j).fold(0.0, f64::max))
-        .collect();
-    let before = look.evidence(before, wanted, &reach)?;
-    let after = after
-        .map(|model| look.evidence(model, wanted, &reach))
-        .transpose()?;
+/// The figure.
+pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
+    let after = of.joints.iter().any(|joint| joint.after.is_some());
     let what = match after {
-        Some(_) => "Residual before and after",
-        None => "Residual",
+        true => "Residual before and after",
+        false => "Residual",
     };
-    let joints = look.machine.robot.joint_names().iter().enumerate();
-    Ok(ResidualFigure {
-        title: format!("{what}: {}", named(&names)),
-        joints: joints
-            .map(|(j, name)| {
-                let after = after.as_ref().map(|after| &after[j]);
-                let mut panels = panels(look.machine, j, &before[j], after);
-                let marks = orders(found, j).map(|order| (order, short(order)));
-                let over_order = panels.iter_mut().filter(|panel| panel.over.0 == ORDER);
-                over_order.for_each(|panel| panel.marks = marks.clone().collect());
-                (name.clone(), panels)
-            })
-            .collect(),
-    })
-}
-
-/// Orders of the waves that a model has at a joint.
-fn orders(model: &AugmentedModel, joint: usize) -> impl Iterator<Item = f64> + Clone {
-    let effects = model.effects.iter();
-    let waves = effects.filter(|e| e.law.entry.search == Search::Orders);
-    let here = waves.filter(move |e| e.place == Place::Joint(joint));
-    here.filter_map(|e| e.shape.first().copied())
+    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    let panels = |(j, (name, of)): (usize, (&String, &JointResidual))| {
+        let mut panels = panels(machine, j, &of.before, of.after.as_ref());
+        let marks = of.orders.iter().map(|order| (*order, short(*order)));
+        let over_order = panels.iter_mut().filter(|panel| panel.over.0 == ORDER);
+        over_order.for_each(|panel| panel.marks = marks.clone().collect());
+        (name.clone(), panels)
+    };
+    ResidualFigure {
+        title: format!("{what}: {}", first_of(&of.logs)),
+        joints: joints.enumerate().map(panels).collect(),
+    }
 }
 
 /// Name of the axis of waves over position.
@@ -68,19 +36,6 @@ const ORDER: &str = "order";
 fn short(order: f64) -> String {
     let text = number::significant(order, 3);
     text.strip_suffix(".0").unwrap_or(&text).to_owned()
-}
-
-/// The first few of many names.
-fn named(names: &[&str]) -> String {
-    const MOST: usize = 3;
-    match names.len() > MOST {
-        true => format!(
-            "{} and {} more",
-            names[..MOST].join(", "),
-            names.len() - MOST
-        ),
-        false => names.join(", "),
-    }
 }
 
 fn panels(

@@ -1,163 +1,99 @@
 //! Measured and reconstructed torque over time, and how far they are apart.
 
-use super::look::Look;
-use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
-use crate::motion::{MotionError, Stretch};
 use crate::number;
+use crate::replay::{JointSeries, TorqueSeries};
 use crate::report::figure::{JointTorque, TorqueFigure};
 use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
 
-/// A model whose torque is drawn.
-pub struct Drawn<'a> {
+/// How the torque of a model is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawn {
     /// Name of its torque, and of its residual.
-    pub names: [&'a str; 2],
+    pub names: [&'static str; 2],
     pub styles: [TraceStyle; 2],
-    pub model: &'a AugmentedModel,
 }
 
-impl<'a> Drawn<'a> {
-    /// The only model.
-    pub fn only(model: &'a AugmentedModel) -> Self {
-        Drawn {
-            names: ["reconstructed", "measured \u{2212} reconstructed"],
-            styles: [TraceStyle::Model, TraceStyle::Residual],
-            model,
-        }
-    }
-}
+/// The only model.
+pub const ONLY: Drawn = Drawn {
+    names: ["reconstructed", "measured \u{2212} reconstructed"],
+    styles: [TraceStyle::Model, TraceStyle::Residual],
+};
 
-/// The torque of `logs` as it was filtered, which the errors are of, and as it was logged.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
-pub fn traces(look: &Look, logs: &[usize], models: &[Drawn]) -> Result<Traces, MotionError> {
-    let (mut filtered, mut raw) = (Vec::new(), Vec::new());
-    for &log in logs {
-        let name = look.names.get(log).cloned().unwrap_or_default();
-        let words = |what: &str| match logs.len() {
-            1 => what.to_owned(),
-            _ => format!("{name}: {what}"),
+/// Torques of logs by models that are drawn so.
+fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[Drawn]) -> Traces {
+    // each log in two forms
+    let several = of.len() > 2;
+    let traces = of.iter().map(|series| {
+        let what = match series.cutoff_hz {
+            Some(cutoff) => format!(
+                "below {} Hz, as in the errors",
+                number::significant(cutoff, 3)
+            ),
+            None => "as logged, every sample".to_owned(),
         };
-        let mut smooth = Series::new(look, models);
-        let mut plain = Series::new(look, models);
-        for stretch in look.of_log(log) {
-            let hats: Vec<Vec<Vec<f64>>> = models
-                .iter()
-                .map(|m| m.model.reconstruct(stretch))
-                .collect();
-            let channels: Vec<&[f64]> = stretch
-                .tau
-                .iter()
-                .chain(hats.iter().flatten())
-                .map(Vec::as_slice)
-                .collect();
-            plain.add(&stretch.t, &channels);
-            let rows = look.filters.of(stretch).run(&channels)?;
-            let times = sampled(look, stretch);
-            let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-            smooth.add(&times, &rows);
-        }
-        let cutoff = number::significant(look.cutoff_hz, 3);
-        filtered.push(smooth.trace(words(&format!("below {cutoff} Hz, as in the errors"))));
-        raw.push(plain.trace(words("as logged, every sample")));
-    }
-    let traces = filtered.into_iter().zip(raw);
-    Ok(Traces {
+        let name = match several {
+            true => format!("{}: {what}", series.log),
+            false => what,
+        };
+        trace(machine, series, models, name)
+    });
+    Traces {
         label: "Measured and reconstructed torque over time".into(),
-        traces: traces.flat_map(|(a, b)| [a, b]).collect(),
-    })
-}
-
-fn sampled(look: &Look, stretch: &Stretch) -> Vec<f64> {
-    let filter = look.filters.of(stretch);
-    let rows = filter.rows(stretch.len());
-    let at = |i| stretch.t.get(filter.sample_of(i)).copied();
-    (0..rows).filter_map(at).collect()
-}
-
-/// Torques of one log, stretch after stretch.
-struct Series<'a> {
-    machine: &'a LoggedRobot,
-    models: &'a [Drawn<'a>],
-    t: Vec<f64>,
-    breaks: Vec<usize>,
-    /// Measured, then of each model, joint by joint.
-    channels: Vec<Vec<f64>>,
-}
-
-impl<'a> Series<'a> {
-    fn new(look: &Look<'a>, models: &'a [Drawn<'a>]) -> Self {
-        let joints = look.machine.robot.joints();
-        Series {
-            machine: look.machine,
-            models,
-            t: Vec::new(),
-            breaks: Vec::new(),
-            channels: vec![Vec::new(); joints * (1 + models.len())],
-        }
-    }
-
-    fn add(&mut self, t: &[f64], channels: &[&[f64]]) {
-        self.breaks.push(self.t.len());
-        self.t.extend_from_slice(t);
-        for (all, channel) in self.channels.iter_mut().zip(channels) {
-            all.extend_from_slice(&channel[..t.len().min(channel.len())]);
-        }
-    }
-
-    fn trace(self, name: String) -> Trace {
-        let joints = self.machine.robot.joint_names();
-        let mut panels = Vec::new();
-        for (j, joint) in joints.iter().enumerate() {
-            let unit = self.machine.file.torque_unit(j).to_owned();
-            let measured = &self.channels[j];
-            let mut lines = vec![TraceLine {
-                name: "measured".into(),
-                style: TraceStyle::Measured,
-                values: measured.clone(),
-            }];
-            let mut differences = Vec::new();
-            for (m, drawn) in self.models.iter().enumerate() {
-                let hat = &self.channels[joints.len() * (m + 1) + j];
-                lines.push(TraceLine {
-                    name: drawn.names[0].into(),
-                    style: drawn.styles[0],
-                    values: hat.clone(),
-                });
-                differences.push(TraceLine {
-                    name: drawn.names[1].into(),
-                    style: drawn.styles[1],
-                    values: measured.iter().zip(hat).map(|(a, b)| a - b).collect(),
-                });
-            }
-            let quantity = if unit == "N" { "force" } else { "torque" };
-            let panel = |small, name: &str, quantity: &str, lines| TracePanel {
-                name: name.to_owned(),
-                quantity: quantity.to_owned(),
-                unit: unit.clone(),
-                small,
-                limits: None,
-                lines,
-            };
-            panels.push(panel(false, joint, quantity, lines));
-            panels.push(panel(true, "", "residual", differences));
-        }
-        Trace {
-            name,
-            t: self.t,
-            breaks: self.breaks,
-            panels,
-        }
+        traces: traces.collect(),
     }
 }
 
-/// The still picture of a trace, by the last of its models.
-pub fn still(machine: &LoggedRobot, trace: &Trace, title: &str) -> TorqueFigure {
+fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: String) -> Trace {
+    let mut panels = Vec::new();
+    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    for (j, (joint, series)) in joints.enumerate() {
+        let unit = machine.file.torque_unit(j).to_owned();
+        let mut lines = vec![TraceLine {
+            name: "measured".into(),
+            style: TraceStyle::Measured,
+            values: series.measured.clone(),
+        }];
+        let mut differences = Vec::new();
+        for (drawn, hat) in models.iter().zip(&series.reconstructed) {
+            lines.push(TraceLine {
+                name: drawn.names[0].into(),
+                style: drawn.styles[0],
+                values: hat.clone(),
+            });
+            let apart = series.measured.iter().zip(hat);
+            differences.push(TraceLine {
+                name: drawn.names[1].into(),
+                style: drawn.styles[1],
+                values: apart.map(|(a, b)| a - b).collect(),
+            });
+        }
+        let quantity = if unit == "N" { "force" } else { "torque" };
+        let panel = |small, name: &str, quantity: &str, lines| TracePanel {
+            name: name.to_owned(),
+            quantity: quantity.to_owned(),
+            unit: unit.clone(),
+            small,
+            limits: None,
+            lines,
+        };
+        panels.push(panel(false, joint, quantity, lines));
+        panels.push(panel(true, "", "residual", differences));
+    }
+    Trace {
+        name,
+        t: of.t.clone(),
+        breaks: of.breaks.clone(),
+        panels,
+    }
+}
+
+/// The still picture of a log, by the last of its models.
+fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure {
     let whole = |values: &[f64]| -> Vec<f64> {
-        let mut out = Vec::with_capacity(values.len() + trace.breaks.len());
+        let mut out = Vec::with_capacity(values.len() + of.breaks.len());
         for (k, v) in values.iter().enumerate() {
-            if k > 0 && trace.breaks.contains(&k) {
+            if k > 0 && of.breaks.contains(&k) {
                 // a row that is not finite parts the lines at a gap
                 out.push(f64::NAN);
             }
@@ -165,48 +101,40 @@ pub fn still(machine: &LoggedRobot, trace: &Trace, title: &str) -> TorqueFigure 
         }
         out
     };
-    let pairs = trace.panels.chunks(2).zip(machine.robot.joint_names());
-    let joints = pairs
-        .enumerate()
-        .filter_map(|(j, (panels, name))| {
-            let lines = &panels.first()?.lines;
-            let (measured, hat) = (lines.first()?, lines.last()?);
-            let square = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>();
-            let pairs = || measured.values.iter().zip(&hat.values);
-            let error = square(&mut pairs().map(|(a, b)| a - b));
-            let torque = square(&mut measured.values.iter().copied());
-            Some(JointTorque {
-                joint: name.clone(),
-                unit: machine.file.torque_unit(j).to_owned(),
-                t: whole(&trace.t),
-                measured: whole(&measured.values),
-                reconstructed: whole(&hat.values),
-                relative_error: (error / torque).sqrt(),
-                rmse: (error / measured.values.len() as f64).sqrt(),
-            })
+    let joint = |(j, (name, series)): (usize, (&String, &JointSeries))| {
+        Some(JointTorque {
+            joint: name.clone(),
+            unit: machine.file.torque_unit(j).to_owned(),
+            t: whole(&of.t),
+            measured: whole(&series.measured),
+            reconstructed: whole(series.reconstructed.last()?),
+            relative_error: series.relative_error,
+            rmse: series.rmse,
         })
-        .collect();
+    };
+    let joints = machine.robot.joint_names().iter().zip(&of.joints);
     TorqueFigure {
         title: title.to_owned(),
-        joints,
+        joints: joints.enumerate().filter_map(joint).collect(),
     }
 }
 
 /// The section.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub fn section(
     page: &mut Writer,
-    look: &Look,
-    logs: &[usize],
+    machine: &LoggedRobot,
+    of: &[TorqueSeries],
     models: &[Drawn],
     title: &str,
-) -> Result<(), MotionError> {
-    let traces = traces(look, logs, models)?;
+) {
     page.heading("Torque, measured and reconstructed");
-    let first = traces.traces.first();
-    let figure = first.map_or(String::new(), |t| still(look.machine, t, title).by_joint());
-    page.traces(&traces, &figure);
-    Ok(())
+    let figure = of.first().map_or(String::new(), |first| {
+        // without a script, and in print, one log stands for all
+        let title = match of.len() > 2 {
+            true => format!("{}, the first of {} logs", first.log, of.len() / 2),
+            false => title.to_owned(),
+        };
+        still(machine, first, &title).by_joint()
+    });
+    page.traces(&traces(machine, of, models), &figure);
 }

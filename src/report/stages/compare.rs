@@ -1,15 +1,14 @@
 //! The report of `compare`.
 
 use crate::compare::{Apart, Difference, ParameterEstimate, ParameterPair, Reason, SideBySide};
-use crate::identify::{Compared, Curves, DIFFERENT, Side, Tried};
+use crate::identify::{Compared, Curves, DIFFERENT, Tried};
 use crate::log::{Provenance, escape};
-use crate::motion::MotionError;
 use crate::number;
+use crate::replay::{ReplayedPair, is_beyond_curve, speeds};
 use crate::report::figure::{OverlayFigure, OverlayPanel};
-use crate::report::sections::friction::{clouds, is_beyond_curve, speeds};
+use crate::report::sections::provenance;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::{self, Drawn};
-use crate::report::sections::{Look, provenance};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 
@@ -66,38 +65,33 @@ pub fn compare(of: &Compared, logs: &str) -> Report {
     report
 }
 
-/// What a page has room for besides; `read` are both model files and the logs, `look` is absent where
+/// What a page has room for besides; `read` are both model files and the logs, `replayed` is absent where
 /// no log is given.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub fn pictures(
     page: &mut Writer,
     of: &Compared,
     read: &[Provenance],
-    look: Option<&Look>,
+    replayed: Option<&ReplayedPair>,
     quality: &[Inspected],
     command: &str,
-) -> Result<(), MotionError> {
+) {
     if !of.curves.is_empty() {
         page.heading("Friction");
-        page.figures(&figure(of, look)?.cells());
+        page.figures(&figure(of, replayed).cells());
     }
-    if let Some(look) = look {
+    if let Some(replayed) = replayed {
         let models = [
             Drawn {
                 names: ["A", "residual of A"],
                 styles: [TraceStyle::Before, TraceStyle::Before],
-                model: &of.sides[0].model,
             },
             Drawn {
                 names: ["B", "residual of B"],
                 styles: [TraceStyle::Model, TraceStyle::After],
-                model: &of.sides[1].model,
             },
         ];
-        let all: Vec<usize> = (0..look.names.len()).collect();
-        torque::section(page, look, &all, &models, &look.names.join(", "))?;
+        let title = replayed.logs.join(", ");
+        torque::section(page, &of.machine, &replayed.torque, &models, &title);
         quality::section(page, quality, &[]);
     }
     let summary = of.tried.as_ref().map(|tried| &tried.in_memory.summary);
@@ -106,27 +100,19 @@ pub fn pictures(
     let mut made_from: Vec<Provenance> = made_from.collect();
     made_from.dedup();
     provenance::section(page, &of.machine.file, read, &made_from, summary, command);
-    Ok(())
 }
 
 /// Friction of both over each other: a curve over velocity, or along the logs where effects make it depend on
 /// more; of such a model without logs the declared law alone.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
-pub fn figure(of: &Compared, look: Option<&Look>) -> Result<OverlayFigure, MotionError> {
+pub fn figure(of: &Compared, replayed: Option<&ReplayedPair>) -> OverlayFigure {
     let names = of.machine.robot.joint_names();
-    let along = |side: &Side| match look {
-        Some(look) if !side.model.effects.is_empty() => clouds(look, &side.model).map(Some),
-        _ => Ok(None),
-    };
-    let along = [along(&of.sides[0])?, along(&of.sides[1])?];
     let panel = |shown: &Curves| {
         let speeds: Vec<f64> = speeds(shown.most).collect();
         let mut curves = of.at(shown, speeds.into_iter());
         let joint = names.iter().position(|name| *name == shown.joint);
         let clouds = [0, 1].map(|k| {
-            let (Some(rows), Some(j)) = (&along[k], joint) else {
+            let rows = replayed.and_then(|pair| pair.friction[k].as_ref());
+            let (Some(rows), Some(j)) = (rows, joint) else {
                 return Vec::new();
             };
             if !is_beyond_curve(&of.sides[k].model, j) {
@@ -148,17 +134,17 @@ pub fn figure(of: &Compared, look: Option<&Look>) -> Result<OverlayFigure, Motio
         Some("limits") => "up to the speed limit",
         _ => "speeds assumed, no log is given",
     };
-    let declared = match look {
+    let declared = match replayed {
         None if of.sides.iter().any(|side| !side.model.effects.is_empty()) => {
             ", without their effects"
         }
         _ => "",
     };
-    Ok(OverlayFigure {
+    OverlayFigure {
         title: format!("Friction of two models{declared}, {range}"),
         names: [0, 1].map(|k| format!("{}: {}", LETTERS[k], of.name(k))),
         panels: of.curves.iter().map(panel).collect(),
-    })
+    }
 }
 
 /// The verdict in words.

@@ -8,14 +8,11 @@ use crate::diagnose::{
 };
 use crate::identify::{DataFault, Diagnosed, DiagnosisVerdict, LoggedRobot, separating_command};
 use crate::log::{Provenance, escape};
-use crate::motion::MotionError;
 use crate::number;
-use crate::report::figure::ResidualFigure;
+use crate::replay::ReplayedDiagnosis;
 use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::torque::Drawn;
-use crate::report::sections::{
-    Look, fit, friction, parameters, provenance, residual, sketch, torque,
-};
+use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::{Align, Table};
 use crate::report::{Report, TraceStyle, Writer};
 
@@ -45,24 +42,20 @@ pub fn diagnose(of: &Diagnose) -> Report {
     report
 }
 
-/// What a page has room for besides; `figure` is that of [`figure`].
-///
-/// # Errors
-/// Stretches that are too short for the filter.
+/// What a page has room for besides.
 pub fn pictures(
     page: &mut Writer,
     of: &Diagnose,
-    figure: &ResidualFigure,
+    replayed: &ReplayedDiagnosis,
     quality: &[Inspected],
     command: &str,
-) -> Result<(), MotionError> {
+) {
     let (machine, found) = (of.machine, of.found);
-    sections(page, machine, found, figure)?;
-    let look = look(machine, found)?;
+    sections(page, machine, found, replayed);
     let refined = found.model(machine, of.file);
     parameters::section(page, &refined, &|_| None);
-    let curves = friction::figure(&look, &refined, &found.diagnosis.model)?;
-    friction::section(page, &curves);
+    let logs: Vec<String> = found.logs.iter().map(|name| escape(name)).collect();
+    friction::section(page, machine, &replayed.friction, &logs);
     page.heading("Correlated parameters");
     fit::pairs(page, &refined);
     quality::section(page, quality, &found.in_memory.warnings);
@@ -70,7 +63,6 @@ pub fn pictures(
     inputs.extend(found.in_memory.inputs.iter().cloned());
     let (summary, made_from) = (Some(&found.in_memory.summary), &of.file.provenance.inputs);
     provenance::section(page, &machine.file, &inputs, made_from, summary, command);
-    Ok(())
 }
 
 /// Where the data are at fault, which comes before any physics.
@@ -297,20 +289,6 @@ fn path(found: &Diagnosed) -> Option<String> {
     ))
 }
 
-/// The residual before and after, over the logs that were fitted.
-pub fn figure(machine: &LoggedRobot, found: &Diagnosed) -> Result<ResidualFigure, MotionError> {
-    let look = look(machine, found)?;
-    let fitted = found.diagnosis.fitted_logs;
-    let d = &found.diagnosis;
-    // without an effect the given model stands
-    let after = (!d.steps.is_empty()).then_some(&d.model);
-    residual::figure(&look, &|log| log < fitted, &found.given, after)
-}
-
-fn look<'a>(machine: &'a LoggedRobot, found: &'a Diagnosed) -> Result<Look<'a>, MotionError> {
-    Look::new(machine, &found.in_memory, found.logs.iter().cloned())
-}
-
 /// How many of the names are tentative, as a sentence.
 fn tentative_names(d: &Diagnosis) -> String {
     let tentative = |s: &&AcceptedEffect| d.status(s) == StepStatus::Tentative;
@@ -364,26 +342,13 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
 }
 
 /// What was added, the torque and the residual before and after, and what was not added.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
 pub fn sections(
     page: &mut Writer,
     machine: &LoggedRobot,
     found: &Diagnosed,
-    figure: &ResidualFigure,
-) -> Result<(), MotionError> {
-    let look = look(machine, found)?;
+    replayed: &ReplayedDiagnosis,
+) {
     let d = &found.diagnosis;
-    // held-out logs, where there are any
-    let all: Vec<usize> = (0..look.names.len()).collect();
-    let (fitted, others) = all.split_at(d.fitted_logs.min(all.len()));
-    let shown = if others.is_empty() { fitted } else { others };
-    let names: Vec<&str> = shown.iter().map(|log| look.names[*log].as_str()).collect();
-    let data = match others.is_empty() {
-        true => "the fitted data",
-        false => "held-out data",
-    };
     let errors = d.after.holdout.as_ref().unwrap_or(&d.after.train);
     let errors = errors.joints.iter().map(|joint| joint.relative_error);
     let errors: Vec<f64> = errors.collect();
@@ -391,30 +356,28 @@ pub fn sections(
         page.heading("What the model lacks");
     }
     page.list(doubts(machine, found));
-    found_effects::show(page, (machine, found), &look, (shown, data))?;
+    found_effects::show(page, machine, found, replayed);
     if let Some(path) = path(found) {
         page.paragraph(&path);
     }
-    sketch::section(page, &look, shown, &errors);
+    sketch::section(page, machine, replayed.poses.as_ref(), &errors);
     let after = Drawn {
         names: ["after", "residual after"],
         styles: [TraceStyle::Model, TraceStyle::After],
-        model: &d.model,
     };
     let before = Drawn {
         names: ["before", "residual before"],
         styles: [TraceStyle::Before, TraceStyle::Before],
-        model: &found.given,
     };
     let models = match d.steps.is_empty() {
-        true => vec![Drawn::only(&found.given)],
+        true => vec![torque::ONLY],
         false => vec![before, after],
     };
-    torque::section(page, &look, shown, &models, &names.join(", "))?;
+    let title = replayed.logs.join(", ");
+    torque::section(page, machine, &replayed.torque, &models, &title);
     what_is_left::section(page, machine, found);
-    residual::section(page, figure);
+    residual::section(page, &residual::figure(machine, &replayed.residual));
     candidates(page, machine, found);
-    Ok(())
 }
 
 fn candidates(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {

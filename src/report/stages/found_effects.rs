@@ -3,29 +3,30 @@
 use super::step_words::{in_words, tentative, worsened};
 use crate::diagnose::AcceptedEffect;
 use crate::identify::{Diagnosed, LoggedRobot};
-use crate::motion::MotionError;
 use crate::number;
+use crate::replay::ReplayedDiagnosis;
 use crate::report::Writer;
-use crate::report::sections::{Look, effects};
+use crate::report::sections::effects;
 
-/// The table and the cards, over the logs `shown`, which are called `data`.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
+/// The table and the cards.
 pub(super) fn show(
     page: &mut Writer,
-    (machine, found): (&LoggedRobot, &Diagnosed),
-    look: &Look,
-    (shown, data): (&[usize], &str),
-) -> Result<(), MotionError> {
+    machine: &LoggedRobot,
+    found: &Diagnosed,
+    replayed: &ReplayedDiagnosis,
+) {
     let d = &found.diagnosis;
-    let added = d.steps.iter();
-    let added = added.map(|step| (step.effect, words(machine, found, step)));
-    effects::cards(page, look, &d.model, added, (shown, data))?;
+    let data = match replayed.held_out {
+        true => "held-out data",
+        false => "the fitted data",
+    };
+    for (step, rows) in d.steps.iter().zip(&replayed.effects) {
+        let said = words(machine, found, step);
+        effects::card(page, (machine, &d.model), rows, said, data);
+    }
     if !d.steps.is_empty() {
         table(page, machine, found);
     }
-    Ok(())
 }
 
 /// What is said of one effect besides its picture.

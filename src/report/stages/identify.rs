@@ -5,14 +5,10 @@ use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::identify::{Campaigned, DataFault, DiagnoseEnd, Diagnosed, LoggedRobot};
 use crate::log::{Provenance, escape};
-use crate::motion::MotionError;
 use crate::number;
-use crate::report::figure::ResidualFigure;
+use crate::replay::{Replayed, ReplayedDiagnosis};
 use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::torque::Drawn;
-use crate::report::sections::{
-    Look, fit, friction, parameters, provenance, residual, sketch, torque,
-};
+use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::Table;
 use crate::report::{Report, Writer, summary};
 use crate::verdict::Verdict;
@@ -162,18 +158,19 @@ pub struct Origin<'a> {
     pub command: &'a str,
 }
 
-/// What a page has room for besides; `residuals` is the picture of the diagnosis, where there was one,
-/// `look` holds the unseen logs where there was none.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
-pub fn pictures(
-    page: &mut Writer,
-    of: &Identify,
-    look: Option<&Look>,
-    residuals: Option<&ResidualFigure>,
-    origin: &Origin,
-) -> Result<(), MotionError> {
+/// What the logs show beside the model.
+#[derive(Debug, Clone, Copy)]
+pub enum Shown<'a> {
+    /// There are no unseen logs, or they are too long to be held.
+    Nothing,
+    /// The unseen logs, where nothing was diagnosed.
+    Model(&'a Replayed),
+    /// The logs of the diagnosis.
+    Diagnosis(&'a ReplayedDiagnosis),
+}
+
+/// What a page has room for besides.
+pub fn pictures(page: &mut Writer, of: &Identify, shown: Shown, origin: &Origin) {
     let (machine, found) = (of.machine, of.found);
     if let Some((laws, _)) = &found.friction {
         page.heading("Friction");
@@ -183,23 +180,40 @@ pub fn pictures(
              in the fit.",
         );
         page.figures(&filter::figure(machine, laws).cells());
-    } else if let Some(look) = look {
-        let figure = friction::figure(look, &found.model, &found.numbers)?;
-        friction::section(page, &figure);
+    } else if let Shown::Model(Replayed {
+        friction: rows,
+        logs,
+        ..
+    })
+    | Shown::Diagnosis(ReplayedDiagnosis {
+        friction: rows,
+        logs,
+        ..
+    }) = shown
+    {
+        friction::section(page, machine, rows, logs);
     }
-    if let (Some(diagnosed), Some(residuals)) = (of.diagnosed(), residuals) {
-        diagnose::sections(page, machine, diagnosed, residuals)?;
-    } else if let Some(look) = look {
-        let logs: Vec<usize> = (0..of.unseen.len()).collect();
-        if let Some(validated) = &found.validated {
-            let errors = validated.validation.joints.iter();
-            let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();
-            sketch::section(page, look, &logs, &errors);
+    match (shown, of.diagnosed()) {
+        (Shown::Diagnosis(replayed), Some(diagnosed)) => {
+            diagnose::sections(page, machine, diagnosed, replayed);
         }
-        let drawn = [Drawn::only(&found.numbers)];
-        torque::section(page, look, &logs, &drawn, &of.title())?;
-        let figure = residual::figure(look, &|_| true, &found.numbers, None)?;
-        residual::section(page, &figure);
+        (Shown::Model(replayed), _) => {
+            if let Some(validated) = &found.validated {
+                let errors = validated.validation.joints.iter();
+                let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();
+                sketch::section(page, machine, replayed.poses.as_ref(), &errors);
+            }
+            torque::section(
+                page,
+                machine,
+                &replayed.torque,
+                &[torque::ONLY],
+                &of.title(),
+            );
+            let figure = residual::figure(machine, &replayed.residual);
+            residual::section(page, &figure);
+        }
+        _ => {}
     }
     fit::section(page, &found.dynamics, of.model());
     quality::section(page, origin.quality, origin.warnings);
@@ -216,5 +230,4 @@ pub fn pictures(
         "Noise of the torque that is left, by joint: {}.",
         noise.collect::<Vec<_>>().join(", ")
     ));
-    Ok(())
 }

@@ -1,18 +1,16 @@
 //! The report of `lsq`.
 
 use crate::config::ModelFile;
-use crate::effect::AugmentedModel;
 use crate::identify::{
     Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
     MotionFit,
 };
 use crate::log::{Provenance, escape};
 use crate::math::descent::Ending;
-use crate::motion::MotionError;
 use crate::number;
+use crate::replay::Replayed;
 use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::torque::Drawn;
-use crate::report::sections::{Look, fit, friction, parameters, provenance, residual, torque};
+use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
 use crate::report::table::{Align, Table, unbroken};
 use crate::report::{Report, Writer, summary};
 use crate::verdict::{IDENTIFIED, Verdict, WEAK};
@@ -70,26 +68,22 @@ pub fn lsq(of: &Lsq) -> Report {
 }
 
 /// What a page has room for besides; `given` are the robot file and the model that gave the friction,
-/// `look` is absent where the logs are too long to be held.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
+/// `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
     of: &Lsq,
-    model: &AugmentedModel,
-    look: Option<&Look>,
+    replayed: Option<&Replayed>,
     given: &[Provenance],
     quality: &[Inspected],
     command: &str,
-) -> Result<(), MotionError> {
+) {
     parameters::section(page, of.file, &|_| None);
-    if let Some(look) = look {
-        friction::section(page, &friction::figure(look, of.file, model)?);
-        let logs: Vec<usize> = (0..of.logs.len()).collect();
-        let title = look.names.join(", ");
-        torque::section(page, look, &logs, &[Drawn::only(model)], &title)?;
-        let figure = residual::figure(look, &|_| true, model, None)?;
+    if let Some(replayed) = replayed {
+        let (machine, logs) = (of.machine, &replayed.logs);
+        friction::section(page, machine, &replayed.friction, logs);
+        let title = logs.join(", ");
+        torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
+        let figure = residual::figure(machine, &replayed.residual);
         residual::section(page, &figure);
     }
     fit::section(page, of.found, of.file);
@@ -97,7 +91,6 @@ pub fn pictures(
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
     let (file, summary) = (&of.machine.file, Some(&of.found.summary));
     provenance::section(page, file, &inputs, &[], summary, command);
-    Ok(())
 }
 
 /// The residual of the fit, joint by joint.

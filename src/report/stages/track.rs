@@ -12,6 +12,8 @@ use crate::track::ChangeKind;
 const FEW: usize = 12;
 /// Most courses of a robot without a change that a page draws.
 const DRAWN: usize = 60;
+/// Courses without a change that are shown at once.
+const AT_ONCE: usize = 6;
 /// Most robots of which a page draws courses.
 const ROBOTS: usize = 20;
 
@@ -203,8 +205,7 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
     let of =
         |p: &TrackedParameter, c: &&TrackedChange| (&c.parameter, &c.joint) == (&p.name, &p.joint);
     let changed = |p: &&TrackedParameter| robot.changes.iter().any(|c| of(p, &c));
-    let parameters = robot.parameters.iter();
-    let ordered = (parameters.clone().filter(changed)).chain(parameters.filter(|p| !changed(p)));
+    let (changes, steady): (Vec<_>, Vec<_>) = robot.parameters.iter().partition(changed);
     let panel = |p: &TrackedParameter| CoursePanel {
         name: named(&p.name, p.joint.as_ref()),
         unit: p.unit.clone(),
@@ -217,14 +218,27 @@ fn course(page: &mut Writer, robot: &TrackedRobot) {
             .map(|c| (c.time - zero) / seconds)
             .collect(),
     };
-    let figure = CourseFigure {
+    let figure = |what: &str, of: &[&TrackedParameter]| CourseFigure {
         title: format!(
-            "Parameters of {} over {} logs",
+            "{what} of {} over {} logs",
             escape(&robot.name),
             robot.logs.len()
         ),
         time_unit: unit.to_owned(),
-        panels: ordered.take(DRAWN).map(panel).collect(),
+        panels: of.iter().take(DRAWN).map(|p| panel(p)).collect(),
     };
-    page.figures(&figure.cells());
+    if !changes.is_empty() {
+        page.figures(&figure("Parameters that changed", &changes).cells());
+    }
+    // a robot of one joint is seen at a glance, all courses of an arm are not
+    let few = steady.len() <= AT_ONCE;
+    let courses = figure("Parameters without a change", &steady).cells();
+    match steady.as_slice() {
+        [] => {}
+        _ if few => page.figures(&courses),
+        _ => page.folded(
+            &format!("{} parameters without a change", steady.len()),
+            &courses,
+        ),
+    }
 }

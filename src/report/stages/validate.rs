@@ -4,14 +4,11 @@ use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::identify::{LoggedRobot, Validated};
 use crate::log::{DataRole, Provenance, escape};
-use crate::motion::MotionError;
 use crate::number;
+use crate::replay::Replayed;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
 use crate::report::sections::quality::{self, Inspected};
-use crate::report::sections::torque::Drawn;
-use crate::report::sections::{
-    Look, fit, friction, parameters, provenance, residual, sketch, torque,
-};
+use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary};
 use crate::validate::{JointError, Validation};
@@ -69,28 +66,26 @@ fn bars(validation: &Validation, limit: Option<f64>) -> ErrorFigure {
     }
 }
 
-/// What a page has room for besides; `look` is absent where the logs are too long to be held.
-///
-/// # Errors
-/// Stretches that are too short for the filter.
+/// What a page has room for besides; `replayed` is absent where the logs are too long to be held.
 pub fn pictures(
     page: &mut Writer,
     of: &Validate,
-    look: Option<&Look>,
+    replayed: Option<&Replayed>,
     quality: &[Inspected],
     command: &str,
-) -> Result<(), MotionError> {
+) {
     let validation = &of.found.validation;
     let title = escaped(of.logs);
     parameters::section(page, of.file, &|_| None);
-    match look {
-        Some(look) => {
-            let logs: Vec<usize> = (0..of.logs.len()).collect();
+    match replayed {
+        Some(replayed) => {
+            let machine = of.machine;
             let errors = validation.joints.iter().map(|joint| joint.relative_error);
-            sketch::section(page, look, &logs, &errors.collect::<Vec<_>>());
-            friction::section(page, &friction::figure(look, of.file, of.model)?);
-            torque::section(page, look, &logs, &[Drawn::only(of.model)], &title)?;
-            let figure = residual::figure(look, &|_| true, of.model, None)?;
+            let errors: Vec<f64> = errors.collect();
+            sketch::section(page, machine, replayed.poses.as_ref(), &errors);
+            friction::section(page, machine, &replayed.friction, &replayed.logs);
+            torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
+            let figure = residual::figure(machine, &replayed.residual);
             residual::section(page, &figure);
         }
         None => {
@@ -110,7 +105,6 @@ pub fn pictures(
     let (file, made_from) = (&of.machine.file, &of.file.provenance.inputs);
     let summary = Some(&validation.summary);
     provenance::section(page, file, &inputs, made_from, summary, command);
-    Ok(())
 }
 
 /// Names as a page shows them.
