@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::{RobotFile, Trajectory};
 use cft_ident::excite::information::Information;
-use cft_ident::excite::machine::Machine;
+use cft_ident::excite::machine::ForeseenRobot;
 use cft_ident::excite::search::{Task, design};
 use cft_ident::excite::series::Series;
 use cft_ident::excite::usage::{along_period, worst};
@@ -95,7 +95,7 @@ fn processor_seconds() -> f64 {
     (ticks(11).unwrap_or(0.0) + ticks(12).unwrap_or(0.0)) / TICKS_PER_SECOND
 }
 
-fn table_3(machine: &Machine) -> Series {
+fn table_3(machine: &ForeseenRobot) -> Series {
     let file = Trajectory::load(Path::new("configs/table3.toml")).expect("comes with the tool");
     let Trajectory::Fourier(file) = file else {
         panic!("Table 3 is a Fourier series");
@@ -104,7 +104,7 @@ fn table_3(machine: &Machine) -> Series {
 }
 
 /// The printed offsets, where the limits allow them: that of x_c4 lies outside dSPACE's.
-fn offsets(machine: &Machine, table_3: &Series, free: bool) -> Vec<Option<f64>> {
+fn offsets(machine: &ForeseenRobot, table_3: &Series, free: bool) -> Vec<Option<f64>> {
     let allowed = |i: usize, offset: f64| {
         let mut all = machine.channels.iter();
         let position = all.find(|c| c.quantity.name() == "position" && c.index == i);
@@ -116,7 +116,7 @@ fn offsets(machine: &Machine, table_3: &Series, free: bool) -> Vec<Option<f64>> 
         .collect()
 }
 
-fn row(machine: &Machine, series: &Series, mut line: Value) -> Value {
+fn row(machine: &ForeseenRobot, series: &Series, mut line: Value) -> Value {
     let information = Information::of_period(machine, series, 250).expect("reachable");
     for (name, criterion) in [
         ("J_k raw", Criterion::Condition),

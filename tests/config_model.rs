@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use cft_ident::config::held_out::{Excesses, HeldOut};
 use cft_ident::config::model_file::{
-    Covariance, Effect, EffectParameter, FrictionPrior, ModelFile, ModelProvenance, Parameter,
-    Verdict,
+    Covariance, EffectParameter, EffectSection, FrictionPrior, ModelFile, ModelProvenance,
+    Parameter, Verdict,
 };
 use cft_ident::config::{ConfigError, RobotFile};
 use cft_ident::log::Provenance;
@@ -106,7 +106,7 @@ fn model(values: &[f64]) -> ModelFile {
             shape: -0.125,
             largest: vec![1.7, 1.3],
         }),
-        effects: vec![Effect {
+        effects: vec![EffectSection {
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),
             parameters: BTreeMap::from([

@@ -5,18 +5,20 @@ use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::{RobotFile, Trajectory};
 use cft_ident::excite::information::Information;
-use cft_ident::excite::machine::Machine;
-use cft_ident::excite::search::{Found, Task, design, keeps_limits};
+use cft_ident::excite::machine::ForeseenRobot;
+use cft_ident::excite::search::{FoundMotion, Task, design, keeps_limits};
 use cft_ident::excite::series::Series;
 use cft_ident::excite::usage::along_period;
-use cft_ident::excite::{Criterion, Given, PriorInformation, machine, series_of, trajectory};
+use cft_ident::excite::{
+    Criterion, GivenInformation, PriorInformation, machine, series_of, trajectory,
+};
 
-fn built(robot: &str) -> Machine {
+fn built(robot: &str) -> ForeseenRobot {
     let robot = RobotFile::load(Path::new(robot)).expect("embedded");
     machine(&robot, None).expect("a machine")
 }
 
-fn table_3(machine: &Machine) -> Series {
+fn table_3(machine: &ForeseenRobot) -> Series {
     let file = Trajectory::load(Path::new("configs/table3.toml")).expect("embedded");
     let Trajectory::Fourier(file) = file else {
         panic!("a Fourier series");
@@ -38,11 +40,11 @@ fn task(criterion: Criterion) -> Task {
     }
 }
 
-fn found(machine: &Machine, task: &Task) -> Found {
+fn found(machine: &ForeseenRobot, task: &Task) -> FoundMotion {
     design(machine, task, &|_| {}, &AtomicBool::new(false)).expect("a design")
 }
 
-fn condition(machine: &Machine, series: &Series) -> [f64; 2] {
+fn condition(machine: &ForeseenRobot, series: &Series) -> [f64; 2] {
     let information = Information::of_period(machine, series, 250).expect("reachable");
     [Criterion::Condition, Criterion::ConditionNormalised]
         .map(|c| information.value(machine, &c, None).expect("finite"))
@@ -101,7 +103,7 @@ fn a_design_after_another_tells_what_the_first_leaves_open() {
     machine.noise = vec![2.0, 0.3, 0.2, 0.3];
     let first = table_3(&machine);
     let information = Information::of_period(&machine, &first, 250).expect("reachable");
-    let mut given = Given::nothing(&machine);
+    let mut given = GivenInformation::nothing(&machine);
     given.add_motion(&information, 2500.0);
     let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
     let criterion = Criterion::AOptimal(vec![1.0; 12]);

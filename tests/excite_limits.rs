@@ -6,8 +6,8 @@ use std::sync::atomic::AtomicBool;
 
 use cft_ident::config::{RobotFile, Trajectory};
 use cft_ident::excite::blend::Blend;
-use cft_ident::excite::limits::Channel;
-use cft_ident::excite::machine::Machine;
+use cft_ident::excite::limits::BoundedQuantity;
+use cft_ident::excite::machine::ForeseenRobot;
 use cft_ident::excite::search::{Task, design};
 use cft_ident::excite::series::{Kinematics, Series};
 use cft_ident::excite::usage::{along_blend, along_period, worst};
@@ -19,12 +19,12 @@ fn robot(name: &str) -> RobotFile {
     RobotFile::load(Path::new(name)).expect("embedded")
 }
 
-fn built(file: &str) -> Machine {
+fn built(file: &str) -> ForeseenRobot {
     machine(&robot(file), None).expect("a machine")
 }
 
 /// A design of few evaluations: what matters here is that it keeps the limits.
-fn quick(machine: &Machine, seed: u64, evaluations: u64) -> Series {
+fn quick(machine: &ForeseenRobot, seed: u64, evaluations: u64) -> Series {
     let criteria = [
         Criterion::Condition,
         Criterion::ConditionNormalised,
@@ -48,8 +48,8 @@ fn quick(machine: &Machine, seed: u64, evaluations: u64) -> Series {
 
 /// The largest share of a limit on equal steps.
 fn on_a_grid(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     steps: usize,
     at: &dyn Fn(usize) -> Kinematics,
 ) -> f64 {
@@ -92,7 +92,8 @@ fn blends_keep_every_limit_and_begin_and_end_at_rest() {
     let machine = built("configs/cft-dspace.toml");
     for seed in [3, 9, 14] {
         let series = quick(&machine, seed, 60);
-        let reserved: Vec<Channel> = machine.channels.iter().map(|c| c.reserved(-0.02)).collect();
+        let reserved: Vec<BoundedQuantity> =
+            machine.channels.iter().map(|c| c.reserved(-0.02)).collect();
         let blend = Blend::within(&machine, &reserved, &series, 2, None).expect("a blend");
         let end = blend.duration(series.period());
         let step = end / 40_000.0;
@@ -124,7 +125,8 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
         seed: 4,
     };
     let found = design(&machine, &task, &|_| {}, &AtomicBool::new(false)).expect("a design");
-    let reserved: Vec<Channel> = machine.channels.iter().map(|c| c.reserved(0.05)).collect();
+    let reserved: Vec<BoundedQuantity> =
+        machine.channels.iter().map(|c| c.reserved(0.05)).collect();
     let blend = Blend::within(&machine, &reserved, &found.series, 2, None).expect("a blend");
     let mut fourier = trajectory(&machine, &found.series);
     fourier.start_s = Some(blend.start);
@@ -140,7 +142,7 @@ fn the_simulated_robot_follows_a_design_without_reaching_a_limit() {
         seed: 1,
     })
     .expect("simulated");
-    assert_eq!(log.ending, simulate::Ending::Completed);
+    assert_eq!(log.ending, simulate::RunEnding::Completed);
     assert!(log.saturated.iter().all(|(_, share)| *share == 0.0));
     let motion = Motion::of_file(&machine, &written, 20.0, 1).expect("a motion");
     let rows: Vec<&[f64]> = log.rows().collect();

@@ -693,7 +693,7 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
         let numbers = numbers
             .iter()
             .map(|(key, x)| ((*key).to_owned(), number(*x)));
-        file.effects = vec![cft_ident::config::model_file::Effect {
+        file.effects = vec![cft_ident::config::model_file::EffectSection {
             name: name.to_owned(),
             joint: Some("elbow".to_owned()),
             parameters: numbers.collect(),

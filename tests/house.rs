@@ -249,6 +249,29 @@ fn only_the_command_line_prints() {
     }
 }
 
+/// Arguments of a command are `Args` of its file: clap names them by the command.
+#[test]
+fn a_type_that_others_see_has_a_name_of_its_own() {
+    let mut places: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let sources = sources();
+    for source in &sources {
+        for line in source.text.lines() {
+            let declared = ["pub struct ", "pub enum ", "pub trait ", "pub type "];
+            let Some(rest) = declared.iter().find_map(|of| line.strip_prefix(of)) else {
+                continue;
+            };
+            let end = rest.find(|c: char| !c.is_alphanumeric());
+            let name = &rest[..end.unwrap_or(rest.len())];
+            if name != "Args" {
+                places.entry(name).or_default().push(&source.file);
+            }
+        }
+    }
+    assert!(places.len() > 300, "{}", places.len());
+    places.retain(|_, files| files.len() > 1);
+    assert_eq!(places, BTreeMap::new());
+}
+
 #[test]
 fn files_stay_below_600_lines() {
     for Source { file, text, .. } in sources() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use cft_ident::config::RobotFile;
-use cft_ident::log::{Block, Channels, Layout, LogSpec, Reader, TimeUnit};
+use cft_ident::log::{Block, DeclaredChannels, Layout, LogSpec, Reader, TimeUnit};
 use cft_ident::output::LogWriter;
 use cft_ident::robot::cft::actuation::ENCODER_SCALE;
 use cft_ident::robot::cft::{Setup, pantograph};
@@ -120,7 +120,7 @@ fn raw_channels_of_the_cft_robot_come_out_as_joint_positions_and_torques() {
     }
     log.commit().unwrap();
     let (block, reader) = read(&path, &robot.layout());
-    assert_eq!(reader.layout().channels, Channels::Actuator);
+    assert_eq!(reader.layout().channels, DeclaredChannels::Actuator);
     assert!(robot.zero_order_hold(reader.layout().channels));
     for (index, row) in rows.iter().enumerate() {
         let q = pantograph::joints(&[row[0], row[1], row[2], row[3]]).unwrap();

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use cft_ident::config::RobotFile;
-use cft_ident::log::{Block, Channels, Layout, LogSpec, Reader};
+use cft_ident::log::{Block, DeclaredChannels, Layout, LogSpec, Reader};
 use cft_ident::robot::cft::actuation::ENCODER_SCALE;
 use log_support::read;
 use log_support::recording::{JointState, Recording};
@@ -95,7 +95,7 @@ fn raw_channels_of_the_cft_robot_are_read_from_text_json_and_joint_states_alike(
     assert_eq!(expected.q[..4], first);
     for file in &files {
         let (found, reader) = read(&shown(file), &counts.layout());
-        assert_eq!(reader.layout().channels, Channels::Actuator);
+        assert_eq!(reader.layout().channels, DeclaredChannels::Actuator);
         assert_eq!((&found.q, &found.tau), (&expected.q, &expected.tau));
         assert_eq!(found.t, expected.t);
         assert_eq!(reader.warnings(), [""; 0]);

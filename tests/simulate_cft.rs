@@ -3,7 +3,7 @@
 use cft_ident::robot::cft::Setup;
 use cft_ident::simulate::cft::{excitation, follow, mechanism, tracking_error};
 use cft_ident::simulate::reference::travel;
-use cft_ident::simulate::{CftTruth, Ending, MotorStatus, OneJointMove, Settings};
+use cft_ident::simulate::{CftTruth, MotorStatus, OneJointMove, RunEnding, Settings};
 
 /// Runs one of the five standard experiments: ladders of q1, q2, q4, q5, then Table 3.
 fn standard(setup: Setup, number: usize, seed: u64) -> cft_ident::simulate::SimulatedRun<4> {
@@ -23,7 +23,7 @@ fn standard_experiments_stay_inside_every_limit_and_below_saturation() {
     for setup in [Setup::Tuedacs, Setup::Dspace] {
         for number in 0..5 {
             let recording = standard(setup, number, 3);
-            assert_eq!(recording.ending, Ending::Completed, "{setup:?} {number}");
+            assert_eq!(recording.ending, RunEnding::Completed, "{setup:?} {number}");
             assert_eq!(recording.rows(), 20_000);
             assert!(recording.limits.is_empty(), "{:?}", recording.limits);
             let all_running = recording

@@ -18,10 +18,11 @@ mod static_torques;
 use cft_ident::robot::cft::pantograph::reference_jacobian;
 use cft_ident::robot::cft::{Coefficients, Setup, dynamics};
 use cft_ident::simulate::cft::{effects, excitation, follow};
-use cft_ident::simulate::effects::{Effect, LAWS, Motion};
+use cft_ident::simulate::effects::{Effect, LAWS, PlantState};
 use cft_ident::simulate::moving::Moving;
 use cft_ident::simulate::{
-    CftTruth, Drive, EffectSpec, Effects, Sensors, Settings, SimulateError, Start, VoltSeries, run,
+    CftTruth, EffectSpec, Effects, MotorInput, Sensors, Settings, SimulateError, Start, VoltSeries,
+    run,
 };
 use cft_ident::simulate::{SingleJointTruth, SmoothFriction};
 
@@ -156,7 +157,7 @@ struct Dahl {
 }
 
 impl Effect for Dahl {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         torque[0] += self.sigma * motion.z[0];
     }
 
@@ -164,7 +165,7 @@ impl Effect for Dahl {
         1
     }
 
-    fn rates(&self, motion: &Motion, dz: &mut [f64]) {
+    fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
         let v = motion.v[0];
         dz[0] = v - self.sigma * v.abs() * motion.z[0] / self.force;
     }
@@ -177,9 +178,9 @@ struct Rotor {
 }
 
 impl Effect for Rotor {
-    fn torque(&self, _motion: &Motion, _torque: &mut [f64]) {}
+    fn torque(&self, _motion: &PlantState, _torque: &mut [f64]) {}
 
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         let (q, v): ([f64; 4], [f64; 4]) = (
             std::array::from_fn(|i| motion.q[i]),
             std::array::from_fn(|i| motion.v[i]),
@@ -207,11 +208,11 @@ struct Play {
 }
 
 impl Effect for Play {
-    fn torque(&self, _motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, _motion: &PlantState, torque: &mut [f64]) {
         torque[0] += self.stiffness * self.centre;
     }
 
-    fn moved(&mut self, motion: &Motion) -> bool {
+    fn moved(&mut self, motion: &PlantState) -> bool {
         let before = self.centre;
         self.centre = self
             .centre
@@ -254,7 +255,7 @@ fn pushed(effect: Box<dyn Effect>, volts: Vec<f64>) -> cft_ident::simulate::Simu
         &joint().plant().expect("a joint"),
         effects,
         &start,
-        &Drive::Volts(series),
+        &MotorInput::Volts(series),
         &Settings::new(seconds),
     )
     .expect("runs")
@@ -339,7 +340,7 @@ fn effect_with_inertia_in_actuator_coordinates_adds_the_rotor_energy() {
         position: [-0.1343, 0.2766, 2.8, 0.2],
         speed: [0.05, 0.1, 0.0, 0.0],
     };
-    let drive = Drive::Volts(VoltSeries::new(vec![0.0], vec![[0.0; 4]]).expect("a series"));
+    let drive = MotorInput::Volts(VoltSeries::new(vec![0.0], vec![[0.0; 4]]).expect("a series"));
     let settings = Settings {
         sensors: Sensors::perfect(),
         ..Settings::new(0.1)

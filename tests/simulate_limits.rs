@@ -5,8 +5,8 @@ use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
 use cft_ident::robot::{JointKind, RobotError};
 use cft_ident::simulate::cft::{excitation, follow, mechanism};
 use cft_ident::simulate::{
-    CftTruth, Drive, Effects, Ending, Frame, MotorStatus, OnLimit, Path, Reference, Sensors,
-    Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
+    CftTruth, Effects, MotorInput, MotorStatus, OnLimit, Path, Reference, ReferenceFrame,
+    RunEnding, Sensors, Settings, SimulateError, SimulatedRun, Start, VoltSeries, run,
 };
 use cft_ident::simulate::{OneJointMove, SingleJointTruth, SmoothFriction};
 
@@ -14,8 +14,8 @@ fn truth() -> CftTruth {
     CftTruth::synthetic(Setup::Tuedacs)
 }
 
-fn constant(volts: [f64; 4]) -> Drive<4> {
-    Drive::Volts(VoltSeries::new(vec![0.0, 1e3], vec![volts, volts]).expect("a series"))
+fn constant(volts: [f64; 4]) -> MotorInput<4> {
+    MotorInput::Volts(VoltSeries::new(vec![0.0, 1e3], vec![volts, volts]).expect("a series"))
 }
 
 fn perfect(seconds: f64) -> Settings<4> {
@@ -34,7 +34,7 @@ fn at_rest(position: [f64; 4]) -> Start<4> {
 
 fn play(
     start: &Start<4>,
-    drive: &Drive<4>,
+    drive: &MotorInput<4>,
     settings: &Settings<4>,
 ) -> Result<SimulatedRun<4>, SimulateError> {
     run(
@@ -118,7 +118,7 @@ fn gravity_pulls_the_arm_down_and_balancing_volts_hold_it() {
 fn settled_start_needs_no_transient() {
     let pose = [-0.1, 0.3, 2.0, 0.1];
     let reference = Reference {
-        frame: Frame::Motors,
+        frame: ReferenceFrame::Motors,
         path: Path::Hold(pose),
     };
     let settings = perfect(2.0);
@@ -140,7 +140,7 @@ fn limit_stops_the_run_and_says_which_coordinate_and_when() {
     // Down and along the rails: x_c1 is reached first.
     let settings = perfect(20.0);
     let recording = play(&start, &constant([0.0, 0.16, 0.0, 1.5]), &settings).expect("runs");
-    assert_eq!(recording.ending, Ending::StoppedAtLimit);
+    assert_eq!(recording.ending, RunEnding::StoppedAtLimit);
     let event = recording.limits.first().expect("a limit");
     assert_eq!(recording.limits.len(), 1);
     let last = recording.rows() - 1;
@@ -174,7 +174,7 @@ fn clamped_run_goes_on_and_keeps_every_coordinate_inside() {
         [10.0, -10.0, 10.0, -10.0],
     ] {
         let recording = play(&start, &constant(volts), &settings).expect("runs");
-        assert_eq!(recording.ending, Ending::Completed);
+        assert_eq!(recording.ending, RunEnding::Completed);
         assert_eq!(recording.rows(), 5000);
         assert!(recording.limits.len() >= 3, "{:?}", recording.limits);
         let mut names: Vec<&String> = recording.limits.iter().map(|l| &l.coordinate).collect();
@@ -254,10 +254,10 @@ fn stop_against_which_a_coordinate_runs_takes_energy_and_gives_none() {
 #[test]
 fn saturation_cuts_the_volts_and_marks_the_channel() {
     let reference = Reference {
-        frame: Frame::Motors,
+        frame: ReferenceFrame::Motors,
         path: Path::Hold([-0.1343, 0.2766, 2.8, 0.2]),
     };
-    let drive = Drive::Follow {
+    let drive = MotorInput::Follow {
         reference,
         control: truth().plant().expect("a pose").control(),
     };
@@ -286,7 +286,7 @@ fn logged_volts_played_back_repeat_the_motion() {
         position: first.x[0],
         speed: [0.0; 4],
     };
-    let second = play(&start, &Drive::Volts(series), &settings).expect("runs");
+    let second = play(&start, &MotorInput::Volts(series), &settings).expect("runs");
     assert_eq!(first.volts, second.volts);
     for (a, b) in first.actual.q.iter().zip(&second.actual.q) {
         for i in 0..4 {
@@ -349,7 +349,7 @@ fn unusable_starts_settings_and_volts_are_errors_with_the_way_out() {
         !matches!(
             outcome,
             Ok(SimulatedRun {
-                ending: Ending::Completed,
+                ending: RunEnding::Completed,
                 ..
             })
         ),
@@ -388,7 +388,8 @@ fn single_joint_follows_its_equation_exactly() {
     };
     let joint = joint.plant().expect("a joint");
     joint.check().expect("physical");
-    let drive = Drive::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[1.0]; 2]).expect("a series"));
+    let drive =
+        MotorInput::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[1.0]; 2]).expect("a series"));
     let start = Start::State {
         position: [0.0],
         speed: [0.0],
@@ -421,8 +422,9 @@ fn dry_friction_holds_a_single_joint_below_its_breakaway() {
     };
     let joint = joint.plant().expect("a joint");
     let travelled = |force: f64| {
-        let drive =
-            Drive::Volts(VoltSeries::new(vec![0.0, 10.0], vec![[force]; 2]).expect("a series"));
+        let drive = MotorInput::Volts(
+            VoltSeries::new(vec![0.0, 10.0], vec![[force]; 2]).expect("a series"),
+        );
         let start = Start::State {
             position: [0.0],
             speed: [0.0],

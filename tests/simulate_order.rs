@@ -7,7 +7,7 @@ use std::path::Path;
 use cft_ident::config::{ModelFile, RobotFile, Trajectory};
 use cft_ident::log::{Block, LogSpec, Reader};
 use cft_ident::simulate::{
-    Ending, Experiment, InitialConditions, Order, Rows, SimulateError, SimulatedLog, TruthFile,
+    Experiment, InitialConditions, Order, Rows, RunEnding, SimulateError, SimulatedLog, TruthFile,
     simulate, simulate_from, simulate_rows,
 };
 
@@ -78,7 +78,7 @@ fn cft_log_is_read_back_by_the_robot_file_that_ordered_it() {
         let tau = column(&log, &format!("tau_{joint}"));
         assert!((0..q.len()).all(|k| block.q[4 * k + i] == q[k] && block.tau[4 * k + i] == tau[k]));
     }
-    assert_eq!(log.ending, Ending::Completed);
+    assert_eq!(log.ending, RunEnding::Completed);
     assert!(log.truth.torque_noise.iter().all(|std| *std > 0.0));
 }
 
@@ -90,7 +90,7 @@ fn every_embedded_cft_robot_simulates_its_moves_without_reaching_a_limit() {
             let log = simulate(&order(&robot, Experiment::of_joint(mover))).expect(mover);
             assert_eq!(
                 log.ending,
-                Ending::Completed,
+                RunEnding::Completed,
                 "{name} {mover}: {:?}",
                 log.limits
             );
@@ -344,7 +344,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
     };
     let log = simulate(&ordered).expect("runs");
     assert_eq!(log.header, ["t", "q1", "tau1"], "named as [log] reads them");
-    assert_eq!(log.ending, Ending::Completed);
+    assert_eq!(log.ending, RunEnding::Completed);
     assert!((span(&column(&log, "q1")) - 0.225).abs() < 0.005);
     let values: Vec<(String, f64)> = log
         .truth

@@ -16,7 +16,9 @@ use cft_ident::log::Block;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::Robot;
 use cft_ident::simulate::reference::Fourier;
-use cft_ident::simulate::{Frame, Noise, Path as Motion, Reference, Settings, SimulatedRun};
+use cft_ident::simulate::{
+    Noise, Path as Motion, Reference, ReferenceFrame, Settings, SimulatedRun,
+};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -152,7 +154,7 @@ pub fn series(file: &str) -> Fourier<4> {
 /// A series in motor coordinates as a reference.
 pub fn along(series: Fourier<4>) -> Reference<4> {
     Reference {
-        frame: Frame::Motors,
+        frame: ReferenceFrame::Motors,
         path: Motion::Fourier(series),
     }
 }

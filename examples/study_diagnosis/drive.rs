@@ -13,12 +13,12 @@ use cft_ident::motion::{FilterSettings as Processing, ZeroOrderHold};
 use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::{JointFriction, Model};
 use cft_ident::robot::{JointKind, Robot};
-use cft_ident::simulate::reference::{Frame, LadderPlan, Path};
+use cft_ident::simulate::reference::{LadderPlan, Path, ReferenceFrame};
 use cft_ident::simulate::run::run;
 use cft_ident::simulate::single_joint::effects;
 use cft_ident::simulate::{
-    Drive, EffectSpec, Noise, Reference, Settings, SimulatedRun, SingleJointTruth, SmoothFriction,
-    Start,
+    EffectSpec, MotorInput, Noise, Reference, Settings, SimulatedRun, SingleJointTruth,
+    SmoothFriction, Start,
 };
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -84,7 +84,7 @@ pub fn log(truth: &SingleJointTruth, specs: &[EffectSpec], noise: f64, seed: u64
     let ladder = LadderPlan::usual(range, (top / 60.0, top), acceleration, SECONDS, Some(seed));
     let ladder = ladder.expect("a ladder");
     let reference = Reference {
-        frame: Frame::Joints,
+        frame: ReferenceFrame::Joints,
         path: Path::Ladder {
             moving: 0,
             pose: [ladder.at(0.0).0],
@@ -95,7 +95,7 @@ pub fn log(truth: &SingleJointTruth, specs: &[EffectSpec], noise: f64, seed: u64
     settings.seed = seed;
     settings.sensors.torque_noise = Noise::Relative(noise);
     let plant = truth.plant().expect("a joint");
-    let drive = Drive::Follow {
+    let drive = MotorInput::Follow {
         reference,
         control: plant.control(),
     };

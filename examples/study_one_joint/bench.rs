@@ -9,11 +9,11 @@ use cft_ident::identify::narrowed;
 use cft_ident::motion::FilterSettings as Processing;
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::robot::{JointKind, Robot};
-use cft_ident::simulate::reference::{Frame, LadderPlan, Path, TURN};
+use cft_ident::simulate::reference::{LadderPlan, Path, ReferenceFrame, TURN};
 use cft_ident::simulate::run::run;
 use cft_ident::simulate::{
-    Drive, Effects, Noise, Reference, Settings, SimulatedRun, SingleJointTruth, SmoothFriction,
-    Start,
+    Effects, MotorInput, Noise, Reference, Settings, SimulatedRun, SingleJointTruth,
+    SmoothFriction, Start,
 };
 use rand::{RngExt, SeedableRng};
 
@@ -125,9 +125,9 @@ fn ladder(
     let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let ladder = plan.build(Some(&mut chance)).expect("a ladder");
     let plant = truth.plant().expect("a joint");
-    let drive = Drive::Follow {
+    let drive = MotorInput::Follow {
         reference: Reference {
-            frame: Frame::Joints,
+            frame: ReferenceFrame::Joints,
             path: Path::Ladder {
                 moving: 0,
                 pose: [ladder.at(0.0).0],

@@ -27,7 +27,7 @@ use cft_ident::robot::cft::{Setup, Structure};
 use cft_ident::robot::friction::DoubleTanh;
 use cft_ident::simulate::cft::follow;
 use cft_ident::simulate::reference::{Fourier, Points};
-use cft_ident::simulate::{CftTruth, Frame, Path as Motion, Reference, SimulatedRun};
+use cft_ident::simulate::{CftTruth, Path as Motion, Reference, ReferenceFrame, SimulatedRun};
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use study::{JOINTS, along, block, noisy, series, source, study, write_summary};
@@ -81,7 +81,7 @@ fn points(seed: u64) -> Reference<4> {
         list.extend([(t, there), (t + 0.2, there)]);
     }
     Reference {
-        frame: Frame::Motors,
+        frame: ReferenceFrame::Motors,
         path: Motion::Points(Points::new(&list).expect("times increase")),
     }
 }

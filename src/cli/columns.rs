@@ -6,7 +6,7 @@ use crate::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
 };
-use crate::log::{self, Channels, Layout, RawReader};
+use crate::log::{self, DeclaredChannels, Layout, RawReader};
 
 /// Channels by their names alone.
 ///
@@ -91,7 +91,7 @@ fn place(
     layout: &Layout,
     known: &mut [Option<ChannelColumn>],
 ) {
-    let raw = layout.channels == Channels::Actuator;
+    let raw = layout.channels == DeclaredChannels::Actuator;
     let kinds = [
         (&layout.positions, ChannelRole::Position),
         (&layout.velocities, ChannelRole::Velocity),

@@ -220,8 +220,8 @@ impl Context {
     }
 
     /// A progress bar over `total` steps (a spinner for `None`), removed when it is dropped.
-    pub fn progress(&self, label: &str, total: Option<u64>) -> Progress {
-        Progress::new(label, total, self.bars)
+    pub fn progress(&self, label: &str, total: Option<u64>) -> RunningBar {
+        RunningBar::new(label, total, self.bars)
     }
 }
 
@@ -242,9 +242,9 @@ fn note(text: &str, quiet: bool) {
 }
 
 /// Shows the progress of a stage; the bar that began last is the one that moves.
-fn show(progress: identify::Progress, running: &mut Vec<Progress>, bars: bool, quiet: bool) {
+fn show(progress: identify::Progress, running: &mut Vec<RunningBar>, bars: bool, quiet: bool) {
     match progress {
-        identify::Progress::Begin(work, steps) => running.push(Progress::new(work, steps, bars)),
+        identify::Progress::Begin(work, steps) => running.push(RunningBar::new(work, steps, bars)),
         identify::Progress::End => drop(running.pop()),
         identify::Progress::Note(text) => note(text, quiet),
         identify::Progress::Advance(steps) => {
@@ -265,11 +265,11 @@ const TICK: Duration = Duration::from_millis(250);
 
 /// A running bar; its methods may be called from any thread.
 #[derive(Debug)]
-pub struct Progress {
+pub struct RunningBar {
     bar: ProgressBar,
 }
 
-impl Progress {
+impl RunningBar {
     fn new(label: &str, total: Option<u64>, drawn: bool) -> Self {
         let bar = match total {
             Some(total) => ProgressBar::new(total),
@@ -294,7 +294,7 @@ impl Progress {
             // a step may take long: the clock runs on meanwhile
             bar.enable_steady_tick(TICK);
         }
-        Progress { bar }
+        RunningBar { bar }
     }
 
     /// `steps` more are done.
@@ -321,7 +321,7 @@ fn left(state: &ProgressState, out: &mut dyn std::fmt::Write) {
     }
 }
 
-impl Drop for Progress {
+impl Drop for RunningBar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

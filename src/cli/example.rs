@@ -27,7 +27,7 @@ Example:
 pub struct Args {
     /// Machine
     #[arg(value_name = "NAME")]
-    pub name: Option<Machine>,
+    pub name: Option<ExampleMachine>,
     /// Folder to write into [default: the name]
     #[arg(short, long, value_name = "DIR", requires = "name")]
     pub output: Option<PathBuf>,
@@ -35,7 +35,7 @@ pub struct Args {
 
 /// A machine whose log comes with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Machine {
+pub enum ExampleMachine {
     /// UR10, six joints, 125 Hz, as CSV and as a recording of ROS 2
     Ur10,
     /// Staubli TX40, six joints, 5 kHz
@@ -135,22 +135,22 @@ const CFT_NEXT: &str = "cft-ident identify {}/campaign.toml -o run\n";
 /// Seed of its simulation: that of `identify`.
 const SEED: u64 = 1;
 
-impl Machine {
+impl ExampleMachine {
     fn measured(self) -> Option<&'static Measured> {
         match self {
-            Machine::Ur10 => Some(&UR10),
-            Machine::Tx40 => Some(&TX40),
-            Machine::Bldc => Some(&BLDC),
-            Machine::Cft => None,
+            ExampleMachine::Ur10 => Some(&UR10),
+            ExampleMachine::Tx40 => Some(&TX40),
+            ExampleMachine::Bldc => Some(&BLDC),
+            ExampleMachine::Cft => None,
         }
     }
 
     fn name(self) -> &'static str {
         match self {
-            Machine::Ur10 => "ur10",
-            Machine::Tx40 => "tx40",
-            Machine::Bldc => "bldc",
-            Machine::Cft => "cft",
+            ExampleMachine::Ur10 => "ur10",
+            ExampleMachine::Tx40 => "tx40",
+            ExampleMachine::Bldc => "bldc",
+            ExampleMachine::Cft => "cft",
         }
     }
 
@@ -221,7 +221,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             });
         }
     }
-    let examples = Machine::value_variants().iter().map(|m| m.known());
+    let examples = ExampleMachine::value_variants().iter().map(|m| m.known());
     let result = Examples {
         examples: examples.collect(),
         written,
@@ -239,7 +239,7 @@ fn list() -> String {
         ("machine", Align::Left),
         ("licence", Align::Left),
     ]);
-    for machine in Machine::value_variants() {
+    for machine in ExampleMachine::value_variants() {
         let known = machine.known();
         table.row([known.name, known.what, known.licence.unwrap_or("")]);
     }
@@ -252,7 +252,11 @@ fn commands(next: &str) -> Vec<String> {
     whole.lines().map(str::to_owned).collect()
 }
 
-fn write(machine: Machine, folder: &Path, context: &Context) -> Result<Vec<String>, CliError> {
+fn write(
+    machine: ExampleMachine,
+    folder: &Path,
+    context: &Context,
+) -> Result<Vec<String>, CliError> {
     let unusable = |e: &dyn std::fmt::Display| {
         CliError::output(format!("cannot write into {}: {e}", folder.display()))
             .hint("name another folder with -o")

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::files::Given;
+use super::files::ReadFile;
 use super::{CliError, Context, Outcome, arguments, files};
 use crate::config::{self, ModelFile, RobotFile, UrdfReplacement, replaced_in_urdf};
 use crate::effect::AugmentedModel;
@@ -131,7 +131,7 @@ fn name(path: &Path) -> String {
 
 /// The effects of a model, as a person names them.
 fn effects(file: &ModelFile) -> Vec<String> {
-    let of = |e: &crate::config::model_file::Effect| match &e.joint {
+    let of = |e: &crate::config::model_file::EffectSection| match &e.joint {
         Some(joint) => format!("{} of {}", escape(&e.name), escape(joint)),
         None => escape(&e.name),
     };
@@ -184,7 +184,7 @@ struct Along {
 }
 
 impl Along {
-    fn read(args: &Args, given: &Given<ModelFile>, context: &Context) -> Result<Self, CliError> {
+    fn read(args: &Args, given: &ReadFile<ModelFile>, context: &Context) -> Result<Self, CliError> {
         if args.logs.is_empty() {
             return Ok(Self::default());
         }
@@ -206,14 +206,14 @@ struct Source {
     robot: RobotFile,
 }
 
-fn source(path: &Path) -> Result<Given<Source>, CliError> {
+fn source(path: &Path) -> Result<ReadFile<Source>, CliError> {
     let shown = escape(&path.to_string_lossy());
     let file = path.file_name().unwrap_or(path.as_os_str());
     let file = file.to_string_lossy();
     let text = config::text(path)?;
     let section = toml::Value::from(&*file);
     let robot = format!("[robot]\nmodel = \"serial\"\nurdf = {section}\n");
-    Ok(Given {
+    Ok(ReadFile {
         provenance: Provenance::of_text(&file, &text),
         value: Source {
             robot: RobotFile::parse_in(&shown, &robot, path.parent())?,

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::Context;
 use super::error::CliError;
-use crate::config::candidates::{self, Candidate};
+use crate::config::candidates::{self, CandidateSection};
 use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
 use crate::log::{Provenance, escape};
 
 /// A configuration file that was read.
 #[derive(Debug, Clone)]
-pub struct Given<T> {
+pub struct ReadFile<T> {
     /// The file as the user named it, for messages.
     pub name: String,
     /// What it says.
@@ -23,11 +23,11 @@ fn read<T>(
     path: &Path,
     wanted: Wanted,
     parse: impl Fn(&str, &str) -> Result<T, ConfigError>,
-) -> Result<Given<T>, CliError> {
+) -> Result<ReadFile<T>, CliError> {
     let name = escape(&path.to_string_lossy());
     let text = config::text_of_kind(path, wanted)?;
     let file = path.file_name().unwrap_or(path.as_os_str());
-    Ok(Given {
+    Ok(ReadFile {
         value: parse(&name, &text)?,
         provenance: Provenance::of_text(&file.to_string_lossy(), &text),
         name,
@@ -35,14 +35,14 @@ fn read<T>(
 }
 
 /// A robot file, or one that comes with the tool.
-pub fn robot(path: &Path) -> Result<Given<RobotFile>, CliError> {
+pub fn robot(path: &Path) -> Result<ReadFile<RobotFile>, CliError> {
     read(path, Wanted::Robot, |name, text| {
         RobotFile::parse_in(name, text, path.parent())
     })
 }
 
 /// A model file; what is reported of it becomes a warning of the command.
-pub fn model(path: &Path, context: &Context) -> Result<Given<ModelFile>, CliError> {
+pub fn model(path: &Path, context: &Context) -> Result<ReadFile<ModelFile>, CliError> {
     let model = read(path, Wanted::Own, |name, text| {
         ModelFile::parse_in(name, text, path.parent())
     })?;
@@ -61,18 +61,18 @@ pub(crate) fn model_of(
     path: &Path,
     robot: &RobotFile,
     context: &Context,
-) -> Result<Given<ModelFile>, CliError> {
+) -> Result<ReadFile<ModelFile>, CliError> {
     let model = model(path, context)?;
     model.value.belongs_to(&model.name, robot)?;
     Ok(model)
 }
 
 /// A file of effects of the user's own.
-pub fn candidates(path: &Path) -> Result<Given<Vec<Candidate>>, CliError> {
+pub fn candidates(path: &Path) -> Result<ReadFile<Vec<CandidateSection>>, CliError> {
     read(path, Wanted::Own, candidates::parse)
 }
 
 /// A trajectory file, or one that comes with the tool.
-pub fn trajectory(path: &Path) -> Result<Given<Trajectory>, CliError> {
+pub fn trajectory(path: &Path) -> Result<ReadFile<Trajectory>, CliError> {
     read(path, Wanted::Trajectory, Trajectory::parse)
 }

@@ -18,7 +18,7 @@ use crate::replay::ReplayedDiagnosis;
 use crate::report::json::Document;
 use crate::report::sections::residual;
 use crate::report::stages;
-use crate::report::stages::identify::Shown;
+use crate::report::stages::identify::ShownLogs;
 use crate::setup::Finding;
 use crate::simulate::TruthFile;
 use crate::simulate::effects::EffectValue;
@@ -198,9 +198,9 @@ fn execute(
     let numbers = (&found.model, &found.numbers);
     let replayed = pictures::replayed(&machine, in_memory.as_ref(), &unseen_names, numbers)?;
     let shown = match (&replayed_diagnosis, &replayed) {
-        (Some(replayed), _) => Shown::Diagnosis(replayed),
-        (None, Some(replayed)) => Shown::Model(replayed),
-        (None, None) => Shown::Nothing,
+        (Some(replayed), _) => ShownLogs::Diagnosis(replayed),
+        (None, Some(replayed)) => ShownLogs::Model(replayed),
+        (None, None) => ShownLogs::Nothing,
     };
     // the logs of the set-up have the one-joint logs among them
     let all = training.iter().chain(&unseen);

@@ -8,7 +8,9 @@ use serde::Serialize;
 use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
 use crate::config::ModelFile;
 use crate::identify::{IdentifyError, LoggedRobot, repeated_rows};
-use crate::inspect::{Comparison, FaultKind, Findings, Inspection, LogFault, look, look_again};
+use crate::inspect::{
+    FaultKind, Findings, Inspection, LogFault, OrderComparison, look, look_again,
+};
 use crate::log::{LogSection, LogSpec, Provenance, RawReader, escape};
 use crate::motion;
 use crate::report::json::Document;
@@ -42,7 +44,7 @@ pub struct Args {
 
 /// What logs hold, and what they say of the robot file.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Inspected {
+pub struct InspectionResult {
     #[serde(flatten)]
     inspection: Inspection,
     /// What the torques say against the set-up that the robot file declares.
@@ -174,7 +176,7 @@ fn compare(
 ) -> Result<Option<LogFault>, CliError> {
     let joints = machine.robot.joint_names();
     let n = joints.len();
-    let mut comparison = Comparison::new(n);
+    let mut comparison = OrderComparison::new(n);
     let changes = comparison.changes().to_vec();
     let mut log = machine.open(&spec.into(), context.control())?;
     let summary = motion::run(
@@ -269,7 +271,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     for finding in &report.findings {
         text.brief().verdict(&finding.meaning, false);
     }
-    let result = Inspected {
+    let result = InspectionResult {
         inspection: Inspection::of(&logs),
         setup: report.findings,
     };

@@ -57,7 +57,7 @@ use crate::report::Detail;
 use crate::report::table::{WIDTH, folded};
 
 pub use arguments::Destination;
-pub use context::{Context, Progress};
+pub use context::{Context, RunningBar};
 pub use error::{CliError, with_sources};
 pub use exit::Exit;
 pub use outcome::Outcome;

@@ -9,8 +9,8 @@ use crate::compare::RunDifference;
 use crate::config::schema::{campaign, model, robot, trajectory};
 use crate::excite::Judgements;
 use crate::identify::{
-    Comparison, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong, Tracked,
-    Validated, Watched,
+    ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong,
+    Tracked, Validated, Watched,
 };
 use crate::report::json::{self, Document};
 use crate::simulate::truth::TruthFile;
@@ -97,12 +97,12 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Reduce => json::schema::<reduce::Reduced>("reduce"),
         Kind::Track => json::schema::<Tracked>("track"),
         Kind::Diagnose => json::schema::<DiagnosisResult>("diagnose"),
-        Kind::Compare => json::schema::<Comparison>("compare"),
+        Kind::Compare => json::schema::<ComparisonResult>("compare"),
         Kind::Diff => json::schema::<RunDifference>("diff"),
         Kind::Identify => json::schema::<identify::Identified>("identify"),
         Kind::Excite => json::schema::<Judgements>("excite"),
-        Kind::Simulate => json::schema::<simulate::Simulated>("simulate"),
-        Kind::Inspect => json::schema::<inspect::Inspected>("inspect"),
+        Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
+        Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Watch => json::schema::<Watched>("watch"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),

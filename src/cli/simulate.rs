@@ -18,7 +18,9 @@ use crate::output::LogWriter;
 use crate::report::json::Document;
 use crate::report::table::{Align, Table};
 use crate::simulate::effects::EffectValue;
-use crate::simulate::{self, EffectSpec, Ending, Experiment, InitialConditions, LimitEvent, Order};
+use crate::simulate::{
+    self, EffectSpec, Experiment, InitialConditions, LimitEvent, Order, RunEnding,
+};
 
 const EXAMPLE: &str = "\
 Example:
@@ -152,7 +154,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     drop(bar);
 
     let names = (file_name(&args.output), file_name(&truth_path));
-    let result = Simulated::of(&simulated, args.seed, &log, &names);
+    let result = SimulationResult::of(&simulated, args.seed, &log, &names);
     let told = [robot.notes.0.clone(), warnings(&simulated)].concat();
     Ok(Outcome {
         text: context.text(
@@ -198,7 +200,7 @@ pub(super) fn simulate_to(
     initial: Option<&InitialConditions>,
     path: &Path,
     context: &Context,
-) -> Result<(simulate::Simulated, LogFigures), CliError> {
+) -> Result<(simulate::SimulationSummary, LogFigures), CliError> {
     context.check()?;
     let mut rows = ToFile {
         path,
@@ -340,7 +342,7 @@ impl Volts {
 
 fn write_truth(
     path: &Path,
-    simulated: &simulate::Simulated,
+    simulated: &simulate::SimulationSummary,
     context: &Context,
 ) -> Result<(), CliError> {
     let text = simulated.truth.to_toml().map_err(|error| {
@@ -358,7 +360,7 @@ fn file_name(path: &Path) -> String {
 /// Time from the first to the last row [s]; the robot file may log it in another unit.
 /// A simulated log in numbers.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Simulated<'a> {
+pub struct SimulationResult<'a> {
     /// Effects that the plant has beyond the model, or faults of its log.
     effects: &'a [EffectValue],
     /// The true parameters.
@@ -369,7 +371,7 @@ pub struct Simulated<'a> {
     samples: usize,
     /// Time from the first to the last row \[s\].
     duration_s: f64,
-    ending: Ending,
+    ending: RunEnding,
     limits_reached: &'a [LimitEvent],
     saturated: Vec<Saturation<'a>>,
     files: Files<'a>,
@@ -390,15 +392,15 @@ struct Files<'a> {
     truth: &'a str,
 }
 
-impl<'a> Simulated<'a> {
+impl<'a> SimulationResult<'a> {
     fn of(
-        log: &'a simulate::Simulated,
+        log: &'a simulate::SimulationSummary,
         seed: u64,
         figures: &LogFigures,
         (name, truth): &'a (String, String),
     ) -> Self {
         let saturated = log.saturated.iter();
-        Simulated {
+        SimulationResult {
             effects: &log.truth.effects,
             parameters: &log.truth.parameters,
             seed,
@@ -417,10 +419,10 @@ impl<'a> Simulated<'a> {
     }
 }
 
-pub(super) fn warnings(simulated: &simulate::Simulated) -> Vec<String> {
+pub(super) fn warnings(simulated: &simulate::SimulationSummary) -> Vec<String> {
     let ends = match simulated.ending {
-        Ending::StoppedAtLimit => ", and the log ends there",
-        Ending::Completed => "",
+        RunEnding::StoppedAtLimit => ", and the log ends there",
+        RunEnding::Completed => "",
     };
     let limits = simulated.limits.iter().map(|event| {
         format!(

@@ -8,4 +8,4 @@ mod runs;
 
 pub use errors::{Difference, ErrorDifferences, differences};
 pub use parameters::{Apart, ParameterEstimate, ParameterPair, Reason, SideBySide, side_by_side};
-pub use runs::{ErrorChange, InputChange, RunDifference, RunError, VerdictChange, runs};
+pub use runs::{DiffError, ErrorChange, InputChange, RunDifference, VerdictChange, runs};

@@ -14,7 +14,7 @@ const COMMANDS: [&str; 5] = ["friction", "lsq", "validate", "diagnose", "identif
 
 /// Documents that cannot be compared.
 #[derive(Debug, Error, PartialEq, Eq)]
-pub enum RunError {
+pub enum DiffError {
     /// No document of this tool.
     #[error("{file} is no JSON document of a run; write one with --json FILE")]
     NoDocument { file: String },
@@ -110,11 +110,11 @@ struct Judged {
 ///
 /// # Errors
 /// Documents of two commands, or of one that estimates nothing.
-pub fn runs(a: (&str, &Value), b: (&str, &Value)) -> Result<RunDifference, RunError> {
+pub fn runs(a: (&str, &Value), b: (&str, &Value)) -> Result<RunDifference, DiffError> {
     let commands = [command(a)?, command(b)?];
     if commands[0] != commands[1] {
         let [a, b] = commands;
-        return Err(RunError::TwoCommands { a, b });
+        return Err(DiffError::TwoCommands { a, b });
     }
     let [command, _] = commands;
     let [ours, theirs] = [a.1, b.1].map(|document| {
@@ -137,15 +137,15 @@ pub fn runs(a: (&str, &Value), b: (&str, &Value)) -> Result<RunDifference, RunEr
 }
 
 /// The command that wrote a document.
-fn command((file, document): (&str, &Value)) -> Result<String, RunError> {
+fn command((file, document): (&str, &Value)) -> Result<String, DiffError> {
     let schema = document["schema"].as_str().unwrap_or_default();
     let mut parts = schema.split('/');
     let (Some("cft-ident"), Some(command)) = (parts.next(), parts.next()) else {
-        return Err(RunError::NoDocument { file: file.into() });
+        return Err(DiffError::NoDocument { file: file.into() });
     };
     match COMMANDS.contains(&command) {
         true => Ok(command.to_owned()),
-        false => Err(RunError::NothingEstimated {
+        false => Err(DiffError::NothingEstimated {
             file: file.into(),
             command: command.into(),
         }),
@@ -425,10 +425,10 @@ mod tests {
         let of = |command: &str| json!({"schema": format!("cft-ident/{command}/1")});
         let (fit, log, other) = (of("lsq"), of("simulate"), json!({"a": 1}));
         let error = runs(("a", &fit), ("b", &of("validate"))).unwrap_err();
-        assert!(matches!(error, RunError::TwoCommands { .. }));
+        assert!(matches!(error, DiffError::TwoCommands { .. }));
         let error = runs(("a", &fit), ("b", &log)).unwrap_err();
         assert!(error.to_string().contains("simulate"), "{error}");
         let error = runs(("a", &other), ("b", &fit)).unwrap_err();
-        assert_eq!(error, RunError::NoDocument { file: "a".into() });
+        assert_eq!(error, DiffError::NoDocument { file: "a".into() });
     }
 }

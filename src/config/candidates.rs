@@ -21,7 +21,7 @@ const LONGEST: usize = 400;
 /// An effect of a user's own: a torque linear in some coefficients, each with a formula in the motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Candidate {
+pub struct CandidateSection {
     /// Name in results and model files; no effect that the tool knows has it.
     pub name: String,
     /// Joints whose torque it may be, each by itself; all of them where it is absent.
@@ -73,14 +73,14 @@ fn is_one(unit: &String) -> bool {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CandidatesToml {
-    candidate: Vec<Candidate>,
+    candidate: Vec<CandidateSection>,
 }
 
 /// Reads a file of candidates from its text; `file` names it in errors.
 ///
 /// # Errors
 /// What the file has wrong, with its line. Formulas are read where their robot is known.
-pub fn parse(file: &str, text: &str) -> Result<Vec<Candidate>, ConfigError> {
+pub fn parse(file: &str, text: &str) -> Result<Vec<CandidateSection>, ConfigError> {
     let document = Document::new(file, text);
     let raw: CandidatesToml = document.read()?;
     check(&raw.candidate, &document)?;
@@ -88,7 +88,10 @@ pub fn parse(file: &str, text: &str) -> Result<Vec<Candidate>, ConfigError> {
 }
 
 /// Checks what needs no robot.
-pub(super) fn check(candidates: &[Candidate], document: &Document) -> Result<(), ConfigError> {
+pub(super) fn check(
+    candidates: &[CandidateSection],
+    document: &Document,
+) -> Result<(), ConfigError> {
     if candidates.len() > MOST {
         let problem = format!("has {} tables", candidates.len());
         return Err(document.value(&["candidate"], &problem, "give at most 100"));

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{
-    ActuatorChannels, ChannelChoice, Channels, Conversion, JointChannels, Layout, PositionUnit,
-    TorqueUnit, channel,
+    ActuatorChannels, ChannelChoice, Conversion, DeclaredChannels, JointChannels, Layout,
+    PositionUnit, TorqueUnit, channel,
 };
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::ENCODER_SCALE;
@@ -41,10 +41,10 @@ impl RobotFile {
     /// Whether a logged torque (or volt) acts from its own row to the next.
     ///
     /// The volts of the CFT robot do unless the file says otherwise.
-    pub fn zero_order_hold(&self, channels: Channels) -> bool {
+    pub fn zero_order_hold(&self, channels: DeclaredChannels) -> bool {
         self.log
             .zero_order_hold
-            .unwrap_or(channels == Channels::Actuator)
+            .unwrap_or(channels == DeclaredChannels::Actuator)
     }
 
     /// Unit of a joint's torque: "N", "Nm", or that of its channel ("A", "V", "counts", "%") where no gain
@@ -91,7 +91,7 @@ impl RobotFile {
     /// or where logs are of actuators or of motors behind gears.
     pub fn reference_layout(&self) -> Option<Layout> {
         let mut layout = self.layout().without_torques();
-        if layout.channels != Channels::Joint || layout.conversion.is_some() {
+        if layout.channels != DeclaredChannels::Joint || layout.conversion.is_some() {
             return None;
         }
         for (joint, position) in layout.joints.iter().zip(&mut layout.positions) {
@@ -115,7 +115,7 @@ impl RobotFile {
         let plain = JointChannels::default();
         let mut layout = Layout {
             time: self.log.time_channel(),
-            zero_order_hold: self.zero_order_hold(Channels::Joint),
+            zero_order_hold: self.zero_order_hold(DeclaredChannels::Joint),
             section: self.log.clone(),
             ..Layout::joint_columns(robot.joint_names())
         };
@@ -166,9 +166,9 @@ impl RobotFile {
         let mut layout = Layout {
             time: self.log.time_channel(),
             velocities: Vec::new(),
-            channels: Channels::Actuator,
+            channels: DeclaredChannels::Actuator,
             conversion: Some(to_joint_side(self.robot.setup.unwrap_or_default())),
-            zero_order_hold: self.zero_order_hold(Channels::Actuator),
+            zero_order_hold: self.zero_order_hold(DeclaredChannels::Actuator),
             section: self.log.clone(),
             ..Layout::joint_columns(&COORDINATES)
         };

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
 use super::document::Document;
-use super::model_file::{Effect, ModelFile, Parameter};
+use super::model_file::{EffectSection, ModelFile, Parameter};
 use super::robot_file::FrictionLawKind;
 use crate::log::escape;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
@@ -37,7 +37,7 @@ pub struct Contents {
 }
 
 /// An effect with its place and the keys of its parameters.
-fn effect_key(effect: &Effect) -> String {
+fn effect_key(effect: &EffectSection) -> String {
     let keys: Vec<&str> = effect.parameters.keys().map(String::as_str).collect();
     let place = effect.joint.as_ref().map(|joint| format!(":{joint}"));
     let name = format!("{}{}", effect.name, place.unwrap_or_default());

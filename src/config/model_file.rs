@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use super::candidates::Candidate;
+use super::candidates::CandidateSection;
 use super::held_out::{Excesses, HeldOut};
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{Provenance, escape};
@@ -135,7 +135,7 @@ pub struct FrictionPrior {
 /// An effect that was added to the declared model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Effect {
+pub struct EffectSection {
     /// Name, e.g. `ripple`.
     pub name: String,
     /// Joint; absent for what concerns all of them.
@@ -196,9 +196,9 @@ pub struct ModelFile {
     /// How often external torques that are none go beyond a level.
     pub excesses: Option<Excesses>,
     /// Formulas of those effects that are the user's own.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<CandidateSection>,
     /// Effects added to the declared model.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<EffectSection>,
     /// Physically consistent links that give these parameters, where they were asked for.
     pub links: Vec<LinkBody>,
     /// Inertia of the drives beside them, by joint [kg m^2 or kg].

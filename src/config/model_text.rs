@@ -7,14 +7,14 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::candidates::{self, Candidate};
+use super::candidates::{self, CandidateSection};
 use super::contents::{self, Contents};
 use super::document::Document;
 use super::embedded::other_kind;
 use super::held_out::{Excesses, HeldOut};
 use super::limits::Limits;
 use super::model_file::{
-    Covariance, Effect, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
+    Covariance, EffectSection, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
 };
 use super::robot_file::{
     ControlSection, FilterSection, FrictionSection, NoiseSection, RobotFile, RobotSection,
@@ -23,7 +23,7 @@ use super::robot_file::{
 use super::robot_file::{ModelKind, Notes};
 use super::{ConfigError, check, urdf};
 use crate::log::LogSection;
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 
 /// The file as it is written: the sections of a robot file, and what was identified.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -42,7 +42,7 @@ pub(super) struct ModelToml {
     #[serde(default)]
     limits: Limits,
     #[serde(default)]
-    drive: BTreeMap<String, Drive>,
+    drive: BTreeMap<String, JointDrive>,
     #[serde(default)]
     control: ControlSection,
     #[serde(default)]
@@ -58,9 +58,9 @@ pub(super) struct ModelToml {
     held_out: Vec<HeldOut>,
     excesses: Option<Excesses>,
     #[serde(default)]
-    candidate: Vec<Candidate>,
+    candidate: Vec<CandidateSection>,
     #[serde(default)]
-    effect: Vec<Effect>,
+    effect: Vec<EffectSection>,
     #[serde(default)]
     link: Vec<LinkBody>,
     #[serde(default)]

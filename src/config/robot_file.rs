@@ -11,7 +11,7 @@ use super::limits::Limits;
 use super::serial_section::{CouplingSection, FrameSection, LinkSection};
 use crate::log::LogSection;
 use crate::robot::cft::{self, Setup, Structure};
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 use crate::robot::{JointKind, Robot};
 
 /// `[robot] model`.
@@ -285,7 +285,7 @@ pub struct RobotFile {
     pub limits: Limits,
     /// Drives by joint: what play and presliding it can have.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub drive: BTreeMap<String, Drive>,
+    pub drive: BTreeMap<String, JointDrive>,
     /// Controller of the simulator.
     #[serde(default, skip_serializing_if = "is_default")]
     pub control: ControlSection,

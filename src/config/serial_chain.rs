@@ -11,7 +11,7 @@ use super::serial_section::{
 };
 use crate::log::{escape, list, nearest};
 use crate::robot::tree::space::{Rotation, Vector};
-use crate::robot::tree::{Coordinate, Coupling, Dependence, Link, Sine, Tree, TreeError};
+use crate::robot::tree::{Coordinate, Coupling, DependentCoordinate, Link, Sine, Tree, TreeError};
 use crate::robot::{JointKind, Robot};
 
 /// Free fall, where the file says nothing: along -z of the base \[m/s^2\].
@@ -196,7 +196,11 @@ impl Names {
     }
 
     /// The coordinate of link `i`, which follows others.
-    fn dependence(&self, i: usize, follows: &FollowsSection) -> Result<Dependence, Misfit> {
+    fn dependence(
+        &self,
+        i: usize,
+        follows: &FollowsSection,
+    ) -> Result<DependentCoordinate, Misfit> {
         let terms = |of: &BTreeMap<String, f64>| -> Result<Vec<(usize, f64)>, Misfit> {
             let term = |(joint, c): (&String, &f64)| match self.joint(joint) {
                 Some(index) => Ok((index, *c)),
@@ -216,7 +220,7 @@ impl Names {
                 of: terms(&s.of)?,
             })
         };
-        Ok(Dependence {
+        Ok(DependentCoordinate {
             offset: follows.offset,
             linear: terms(&follows.linear)?,
             sines: follows.sine.iter().map(sine).collect::<Result<_, _>>()?,

@@ -35,7 +35,7 @@ pub struct FourierCoordinate {
 
 /// A finite Fourier series in every coordinate, eq. (43).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fourier {
+pub struct FourierSection {
     /// Which coordinates the series is in.
     pub coordinates: Coordinates,
     /// Fundamental frequency [Hz]; omega_f = 2 pi times it.
@@ -80,7 +80,7 @@ pub struct Point {
 
 /// A list of poses at times.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Points {
+pub struct PointsSection {
     /// Which coordinates the poses are in.
     pub coordinates: Coordinates,
     /// The poses, at least two.
@@ -93,11 +93,11 @@ pub struct Points {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Trajectory {
     /// `kind = "fourier"`.
-    Fourier(Fourier),
+    Fourier(FourierSection),
     /// `kind = "single-joint"`.
     SingleJoint(SingleJointMove),
     /// `kind = "points"`.
-    Points(Points),
+    Points(PointsSection),
 }
 
 /// Names of the actuator coordinates of the CFT robot.
@@ -186,7 +186,7 @@ fn coordinates(document: &Document, raw: &TrajectoryToml) -> Result<Coordinates,
     })
 }
 
-fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigError> {
+fn fourier(document: &Document, raw: TrajectoryToml) -> Result<FourierSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
     let fundamental_hz = raw
         .fundamental_hz
@@ -226,7 +226,7 @@ fn fourier(document: &Document, raw: TrajectoryToml) -> Result<Fourier, ConfigEr
             ));
         }
     }
-    Ok(Fourier {
+    Ok(FourierSection {
         coordinates,
         fundamental_hz,
         start_s: raw.start_s,
@@ -269,7 +269,7 @@ fn single_joint(document: &Document, raw: TrajectoryToml) -> Result<SingleJointM
     })
 }
 
-fn points(document: &Document, raw: TrajectoryToml) -> Result<Points, ConfigError> {
+fn points(document: &Document, raw: TrajectoryToml) -> Result<PointsSection, ConfigError> {
     let coordinates = coordinates(document, &raw)?;
     if raw.point.len() < 2 {
         return Err(document.missing(
@@ -294,7 +294,7 @@ fn points(document: &Document, raw: TrajectoryToml) -> Result<Points, ConfigErro
             ));
         }
     }
-    Ok(Points {
+    Ok(PointsSection {
         coordinates,
         points: raw.point,
     })

@@ -29,13 +29,13 @@ fn printable(line: &str) -> String {
 mod tests {
     use super::*;
     use crate::config::trajectory::{
-        Coordinates, Fourier, FourierCoordinate, Point, Points, SingleJointMove,
+        Coordinates, FourierCoordinate, FourierSection, Point, PointsSection, SingleJointMove,
     };
 
     #[test]
     fn every_kind_reads_back_as_it_was() {
         let all = [
-            Trajectory::Fourier(Fourier {
+            Trajectory::Fourier(FourierSection {
                 coordinates: Coordinates::Cartesian,
                 fundamental_hz: 0.4,
                 start_s: Some(0.1 + 0.2),
@@ -55,7 +55,7 @@ mod tests {
                 acceleration: Some(3.0),
                 turn_s: Some(0.7),
             }),
-            Trajectory::Points(Points {
+            Trajectory::Points(PointsSection {
                 coordinates: Coordinates::Joint,
                 points: (0..3)
                     .map(|k| Point {

@@ -7,7 +7,7 @@
 
 use super::empirical::cubes;
 use super::law_text::{exact, law};
-use super::{Added, AugmentedModel, EffectError, Place, Role, Signal, entry};
+use super::{Added, AugmentedModel, CurveSignal, EffectError, Place, Role, entry};
 use crate::robot::cft::geometry::L4;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::{Body, STANDARD};
@@ -27,7 +27,7 @@ pub(crate) struct Memory {
 
 /// Statements and numbers of all effects of a model.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Effects {
+pub struct EffectsCode {
     /// After friction: what depends on a joint's own speed alone.
     pub(crate) friction: Vec<String>,
     /// After load and friction: other functions of q, v, a and load.
@@ -55,15 +55,15 @@ const ELASTIC: usize = 14;
 /// Where its inertia stands.
 pub(crate) const INERTIA: usize = 9;
 
-impl Effects {
+impl EffectsCode {
     /// Those of a model.
     ///
     /// # Errors
     /// [`EffectError::NoCode`].
     pub fn of(refined: &AugmentedModel) -> Result<Self, EffectError> {
-        let mut out = Effects {
+        let mut out = EffectsCode {
             lead_s: vec![0.0; refined.model.robot.joints()],
-            ..Effects::default()
+            ..EffectsCode::default()
         };
         for (i, effect) in refined.effects.iter().enumerate() {
             out.add(i, effect, refined)?;
@@ -144,12 +144,12 @@ impl Effects {
             ))),
             ("empirical", Place::Joint(_)) => {
                 let (signal, friction) = match effect.curve() {
-                    Some((Signal::Position, _)) => (q, false),
-                    Some((Signal::Friction, _)) => (q, true),
-                    Some((Signal::Speed, _)) => (v.clone(), false),
-                    Some((Signal::Load, _)) => (format!("load[{j}]"), true),
+                    Some((CurveSignal::Position, _)) => (q, false),
+                    Some((CurveSignal::Friction, _)) => (q, true),
+                    Some((CurveSignal::Speed, _)) => (v.clone(), false),
+                    Some((CurveSignal::Load, _)) => (format!("load[{j}]"), true),
                     // it would have to remember where the joint turned
-                    Some((Signal::Way, _)) | None => return Err(unknown()),
+                    Some((CurveSignal::Way, _)) | None => return Err(unknown()),
                 };
                 let curve = curve_text(effect, &signal);
                 self.added.push(to(match friction {

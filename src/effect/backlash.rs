@@ -4,7 +4,7 @@
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{Law, Memory};
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -25,7 +25,7 @@ pub static ENTRY: Entry = Entry {
         ),
         Rule::not_negative("c", "play takes torque away, and adds none"),
     ],
-    otherwise: Some(Signal::Way),
+    otherwise: Some(CurveSignal::Way),
     ladder: Some(Ladder::NARROW),
     separate_by: "log reversals at several amplitudes (a gap keeps its width, a presliding loop shrinks \
                   with the amplitude)",

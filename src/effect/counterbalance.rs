@@ -4,7 +4,7 @@
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::robot::JointKind;
 
@@ -40,7 +40,7 @@ pub static ENTRY: Entry = Entry {
         Limit::Is(1.0),
         "the joint carries no weight that a counterbalance would carry",
     )],
-    otherwise: Some(Signal::Position),
+    otherwise: Some(CurveSignal::Position),
     ladder: Some(Ladder::USUAL),
     separate_by: "log a slow sweep over the whole travel, both ways, with two payloads",
     formula: "d/dq of stiffness (l - free_length)^2/2, l between points at a and b from the \

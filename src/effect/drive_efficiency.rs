@@ -3,7 +3,7 @@
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::number;
 
@@ -19,7 +19,7 @@ pub static ENTRY: Entry = Entry {
         Rule::not_negative("k", LOSS),
         Rule::at_most(Number::Key("k"), Limit::Is(0.6), LOSS),
     ],
-    otherwise: Some(Signal::Load),
+    otherwise: Some(CurveSignal::Load),
     friction: true,
     separate_by: "lift and lower a known payload at the same speeds",
     formula: "k tau_l H(tau_l v)",

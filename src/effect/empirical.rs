@@ -5,7 +5,7 @@ use super::added::Added;
 use super::entry::{Entry, Family, Key, Role, Search};
 use super::law::{Law, Memory};
 use super::scene::Scene;
-use super::signal::{SIGNALS, Signal};
+use super::signal::{CurveSignal, SIGNALS};
 use super::unit::Unit;
 use crate::number;
 
@@ -68,16 +68,16 @@ pub static LAW: Law = Law {
         Err("it is used only in place of an effect with numbers that no machine has".into())
     },
     varied: Some(|shape| {
-        let signal = Signal::of(shape[0]);
-        (signal.family(), signal == Signal::Position)
+        let signal = CurveSignal::of(shape[0]);
+        (signal.family(), signal == CurveSignal::Position)
     }),
     memory: Some(Memory {
         size: TURNING,
         step: |scene, place, shape, _, kept, out| {
             let Some(j) = place.joint() else { return };
-            let (signal, least) = (Signal::of(shape[0]), TURN * (shape[2] - shape[1]));
+            let (signal, least) = (CurveSignal::of(shape[0]), TURN * (shape[2] - shape[1]));
             let (mut x, sign) = signal.along(scene, j, least);
-            if signal == Signal::Way {
+            if signal == CurveSignal::Way {
                 x[0] = way(scene.stretch.q[j][0], least, kept);
             }
             let at = (x[0] - shape[1]) / (shape[2] - shape[1]).max(f64::MIN_POSITIVE);
@@ -88,7 +88,7 @@ pub static LAW: Law = Law {
     }),
     ..Law::linear(&ENTRY, &VALUES, |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
-        let signal = Signal::of(shape[0]);
+        let signal = CurveSignal::of(shape[0]);
         let (x, sign) = signal.along(scene, j, TURN * (shape[2] - shape[1]));
         let spline = Basis::new();
         for k in 0..scene.len() {
@@ -100,23 +100,23 @@ pub static LAW: Law = Law {
     })
 };
 
-impl Signal {
+impl CurveSignal {
     /// Family of what depends on it.
     pub(crate) fn family(self) -> Family {
         match self {
-            Signal::Position | Signal::Friction => Family::Position,
-            Signal::Speed => Family::Velocity,
-            Signal::Load => Family::Load,
-            Signal::Way => Family::Memory,
+            CurveSignal::Position | CurveSignal::Friction => Family::Position,
+            CurveSignal::Speed => Family::Velocity,
+            CurveSignal::Load => Family::Load,
+            CurveSignal::Way => Family::Memory,
         }
     }
 
     /// Its unit.
     pub(crate) fn unit(self) -> Unit {
         match self {
-            Signal::Position | Signal::Friction | Signal::Way => Unit::Position,
-            Signal::Speed => Unit::Speed,
-            Signal::Load => Unit::Torque,
+            CurveSignal::Position | CurveSignal::Friction | CurveSignal::Way => Unit::Position,
+            CurveSignal::Speed => Unit::Speed,
+            CurveSignal::Load => Unit::Torque,
         }
     }
 
@@ -125,17 +125,17 @@ impl Signal {
         let s = scene.stretch;
         let friction = || (0..s.len()).map(|k| scene.direction(j, k)).collect();
         match self {
-            Signal::Position => (s.q[j].clone(), vec![1.0; s.len()]),
-            Signal::Friction => (s.q[j].clone(), friction()),
-            Signal::Speed => (s.v[j].clone(), vec![1.0; s.len()]),
-            Signal::Load => (scene.load[j].clone(), friction()),
-            Signal::Way => (ways(&s.q[j], least), friction()),
+            CurveSignal::Position => (s.q[j].clone(), vec![1.0; s.len()]),
+            CurveSignal::Friction => (s.q[j].clone(), friction()),
+            CurveSignal::Speed => (s.v[j].clone(), vec![1.0; s.len()]),
+            CurveSignal::Load => (scene.load[j].clone(), friction()),
+            CurveSignal::Way => (ways(&s.q[j], least), friction()),
         }
     }
 
     /// Ends of the curve to try on these scenes; none where nothing moves.
     pub fn ends(self, scenes: &[Scene], j: usize, range: f64) -> Vec<[f64; 2]> {
-        if self == Signal::Way {
+        if self == CurveSignal::Way {
             return [0.03, 0.1, 0.3].map(|share| [0.0, share * range]).to_vec();
         }
         let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
@@ -233,7 +233,7 @@ pub(super) fn cubes(values: &[f64]) -> Vec<f64> {
 
 impl Added {
     /// Signal and greatest torque of a curve in place of a law; none of a named effect.
-    pub fn curve(&self) -> Option<(Signal, f64)> {
+    pub fn curve(&self) -> Option<(CurveSignal, f64)> {
         if self.law.entry.role != Role::StandIn {
             return None;
         }
@@ -241,7 +241,7 @@ impl Added {
         let at = |k: i32| spline.at(f64::from(k) / 100.0);
         let torque = |k: i32| -> f64 { at(k).iter().zip(&self.linear).map(|(b, c)| b * c).sum() };
         let peak = (0..=100).map(torque).map(f64::abs).fold(0.0, f64::max);
-        Some((Signal::of(self.shape[0]), peak))
+        Some((CurveSignal::of(self.shape[0]), peak))
     }
 }
 

@@ -4,7 +4,7 @@
 use super::facts::Facts;
 use super::physics::Rule;
 use super::place::Places;
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 
 /// Families of effects that look alike: named first, the member only where the data separate it.
@@ -205,7 +205,7 @@ pub struct Entry {
     /// What its numbers must satisfy to bear its name.
     pub must: &'static [Rule],
     /// The signal over which a curve takes its place where they do not.
-    pub otherwise: Option<Signal>,
+    pub otherwise: Option<CurveSignal>,
     /// The motion that separates it from its like; none where it takes a payload, a standstill or other sensors.
     pub ladder: Option<Ladder>,
     /// The experiment that separates it, as what to do.

@@ -1,6 +1,6 @@
 //! What an effect that was found is called by a person who knows machines: `ripple of q1, 2.5 mm pitch`.
 
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use crate::number;
 use crate::robot::JointKind;
 
@@ -15,7 +15,7 @@ pub struct Facts {
     /// Key, value and unit of its numbers.
     pub numbers: Vec<(String, f64, String)>,
     /// The signal that a curve is drawn over, and its peak.
-    pub curve: Option<(Signal, f64)>,
+    pub curve: Option<(CurveSignal, f64)>,
     /// Unit of the torque.
     pub torque: String,
 }

@@ -4,7 +4,7 @@
 use super::entry::{Entry, Family, Key, Search};
 use super::law::Law;
 use super::physics::Rule;
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::number;
 
@@ -19,7 +19,7 @@ pub static ENTRY: Entry = Entry {
     search: Search::Refined,
     // mu_v may be negative: what it takes at speed is bounded by the power of all friction of the joint
     must: &[Rule::not_negative("mu_c", LOADED).or_zero()],
-    otherwise: Some(Signal::Load),
+    otherwise: Some(CurveSignal::Load),
     friction: true,
     separate_by: "log the same path at the same speed with and without a known payload",
     formula: "(mu_c + mu_v abs(v)) abs(tau_l) tanh(w v)",

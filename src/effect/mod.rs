@@ -37,7 +37,7 @@ pub use physics::{Rule, Seen};
 pub use place::{Place, Places};
 pub use sampled::Sampled;
 pub use scene::Scene;
-pub use signal::Signal;
+pub use signal::CurveSignal;
 pub use unit::Unit;
 pub use values::{EffectError, Values};
 

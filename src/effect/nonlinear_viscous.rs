@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::number;
 use crate::robot::friction::sign;
@@ -21,7 +21,7 @@ pub static ENTRY: Entry = Entry {
     search: Search::Refined,
     ladder: Some(Ladder::USUAL),
     friction: true,
-    otherwise: Some(Signal::Speed),
+    otherwise: Some(CurveSignal::Speed),
     separate_by: "log constant speeds, both ways, up to the top speed",
     formula: "c sgn(v) abs(v)^p",
     source: "lubricants that shear thin, or churn at speed",

@@ -3,7 +3,7 @@
 
 use super::cover::JointCover;
 use crate::robot::JointKind;
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 use crate::robot::model::JointFriction;
 
 /// One thing that must hold.
@@ -60,7 +60,7 @@ pub struct Seen<'a> {
     pub duration_s: f64,
     pub kind: JointKind,
     pub friction: &'a JointFriction,
-    pub drive: &'a Drive,
+    pub drive: &'a JointDrive,
     /// Gravity acts on it, as far as the model knows.
     pub weight: bool,
 }
@@ -198,7 +198,7 @@ mod tests {
     use crate::robot::friction::ViscousCoulomb;
 
     /// What a joint that turns at up to 2 rad/s for 60 s says of an effect's keys, its drive declared so.
-    fn said(name: &str, keys: &[(&str, f64)], drive: &Drive) -> Option<String> {
+    fn said(name: &str, keys: &[(&str, f64)], drive: &JointDrive) -> Option<String> {
         let cover = JointCover {
             speed: [-2.0, 2.0],
             speed_rms: 1.0,
@@ -298,7 +298,7 @@ mod tests {
             ("payload", &[("mass", -0.1)], false),
         ];
         for (name, keys, holds) in cases {
-            let told = said(name, keys, &Drive::default());
+            let told = said(name, keys, &JointDrive::default());
             assert_eq!(told.is_none(), *holds, "{name} {keys:?}: {told:?}");
             assert!(told.is_none_or(|why| why.len() > 20), "{name}");
         }
@@ -306,26 +306,26 @@ mod tests {
 
     #[test]
     fn a_declared_drive_widens_and_narrows_what_a_joint_can_have() {
-        let gap = |drive: Drive, gap: f64| said("backlash", &[("gap", gap)], &drive);
-        let of = |kind| Drive {
+        let gap = |drive: JointDrive, gap: f64| said("backlash", &[("gap", gap)], &drive);
+        let of = |kind| JointDrive {
             kind: Some(kind),
-            ..Drive::default()
+            ..JointDrive::default()
         };
         assert!(gap(of(DriveKind::Geared), 0.01).is_none());
         assert!(gap(of(DriveKind::Harmonic), 0.01).is_some());
         assert!(gap(of(DriveKind::Direct), 1e-4).is_some());
-        let declared = |most| Drive {
+        let declared = |most| JointDrive {
             backlash_max: Some(most),
             ..of(DriveKind::Harmonic)
         };
         assert!(gap(declared(0.02), 0.01).is_none());
         assert!(gap(declared(0.001), 0.01).is_some());
         let keys = [("sigma0", 90.0), ("sigma1", 0.0), ("fc", 9.0)];
-        let wide = Drive {
+        let wide = JointDrive {
             presliding_max: Some(0.2),
-            ..Drive::default()
+            ..JointDrive::default()
         };
-        assert!(said("presliding", &keys, &Drive::default()).is_some());
+        assert!(said("presliding", &keys, &JointDrive::default()).is_some());
         assert!(said("presliding", &keys, &wide).is_none());
     }
 

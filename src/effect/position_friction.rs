@@ -6,7 +6,7 @@ use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::order::{order_limits, orders, wavenumber};
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 
 pub static ENTRY: Entry = Entry {
@@ -23,7 +23,7 @@ pub static ENTRY: Entry = Entry {
         Limit::Coulomb(1.0),
         "with more than the joint's Coulomb friction it would drive the joint",
     )],
-    otherwise: Some(Signal::Friction),
+    otherwise: Some(CurveSignal::Friction),
     ladder: Some(Ladder::USUAL),
     friction: true,
     separate_by: "log the same stretch of travel in both directions at one speed",

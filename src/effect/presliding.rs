@@ -6,7 +6,7 @@
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{KeyValue, Law, Memory, Reparametrisation};
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 use crate::robot::model::JointFriction;
@@ -35,7 +35,7 @@ pub static ENTRY: Entry = Entry {
             "rolling contacts and seals slip after 0.05 rad or 5 mm, or what [drive] declares",
         ),
     ],
-    otherwise: Some(Signal::Way),
+    otherwise: Some(CurveSignal::Way),
     ladder: Some(Ladder::NARROW),
     separate_by: "log slow reversals at several amplitudes below and above breakaway",
     formula: "sigma0 z + sigma1 dz/dt for F - viscous v; dz/dt = v - sigma0 abs(v) z/fc",

@@ -2,7 +2,7 @@
 
 /// What the curve is drawn over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Signal {
+pub enum CurveSignal {
     /// A torque over the position.
     Position,
     /// Friction over the position: it flips with the direction.
@@ -16,19 +16,19 @@ pub enum Signal {
 }
 
 /// In the order of their numbers in files, from 1.
-const ALL: [Signal; 5] = [
-    Signal::Position,
-    Signal::Friction,
-    Signal::Speed,
-    Signal::Load,
-    Signal::Way,
+const ALL: [CurveSignal; 5] = [
+    CurveSignal::Position,
+    CurveSignal::Friction,
+    CurveSignal::Speed,
+    CurveSignal::Load,
+    CurveSignal::Way,
 ];
 
 /// How many there are.
 pub(super) const SIGNALS: usize = ALL.len();
 
-impl Signal {
-    pub(super) fn of(number: f64) -> Signal {
+impl CurveSignal {
+    pub(super) fn of(number: f64) -> CurveSignal {
         let index = (number.round() as usize).clamp(1, ALL.len());
         ALL[index - 1]
     }
@@ -41,23 +41,23 @@ impl Signal {
     /// What it is and what to look at: `torque that depends on its position`, `a cable, a hose or the sensor`.
     pub fn words(self) -> [&'static str; 2] {
         match self {
-            Signal::Position => [
+            CurveSignal::Position => [
                 "torque that depends on its position",
                 "a cable, a hose or the sensor",
             ],
-            Signal::Friction => [
+            CurveSignal::Friction => [
                 "friction that depends on its position",
                 "a bent screw, an eccentric gear or a seal",
             ],
-            Signal::Speed => [
+            CurveSignal::Speed => [
                 "torque that depends on its speed",
                 "a lubricant, or a friction law that is not in the catalogue",
             ],
-            Signal::Load => [
+            CurveSignal::Load => [
                 "friction that depends on its load",
                 "gear teeth, bearings or the torque sensor",
             ],
-            Signal::Way => [
+            CurveSignal::Way => [
                 "friction that depends on the way since it last reversed",
                 "play, presliding or a shaft that twists",
             ],

@@ -4,7 +4,7 @@
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{self, Law};
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -25,7 +25,7 @@ pub static ENTRY: Entry = Entry {
             "Coulomb friction is reached well below the top speed",
         ),
     ],
-    otherwise: Some(Signal::Speed),
+    otherwise: Some(CurveSignal::Speed),
     ladder: Some(Ladder::NARROW),
     separate_by: "log slow reversals at several amplitudes (friction that depends on speed stays the \
                   same, a presliding loop shrinks with the amplitude)",

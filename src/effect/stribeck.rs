@@ -4,7 +4,7 @@
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{self, Law};
 use super::physics::{Limit, Number, Rule};
-use super::signal::Signal;
+use super::signal::CurveSignal;
 use super::unit::Unit;
 use crate::robot::friction::sign;
 
@@ -27,7 +27,7 @@ pub static ENTRY: Entry = Entry {
             "a lubricant film builds up at low speed, below 0.3 of the top speed",
         ),
     ],
-    otherwise: Some(Signal::Speed),
+    otherwise: Some(CurveSignal::Speed),
     ladder: Some(Ladder::USUAL),
     friction: true,
     separate_by: "log slow constant speeds, both ways, from a hundredth of the top speed up",

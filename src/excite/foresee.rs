@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::ExciteError;
 use super::information::{Information, normalised};
-use super::machine::Machine;
+use super::machine::ForeseenRobot;
 use super::motion::Motion;
 use crate::math::rank;
 
@@ -44,7 +44,7 @@ pub struct Expected {
 
 /// Part of an unknown in a direction; columns are scaled to norm 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Part {
+pub struct UnknownShare {
     pub parameter: String,
     pub weight: f64,
 }
@@ -69,7 +69,7 @@ pub struct Foresight {
     pub samples: u64,
     pub parameters: Vec<Expected>,
     /// Largest parts first.
-    pub weakest_direction: Vec<Part>,
+    pub weakest_direction: Vec<UnknownShare>,
     pub confounded: Option<Pair>,
     /// Rows per joint that the deviations stand for.
     pub rows: f64,
@@ -84,7 +84,7 @@ pub struct Foresight {
 /// # Errors
 /// [`ExciteError::Robot`] where the machine cannot follow.
 pub fn information(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     motion: &Motion,
     rate_hz: f64,
     seconds: f64,
@@ -116,7 +116,7 @@ pub fn information(
 /// # Errors
 /// [`ExciteError`] where a number is not finite.
 pub fn foresee(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     information: &Information,
     rows: f64,
     given: Option<&DMatrix<f64>>,
@@ -130,10 +130,10 @@ pub fn foresee(
     let full = rank == p && largest > 0.0;
     let singular = rank::svd(&plain)?.s;
     let weakest = scaled.v.column(p - 1);
-    let mut weakest_direction: Vec<Part> = names
+    let mut weakest_direction: Vec<UnknownShare> = names
         .iter()
         .zip(weakest.iter())
-        .map(|(name, weight)| Part {
+        .map(|(name, weight)| UnknownShare {
             parameter: name.clone(),
             weight: *weight,
         })
@@ -238,7 +238,7 @@ fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) 
 }
 
 /// Unit of unknown i.
-fn unit(machine: &Machine, i: usize) -> String {
+fn unit(machine: &ForeseenRobot, i: usize) -> String {
     let robot = &machine.model.robot;
     if let Some(info) = robot.parameters().get(i) {
         return info.unit.to_string();

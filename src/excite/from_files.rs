@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::config::robot_file::CoordinateLimits;
-use crate::config::trajectory::{Fourier, FourierCoordinate};
+use crate::config::trajectory::{FourierCoordinate, FourierSection};
 use crate::config::{ModelFile, RobotFile};
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::friction::ViscousCoulomb;
@@ -12,10 +12,10 @@ use crate::robot::{JointKind, Robot};
 use crate::simulate::Mechanism;
 
 use super::ExciteError;
-use super::limits::{Channel, Quantity};
-use super::machine::Machine;
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::ForeseenRobot;
 use super::series::{MOST, Series};
-use super::space::Space;
+use super::space::DesignSpace;
 
 /// Share of the speed limit within which the sign of a Coulomb column is smoothed in a search.
 const SIGN: f64 = 0.005;
@@ -31,7 +31,7 @@ const SIGN: f64 = 0.005;
 pub fn machine(
     file: &RobotFile,
     model: Option<(&str, &ModelFile)>,
-) -> Result<Machine, ExciteError> {
+) -> Result<ForeseenRobot, ExciteError> {
     let robot = file.robot();
     let n = robot.joints();
     let model = match model {
@@ -50,7 +50,7 @@ pub fn machine(
             }
         }
     }
-    let mut machine = Machine {
+    let mut machine = ForeseenRobot {
         columns: RegressorColumns {
             joints: n,
             shared: robot.parameters().len(),
@@ -60,13 +60,13 @@ pub fn machine(
         },
         model,
         mechanism: Mechanism::of(file)?,
-        space: Space::default(),
+        space: DesignSpace::default(),
         channels: Vec::new(),
         noise: vec![1.0; n],
         coulomb_speed: vec![1.0; n],
     };
     machine.channels = channels(file, &machine.mechanism)?;
-    let (space, of_places) = Space::of(file, &machine.model.robot);
+    let (space, of_places) = DesignSpace::of(file, &machine.model.robot);
     machine.space = space;
     machine.channels.extend(of_places);
     for i in 0..n {
@@ -114,7 +114,10 @@ fn nominal(file: &RobotFile, robot: &Robot) -> Model {
 
 /// What a motion must keep: limits of the motors' coordinates, of joints that are none of these, and where the
 /// motors could lose hold of a joint.
-fn channels(file: &RobotFile, mechanism: &Mechanism<MOST>) -> Result<Vec<Channel>, ExciteError> {
+fn channels(
+    file: &RobotFile,
+    mechanism: &Mechanism<MOST>,
+) -> Result<Vec<BoundedQuantity>, ExciteError> {
     let robot = &mechanism.robot;
     let mut channels = Vec::new();
     for i in 0..robot.joints() {
@@ -147,10 +150,10 @@ fn channels(file: &RobotFile, mechanism: &Mechanism<MOST>) -> Result<Vec<Channel
     if let Some(practice) = &mechanism.practice {
         let (joint, least) = practice.clearance;
         let name = &robot.joint_names()[joint];
-        channels.push(Channel {
+        channels.push(BoundedQuantity {
             lower: least,
             upper: f64::INFINITY,
-            ..Channel::symmetric(Quantity::Clearance, joint, name, "", 0.0)
+            ..BoundedQuantity::symmetric(Quantity::Clearance, joint, name, "", 0.0)
         });
     }
     Ok(channels)
@@ -161,7 +164,7 @@ fn of_coordinate(
     file: &RobotFile,
     mechanism: &Mechanism<MOST>,
     i: usize,
-    channels: &mut Vec<Channel>,
+    channels: &mut Vec<BoundedQuantity>,
 ) {
     let (robot, practice) = (&mechanism.robot, mechanism.practice.as_ref());
     let (names, kind) = (robot.coordinate_names(), robot.coordinate_kind(i));
@@ -182,9 +185,9 @@ fn of_coordinate(
         acceleration = acceleration.min(of_joint.acceleration.unwrap_or(f64::INFINITY));
     }
     let symmetric =
-        |quantity, unit: &str, most: f64| Channel::symmetric(quantity, i, name, unit, most);
+        |quantity, unit: &str, most: f64| BoundedQuantity::symmetric(quantity, i, name, unit, most);
     if lower.is_finite() && upper.is_finite() {
-        channels.push(Channel {
+        channels.push(BoundedQuantity {
             lower,
             upper,
             ..symmetric(Quantity::Position, unit, 0.0)
@@ -220,11 +223,12 @@ fn of_joint(
     name: &str,
     kind: JointKind,
     same: bool,
-    channels: &mut Vec<Channel>,
+    channels: &mut Vec<BoundedQuantity>,
 ) {
     let unit = kind.position_unit();
-    let symmetric =
-        |quantity, unit: &str, most: f64| Channel::symmetric(quantity, joint, name, unit, most);
+    let symmetric = |quantity, unit: &str, most: f64| {
+        BoundedQuantity::symmetric(quantity, joint, name, unit, most)
+    };
     if let Some(torque) = given.torque {
         channels.push(symmetric(Quantity::Torque, kind.torque_unit(), torque));
     }
@@ -232,7 +236,7 @@ fn of_joint(
         return;
     }
     if let Some([lower, upper]) = given.position {
-        channels.push(Channel {
+        channels.push(BoundedQuantity {
             lower,
             upper,
             ..symmetric(Quantity::JointPosition, unit, 0.0)
@@ -253,7 +257,7 @@ fn of_joint(
 /// # Errors
 /// [`ExciteError`] for a coordinate that the machine does not have, and for a series of the CFT
 /// robot in joint coordinates.
-pub fn series_of(machine: &Machine, file: &Fourier) -> Result<Series, ExciteError> {
+pub fn series_of(machine: &ForeseenRobot, file: &FourierSection) -> Result<Series, ExciteError> {
     let names = machine.coordinate_names();
     if file.coordinates != machine.designed() {
         return Err(ExciteError::OtherCoordinates {
@@ -282,14 +286,14 @@ pub fn series_of(machine: &Machine, file: &Fourier) -> Result<Series, ExciteErro
 }
 
 /// The trajectory file of a series in the machine's designed coordinates.
-pub fn trajectory(machine: &Machine, series: &Series) -> Fourier {
+pub fn trajectory(machine: &ForeseenRobot, series: &Series) -> FourierSection {
     let of = |(i, name): (usize, String)| FourierCoordinate {
         name,
         offset: series.offset[i],
         a: series.a[i].clone(),
         b: series.b[i].clone(),
     };
-    Fourier {
+    FourierSection {
         coordinates: machine.designed(),
         fundamental_hz: series.fundamental / TAU,
         start_s: None,

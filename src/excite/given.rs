@@ -5,18 +5,18 @@ use nalgebra::DMatrix;
 use crate::inertia::accumulate::BlockFactors;
 
 use super::information::Information;
-use super::machine::Machine;
+use super::machine::ForeseenRobot;
 
 /// F'F of every joint's rows, as many as a log holds.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Given {
+pub struct GivenInformation {
     /// p x p per joint.
     joints: Vec<DMatrix<f64>>,
 }
 
-impl Given {
+impl GivenInformation {
     /// Nothing.
-    pub fn nothing(machine: &Machine) -> Self {
+    pub fn nothing(machine: &ForeseenRobot) -> Self {
         let p = machine.unknowns();
         Self {
             joints: vec![DMatrix::zeros(p, p); machine.coordinates()],

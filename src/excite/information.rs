@@ -8,7 +8,7 @@ use crate::math::rfactor::RFactor;
 use crate::robot::RobotError;
 
 use super::criterion::Criterion;
-use super::machine::Machine;
+use super::machine::ForeseenRobot;
 use super::objective::{NoValue, PriorInformation};
 use super::series::{Kinematics, Series};
 
@@ -27,7 +27,7 @@ impl Information {
     /// # Errors
     /// [`RobotError`] where the machine cannot follow.
     pub fn of_period(
-        machine: &Machine,
+        machine: &ForeseenRobot,
         series: &Series,
         samples: usize,
     ) -> Result<Self, RobotError> {
@@ -40,7 +40,7 @@ impl Information {
     /// # Errors
     /// As [`Self::of_period`].
     pub(crate) fn of_path(
-        machine: &Machine,
+        machine: &ForeseenRobot,
         samples: usize,
         at: &dyn Fn(usize) -> Kinematics,
     ) -> Result<Self, RobotError> {
@@ -83,7 +83,7 @@ impl Information {
     /// [`NoValue`] where the rows are not finite.
     pub fn value(
         &self,
-        machine: &Machine,
+        machine: &ForeseenRobot,
         criterion: &Criterion,
         prior: Option<&PriorInformation>,
     ) -> Result<f64, NoValue> {

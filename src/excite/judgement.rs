@@ -4,12 +4,12 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::foresee::{Condition, Expected, Foresight, Pair, Part, foresee, information};
-use super::limits::{Channel, Quantity};
-use super::machine::Machine;
+use super::foresee::{Condition, Expected, Foresight, Pair, UnknownShare, foresee, information};
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::ForeseenRobot;
 use super::motion::{spectrum, torque_band};
 use super::usage::{Use, along_way};
-use super::{ExciteError, Given, Motion};
+use super::{ExciteError, GivenInformation, Motion};
 use crate::number;
 
 /// Share of the torque's power that its band holds.
@@ -40,10 +40,10 @@ pub struct Judgement {
     /// Expected deviations, friction known.
     pub parameters: Vec<Expected>,
     /// The combination of columns, scaled to norm 1, that is least certain; largest parts first.
-    pub weakest_direction: Vec<Part>,
+    pub weakest_direction: Vec<UnknownShare>,
     pub confounded: Option<Pair>,
     /// The same with what is given besides.
-    pub together: Option<Together>,
+    pub together: Option<GivenTogether>,
     /// Of a one-joint move: what it tells about the joint's friction.
     pub friction: Option<LawForeseen>,
     /// The noise that deviations are expected from.
@@ -55,7 +55,7 @@ pub struct Judgement {
     /// Of a series alone.
     pub spectrum: Option<Vec<Amplitudes>>,
     /// Of a series alone.
-    pub band: Option<Vec<Band>>,
+    pub band: Option<Vec<PowerBand>>,
     /// Duration of the motion \[s\].
     pub seconds: f64,
     /// Whole periods between the ends, of a series.
@@ -105,7 +105,7 @@ pub struct LimitUse {
 
 /// Expected deviations together with what is given besides.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Together {
+pub struct GivenTogether {
     pub parameters: Vec<Expected>,
     pub confounded: Option<Pair>,
 }
@@ -139,7 +139,7 @@ pub struct Amplitudes {
 
 /// Where the power of a joint's torque lies.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Band {
+pub struct PowerBand {
     pub joint: String,
     /// Frequency below which 99 % of it lies \[Hz\].
     pub torque_power_99_below_hz: f64,
@@ -173,9 +173,9 @@ impl Judgements {
 #[derive(Debug, Clone)]
 pub struct Terms<'a> {
     /// Limits that are looked at.
-    pub channels: &'a [Channel],
+    pub channels: &'a [BoundedQuantity],
     /// What is used together with the motion.
-    pub given: Option<&'a Given>,
+    pub given: Option<&'a GivenInformation>,
     /// Of a one-joint move.
     pub friction: Option<LawForeseen>,
     /// Pose from which the robot goes to the first point, in the designed coordinates \[m or rad\].
@@ -193,7 +193,11 @@ pub struct Terms<'a> {
 ///
 /// # Errors
 /// [`ExciteError::Robot`] where the machine cannot follow.
-pub fn judge(machine: &Machine, motion: &Motion, terms: Terms) -> Result<Judgement, ExciteError> {
+pub fn judge(
+    machine: &ForeseenRobot,
+    motion: &Motion,
+    terms: Terms,
+) -> Result<Judgement, ExciteError> {
     let uses = motion.usage(machine, terms.channels);
     let first = motion.at(0.0);
     let way = (terms.from).map(|from| along_way(machine, terms.channels, from, &first));
@@ -204,7 +208,7 @@ pub fn judge(machine: &Machine, motion: &Motion, terms: Terms) -> Result<Judgeme
             let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
             let before = given.weighted(&weights);
             let found = foresee(machine, &information, rows, Some(&before))?;
-            Some(Together {
+            Some(GivenTogether {
                 parameters: found.parameters,
                 confounded: found.confounded,
             })
@@ -225,7 +229,7 @@ pub fn judge(machine: &Machine, motion: &Motion, terms: Terms) -> Result<Judgeme
                     speed_amplitudes,
                 };
             let spectrum = rows.map(of).collect();
-            let of = |(joint, torque_power_99_below_hz): (&String, f64)| Band {
+            let of = |(joint, torque_power_99_below_hz): (&String, f64)| PowerBand {
                 joint: joint.clone(),
                 torque_power_99_below_hz,
             };

@@ -20,7 +20,7 @@ use crate::simulate::{OneJointMove, Path, Reference};
 use super::ExciteError;
 use super::foresee::Expected;
 use super::limits::Quantity;
-use super::machine::Machine;
+use super::machine::ForeseenRobot;
 use super::motion::differentiated;
 use super::series::MOST;
 
@@ -58,7 +58,7 @@ pub struct LadderTask {
 
 /// A ladder, and what it is expected to tell.
 #[derive(Debug, Clone)]
-pub struct Ladder {
+pub struct DesignedLadder {
     pub file: SingleJointMove,
     /// The law's parameters, as a log of the design is expected to give them.
     pub expected: Vec<Expected>,
@@ -72,7 +72,10 @@ pub struct Ladder {
 /// # Errors
 /// [`ExciteError::NoLaw`] where the joint has no friction to tell, others where the machine has no such
 /// joint or its travel is not known.
-pub fn design_ladder(machine: &Machine, task: &LadderTask) -> Result<Ladder, ExciteError> {
+pub fn design_ladder(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+) -> Result<DesignedLadder, ExciteError> {
     let joint = joint_of(machine, &task.joint)?;
     if machine.model.friction[joint].parameters() == 0 {
         return Err(ExciteError::NoLaw {
@@ -131,7 +134,7 @@ pub fn design_ladder(machine: &Machine, task: &LadderTask) -> Result<Ladder, Exc
         *number = three_digits(*number);
     }
     let expected = expectation(machine, task, joint, &rungs)?;
-    Ok(Ladder {
+    Ok(DesignedLadder {
         file: move_of(&task.joint, &rungs),
         expected,
         usual: before.iter().map(|e| e.relative_std).collect(),
@@ -144,7 +147,7 @@ pub fn design_ladder(machine: &Machine, task: &LadderTask) -> Result<Ladder, Exc
 /// # Errors
 /// As [`design_ladder`].
 pub fn foresee_ladder(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &LadderTask,
     file: &SingleJointMove,
 ) -> Result<Vec<Expected>, ExciteError> {
@@ -153,7 +156,7 @@ pub fn foresee_ladder(
     expected(machine, task, joint, &reference).map(|(expected, _)| expected)
 }
 
-fn joint_of(machine: &Machine, name: &str) -> Result<usize, ExciteError> {
+fn joint_of(machine: &ForeseenRobot, name: &str) -> Result<usize, ExciteError> {
     let names = machine.model.robot.joint_names();
     names
         .iter()
@@ -198,7 +201,7 @@ fn ends(speeds: &[f64]) -> (f64, f64) {
 
 /// Speeds of the ladder that the simulator runs where no file says otherwise.
 fn usual_speeds(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &LadderTask,
     joint: usize,
 ) -> Result<Vec<f64>, ExciteError> {
@@ -213,7 +216,7 @@ fn usual_speeds(
 }
 
 /// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
-fn keep_speed_limit(machine: &Machine, reserve: f64, joint: usize, speeds: &mut Vec<f64>) {
+fn keep_speed_limit(machine: &ForeseenRobot, reserve: f64, joint: usize, speeds: &mut Vec<f64>) {
     let quantity = match machine.mechanism.motors_at_joints() {
         true => Quantity::Speed,
         false => Quantity::JointSpeed,
@@ -231,7 +234,7 @@ fn keep_speed_limit(machine: &Machine, reserve: f64, joint: usize, speeds: &mut 
 
 /// The ladder of a file in joint coordinates.
 fn reference(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &LadderTask,
     file: &SingleJointMove,
 ) -> Result<Reference<MOST>, ExciteError> {
@@ -242,7 +245,7 @@ fn reference(
 
 /// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
 fn expectation(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &LadderTask,
     joint: usize,
     rungs: &Rungs,
@@ -277,7 +280,7 @@ fn score(law: &JointFriction, expected: &[Expected]) -> f64 {
 
 /// Expected deviations along a reference, and the largest share of a drive's limit.
 fn expected(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &LadderTask,
     joint: usize,
     along: &Reference<MOST>,
@@ -312,7 +315,7 @@ fn expected(
 /// Sums of squares and products of a joint's rows along a reference, for inertial parameters, a constant torque
 /// and the friction law; and the largest share of a drive's limit.
 fn information(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     seconds: f64,
     joint: usize,
     along: &Reference<MOST>,

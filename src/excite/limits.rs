@@ -64,7 +64,7 @@ impl Quantity {
 
 /// One bounded quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
+pub struct BoundedQuantity {
     pub quantity: Quantity,
     /// Coordinate or joint, from 0.
     pub index: usize,
@@ -77,7 +77,7 @@ pub struct Channel {
     pub upper: f64,
 }
 
-impl Channel {
+impl BoundedQuantity {
     /// A channel bounded to `-most..=most`.
     pub fn symmetric(quantity: Quantity, index: usize, name: &str, unit: &str, most: f64) -> Self {
         Self {
@@ -135,11 +135,11 @@ impl Channel {
 mod tests {
     use super::*;
 
-    fn position() -> Channel {
-        Channel {
+    fn position() -> BoundedQuantity {
+        BoundedQuantity {
             lower: -0.1,
             upper: 0.5,
-            ..Channel::symmetric(Quantity::Position, 0, "x_c4", "m", 1.0)
+            ..BoundedQuantity::symmetric(Quantity::Position, 0, "x_c4", "m", 1.0)
         }
     }
 
@@ -151,10 +151,10 @@ mod tests {
         assert!(channel.used(0.2) < 1e-12);
         let reserved = channel.reserved(0.1);
         assert!((reserved.lower + 0.07).abs() < 1e-12 && (reserved.upper - 0.47).abs() < 1e-12);
-        let clearance = Channel {
+        let clearance = BoundedQuantity {
             upper: f64::INFINITY,
             lower: 0.2,
-            ..Channel::symmetric(Quantity::Clearance, 0, "q5", "", 1.0)
+            ..BoundedQuantity::symmetric(Quantity::Clearance, 0, "q5", "", 1.0)
         };
         assert_eq!(clearance.used(0.2), 1.0);
         assert_eq!(clearance.used(0.4), 0.5);

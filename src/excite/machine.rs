@@ -10,22 +10,22 @@ use crate::robot::model::{JointFriction, Model};
 use crate::robot::tree::pose::{Frame, frames};
 use crate::simulate::Mechanism;
 
-use super::limits::{Channel, Quantity};
+use super::limits::{BoundedQuantity, Quantity};
 use super::series::{Kinematics, MOST};
-use super::space::Space;
+use super::space::DesignSpace;
 
 /// A robot with the numbers that its torques are foreseen with, and its limits.
 #[derive(Debug, Clone)]
-pub struct Machine {
+pub struct ForeseenRobot {
     pub model: Model,
     /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
     pub columns: RegressorColumns,
     /// Motors and limits, as the simulator knows them.
     pub mechanism: Mechanism<MOST>,
     /// Points and links that some of the limits speak of.
-    pub space: Space,
+    pub space: DesignSpace,
     /// Limits that a motion must keep.
-    pub channels: Vec<Channel>,
+    pub channels: Vec<BoundedQuantity>,
     /// Standard deviation of the noise on each joint's torque \[N or N m\], sample by sample.
     pub noise: Vec<f64>,
     /// Speeds above which the sign in a Coulomb column counts as whole, per joint \[m/s or rad/s\].
@@ -67,7 +67,7 @@ pub(super) struct Linearised {
     v: [f64; MOST],
 }
 
-impl Machine {
+impl ForeseenRobot {
     /// Number of designed coordinates, and of joints.
     pub fn coordinates(&self) -> usize {
         self.model.friction.len()
@@ -303,7 +303,7 @@ impl Machine {
 /// What channels bound at one state.
 #[derive(Debug)]
 pub struct Quantities<'a> {
-    machine: &'a Machine,
+    machine: &'a ForeseenRobot,
     state: &'a State,
     /// Of the links, for the first channel that asks where they are and all after it.
     frames: OnceCell<Vec<Frame>>,
@@ -312,7 +312,7 @@ pub struct Quantities<'a> {
 impl Quantities<'_> {
     /// The quantity of a channel.
     #[inline]
-    pub fn of(&self, channel: &Channel) -> f64 {
+    pub fn of(&self, channel: &BoundedQuantity) -> f64 {
         let (i, machine, state) = (channel.index, self.machine, self.state);
         let robot = &machine.model.robot;
         let q = &state.q[..machine.coordinates()];

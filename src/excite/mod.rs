@@ -35,7 +35,7 @@ mod variables;
 
 pub use criterion::Criterion;
 pub use from_files::{machine, series_of, trajectory};
-pub use given::Given;
+pub use given::GivenInformation;
 pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
 pub use motion::Motion;
 pub use objective::{NoValue, PriorInformation};

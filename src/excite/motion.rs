@@ -3,15 +3,15 @@
 
 use std::f64::consts::TAU;
 
-use crate::config::trajectory::{Fourier, Trajectory};
+use crate::config::trajectory::{FourierSection, Trajectory};
 use crate::robot::Robot;
-use crate::simulate::{Frame, Reference, experiment};
+use crate::simulate::{Reference, ReferenceFrame, experiment};
 
 use super::ExciteError;
 use super::blend::Blend;
 use super::from_files::series_of;
-use super::limits::Channel;
-use super::machine::Machine;
+use super::limits::BoundedQuantity;
+use super::machine::ForeseenRobot;
 use super::series::{Kinematics, MOST, Series};
 use super::usage::{Interval, Use, along, along_blend, along_period};
 
@@ -44,7 +44,7 @@ impl Motion {
     /// # Errors
     /// [`ExciteError`] where the trajectory names what the machine does not have, or does not fit.
     pub fn of_file(
-        machine: &Machine,
+        machine: &ForeseenRobot,
         file: &Trajectory,
         seconds: f64,
         seed: u64,
@@ -100,7 +100,7 @@ impl Motion {
     }
 
     /// How near the motion comes to every channel, blends and what lies between samples included.
-    pub fn usage(&self, machine: &Machine, channels: &[Channel]) -> Vec<Use> {
+    pub fn usage(&self, machine: &ForeseenRobot, channels: &[BoundedQuantity]) -> Vec<Use> {
         match self {
             Self::Periodic { series, blend } => {
                 let whole = along_period(machine, channels, series);
@@ -131,7 +131,7 @@ fn short_enough(seconds: f64) -> Result<(), ExciteError> {
 }
 
 /// Start, blend and periods of a file, blended as the simulator does where it does not say.
-fn blend_of(file: &Fourier) -> Blend {
+fn blend_of(file: &FourierSection) -> Blend {
     Blend {
         start: file.start_s.unwrap_or(0.0),
         seconds: file.blend_s.unwrap_or(BLEND),
@@ -156,7 +156,7 @@ pub(super) fn differentiated(reference: &Reference<MOST>, t: f64) -> Kinematics 
 /// A reference in the motors' coordinates.
 fn kinematics(reference: &Reference<MOST>, robot: &Robot, t: f64) -> Kinematics {
     let own = differentiated(reference, t);
-    if reference.frame == Frame::Motors {
+    if reference.frame == ReferenceFrame::Motors {
         return own;
     }
     let (n, mut k) = (robot.joints(), Kinematics::REST);
@@ -182,7 +182,7 @@ pub fn spectrum(series: &Series) -> Vec<Vec<f64>> {
 /// # Errors
 /// [`ExciteError::Robot`] where the machine cannot follow.
 pub(crate) fn torque_band(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     series: &Series,
     share: f64,
 ) -> Result<Vec<f64>, ExciteError> {

@@ -13,8 +13,8 @@ use crate::math::MathError;
 use crate::robot::RobotError;
 
 use super::criterion::{Criterion, Slope};
-use super::limits::Channel;
-use super::machine::{Linearised, Machine, State};
+use super::limits::BoundedQuantity;
+use super::machine::{ForeseenRobot, Linearised, State};
 use super::series::{Basis, Kinematics, MOST, Series};
 use super::usage::along_period;
 use super::variables::Variables;
@@ -55,7 +55,7 @@ pub(super) struct Multipliers {
 /// The function and all that it needs.
 #[derive(Debug, Clone)]
 pub(super) struct Objective<'a> {
-    pub machine: &'a Machine,
+    pub machine: &'a ForeseenRobot,
     pub criterion: &'a Criterion,
     pub variables: Variables,
     pub prior: Option<&'a PriorInformation>,
@@ -64,8 +64,8 @@ pub(super) struct Objective<'a> {
     /// Samples at which limits are kept: friction turns round between those of the regressor.
     fine: Basis,
     /// Linear channels, then the others, as the search keeps them.
-    linear: Vec<Channel>,
-    curved: Vec<Channel>,
+    linear: Vec<BoundedQuantity>,
+    curved: Vec<BoundedQuantity>,
     /// Weight of each joint's rows.
     weights: Vec<f64>,
 }
@@ -89,9 +89,9 @@ pub(super) struct Work {
 impl<'a> Objective<'a> {
     /// `channels` are the limits as the search keeps them; `samples` those of the period.
     pub fn new(
-        machine: &'a Machine,
+        machine: &'a ForeseenRobot,
         criterion: &'a Criterion,
-        channels: &[Channel],
+        channels: &[BoundedQuantity],
         variables: Variables,
         prior: Option<&'a PriorInformation>,
         samples: usize,
@@ -99,7 +99,7 @@ impl<'a> Objective<'a> {
         let (linear, curved) = channels
             .iter()
             .cloned()
-            .partition(|c: &Channel| c.quantity.is_linear());
+            .partition(|c: &BoundedQuantity| c.quantity.is_linear());
         let weights = if criterion.weighted() {
             machine.noise.iter().map(|s| 1.0 / (s * s)).collect()
         } else {
@@ -342,7 +342,7 @@ impl<'a> Objective<'a> {
         self.variables.series(z, &mut work.series);
         let mut state = State::EMPTY;
         let mut at = 0;
-        let mut renew = |at: &mut usize, channel: &Channel, value: f64| {
+        let mut renew = |at: &mut usize, channel: &BoundedQuantity, value: f64| {
             for (g, _) in channel.constraints(value) {
                 let moved = multipliers.lambda[*at] + multipliers.weight * g;
                 multipliers.lambda[*at] = moved.max(0.0);
@@ -371,7 +371,7 @@ impl<'a> Objective<'a> {
 }
 
 /// Which of position, speed and acceleration a linear channel bounds.
-fn order(channel: &Channel) -> usize {
+fn order(channel: &BoundedQuantity) -> usize {
     match channel.quantity {
         super::limits::Quantity::Position => 0,
         super::limits::Quantity::Speed => 1,
@@ -477,7 +477,7 @@ mod tests {
     use crate::excite::start::random_motion;
     use std::f64::consts::TAU;
 
-    fn built(file: &str) -> Machine {
+    fn built(file: &str) -> ForeseenRobot {
         let robot = RobotFile::parse("robot.toml", file).expect("a robot file");
         machine(&robot, None).expect("a machine")
     }
@@ -493,7 +493,7 @@ mod tests {
 
     /// Relative differences of the derivative and of central differences of the value.
     fn compare(
-        machine: &Machine,
+        machine: &ForeseenRobot,
         criterion: &Criterion,
         prior: Option<&PriorInformation>,
         step: f64,
@@ -502,7 +502,8 @@ mod tests {
         let free = (0..n).map(|i| (i == 2).then_some(1.7)).collect();
         let variables = Variables::new(&machine.channels, n, TAU * 0.4, 5, free);
         // motions fill twice the room that the objective allows, so that penalties press
-        let tight: Vec<Channel> = machine.channels.iter().map(|c| c.reserved(0.5)).collect();
+        let tight: Vec<BoundedQuantity> =
+            machine.channels.iter().map(|c| c.reserved(0.5)).collect();
         let objective = Objective::new(machine, criterion, &tight, variables, prior, 60);
         let mut work = objective.work();
         let mut worst = 0.0_f64;

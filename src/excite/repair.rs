@@ -1,7 +1,7 @@
 //! A motion that breaks limits, moved and scaled down until it keeps all of them.
 
-use super::limits::{Channel, Quantity};
-use super::machine::Machine;
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::ForeseenRobot;
 use super::series::Series;
 use super::usage::{along_period, closely_along_period, roughly_along_period, worst};
 
@@ -29,8 +29,8 @@ pub(super) enum Care {
 ///
 /// `None` where standing still breaks a limit there too.
 pub(super) fn repaired(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
     fixed: &[Option<f64>],
     care: Care,
@@ -48,14 +48,14 @@ pub(super) fn repaired(
 }
 
 fn fitted(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
     fixed: &[Option<f64>],
     care: Care,
 ) -> Option<Series> {
     let mut series = series.clone();
-    let (linear, curved): (Vec<Channel>, Vec<Channel>) = channels
+    let (linear, curved): (Vec<BoundedQuantity>, Vec<BoundedQuantity>) = channels
         .iter()
         .cloned()
         .partition(|c| c.quantity.is_linear());
@@ -127,8 +127,8 @@ fn narrowed(
 }
 
 fn into_span(
-    machine: &Machine,
-    channel: &Channel,
+    machine: &ForeseenRobot,
+    channel: &BoundedQuantity,
     series: &mut Series,
     fixed: &[Option<f64>],
 ) -> Option<()> {

@@ -9,8 +9,8 @@ use super::ExciteError;
 use super::criterion::Criterion;
 use super::information::Information;
 use super::lagrangian::{Round, Search};
-use super::limits::{Channel, Quantity};
-use super::machine::Machine;
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::ForeseenRobot;
 use super::objective::{Objective, PriorInformation};
 use super::repair::{Care, repaired};
 use super::series::Series;
@@ -41,7 +41,7 @@ pub struct Task {
 
 /// What a search found.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FoundMotion {
     pub series: Series,
     /// Evaluations of the criterion with its derivative, over all starts.
     pub evaluations: u64,
@@ -109,13 +109,13 @@ impl Task {
 /// [`ExciteError`] where limits are missing or contradict each other, and where no start could be
 /// repaired.
 pub fn design(
-    machine: &Machine,
+    machine: &ForeseenRobot,
     task: &Task,
     progress: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
-) -> Result<Found, ExciteError> {
+) -> Result<FoundMotion, ExciteError> {
     let reserved = machine.channels.iter().map(|c| c.reserved(task.reserve));
-    let channels: Vec<Channel> = reserved.collect();
+    let channels: Vec<BoundedQuantity> = reserved.collect();
     check(machine, task, &channels)?;
     let variables = Variables::new(
         &channels,
@@ -183,7 +183,7 @@ pub fn design(
         });
     searches.sort_by(|a, b| order(&a.2, &b.2).then(a.0.cmp(&b.0)));
     match searches.into_iter().next() {
-        Some((start, _, Some((_, series)))) => Ok(Found {
+        Some((start, _, Some((_, series)))) => Ok(FoundMotion {
             series,
             start,
             usable,
@@ -227,14 +227,14 @@ impl Effort<'_> {
 }
 
 /// The criterion as it is, smaller is better.
-fn value(machine: &Machine, task: &Task, series: &Series) -> Option<f64> {
+fn value(machine: &ForeseenRobot, task: &Task, series: &Series) -> Option<f64> {
     let information = Information::of_period(machine, series, 40 * task.harmonics).ok()?;
     let value = information.value(machine, &task.criterion, task.prior.as_ref());
     value.ok().filter(|value| value.is_finite())
 }
 
 /// The series with its coefficients at six decimals, where it keeps the channels so too.
-fn rounded(machine: &Machine, channels: &[Channel], series: Series) -> Series {
+fn rounded(machine: &ForeseenRobot, channels: &[BoundedQuantity], series: Series) -> Series {
     const DECIMALS: f64 = 1e6;
     // what rounding moves, taken off the amplitudes first
     let mut out = series.scaled(1.0 - 1e-5);
@@ -251,7 +251,11 @@ fn rounded(machine: &Machine, channels: &[Channel], series: Series) -> Series {
 }
 
 /// Refuses what no search can mend.
-fn check(machine: &Machine, task: &Task, channels: &[Channel]) -> Result<(), ExciteError> {
+fn check(
+    machine: &ForeseenRobot,
+    task: &Task,
+    channels: &[BoundedQuantity],
+) -> Result<(), ExciteError> {
     let names = machine.coordinate_names();
     for (i, name) in names.iter().enumerate() {
         let of = |quantity| {
@@ -288,8 +292,8 @@ fn check(machine: &Machine, task: &Task, channels: &[Channel]) -> Result<(), Exc
 
 /// Names the limit that standing still breaks, or says that nothing is excited.
 fn nothing_fits(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     variables: &Variables,
     task: &Task,
 ) -> ExciteError {
@@ -315,6 +319,6 @@ fn nothing_fits(
 }
 
 /// Whether a series keeps every limit of the machine along its period.
-pub fn keeps_limits(machine: &Machine, series: &Series) -> bool {
+pub fn keeps_limits(machine: &ForeseenRobot, series: &Series) -> bool {
     worst(&along_period(machine, &machine.channels, series)) <= 1.0
 }

@@ -10,14 +10,14 @@ use crate::robot::tree::capsule::Capsule;
 use crate::robot::tree::pose::{BASE, Frame, frames};
 use crate::robot::tree::space::{Vector, add, dot, times, turn};
 
-use super::limits::{Channel, Quantity};
+use super::limits::{BoundedQuantity, Quantity};
 
 /// Least distance where the file says none \[m\].
 const DISTANCE: f64 = 0.02;
 
 /// Points and pairs of links that are looked at.
 #[derive(Debug, Clone, Default)]
-pub struct Space {
+pub struct DesignSpace {
     points: Vec<Point>,
     pairs: Vec<Pair>,
     /// Away from where things fall, a unit vector of the base frame.
@@ -53,7 +53,7 @@ const POSES: u32 = 256;
 /// many poses within the limits: shapes that overlap by how they are drawn, and that no motion can part.
 pub fn always_touching(file: &RobotFile) -> Vec<[String; 2]> {
     let robot = file.robot();
-    let (space, channels) = Space::of(file, &robot);
+    let (space, channels) = DesignSpace::of(file, &robot);
     let spans = robot.joint_names().iter().map(|joint| {
         let position = file.limits.get(joint).and_then(|of| of.position);
         position.unwrap_or([-PI, PI])
@@ -79,9 +79,9 @@ pub fn always_touching(file: &RobotFile) -> Vec<[String; 2]> {
     names.collect()
 }
 
-impl Space {
+impl DesignSpace {
     /// What `[limits]` declares, and the limits that come of it.
-    pub(super) fn of(file: &RobotFile, robot: &Robot) -> (Self, Vec<Channel>) {
+    pub(super) fn of(file: &RobotFile, robot: &Robot) -> (Self, Vec<BoundedQuantity>) {
         let (limits, tree) = (&file.limits, robot.tree());
         let link = |name: &str| link_of(tree, name).flatten();
         let gravity = tree.gravity();
@@ -109,7 +109,7 @@ impl Space {
         };
         let bare = all().filter(|link| of(*link).is_empty());
         let bare = bare.map(|link| escape(&name(link)));
-        let mut space = Space {
+        let mut space = DesignSpace {
             points: named.collect(),
             pairs: Vec::new(),
             up: match size > 0.0 {
@@ -121,20 +121,26 @@ impl Space {
             bare: bare.collect(),
         };
         let distance = limits.distance.unwrap_or(DISTANCE);
-        let apart = |quantity, index, name: &str| Channel {
+        let apart = |quantity, index, name: &str| BoundedQuantity {
             lower: distance,
             upper: f64::INFINITY,
-            ..Channel::symmetric(quantity, index, name, "m", 0.0)
+            ..BoundedQuantity::symmetric(quantity, index, name, "m", 0.0)
         };
         let mut channels = Vec::new();
         for (i, point) in space.points.iter().enumerate() {
             if let Some([low, high]) = limits.bounds {
                 for (k, axis) in ["x", "y", "z"].iter().enumerate() {
                     let name = format!("{} along {axis}", point.name);
-                    channels.push(Channel {
+                    channels.push(BoundedQuantity {
                         lower: low[k],
                         upper: high[k],
-                        ..Channel::symmetric(Quantity::PointPosition, 3 * i + k, &name, "m", 0.0)
+                        ..BoundedQuantity::symmetric(
+                            Quantity::PointPosition,
+                            3 * i + k,
+                            &name,
+                            "m",
+                            0.0,
+                        )
                     });
                 }
             }
@@ -244,7 +250,7 @@ mod tests {
     #[test]
     fn places_and_distances_of_two_links_are_those_of_trigonometry() {
         let robot = file(ARM).robot();
-        let (space, channels) = Space::of(&file(ARM), &robot);
+        let (space, channels) = DesignSpace::of(&file(ARM), &robot);
         let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         let axes = ["tip along x", "tip along y", "tip along z"];
         // neighbours touch, so that one pair is left
@@ -301,7 +307,7 @@ mod tests {
     fn what_nobody_checks_is_told_by_what_is_declared() {
         let told = |text: &str, way| {
             let file = file(text);
-            Space::of(&file, &file.robot()).0.not_checked(way)
+            DesignSpace::of(&file, &file.robot()).0.not_checked(way)
         };
         assert_eq!(
             told(ARM, true),

@@ -4,8 +4,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::limits::Channel;
-use super::machine::Machine;
+use super::limits::BoundedQuantity;
+use super::machine::ForeseenRobot;
 use super::repair::{Care, repaired};
 use super::series::Series;
 use super::variables::Variables;
@@ -22,8 +22,8 @@ const SAMPLES: usize = 64;
 /// Random motion number `number` of a seed, within the channels; one that stands still at its
 /// offsets where none could be made to fit.
 pub(super) fn random_motion(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     variables: &Variables,
     seed: u64,
     number: usize,
@@ -49,7 +49,7 @@ pub(super) fn random_motion(
 
 /// Root mean square of every joint's torque over random motions that fill the limits \[N or N m\]:
 /// what a share of the torque refers to before there is a motion.
-pub fn usual_torque(machine: &Machine, fundamental: f64, harmonics: usize) -> Vec<f64> {
+pub fn usual_torque(machine: &ForeseenRobot, fundamental: f64, harmonics: usize) -> Vec<f64> {
     let n = machine.coordinates();
     let free = vec![None; n];
     let channels = &machine.channels;

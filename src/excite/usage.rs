@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::ExciteError;
 use super::blend::Blend;
-use super::limits::{Channel, Quantity};
-use super::machine::{Machine, State};
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::{ForeseenRobot, State};
 use super::peak::{Peak, highest, highest_from};
 use super::series::{Kinematics, Series};
 
@@ -23,7 +23,7 @@ const ROUGH: f64 = 1e-3;
 /// A channel along a motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Use {
-    pub channel: Channel,
+    pub channel: BoundedQuantity,
     /// Least and most of the quantity.
     pub range: [f64; 2],
     /// Share of the limit: 1 at it, above 1 beyond it; infinite where the machine cannot follow.
@@ -43,14 +43,18 @@ pub struct Interval<'a> {
 
 /// Channels along the whole period of a series: those that are trigonometric polynomials with a
 /// certain bound, the others with one from their measured curvature.
-pub fn along_period(machine: &Machine, channels: &[Channel], series: &Series) -> Vec<Use> {
+pub fn along_period(
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
+    series: &Series,
+) -> Vec<Use> {
     period(machine, channels, series, PARTS, TOLERANCE)
 }
 
 /// [`along_period`] with bounds that lie a little higher, for searches.
 pub(super) fn closely_along_period(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
 ) -> Vec<Use> {
     period(machine, channels, series, PARTS, CLOSE)
@@ -58,16 +62,16 @@ pub(super) fn closely_along_period(
 
 /// [`along_period`], to a thousandth.
 pub(super) fn roughly_along_period(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
 ) -> Vec<Use> {
     period(machine, channels, series, ROUGH_PARTS, ROUGH)
 }
 
 fn period(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
     parts: usize,
     tolerance: f64,
@@ -77,7 +81,7 @@ fn period(
         span: [0.0, series.period()],
         parts,
     };
-    let (linear, curved): (Vec<&Channel>, Vec<&Channel>) =
+    let (linear, curved): (Vec<&BoundedQuantity>, Vec<&BoundedQuantity>) =
         channels.iter().partition(|c| c.quantity.is_linear());
     let mut curved = of_path(machine, &curved, &path, tolerance).into_iter();
     let mut linear = linear.into_iter().map(|c| of_polynomial(c, series));
@@ -91,15 +95,15 @@ fn period(
 }
 
 /// Channels along any path.
-pub fn along(machine: &Machine, channels: &[Channel], path: &Interval) -> Vec<Use> {
-    let channels: Vec<&Channel> = channels.iter().collect();
+pub fn along(machine: &ForeseenRobot, channels: &[BoundedQuantity], path: &Interval) -> Vec<Use> {
+    let channels: Vec<&BoundedQuantity> = channels.iter().collect();
     of_path(machine, &channels, path, TOLERANCE)
 }
 
 /// Channels along the motion from rest to rest, outside the whole periods.
 pub fn along_blend(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     series: &Series,
     blend: &Blend,
 ) -> Vec<Use> {
@@ -131,8 +135,8 @@ const WAY_PARTS: usize = 512;
 /// Channels along the straight way between two poses in the designed coordinates, slowly: on the clock that is 0
 /// at the first and 1 at the other.
 pub fn along_way(
-    machine: &Machine,
-    channels: &[Channel],
+    machine: &ForeseenRobot,
+    channels: &[BoundedQuantity],
     from: &[f64],
     to: &Kinematics,
 ) -> Vec<Use> {
@@ -155,7 +159,7 @@ pub fn along_way(
 ///
 /// # Errors
 /// [`ExciteError::BrokenPose`] with the limit that it breaks most.
-pub fn check_pose(machine: &Machine, from: &[f64]) -> Result<(), ExciteError> {
+pub fn check_pose(machine: &ForeseenRobot, from: &[f64]) -> Result<(), ExciteError> {
     let mut here = Kinematics::REST;
     here.x[..from.len()].copy_from_slice(from);
     let uses = along_way(machine, &machine.channels, from, &here);
@@ -187,8 +191,8 @@ impl Blend {
     /// [`ExciteError::NoBlend`] where even the longest breaks one, [`ExciteError::NoWay`] where all ways to
     /// the points where blends begin do.
     pub fn within(
-        machine: &Machine,
-        channels: &[Channel],
+        machine: &ForeseenRobot,
+        channels: &[BoundedQuantity],
         series: &Series,
         periods: u32,
         from: Option<&[f64]>,
@@ -259,7 +263,7 @@ pub fn worst(uses: &[Use]) -> f64 {
     uses.iter().fold(0.0, |most, u| most.max(u.share))
 }
 
-fn gathered(channel: &Channel, most: Peak, least: Peak) -> Use {
+fn gathered(channel: &BoundedQuantity, most: Peak, least: Peak) -> Use {
     // least is the peak of the negative
     let upper = channel.used(most.bound);
     let lower = channel.used(-least.bound);
@@ -286,7 +290,7 @@ fn gathered(channel: &Channel, most: Peak, least: Peak) -> Use {
 }
 
 /// Size of a channel's room: what a share of 1 stands for.
-fn room(channel: &Channel) -> f64 {
+fn room(channel: &BoundedQuantity) -> f64 {
     if channel.upper.is_finite() {
         0.5 * (channel.upper - channel.lower)
     } else {
@@ -294,7 +298,7 @@ fn room(channel: &Channel) -> f64 {
     }
 }
 
-fn of_polynomial(channel: &Channel, series: &Series) -> Use {
+fn of_polynomial(channel: &BoundedQuantity, series: &Series) -> Use {
     let i = channel.index;
     let order = match channel.quantity {
         Quantity::Position => 0,
@@ -317,7 +321,12 @@ fn of_polynomial(channel: &Channel, series: &Series) -> Use {
     gathered(channel, peak(1.0), peak(-1.0))
 }
 
-fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance: f64) -> Vec<Use> {
+fn of_path(
+    machine: &ForeseenRobot,
+    channels: &[&BoundedQuantity],
+    path: &Interval,
+    tolerance: f64,
+) -> Vec<Use> {
     let [from, to] = path.span;
     let mut state = State::EMPTY;
     let mut grid = vec![Vec::with_capacity(path.parts + 1); channels.len()];
@@ -333,7 +342,7 @@ fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance:
             });
         }
     }
-    let mut value = |channel: &Channel, t: f64| {
+    let mut value = |channel: &BoundedQuantity, t: f64| {
         let k = (path.at)(t);
         if channel.quantity.is_linear() {
             return of_kinematics(channel, &k);
@@ -357,7 +366,7 @@ fn of_path(machine: &Machine, channels: &[&Channel], path: &Interval, tolerance:
 }
 
 /// Position, speed or acceleration that a linear channel bounds.
-fn of_kinematics(channel: &Channel, k: &Kinematics) -> f64 {
+fn of_kinematics(channel: &BoundedQuantity, k: &Kinematics) -> f64 {
     let i = channel.index;
     match channel.quantity {
         Quantity::Position => k.x[i],

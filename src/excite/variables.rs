@@ -1,6 +1,6 @@
 //! The numbers that a search turns: offsets and coefficients, scaled to about 1.
 
-use super::limits::{Channel, Quantity};
+use super::limits::{BoundedQuantity, Quantity};
 use super::series::Series;
 
 /// Length of one unit of a search variable, in half spans and speed limits: the first step of a search
@@ -27,7 +27,7 @@ impl Variables {
     /// Scales from the limits of `n` coordinates; positions must be bounded. Where nothing bounds
     /// the speed, that which crosses the span within a period of the highest harmonic stands in.
     pub fn new(
-        channels: &[Channel],
+        channels: &[BoundedQuantity],
         n: usize,
         fundamental: f64,
         harmonics: usize,

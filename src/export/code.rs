@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use super::Program;
 use super::note::Note;
-use crate::effect::as_code::Effects;
+use crate::effect::as_code::EffectsCode;
 use crate::effect::law_text::{exact, law};
 use crate::robot::JointKind;
 use crate::robot::standard::STANDARD;
-use crate::robot::tree::{Coordinate, Coupling, Dependence};
+use crate::robot::tree::{Coordinate, Coupling, DependentCoordinate};
 
 /// The words of a language.
 pub(super) struct Language {
@@ -268,7 +268,7 @@ pub(super) fn fall(program: &Program) -> [f64; 3] {
 }
 
 /// What the function without a state leaves to the one with it.
-pub(super) fn without_memory(effects: &Effects) -> &'static str {
+pub(super) fn without_memory(effects: &EffectsCode) -> &'static str {
     match effects.remember_anything() {
         true => " and the effects\n * that remember nothing: `step` has them all",
         false => " and effects",
@@ -278,7 +278,7 @@ pub(super) fn without_memory(effects: &Effects) -> &'static str {
 /// Every sine of a dependent coordinate: its link, then amplitude, phase and a factor per joint.
 pub(super) fn sines(program: &Program) -> Vec<(usize, Vec<f64>)> {
     let n = program.joints.len();
-    let of = |d: &Dependence| -> Vec<Vec<f64>> {
+    let of = |d: &DependentCoordinate| -> Vec<Vec<f64>> {
         d.sines
             .iter()
             .map(|sine| {

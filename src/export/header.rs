@@ -7,7 +7,7 @@ use super::Program;
 use super::code::{self, C, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
-use crate::effect::as_code::{Effects, INERTIA};
+use crate::effect::as_code::{EffectsCode, INERTIA};
 use crate::effect::law_text::exact;
 use crate::robot::model::JointFriction;
 
@@ -133,7 +133,7 @@ fn lead(program: &Program) -> String {
 }
 
 /// The function that takes the inertias of elastic joints from a pose.
-fn about(effects: &Effects) -> String {
+fn about(effects: &EffectsCode) -> String {
     if effects.elastic.is_empty() {
         return String::new();
     }

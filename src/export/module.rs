@@ -6,7 +6,7 @@ use super::Program;
 use super::code::{self, RUST, carried, fall, sines, without_memory};
 use super::functions;
 use super::note::Note;
-use crate::effect::as_code::{Effects, INERTIA, Memory};
+use crate::effect::as_code::{EffectsCode, INERTIA, Memory};
 
 const TEMPLATE: &str = include_str!("module.rs.in");
 
@@ -132,7 +132,7 @@ fn lead(program: &Program) -> String {
 }
 
 /// The function that takes the inertias of elastic joints from a pose.
-fn about(effects: &Effects) -> String {
+fn about(effects: &EffectsCode) -> String {
     if effects.elastic.is_empty() {
         return String::new();
     }

@@ -3,7 +3,7 @@
 use super::error::ExportError;
 use super::recipe::Recipe;
 use crate::effect::AugmentedModel;
-use crate::effect::as_code::Effects;
+use crate::effect::as_code::EffectsCode;
 use crate::robot::JointKind;
 use crate::robot::model::{JointFriction, Model};
 use crate::robot::standard::STANDARD;
@@ -30,7 +30,7 @@ pub struct Program {
     /// Constant torque of each joint [N or Nm].
     pub offset: Vec<f64>,
     /// What effects add.
-    pub effects: Effects,
+    pub effects: EffectsCode,
     /// The observer of external torques, where one is asked for.
     pub observer: Option<Recipe>,
     /// Speed of each joint below which it may be at rest [m/s or rad/s].
@@ -52,7 +52,7 @@ impl Program {
     /// [`ExportError::Effect`] for an effect that no code is known of.
     pub fn with_effects(refined: &AugmentedModel) -> Result<Self, ExportError> {
         Ok(Self {
-            effects: Effects::of(refined)?,
+            effects: EffectsCode::of(refined)?,
             ..Self::of(&refined.model)
         })
     }
@@ -72,9 +72,9 @@ impl Program {
                 .collect(),
             friction: model.friction.clone(),
             offset: model.offset.clone(),
-            effects: Effects {
+            effects: EffectsCode {
                 lead_s: vec![0.0; robot.joints()],
-                ..Effects::default()
+                ..EffectsCode::default()
             },
             observer: None,
             rest: (0..robot.joints())

@@ -17,7 +17,7 @@ use crate::robot::{JointKind, Robot};
 
 /// The two files.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Exported {
+pub struct UrdfFiles {
     pub urdf: String,
     pub side: String,
 }
@@ -32,7 +32,7 @@ pub fn urdf(
     model: &Model,
     urdf_name: &str,
     notes: &[String],
-) -> Result<Exported, ExportError> {
+) -> Result<UrdfFiles, ExportError> {
     let Prepared {
         file,
         model,
@@ -59,7 +59,7 @@ pub fn urdf(
     }
     frames(&mut out, robot, file);
     out.push_str("</robot>\n");
-    Ok(Exported {
+    Ok(UrdfFiles {
         urdf: out,
         side: side_file(file, robot, standard, urdf_name, notes)?,
     })

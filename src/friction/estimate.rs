@@ -357,12 +357,16 @@ fn nuisance(names: &[String], prepared: &Prepared, maximum: &Maximum) -> Vec<Nui
 #[cfg(test)]
 mod tests {
     use super::super::prepare::{SensorModel, prepare};
-    use super::super::trial::Trial;
+    use super::super::trial::FrictionTrial;
     use super::*;
     use crate::math::descent::Ending;
     use crate::robot::{JointKind, Robot};
 
-    fn run(trial: &Trial, seed: u64, options: &Options) -> Result<JointEstimate, FrictionError> {
+    fn run(
+        trial: &FrictionTrial,
+        seed: u64,
+        options: &Options,
+    ) -> Result<JointEstimate, FrictionError> {
         estimate(
             "q1",
             &["inertia".to_owned()],
@@ -383,7 +387,7 @@ mod tests {
 
     #[test]
     fn friction_inertia_and_offset_come_out_of_a_quantised_noisy_log() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let e = run(&trial, 3, &Options::default()).unwrap();
         assert_eq!(e.ending, Ending::Converged);
         assert!(curve_error(&e, &trial.law) < 2e-3);
@@ -409,7 +413,7 @@ mod tests {
 
     #[test]
     fn a_start_wrong_by_three_in_everything_ends_at_the_same_law() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let wrong = [3.0, 1.0 / 3.0, 3.0, 1.0 / 3.0, 3.0];
         let mut p = trial.law.parameters();
         for (x, f) in p.iter_mut().zip(wrong) {
@@ -426,7 +430,7 @@ mod tests {
 
     #[test]
     fn a_reversal_too_quick_to_see_bounds_the_slope_from_below_only() {
-        let mut trial = Trial::usual();
+        let mut trial = FrictionTrial::usual();
         trial.law = DoubleTanh::from_parameters([30.0, 14.0, 0.0, 1e5, 12.0]);
         trial.motion = vec![(0.05, 1.1)];
         let e = run(&trial, 5, &Options::default()).unwrap();
@@ -438,7 +442,7 @@ mod tests {
 
     #[test]
     fn a_force_that_the_model_lacks_leaves_innovations_beyond_their_bounds() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let mut motion = trial.motion(7);
         for (tau, q) in motion.tau.iter_mut().zip(&motion.q) {
             *tau += 3.0 * (300.0 * q).sin();
@@ -465,7 +469,7 @@ mod tests {
 
     #[test]
     fn motion_in_one_direction_is_answered_with_what_is_missing() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let mut prepared = trial.prepared(6);
         for v in &mut prepared.velocity {
             *v = v.abs();
@@ -480,7 +484,7 @@ mod tests {
 
     #[test]
     fn the_plateau_map_lies_on_the_curve() {
-        let mut trial = Trial::usual();
+        let mut trial = FrictionTrial::usual();
         // triangles of constant speed, from odd harmonics
         trial.motion = (0..40)
             .map(|k| {

@@ -207,11 +207,11 @@ impl ExtendedKalmanFilter {
 mod tests {
     use super::super::passes::{GivenNoise, first_noise, spread};
     use super::super::score::score;
-    use super::super::trial::Trial;
+    use super::super::trial::FrictionTrial;
     use super::*;
     use nalgebra::DMatrix;
 
-    fn start(trial: &Trial, problem: &FrictionProblem) -> Vec<f64> {
+    fn start(trial: &FrictionTrial, problem: &FrictionProblem) -> Vec<f64> {
         let mut p = vec![0.0; problem.parameters()];
         problem.coordinates(&trial.law, &mut p);
         p
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn the_covariance_stays_symmetric_and_positive_definite() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let prepared = trial.prepared(1);
         let problem = &prepared.problem;
         let noise = first_noise(problem, &GivenNoise::default());
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn at_the_maximum_its_covariance_is_the_inverse_information() {
-        let trial = Trial::usual();
+        let trial = FrictionTrial::usual();
         let prepared = trial.prepared(2);
         let problem = &prepared.problem;
         let starts = super::super::start::from_log(&prepared, 2);

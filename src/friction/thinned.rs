@@ -83,12 +83,12 @@ fn part(record: &Record, rows: Range<usize>, v0: f64, nuisance: usize) -> Record
 
 #[cfg(test)]
 mod tests {
-    use super::super::trial::Trial;
+    use super::super::trial::FrictionTrial;
     use super::*;
 
     #[test]
     fn a_share_of_a_log_keeps_turning_points_and_what_lies_between_in_their_order() {
-        let prepared = Trial::usual().prepared(1);
+        let prepared = FrictionTrial::usual().prepared(1);
         let all = prepared.problem.samples();
         assert!(thinned(&prepared, all).is_none());
         let share = thinned(&prepared, 6000).expect("the log is longer");

@@ -6,7 +6,7 @@ use crate::robot::friction::DoubleTanh;
 use crate::robot::{JointKind, Robot};
 
 /// Plant and experiment.
-pub struct Trial {
+pub struct FrictionTrial {
     pub law: DoubleTanh,
     pub inertia: f64,
     pub offset: f64,
@@ -18,10 +18,10 @@ pub struct Trial {
     pub noise: f64,
 }
 
-impl Trial {
+impl FrictionTrial {
     /// A drive with a Stribeck dip that passes slowly and quickly through zero speed.
     pub fn usual() -> Self {
-        Trial {
+        FrictionTrial {
             law: DoubleTanh::from_parameters([30.0, 14.0, -5.0, 150.0, 12.0]),
             inertia: 12.0,
             offset: 1.5,

@@ -15,7 +15,7 @@ use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::residual::JointResidual;
 use super::validate::validate;
-use crate::config::model_file::Effect;
+use crate::config::model_file::EffectSection;
 use crate::effect::{Added, AugmentedModel};
 use crate::inertia::verdict::verdict;
 use crate::math::descent::Ending;
@@ -159,7 +159,7 @@ fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, gi
 }
 
 /// Effects as a model file holds them; what the fit left where it was is held.
-fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<Effect> {
+fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<EffectSection> {
     let mut first =
         fit.covariance.nrows() - model.effects.iter().map(Added::parameters).sum::<usize>();
     let of = |effect: &Added| {

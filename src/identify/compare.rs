@@ -42,7 +42,7 @@ pub struct Side {
 }
 
 /// Both models on the same logs.
-pub struct Tried {
+pub struct TriedOnLogs {
     pub in_memory: InMemory,
     pub validations: [Validation; 2],
     pub differences: ErrorDifferences,
@@ -55,7 +55,7 @@ pub struct Compared {
     pub table: SideBySide,
     pub curves: Vec<Curves>,
     /// None where no log is given.
-    pub tried: Option<Tried>,
+    pub tried: Option<TriedOnLogs>,
     pub warnings: Vec<String>,
 }
 
@@ -72,7 +72,7 @@ pub struct Curves {
 
 /// A comparison as a document holds it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Comparison {
+pub struct ComparisonResult {
     /// A and B.
     pub models: Vec<ComparedModel>,
     #[serde(flatten)]
@@ -143,7 +143,7 @@ pub struct ComparedErrors<T> {
     pub difference: Difference,
 }
 
-impl Tried {
+impl TriedOnLogs {
     fn result(&self) -> ComparedOnLogs {
         let [a, b] = &self.validations;
         let joints = a.joints.iter().zip(&b.joints);
@@ -270,7 +270,7 @@ fn on_logs(
     sides: &[Side; 2],
     logs: &[Log],
     control: &Control,
-) -> Result<Tried, IdentifyError> {
+) -> Result<TriedOnLogs, IdentifyError> {
     // one motion for both models: that of the first
     let laws = known(&sides[0].model.model);
     let machine = &machine.with_position_cutoffs(logs, &laws, control)?;
@@ -294,7 +294,7 @@ fn on_logs(
     let models = sides.each_ref().map(|side| &side.model);
     let differences =
         compare::differences(models, &in_memory.stretches, &filters).map_err(named)?;
-    Ok(Tried {
+    Ok(TriedOnLogs {
         in_memory,
         validations,
         differences,
@@ -302,7 +302,7 @@ fn on_logs(
 }
 
 /// Friction of the joints where a model has some.
-fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Vec<Curves> {
+fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&TriedOnLogs>) -> Vec<Curves> {
     let robot = &machine.robot;
     let joints = robot.joint_names().iter().enumerate();
     joints
@@ -337,7 +337,7 @@ fn curves(machine: &LoggedRobot, sides: &[Side; 2], tried: Option<&Tried>) -> Ve
 
 impl Compared {
     /// The comparison as a document holds it.
-    pub fn result(&self) -> Comparison {
+    pub fn result(&self) -> ComparisonResult {
         let model = |side: &Side| {
             let from = &side.given.file.provenance;
             ComparedModel {
@@ -347,11 +347,11 @@ impl Compared {
                 inputs: from.inputs.clone(),
             }
         };
-        Comparison {
+        ComparisonResult {
             models: self.sides.iter().map(model).collect(),
             table: self.table.clone(),
             friction: self.curves.iter().map(|c| self.friction(c)).collect(),
-            logs: self.tried.as_ref().map(Tried::result),
+            logs: self.tried.as_ref().map(TriedOnLogs::result),
         }
     }
 

@@ -15,7 +15,7 @@ use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
 use crate::config::ModelFile;
-use crate::config::candidates::Candidate;
+use crate::config::candidates::CandidateSection;
 use crate::config::model_file::{FrictionPrior, Parameter};
 use crate::diagnose::{
     self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, SelectionLimits,
@@ -24,7 +24,7 @@ use crate::diagnose::{
 use crate::effect::{self, AugmentedModel, EffectNumber};
 use crate::log::DataRole;
 use crate::motion::{MotionError, ParallelFilters, Stretch};
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 use crate::robot::friction::{DoubleTanh, ViscousCoulomb};
 use crate::robot::model::JointFriction;
 use crate::setup::{Finding, FindingKind};
@@ -49,7 +49,7 @@ pub struct DiagnoseSettings {
     /// What an effect must keep to be accepted.
     pub limits: SelectionLimits,
     /// Effects of the user's own, tried beside those that are known.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<CandidateSection>,
     /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
     pub hold_friction: bool,
 }
@@ -76,7 +76,7 @@ pub struct Diagnosed {
     /// What a refined model keeps of the friction before these logs.
     friction_prior: Vec<FrictionPrior>,
     /// Effects of the user's own that were tried.
-    candidates: Vec<Candidate>,
+    candidates: Vec<CandidateSection>,
     /// The friction was held.
     hold_friction: bool,
     pub filters: ParallelFilters,
@@ -97,12 +97,12 @@ pub struct DataFault {
 /// # Errors
 /// Formulas that are none on this robot, and a name that the model has for another effect.
 pub fn check_candidates(
-    candidates: &[Candidate],
+    candidates: &[CandidateSection],
     machine: &LoggedRobot,
     (name, file): (&str, &ModelFile),
 ) -> Result<(), IdentifyError> {
     own_laws(candidates, &machine.robot)?;
-    let other = |own: &&Candidate| {
+    let other = |own: &&CandidateSection| {
         let mut known = file.candidates.iter();
         known.any(|known| known.name == own.name && known != *own)
     };
@@ -338,7 +338,7 @@ fn case(
 }
 
 /// The drives that the robot file declares, joint by joint.
-fn drives(machine: &LoggedRobot) -> Vec<Drive> {
+fn drives(machine: &LoggedRobot) -> Vec<JointDrive> {
     let names = machine.robot.joint_names().iter();
     let declared = names.map(|name| machine.file.drive.get(name).cloned());
     declared.map(Option::unwrap_or_default).collect()
@@ -431,7 +431,7 @@ impl Diagnosed {
         model.effects = effects
             .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
             .collect();
-        let of_model = |c: &&Candidate| model.effects.iter().any(|e| e.name == c.name);
+        let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
         let known = file.candidates.iter().chain(&self.candidates);
         for candidate in known.filter(of_model) {
             if !model.candidates.contains(candidate) {

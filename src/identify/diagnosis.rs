@@ -28,7 +28,7 @@ pub struct DiagnosisResult {
     pub before: Option<ErrorsBySide>,
     /// Errors of the refined model.
     pub after: Option<ErrorsBySide>,
-    pub unexplained: Vec<Unexplained>,
+    pub unexplained: Vec<UnexplainedResult>,
     /// Signals that the residual of a joint with structure depends on, the strongest of each joint first.
     pub dependence: Vec<ResidualDependence>,
     /// Candidates that were added, then those of the last round.
@@ -150,7 +150,7 @@ pub struct ErrorsBySide {
 
 /// What is left of a joint's torque.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Unexplained {
+pub struct UnexplainedResult {
     pub joint: String,
     /// Fraction of the torque's power that is residual above the noise floor.
     pub share: f64,
@@ -277,7 +277,7 @@ impl Diagnosed {
             .unexplained
             .iter()
             .zip(names)
-            .map(|(left, joint)| Unexplained {
+            .map(|(left, joint)| UnexplainedResult {
                 joint: joint.clone(),
                 share: left.share,
                 over_floor: left.over_floor,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::error::IdentifyError;
 use super::known_friction::{of_joint, of_refinement, with_friction};
 use super::logged_robot::LoggedRobot;
-use super::passes::{Passes, PositionFilter, Simulated};
+use super::passes::{Passes, PositionFilter, SimulatedLoop};
 use crate::config::campaign::EstimatorKind;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::add_processing;
@@ -37,7 +37,7 @@ pub struct Account {
     pub joints: Vec<JointAccount>,
     /// The loop that was simulated.
     #[serde(flatten)]
-    pub simulated: Option<Simulated>,
+    pub simulated: Option<SimulatedLoop>,
 }
 
 /// The same of one joint, as far as the estimator has it.
@@ -331,7 +331,7 @@ fn instrumental(
         account.simulated = Some(simulated);
         Ok::<_, IdentifyError>(sums)
     })?;
-    if let Some(Simulated { gains, .. }) = account.simulated.clone() {
+    if let Some(SimulatedLoop { gains, .. }) = account.simulated.clone() {
         account.tell(passes.machine, |j| JointAccount {
             proportional: gains.proportional.get(j).copied(),
             derivative: gains.derivative.get(j).copied(),

@@ -47,7 +47,7 @@ pub struct Gain {
 
 /// The gains of all joints.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gains {
+pub struct CurrentGains {
     pub joints: Vec<Gain>,
     /// Joint whose gain is 1 where only ratios could be told.
     pub reference: Option<String>,
@@ -61,7 +61,7 @@ pub struct Gains {
 /// The gains, and the robot with them.
 #[derive(Debug, Clone)]
 pub struct FittedGains {
-    pub gains: Gains,
+    pub gains: CurrentGains,
     /// The robot, its file with the gains as `torque_scale`.
     pub machine: LoggedRobot,
     /// What differs in its file.
@@ -132,7 +132,7 @@ pub fn fit_gains(
         .reference
         .map(|j| machine.robot.joint_names()[j].clone());
     Ok(FittedGains {
-        gains: Gains {
+        gains: CurrentGains {
             joints: joints.map(gain).collect(),
             warnings: warnings(
                 &fit,

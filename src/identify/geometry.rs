@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use super::logged_robot::LoggedRobot;
-use super::unknowns::Unknown;
+use super::unknowns::FittedUnknown;
 use crate::config::RobotFile;
 use crate::config::robot_file::ModelKind;
 use crate::config::serial_section::LinkSection;
@@ -90,10 +90,10 @@ fn parameters<'n>(file: &RobotFile, plain: impl Iterator<Item = &'n Nearly>) -> 
 pub(super) fn geometry(
     machine: &LoggedRobot,
     condition: Option<f64>,
-    unknowns: &[Unknown],
+    unknowns: &[FittedUnknown],
 ) -> Vec<Finding> {
     let file = &machine.file;
-    let open = |u: &&Unknown| u.joint.is_none() && u.verdict == Verdict::NotIdentifiable;
+    let open = |u: &&FittedUnknown| u.joint.is_none() && u.verdict == Verdict::NotIdentifiable;
     let poor = condition.is_none_or(|condition| condition > CONDITION);
     if file.robot.model != ModelKind::Serial || !poor || !unknowns.iter().any(|u| open(&u)) {
         return Vec::new();

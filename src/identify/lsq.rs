@@ -9,7 +9,7 @@ use super::control::Control;
 use super::error::IdentifyError;
 use super::estimate::{Account, Estimated, estimate};
 use super::gain_error::GainError;
-use super::gains::{Gain, Gains};
+use super::gains::{CurrentGains, Gain};
 use super::geometry::geometry;
 use super::hold_out::{Held, hold_out, or_warning};
 use super::known_friction::{FrictionBefore, FrictionOfFit};
@@ -24,7 +24,7 @@ use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::{MadeWith, ReducedLog};
 use super::repeated::each_row_once;
 use super::residual::{JointResidual, RelativeError};
-use super::unknowns::{Unknown, columns, unknowns};
+use super::unknowns::{FittedUnknown, columns, unknowns};
 use super::weakest::{WeakestPart, weakest};
 use crate::config::ModelFile;
 use crate::config::campaign::EstimatorKind;
@@ -59,14 +59,14 @@ pub struct LsqSettings<'a> {
     /// The friction of `friction` stays as it is; otherwise it is refined with the inertias, but for `ols`.
     pub hold_friction: bool,
     /// Gains that were fitted before, whose uncertainty the parameters share.
-    pub gains: Option<&'a Gains>,
+    pub gains: Option<&'a CurrentGains>,
 }
 
 /// What `lsq` found.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct IdentifiedDynamics {
     #[serde(rename = "parameters")]
-    pub unknowns: Vec<Unknown>,
+    pub unknowns: Vec<FittedUnknown>,
     /// The friction that was known, before and after the fit.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub friction: Vec<FrictionOfFit>,
@@ -297,7 +297,7 @@ pub fn lsq(
 }
 
 /// Adds to the covariance of a fit that of the gains by which its torques were made.
-fn share_uncertainty(estimated: &mut Estimated, gains: &Gains) -> Result<(), FitError> {
+fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<(), FitError> {
     let (fit, basis) = (&mut estimated.fit, &estimated.basis);
     let std = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
     let weights = weights_of(&basis.sums, &std);
@@ -379,9 +379,9 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
 }
 
 /// Friction and inertias that are below zero by more than two deviations, as a warning.
-fn negative(unknowns: &[Unknown]) -> Option<String> {
-    let positive = |u: &&Unknown| is_positive(&u.key, u.joint.is_some());
-    let below = |u: &&Unknown| u.fitted < -2.0 * u.fitted_std;
+fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
+    let positive = |u: &&FittedUnknown| is_positive(&u.key, u.joint.is_some());
+    let below = |u: &&FittedUnknown| u.fitted < -2.0 * u.fitted_std;
     let names: Vec<String> = unknowns
         .iter()
         .filter(positive)
@@ -400,7 +400,7 @@ fn negative(unknowns: &[Unknown]) -> Option<String> {
 }
 
 /// What the data do not separate, as warnings.
-fn confounded(fit: &Fit, unknowns: &[Unknown]) -> Vec<String> {
+fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<String> {
     let sentence = |c: &Confounded| {
         let most = || c.terms.iter().take(6);
         let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].key.as_str()).collect();
@@ -446,7 +446,7 @@ impl IdentifiedDynamics {
     /// The model: friction as it was known, and what was fitted, with their joint covariance.
     pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
         let mut model = new_model(machine, "lsq", &self.inputs);
-        model.parameters = self.unknowns.iter().map(Unknown::parameter).collect();
+        model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();
         let robot = &machine.robot;
         let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
         if let Some(friction) = friction {

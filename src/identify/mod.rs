@@ -70,7 +70,9 @@ mod weakest;
 
 pub use by_motion::by_motion;
 pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
-pub use compare::{Compared, Comparison, Curves, DIFFERENT, GivenModel, Side, Tried, compare};
+pub use compare::{
+    Compared, ComparisonResult, Curves, DIFFERENT, GivenModel, Side, TriedOnLogs, compare,
+};
 pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
 pub use control::{Control, Progress};
 pub use curve::friction_curve;
@@ -85,7 +87,7 @@ pub use friction::{
     FrictionOfJoint, FrictionSettings, IdentifiedFriction, LawParameter, LawParameters, friction,
 };
 pub use gain_error::GainError;
-pub use gains::{FittedGains, Gain, Gains, PayloadLog, fit_gains};
+pub use gains::{CurrentGains, FittedGains, Gain, PayloadLog, fit_gains};
 pub use hold_out::Held;
 pub use in_memory::{InMemory, read_whole};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
@@ -96,7 +98,7 @@ pub use model::{new_model, refined, refined_or_friction};
 pub use motion_fit::MotionFit;
 pub use open_log::OpenLog;
 pub use open_loop::open_loop;
-pub use passes::Simulated;
+pub use passes::SimulatedLoop;
 pub use position_cutoff::PositionCutoff;
 pub use reduce::reduce;
 pub use reduced::{
@@ -112,7 +114,7 @@ pub use track::{
     TrackedRobot, track,
 };
 pub use track_error::TrackError;
-pub use unknowns::Unknown;
+pub use unknowns::FittedUnknown;
 pub use validate::{Validated, validate};
 pub use watch::{
     STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::error::IdentifyError;
 use super::logged_robot::LoggedRobot;
 use crate::config::ModelFile;
-use crate::config::candidates::Candidate;
-use crate::config::model_file::{Effect, EffectParameter, ModelProvenance};
+use crate::config::candidates::CandidateSection;
+use crate::config::model_file::{EffectParameter, EffectSection, ModelProvenance};
 use crate::effect::{self, Added, AugmentedModel, EffectNumber, Law, formula, own};
 use crate::log::{DataRole, Provenance};
 use crate::robot::Robot;
@@ -58,10 +58,10 @@ fn with_effects(
 /// # Errors
 /// [`IdentifyError::Formula`] for a formula that is none on this robot.
 pub(super) fn own_laws(
-    candidates: &[Candidate],
+    candidates: &[CandidateSection],
     robot: &Robot,
 ) -> Result<Vec<&'static Law>, IdentifyError> {
-    let of = |candidate: &Candidate| {
+    let of = |candidate: &CandidateSection| {
         let unit = |name: &String| candidate.units.get(name).cloned().unwrap_or_default();
         let coefficients = candidate.formulas.iter();
         let shapes = candidate.shapes.iter().map(|(name, range)| formula::Shape {
@@ -86,8 +86,12 @@ pub(super) fn own_laws(
 }
 
 /// An effect as a model file holds it.
-pub(super) fn in_file(effect: &Added, machine: &LoggedRobot, told: &[EffectNumber]) -> Effect {
-    Effect {
+pub(super) fn in_file(
+    effect: &Added,
+    machine: &LoggedRobot,
+    told: &[EffectNumber],
+) -> EffectSection {
+    EffectSection {
         name: effect.name().to_owned(),
         joint: effect.place.name(&machine.robot),
         parameters: told

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::config::model_file::Effect;
+use crate::config::model_file::EffectSection;
 use crate::math::descent::Ending;
-use crate::open_loop::{PositionErrors, Tried};
+use crate::open_loop::{PositionErrors, TriedAxis};
 
 /// What a fit to the motion of an axis came to.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -29,7 +29,7 @@ pub struct MotionFit {
     pub status: Ending,
     pub steps: u64,
     /// Friction that was added.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<EffectSection>,
     /// What was tried on the blocks, in order.
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedAxis>,
 }

@@ -11,7 +11,7 @@ use super::logged_robot::{LoggedRobot, narrowed};
 use super::own_settings::OwnSettings;
 use crate::inertia::accumulate::BlockFactors;
 use crate::inertia::accumulate_weighted;
-use crate::inertia::closed_loop::Gains;
+use crate::inertia::closed_loop::LoopGains;
 use crate::inertia::columns::RegressorColumns;
 use crate::inertia::encoder::{GRIDS, accumulate_shifted};
 use crate::inertia::instruments::{self, ReferenceSource};
@@ -21,7 +21,7 @@ use crate::motion::{FilterSettings, Summary};
 
 /// The loop by which instruments were simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Simulated {
+pub struct SimulatedLoop {
     /// Where the reference comes from.
     pub reference: ReferenceSource,
     /// Natural frequency [rad/s].
@@ -29,7 +29,7 @@ pub struct Simulated {
     /// Share of the steps at which the simulation failed a joint.
     pub failed_steps_share: f64,
     #[serde(skip)]
-    pub gains: Gains,
+    pub gains: LoopGains,
 }
 
 /// Which filter positions come through before they are differentiated.
@@ -211,8 +211,8 @@ impl<'a> Passes<'a> {
         filter: PositionFilter,
         columns: &RegressorColumns,
         theta: &DVector<f64>,
-    ) -> Result<(BlockFactors, Simulated), IdentifyError> {
-        let mut total: Option<(BlockFactors, Simulated)> = None;
+    ) -> Result<(BlockFactors, SimulatedLoop), IdentifyError> {
+        let mut total: Option<(BlockFactors, SimulatedLoop)> = None;
         for (index, log) in self.logs.iter().enumerate() {
             let (settings, step) = (self.settings(filter, index), self.step_of(index));
             let mut open = self.machine.open(log, self.control)?;
@@ -242,7 +242,7 @@ impl<'a> Passes<'a> {
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
             match &mut total {
                 None => {
-                    let simulated = Simulated {
+                    let simulated = SimulatedLoop {
                         reference,
                         loop_frequency: read.gains.frequency,
                         failed_steps_share: read.indefinite,

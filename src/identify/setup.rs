@@ -3,7 +3,7 @@
 
 use crate::config::ModelFile;
 use crate::inertia::columns::RegressorColumns;
-use crate::log::{Channels as Logged, Layout};
+use crate::log::{DeclaredChannels as Logged, Layout};
 use crate::motion;
 use crate::robot::Robot;
 use crate::robot::friction::sign;

@@ -15,7 +15,7 @@ use super::told::{Source, Told};
 use super::track_error::TrackError;
 use crate::config::ModelFile;
 use crate::log::Provenance;
-use crate::track::{Change, ChangeKind, Course, Estimate, Level, apart, follow_together};
+use crate::track::{ChangeKind, Course, Estimate, Level, ParameterChange, apart, follow_together};
 
 /// Probability at which changes are reported of a robot that has none, all its parameters together, at one look. A robot is
 /// looked at after each of its logs, and payloads follow no normal law: over fifty logs there are more
@@ -440,8 +440,8 @@ const SHOWN: f64 = 2.0;
 
 /// Changes of one parameter of those that are followed together.
 fn changed(key: &Told, course: &Course, together: &[Course], times: &[f64]) -> Vec<TrackedChange> {
-    let clear = |c: &Change| (c.size / c.std).abs();
-    let shown = |(i, change): &(usize, &Change)| {
+    let clear = |c: &ParameterChange| (c.size / c.std).abs();
+    let shown = |(i, change): &(usize, &ParameterChange)| {
         let all = together.iter().map(|course| clear(&course.changes[*i]));
         clear(change) >= all.fold(0.0, f64::max).min(SHOWN)
     };

@@ -14,7 +14,7 @@ use crate::verdict::Verdict;
 
 /// One unknown of the fit with what the data say about it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Unknown {
+pub struct FittedUnknown {
     /// The combination of standard parameters that it stands for, else its short name.
     pub name: String,
     /// Short name, that of the model file.
@@ -47,7 +47,7 @@ pub struct Unknown {
     pub fitted_std: f64,
 }
 
-impl Unknown {
+impl FittedUnknown {
     /// Standard deviation of the fitted value over its size.
     pub fn fitted_relative_std(&self) -> f64 {
         self.fitted_std / self.fitted.abs()
@@ -102,7 +102,7 @@ pub(super) fn unknowns(
     columns: &RegressorColumns,
     fit: &Fit,
     essential: &Essential,
-) -> Vec<Unknown> {
+) -> Vec<FittedUnknown> {
     let robot = &machine.robot;
     // of the unknown in column i
     let rated = |i: usize, key: &str, unit: String, meaning: &str| {
@@ -114,7 +114,7 @@ pub(super) fn unknowns(
             .fold(0.0, f64::max);
         let (verdict, negligible) = verdict(fitted, std, fit.determined[i], share);
         let known = verdict != Verdict::NotIdentifiable;
-        Unknown {
+        FittedUnknown {
             name: key.to_owned(),
             key: key.to_owned(),
             theta: None,

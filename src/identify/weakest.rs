@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::unknowns::Unknown;
+use super::unknowns::FittedUnknown;
 use crate::inertia::solve::Fit;
 
 /// Parts below this share of a direction of norm 1 are left out.
@@ -21,7 +21,7 @@ pub struct WeakestPart {
 }
 
 /// The direction of largest variance, largest part first; nothing where a variance is not finite.
-pub(super) fn weakest(fit: &Fit, unknowns: &[Unknown]) -> Vec<WeakestPart> {
+pub(super) fn weakest(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<WeakestPart> {
     let n = unknowns.len();
     let norm = |i: usize| fit.column_rms.column(i).norm();
     let scaled = DMatrix::from_fn(n, n, |a, b| norm(a) * norm(b) * fit.covariance[(a, b)]);

@@ -21,7 +21,7 @@ const LEAST: f64 = 1e-6;
 
 /// Gains of the loop.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Gains {
+pub struct LoopGains {
     /// Natural frequency [rad/s].
     pub frequency: f64,
     /// Per joint: K [N/m or Nm/rad].
@@ -36,7 +36,7 @@ pub(super) struct ClosedLoop<'a> {
     robot: &'a Robot,
     columns: &'a RegressorColumns,
     theta: Vec<f64>,
-    pub gains: Gains,
+    pub gains: LoopGains,
     q: [f64; MOST_JOINTS],
     v: [f64; MOST_JOINTS],
     /// Steps at which the mass matrix was not positive definite, or a joint went astray.
@@ -60,7 +60,7 @@ impl<'a> ClosedLoop<'a> {
             robot,
             columns,
             theta,
-            gains: Gains {
+            gains: LoopGains {
                 frequency,
                 proportional: Vec::new(),
                 derivative: Vec::new(),

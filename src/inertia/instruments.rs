@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::BLOCK_SECONDS;
 use super::accumulate::{Accumulator, BlockFactor, BlockFactors};
-use super::closed_loop::{ClosedLoop, Gains};
+use super::closed_loop::{ClosedLoop, LoopGains};
 use super::columns::{GRADIENT, RegressorColumns};
 use super::covariance::{at_least, bandwidth};
 use super::solution::FitError;
@@ -64,7 +64,7 @@ fn doubled(columns: &RegressorColumns) -> RegressorColumns {
 pub struct InstrumentReading {
     pub factors: BlockFactors,
     pub summary: Summary,
-    pub gains: Gains,
+    pub gains: LoopGains,
     /// Share of the steps at which the mass matrix was not positive definite, or a joint went astray.
     pub indefinite: f64,
 }
@@ -142,7 +142,7 @@ pub fn accumulate<E: Send>(
     let steps = simulation.steps.max(1) as f64;
     let (gains, indefinite) = match simulation.run {
         Some((run, ..)) => (run.gains, run.indefinite),
-        None => (Gains::default(), 0),
+        None => (LoopGains::default(), 0),
     };
     Ok(InstrumentReading {
         factors: factors.finish(),

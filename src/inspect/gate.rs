@@ -7,7 +7,7 @@ use super::findings::{Findings, RowCost, RowFate, joined};
 use super::judge::{Depth, LogJudge};
 use super::words::ChannelRole;
 use crate::log::{
-    Block, Bridge, Channels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
+    Block, Bridge, DeclaredChannels, Instant, Layout, LogError, Mending, Reader, RowFault, escape,
 };
 
 /// A step that is cut out is longer than what counts as a gap by this factor, so that an uneven
@@ -299,7 +299,8 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
         joints.map(move |(channel, joint)| {
             let mut seen = InspectedChannel::new(&channel.column, role, Some(joint), None);
             // Volts are logged as the amplifier gave them.
-            seen.saturates = role == ChannelRole::Torque && layout.channels == Channels::Actuator;
+            seen.saturates =
+                role == ChannelRole::Torque && layout.channels == DeclaredChannels::Actuator;
             seen.factor = channel.factor;
             seen
         })

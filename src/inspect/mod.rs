@@ -33,5 +33,5 @@ pub use findings::{ChannelFacts, Findings, Gap, Inspection, RowCost, RowFate};
 pub use gate::{Cutter, Gate};
 pub use judge::{Depth, LogJudge};
 pub use look::{ChannelColumn, ColumnPlan, look, look_again};
-pub use order::{Change, Comparison};
+pub use order::{OrderComparison, OrderFault};
 pub use words::ChannelRole;

@@ -22,7 +22,7 @@ const DELAY_EXPLAINS: f64 = 0.5;
 
 /// What may be wrong with the order and signs of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Change {
+pub enum OrderFault {
     /// Nothing.
     None,
     /// A joint has the other sign.
@@ -31,7 +31,7 @@ pub enum Change {
     Exchange(usize, usize),
 }
 
-impl Change {
+impl OrderFault {
     /// Makes the change in a list with one number for each joint.
     pub fn apply(self, x: &mut [f64]) {
         match self {
@@ -49,9 +49,9 @@ impl Change {
 
 /// Compares torques as logged with those that a model gives under each change of the positions.
 #[derive(Debug, Clone)]
-pub struct Comparison {
+pub struct OrderComparison {
     joints: usize,
-    changes: Vec<Change>,
+    changes: Vec<OrderFault>,
     /// For each change of the positions, joint of the model and joint of the log: sum of products.
     products: Vec<f64>,
     /// For each change and joint: power of the model's torque.
@@ -72,13 +72,13 @@ struct Last {
     logged: Vec<f64>,
 }
 
-impl Comparison {
+impl OrderComparison {
     /// For a robot of `joints` joints.
     pub fn new(joints: usize) -> Self {
-        let mut changes = vec![Change::None];
-        changes.extend((0..joints).map(Change::Turn));
+        let mut changes = vec![OrderFault::None];
+        changes.extend((0..joints).map(OrderFault::Turn));
         for a in 0..joints {
-            changes.extend((a + 1..joints).map(|b| Change::Exchange(a, b)));
+            changes.extend((a + 1..joints).map(|b| OrderFault::Exchange(a, b)));
         }
         Self {
             products: vec![0.0; changes.len() * joints * joints],
@@ -92,7 +92,7 @@ impl Comparison {
     }
 
     /// Changes of the positions for which the model's torque is asked, in order.
-    pub fn changes(&self) -> &[Change] {
+    pub fn changes(&self) -> &[OrderFault] {
         &self.changes
     }
 
@@ -181,15 +181,15 @@ impl Comparison {
 
     /// Share of the torque's power that is left, the mean of the joints, under change `index` of the
     /// positions and `of_torques`.
-    fn left(&self, index: usize, of_torques: Change) -> f64 {
+    fn left(&self, index: usize, of_torques: OrderFault) -> f64 {
         let n = self.joints;
         // Which logged torque stands for each joint, and its sign.
         let mut from: Vec<usize> = (0..n).collect();
         let mut sign = vec![1.0; n];
         match of_torques {
-            Change::None => {}
-            Change::Turn(joint) => sign[joint] = -1.0,
-            Change::Exchange(a, b) => from.swap(a, b),
+            OrderFault::None => {}
+            OrderFault::Turn(joint) => sign[joint] = -1.0,
+            OrderFault::Exchange(a, b) => from.swap(a, b),
         }
         let (mut sum, mut count) = (0.0, 0.0);
         for j in 0..n {
@@ -205,11 +205,11 @@ impl Comparison {
 
     /// What is wrong with order and signs, where a single change explains it.
     pub fn fault(&self, joints: &[String], rows: u64, duration_s: f64) -> Option<LogFault> {
-        let as_logged = self.left(0, Change::None);
-        let mut best = (as_logged, Change::None, "");
+        let as_logged = self.left(0, OrderFault::None);
+        let mut best = (as_logged, OrderFault::None, "");
         for (index, change) in self.changes.iter().enumerate().skip(1) {
             for (of_torques, at, what) in [
-                (Change::None, index, "positions"),
+                (OrderFault::None, index, "positions"),
                 (*change, 0, "torques"),
                 (*change, index, "positions and torques"),
             ] {
@@ -230,12 +230,12 @@ impl Comparison {
                 .unwrap_or_default()
         };
         let (problem, remedy) = match change {
-            Change::None => return None,
-            Change::Turn(joint) => (
+            OrderFault::None => return None,
+            OrderFault::Turn(joint) => (
                 format!("{what} of {} have the other sign", name(joint)),
                 "turn the sign of this joint in the [log] section of the robot file",
             ),
-            Change::Exchange(a, b) => (
+            OrderFault::Exchange(a, b) => (
                 format!("{what} of {} and {} are exchanged", name(a), name(b)),
                 "exchange the columns of the two joints in the [log] section of the robot file",
             ),
@@ -264,8 +264,8 @@ mod tests {
         ]
     }
 
-    fn compared(positions: Change, torques: Change, late: f64) -> Comparison {
-        let mut comparison = Comparison::new(2);
+    fn compared(positions: OrderFault, torques: OrderFault, late: f64) -> OrderComparison {
+        let mut comparison = OrderComparison::new(2);
         let changes = comparison.changes().to_vec();
         for k in 0..5000 {
             let t = f64::from(k) * 0.01;
@@ -298,7 +298,7 @@ mod tests {
         comparison
     }
 
-    fn told(positions: Change, torques: Change) -> Option<String> {
+    fn told(positions: OrderFault, torques: OrderFault) -> Option<String> {
         let comparison = compared(positions, torques, 0.0);
         let names = ["a".to_owned(), "b".to_owned()];
         let fault = comparison.fault(&names, 5000, 50.0)?;
@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn each_single_change_is_told_apart_and_a_right_log_is_not_doubted() {
-        use Change::{Exchange, None, Turn};
+        use OrderFault::{Exchange, None, Turn};
         assert_eq!(told(None, None), Option::None);
         for (positions, torques, expected) in [
             (Turn(0), None, "positions of a have the other sign"),
@@ -326,7 +326,8 @@ mod tests {
 
     #[test]
     fn a_delay_is_told_with_its_size_and_a_log_without_one_has_none() {
-        let delay = |late| compared(Change::None, Change::None, late).delay(0.01, 5000, 50.0);
+        let delay =
+            |late| compared(OrderFault::None, OrderFault::None, late).delay(0.01, 5000, 50.0);
         assert_eq!(delay(0.0), None);
         let late = delay(0.03).unwrap().effect;
         let number: f64 = late.split(' ').nth(2).unwrap().parse().unwrap();

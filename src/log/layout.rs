@@ -66,7 +66,7 @@ pub(crate) fn channel(
 
 /// What the position and torque channels of a layout are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Channels {
+pub enum DeclaredChannels {
     /// Joint positions and joint torques.
     Joint,
     /// Actuator positions x_c1..x_c4 and volts u_1..u_4 of the CFT robot.
@@ -126,7 +126,7 @@ pub struct Layout {
     /// Velocities in joint order; read only where the log has all of them.
     pub velocities: Vec<Channel>,
     /// What positions and torques are.
-    pub channels: Channels,
+    pub channels: DeclaredChannels,
     /// Applied to every row.
     pub conversion: Option<Conversion>,
     /// A torque holds from its row, or from its message, to the next; else it is interpolated where
@@ -154,7 +154,7 @@ impl Layout {
             torques: each("tau_"),
             velocities: each("dq_"),
             joints,
-            channels: Channels::Joint,
+            channels: DeclaredChannels::Joint,
             conversion: None,
             zero_order_hold: false,
             section: LogSection::default(),

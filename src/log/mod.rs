@@ -34,7 +34,7 @@ pub use arrays::Arrays;
 pub use block::Block;
 pub use content::REDUCED;
 pub use error::LogError;
-pub use layout::{Channel, Channels, Conversion, Layout};
+pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
 pub use mend::{Bridge, Mending, Unwrap};
 pub use names::{escape, escape_whole, nearest};
 pub use raw::{RawBlock, RawReader, topics};

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::column::Column;
+use super::column::LogColumn;
 use super::family::{Family, How, Key, families, fit};
-use super::look::{Clock, Seen};
+use super::look::{ClockSource, SeenColumns};
 use super::units::{Unit, of_positions, of_torques};
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{joint, words};
@@ -69,7 +69,7 @@ pub struct Mapping {
 struct Taken<'a> {
     pattern: String,
     how: How,
-    columns: Vec<Option<&'a Column>>,
+    columns: Vec<Option<&'a LogColumn>>,
     /// Others that fit, best first, and whether the first of them is as good.
     others: Vec<String>,
     tie: bool,
@@ -83,8 +83,8 @@ const ROLES: [(ChannelRole, &str); 3] = [
 
 impl Mapping {
     /// The columns of the joints of a URDF, or of those that the log shows.
-    pub fn of(known: Option<&[Known]>, seen: Option<&Seen>) -> Self {
-        let columns: &[Column] = seen.map_or(&[], |seen| &seen.columns);
+    pub fn of(known: Option<&[Known]>, seen: Option<&SeenColumns>) -> Self {
+        let columns: &[LogColumn] = seen.map_or(&[], |seen| &seen.columns);
         let joints: Vec<Known> = match known {
             Some(known) => known.to_vec(),
             None => shown(columns),
@@ -132,7 +132,7 @@ impl Mapping {
             out.how = "by what they hold, for they have no names: CHECK IT";
         }
         let [position, velocity, torque] = all;
-        let columns_of = |taken: &Option<Taken>| -> Vec<Option<Column>> {
+        let columns_of = |taken: &Option<Taken>| -> Vec<Option<LogColumn>> {
             let none = vec![None; names.len()];
             let cloned = |t: &Taken| t.columns.iter().map(|c| c.cloned()).collect();
             taken.as_ref().map_or(none, cloned)
@@ -144,7 +144,7 @@ impl Mapping {
         );
         out.units(&joints, &q, &tau);
         for (k, joint) in out.joints.iter_mut().enumerate() {
-            let name = |column: &Option<Column>| column.as_ref().map(|c| c.name.clone());
+            let name = |column: &Option<LogColumn>| column.as_ref().map(|c| c.name.clone());
             (joint.position, joint.velocity, joint.torque) =
                 (name(&q[k]), name(&dq[k]), name(&tau[k]));
             joint.wrap = q[k].as_ref().and_then(|c| c.wrap);
@@ -190,14 +190,14 @@ impl Mapping {
     }
 
     /// Units of positions and torques.
-    fn units(&mut self, known: &[Known], q: &[Option<Column>], tau: &[Option<Column>]) {
-        let paired = |columns: &[Option<Column>]| -> Vec<usize> {
+    fn units(&mut self, known: &[Known], q: &[Option<LogColumn>], tau: &[Option<LogColumn>]) {
+        let paired = |columns: &[Option<LogColumn>]| -> Vec<usize> {
             (0..columns.len())
                 .filter(|k| columns[*k].is_some())
                 .collect()
         };
         let found = paired(q);
-        let columns: Vec<&Column> = found.iter().filter_map(|k| q[*k].as_ref()).collect();
+        let columns: Vec<&LogColumn> = found.iter().filter_map(|k| q[*k].as_ref()).collect();
         let kinds: Vec<JointKind> = found.iter().map(|k| known[*k].kind).collect();
         let Unit {
             unit, scale, check, ..
@@ -214,7 +214,7 @@ impl Mapping {
         self.checks
             .extend(check.map(|text| format!("positions: {text}")));
         let found = paired(tau);
-        let columns: Vec<&Column> = found.iter().filter_map(|k| tau[*k].as_ref()).collect();
+        let columns: Vec<&LogColumn> = found.iter().filter_map(|k| tau[*k].as_ref()).collect();
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
         let Unit {
             unit,
@@ -236,9 +236,9 @@ impl Mapping {
     }
 
     /// Whether nothing in the file is a guess.
-    pub fn is_sure(&self, seen: Option<&Seen>) -> bool {
+    pub fn is_sure(&self, seen: Option<&SeenColumns>) -> bool {
         let clock = seen.map(|seen| &seen.clock);
-        let guessed = matches!(clock, Some(Clock::Column { guessed: true, .. }));
+        let guessed = matches!(clock, Some(ClockSource::Column { guessed: true, .. }));
         self.checks.is_empty() && !guessed
     }
 
@@ -278,19 +278,19 @@ struct Fitting<'a> {
     rank: (i32, i32),
     pattern: String,
     how: How,
-    columns: Vec<Option<&'a Column>>,
+    columns: Vec<Option<&'a LogColumn>>,
 }
 
 /// The family of a role that fits the joints best.
 fn best<'a>(
-    columns: &'a [Column],
+    columns: &'a [LogColumn],
     role: ChannelRole,
     commanded: bool,
     joints: &[&str],
     beside: Option<&str>,
 ) -> Option<Taken<'a>> {
-    let of_role = |c: &&Column| c.role == role && c.commanded == commanded;
-    let of_role: Vec<&Column> = columns.iter().filter(of_role).collect();
+    let of_role = |c: &&LogColumn| c.role == role && c.commanded == commanded;
+    let of_role: Vec<&LogColumn> = columns.iter().filter(of_role).collect();
     let mut found: Vec<Fitting> = Vec::new();
     for family in families(&of_role, joints) {
         if let Some((how, columns)) = fit(&family, joints)
@@ -324,7 +324,7 @@ fn best<'a>(
     let (mut others, mut tie) = (Vec::new(), false);
     for other in found {
         // another reading of the same columns is no other family
-        let same = |c: &&Column| taken.contains(&c.name.as_str());
+        let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
         if other.columns.iter().flatten().all(same)
             || other.how == How::InPart
             || others.contains(&other.pattern)
@@ -345,14 +345,14 @@ fn best<'a>(
 
 /// The joints that a log shows: the members of the family of positions that has torques beside it and is
 /// the likeliest to have been measured; else the largest one.
-fn shown(columns: &[Column]) -> Vec<Known> {
+fn shown(columns: &[LogColumn]) -> Vec<Known> {
     let one = |name: &str, kind| Known {
         name: name.to_owned(),
         kind,
         torque: None,
     };
-    let of = |role: ChannelRole| -> Vec<&Column> {
-        let of_role = |c: &&Column| c.role == role && !c.commanded;
+    let of = |role: ChannelRole| -> Vec<&LogColumn> {
+        let of_role = |c: &&LogColumn| c.role == role && !c.commanded;
         columns.iter().filter(of_role).collect()
     };
     let (positions, torques) = (of(ChannelRole::Position), of(ChannelRole::Torque));
@@ -391,17 +391,17 @@ fn shown(columns: &[Column]) -> Vec<Known> {
             .all(|head| head.len() > k + 1 && head[k] == heads[0][k])
     };
     // `q_<joint>` of the contract has the joint's whole name
-    let named = |(_, column): &(Key, &Column)| own_name(&column.name).is_some();
+    let named = |(_, column): &(Key, &LogColumn)| own_name(&column.name).is_some();
     let begins = match heads.len() {
         _ if best.pattern == "q_#" && best.members.iter().all(named) => 0,
         0 | 1 => 0,
         _ => (0..).take_while(|k| common(*k)).count(),
     };
-    let mut members: Vec<&(Key, &Column)> = best.members.iter().collect();
+    let mut members: Vec<&(Key, &LogColumn)> = best.members.iter().collect();
     if members.iter().all(|(key, _)| matches!(key, Key::Number(_))) {
         members.sort_by(|a, b| a.0.cmp(&b.0));
     }
-    let of_member = |(key, column): &&(Key, &Column)| {
+    let of_member = |(key, column): &&(Key, &LogColumn)| {
         let name = match key {
             // of `q_fer_joint1` the joint is what the contract says, where all of it names a joint
             Key::Number(_) if own_name(&column.name).is_some() => {
@@ -430,7 +430,7 @@ fn own_name(column: &str) -> Option<&str> {
 }
 
 /// Metres slide, everything else turns.
-fn kind_of(column: &Column) -> JointKind {
+fn kind_of(column: &LogColumn) -> JointKind {
     match column.unit.as_deref() {
         Some("m" | "mm" | "cm") => JointKind::Prismatic,
         _ => JointKind::Revolute,
@@ -458,8 +458,8 @@ fn joint_name(joint: &str) -> String {
 mod tests {
     use super::*;
 
-    fn columns(names: &[&str]) -> Vec<Column> {
-        names.iter().map(|name| Column::named(name)).collect()
+    fn columns(names: &[&str]) -> Vec<LogColumn> {
+        names.iter().map(|name| LogColumn::named(name)).collect()
     }
 
     fn matched(joints: &[&str], names: &[&str]) -> (Vec<Option<String>>, Option<How>) {

@@ -5,7 +5,7 @@ use crate::inspect::{ChannelRole, InspectedChannel};
 
 /// A column of a log.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct LogColumn {
     /// Its name; `#3` where it has none.
     pub name: String,
     /// What it holds, commanded or measured.
@@ -24,7 +24,7 @@ pub struct Column {
     pub wrap: Option<f64>,
 }
 
-impl Column {
+impl LogColumn {
     /// A column by its name.
     pub fn named(name: &str) -> Self {
         let guessed = InspectedChannel::guessed(name);

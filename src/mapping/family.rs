@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::column::Column;
+use super::column::LogColumn;
 use crate::inspect::ChannelRole;
 use crate::inspect::words::{Word, words};
 use crate::log::nearest;
@@ -19,7 +19,7 @@ pub(super) enum Key {
 pub(super) struct Family<'a> {
     /// The name that they share, `#` for what differs.
     pub pattern: String,
-    pub members: Vec<(Key, &'a Column)>,
+    pub members: Vec<(Key, &'a LogColumn)>,
     /// How far its words are from a measured quantity of the joint; below 0 where they say `measured`.
     pub penalty: i32,
 }
@@ -109,10 +109,10 @@ fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
 }
 
 /// The families among columns of one role. A column may be in several.
-pub(super) fn families<'a>(columns: &[&'a Column], joints: &[&str]) -> Vec<Family<'a>> {
-    let mut found: BTreeMap<String, Vec<(Key, &Column)>> = BTreeMap::new();
+pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Family<'a>> {
+    let mut found: BTreeMap<String, Vec<(Key, &LogColumn)>> = BTreeMap::new();
     let mut order: Vec<String> = Vec::new();
-    let mut add = |pattern: String, key: Key, column: &'a Column| {
+    let mut add = |pattern: String, key: Key, column: &'a LogColumn| {
         let members = found.entry(pattern.clone()).or_insert_with(|| {
             order.push(pattern);
             Vec::new()
@@ -236,12 +236,12 @@ fn bare(name: &str) -> String {
 pub(super) fn fit<'a>(
     family: &Family<'a>,
     joints: &[&str],
-) -> Option<(How, Vec<Option<&'a Column>>)> {
+) -> Option<(How, Vec<Option<&'a LogColumn>>)> {
     let by_key = |key: &Key| {
         let found = family.members.iter().find(|(own, _)| own == key);
         found.map(|(_, column)| *column)
     };
-    let named: Vec<Option<&Column>> = joints
+    let named: Vec<Option<&LogColumn>> = joints
         .iter()
         .map(|joint| {
             let is = |key: &Key| matches!(key, Key::Name(name) if bare(name) == bare(joint));
@@ -327,7 +327,7 @@ pub(super) fn fit<'a>(
             Key::Number(_) => None,
         })
         .collect();
-    let near: Vec<Option<&Column>> = joints
+    let near: Vec<Option<&LogColumn>> = joints
         .iter()
         .map(|joint| {
             let near = nearest(joint, names.iter().copied())?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::column::Column;
+use super::column::LogColumn;
 use super::content;
 use super::error::MappingError;
 use super::units::wrap_of;
@@ -17,7 +17,7 @@ const SAMPLE: usize = 20_480;
 
 /// Where times come from.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Clock {
+pub enum ClockSource {
     /// Messages have their own.
     Messages,
     /// A column, by its name; seconds per unit of it, and whether anything but its name told that it is
@@ -42,9 +42,9 @@ pub struct Asked {
 
 /// What a log shows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
-    pub columns: Vec<Column>,
-    pub clock: Clock,
+pub struct SeenColumns {
+    pub columns: Vec<LogColumn>,
+    pub clock: ClockSource,
     /// Topic that was chosen among several.
     pub topic: Option<String>,
     /// Topics that were not.
@@ -57,10 +57,10 @@ pub struct Seen {
     pub provenance: Provenance,
 }
 
-impl Seen {
+impl SeenColumns {
     /// Whether it is a recording of messages.
     pub fn is_recording(&self) -> bool {
-        self.clock == Clock::Messages
+        self.clock == ClockSource::Messages
     }
 }
 
@@ -73,7 +73,7 @@ pub fn look(
     asked: &Asked,
     joints: Option<usize>,
     stop: &dyn Fn() -> bool,
-) -> Result<Seen, MappingError> {
+) -> Result<SeenColumns, MappingError> {
     let name = escape(&spec.name());
     let groups = log::topics(spec)?;
     let topic = match &asked.topic {
@@ -97,13 +97,13 @@ pub fn look(
     // the time of a recording is its first column
     let at = at.or_else(|| log.is_recording().then_some(0));
     let numbers: Vec<usize> = (0..log.names().len()).filter(|k| Some(*k) != at).collect();
-    let mut columns: Vec<Column> = numbers
+    let mut columns: Vec<LogColumn> = numbers
         .iter()
-        .map(|k| Column {
+        .map(|k| LogColumn {
             unit: log.unit(*k).map(str::to_owned),
             whole: is_whole(&sample[*k]),
             wrap: wrap_of(&sample[*k]),
-            ..Column::named(&log.names()[*k])
+            ..LogColumn::named(&log.names()[*k])
         })
         .collect();
     if headerless {
@@ -140,16 +140,16 @@ pub fn look(
         }
     }
     let clock = match (time, asked.rate_hz) {
-        (Some((at, seconds, guessed)), _) => Clock::Column {
+        (Some((at, seconds, guessed)), _) => ClockSource::Column {
             name: log.names()[at].clone(),
             seconds,
             guessed,
         },
-        (None, Some(rate)) if !log.is_recording() => Clock::Rate(rate),
-        _ => Clock::Messages,
+        (None, Some(rate)) if !log.is_recording() => ClockSource::Rate(rate),
+        _ => ClockSource::Messages,
     };
     let others = groups.into_iter().map(|group| group.topic);
-    Ok(Seen {
+    Ok(SeenColumns {
         columns,
         clock,
         other_topics: match &topic {

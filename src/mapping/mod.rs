@@ -20,6 +20,6 @@ mod look;
 mod units;
 
 pub use choose::{JointColumns, Known, Mapping};
-pub use column::Column;
+pub use column::LogColumn;
 pub use error::MappingError;
-pub use look::{Asked, Clock, Seen, look};
+pub use look::{Asked, ClockSource, SeenColumns, look};

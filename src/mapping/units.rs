@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::column::Column;
+use super::column::LogColumn;
 use crate::inspect::words::words;
 use crate::robot::JointKind;
 
@@ -26,7 +26,7 @@ pub(super) struct Unit {
     pub drive: bool,
 }
 
-fn says(column: &Column, known: &[&str]) -> bool {
+fn says(column: &LogColumn, known: &[&str]) -> bool {
     let unit = column.unit.as_deref().unwrap_or_default().to_lowercase();
     known.contains(&unit.as_str())
         || words(&column.name)
@@ -35,7 +35,7 @@ fn says(column: &Column, known: &[&str]) -> bool {
 }
 
 /// The unit of the positions of all joints.
-pub(super) fn of_positions(columns: &[&Column], kinds: &[JointKind]) -> Unit {
+pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Unit {
     let Some(first) = columns.first() else {
         return Unit::default();
     };
@@ -96,7 +96,7 @@ pub(super) fn of_positions(columns: &[&Column], kinds: &[JointKind]) -> Unit {
 }
 
 /// The unit of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
-pub(super) fn of_torques(columns: &[&Column], limits: &[Option<f64>]) -> Unit {
+pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
     let Some(first) = columns.first() else {
         return Unit::default();
     };
@@ -198,11 +198,11 @@ pub(super) fn wrap_of(numbers: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn column(name: &str, largest: f64, whole: bool) -> Column {
-        Column {
+    fn column(name: &str, largest: f64, whole: bool) -> LogColumn {
+        LogColumn {
             range: [-largest, 0.9 * largest],
             whole,
-            ..Column::named(name)
+            ..LogColumn::named(name)
         }
     }
 

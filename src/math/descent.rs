@@ -79,7 +79,7 @@ pub enum Trial<S> {
 }
 
 /// What is made of a point and the control number.
-pub type Step<'a, S, E> = dyn FnMut(&S, f64) -> Result<Trial<S>, E> + 'a;
+pub type DescentStep<'a, S, E> = dyn FnMut(&S, f64) -> Result<Trial<S>, E> + 'a;
 
 /// Descends from `start` by at most so many tried steps: `step` gets the present point and the control
 /// number. The point at the end, how it ended, and the steps that were tried.
@@ -90,7 +90,7 @@ pub fn descend<S, E>(
     start: S,
     control: &StepControl,
     most: usize,
-    step: &mut Step<S, E>,
+    step: &mut DescentStep<S, E>,
 ) -> Result<(S, Ending, usize), E> {
     let (mut at, mut number) = (start, control.start);
     for tried in 1..=most {

@@ -15,7 +15,7 @@ use argmin::solver::quasinewton::LBFGS;
 
 /// How a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
+pub enum SearchEnding {
     /// Within the tolerance.
     Converged,
     /// The evaluations are used up; the best point so far is given.
@@ -36,7 +36,7 @@ pub struct Minimum {
     /// Evaluations of the function (and its gradient) that were spent.
     pub evaluations: u64,
     /// How the search ended.
-    pub ending: Ending,
+    pub ending: SearchEnding,
 }
 
 /// Minimises `f` from `start` by the simplex method, its first simplex reaching `steps` along each
@@ -79,7 +79,7 @@ pub fn nelder_mead(
             });
         let ending = search.borrow().ending(&outcome);
         let gained = before - search.borrow().best.1;
-        if ending != Ending::Converged || (shrink < 1.0 && gained <= tolerance) {
+        if ending != SearchEnding::Converged || (shrink < 1.0 && gained <= tolerance) {
             return search.into_inner().end(ending);
         }
         shrink = 0.25;
@@ -119,7 +119,7 @@ pub fn lbfgs(
             });
         let ending = search.borrow().ending(&outcome);
         // A line search that fails may only need a fresh memory.
-        if ending != Ending::Stalled || search.borrow().best.1 >= before {
+        if ending != SearchEnding::Stalled || search.borrow().best.1 >= before {
             return search.into_inner().end(ending);
         }
     }
@@ -166,16 +166,16 @@ impl<'a> Search<'a> {
     }
 
     /// Evaluates the start; the ending of a search that cannot go on from there.
-    fn begin(&mut self) -> Option<Ending> {
+    fn begin(&mut self) -> Option<SearchEnding> {
         let start = self.best.0.clone();
         match self.at(&start) {
             Ok(value) if value.is_finite() && !start.is_empty() => None,
-            Ok(_) => Some(Ending::NoStart),
-            Err(_) => Some(Ending::EvaluationLimit),
+            Ok(_) => Some(SearchEnding::NoStart),
+            Err(_) => Some(SearchEnding::EvaluationLimit),
         }
     }
 
-    fn end(self, ending: Ending) -> Minimum {
+    fn end(self, ending: SearchEnding) -> Minimum {
         let (x, value) = self.best;
         Minimum {
             x,
@@ -185,12 +185,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn ending<O, S, I: State>(&self, run: &Result<OptimizationResult<O, S, I>, Error>) -> Ending {
+    fn ending<O, S, I: State>(
+        &self,
+        run: &Result<OptimizationResult<O, S, I>, Error>,
+    ) -> SearchEnding {
         let done = TerminationStatus::Terminated(TerminationReason::SolverConverged);
         match run {
-            _ if self.refused => Ending::EvaluationLimit,
-            Ok(run) if *run.state().get_termination_status() == done => Ending::Converged,
-            _ => Ending::Stalled,
+            _ if self.refused => SearchEnding::EvaluationLimit,
+            Ok(run) if *run.state().get_termination_status() == done => SearchEnding::Converged,
+            _ => SearchEnding::Stalled,
         }
     }
 
@@ -264,7 +267,7 @@ mod tests {
         let simplex = nelder_mead(&mut |x| rosenbrock(x), &start, &[0.5, 0.5], 1e-14, 2000);
         let newton = lbfgs(&mut rosenbrock_with_gradient, &start, 1e-8, 500);
         for (found, most) in [(simplex, 1000), (newton, 150)] {
-            assert_eq!(found.ending, Ending::Converged);
+            assert_eq!(found.ending, SearchEnding::Converged);
             for x in &found.x {
                 assert!((x - 1.0).abs() < 1e-6, "{found:?}");
             }
@@ -306,7 +309,7 @@ mod tests {
             1e-14,
             40,
         );
-        assert_eq!(found.ending, Ending::EvaluationLimit);
+        assert_eq!(found.ending, SearchEnding::EvaluationLimit);
         assert_eq!((found.evaluations, seen.len()), (40, 40));
         assert_eq!(
             found.value,
@@ -315,7 +318,7 @@ mod tests {
         let found = lbfgs(&mut rosenbrock_with_gradient, &[-1.2, 1.0], 1e-8, 7);
         assert_eq!(
             (found.ending, found.evaluations),
-            (Ending::EvaluationLimit, 7)
+            (SearchEnding::EvaluationLimit, 7)
         );
     }
 
@@ -329,27 +332,30 @@ mod tests {
             }
         };
         let found = nelder_mead(&mut f, &[3.0, 2.0], &[1.0, 1.0], 1e-16, 1000);
-        assert_eq!(found.ending, Ending::Converged);
+        assert_eq!(found.ending, SearchEnding::Converged);
         assert!((found.x[0] - 0.6).abs() < 1e-6 && found.x[1].abs() < 1e-6);
     }
 
     #[test]
     fn a_start_without_a_value_is_said() {
         let found = nelder_mead(&mut |_| f64::NAN, &[1.0], &[1.0], 1e-9, 100);
-        assert_eq!((found.ending, found.evaluations), (Ending::NoStart, 1));
+        assert_eq!(
+            (found.ending, found.evaluations),
+            (SearchEnding::NoStart, 1)
+        );
         assert_eq!(found.x, [1.0]);
         assert_eq!(
             lbfgs(&mut |_, _| f64::NAN, &[1.0], 1e-9, 100).ending,
-            Ending::NoStart
+            SearchEnding::NoStart
         );
         let found = lbfgs(&mut |_, _| 1.0, &[1.0], 1e-9, 0);
-        assert_eq!(found.ending, Ending::EvaluationLimit);
+        assert_eq!(found.ending, SearchEnding::EvaluationLimit);
     }
 
     #[test]
     fn a_start_at_the_minimum_stays_there() {
         let found = lbfgs(&mut rosenbrock_with_gradient, &[1.0, 1.0], 1e-8, 100);
-        assert_eq!((found.ending, found.value), (Ending::Converged, 0.0));
+        assert_eq!((found.ending, found.value), (SearchEnding::Converged, 0.0));
         let found = nelder_mead(
             &mut |x| rosenbrock(x),
             &[1.0, 1.0],
@@ -357,7 +363,7 @@ mod tests {
             1e-14,
             1000,
         );
-        assert_eq!((found.ending, found.value), (Ending::Converged, 0.0));
+        assert_eq!((found.ending, found.value), (SearchEnding::Converged, 0.0));
     }
 
     #[test]
@@ -373,7 +379,7 @@ mod tests {
             sum
         };
         let found = lbfgs(&mut f, &[0.0; 12], 1e-6, 2000);
-        assert_eq!(found.ending, Ending::Converged);
+        assert_eq!(found.ending, SearchEnding::Converged);
         for (i, x) in found.x.iter().enumerate() {
             assert!((x - i as f64).abs() < 1e-5, "{i}: {x}");
         }

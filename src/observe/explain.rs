@@ -15,7 +15,7 @@ const ROWS: f64 = 10.0;
 
 /// A number of an explanation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Change {
+pub struct ExplainedNumber {
     pub name: String,
     pub value: f64,
     pub std: f64,
@@ -31,7 +31,7 @@ pub struct Explanation {
     pub joint: Option<String>,
     /// Share of the external torques' power that it takes away, deviations as units.
     pub share: f64,
-    pub changes: Vec<Change>,
+    pub changes: Vec<ExplainedNumber>,
 }
 
 /// Sums over the samples of alarms: a payload's columns and each joint's friction.
@@ -148,7 +148,7 @@ impl Explainer {
                     f64::from(u8::from(k == i))
                 }))
             };
-            let number = |name: &str, value, std, unit: String| Change {
+            let number = |name: &str, value, std, unit: String| ExplainedNumber {
                 name: name.to_owned(),
                 value,
                 std,

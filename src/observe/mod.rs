@@ -26,6 +26,6 @@ mod recipe;
 
 pub use alarms::{Alarm, Alarms, JointOfAlarm};
 pub use excesses::{KEPT, Quiet, QuietSample, hold_s};
-pub use explain::{Change, Explainer, Explanation};
+pub use explain::{ExplainedNumber, Explainer, Explanation};
 pub use observer::{Observed, Observer};
 pub use recipe::{Recipe, recipe};

@@ -45,7 +45,7 @@ pub enum AxisError {
 
 /// One model that was tried on blocks set aside.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Tried {
+pub struct TriedAxis {
     /// Length of its windows \[s\].
     pub window_s: f64,
     /// Effect that it adds to the model before it.
@@ -86,7 +86,7 @@ pub struct AxisFit {
     pub ending: Ending,
     /// Steps of the last fit.
     pub steps: usize,
-    pub tried: Vec<Tried>,
+    pub tried: Vec<TriedAxis>,
 }
 
 /// Fits a model of one axis to its motion, in windows of `window` seconds or of a length that blocks set aside choose.
@@ -132,12 +132,17 @@ pub fn fit_axis(
             .map(|rival| trial.held_out(rival, score.1))
             .collect::<Result<_, _>>()?;
         let first = tried.len();
-        tried.extend(rivals.iter().zip(&scores).map(|(rival, held_out)| Tried {
-            window_s: score.1,
-            effect: rival.effects.last().map(Added::name),
-            held_out: *held_out,
-            taken: false,
-        }));
+        tried.extend(
+            rivals
+                .iter()
+                .zip(&scores)
+                .map(|(rival, held_out)| TriedAxis {
+                    window_s: score.1,
+                    effect: rival.effects.last().map(Added::name),
+                    held_out: *held_out,
+                    taken: false,
+                }),
+        );
         let scores = scores.iter().enumerate();
         let best = scores
             .filter_map(|(i, e)| Some((i, (*e)?)))
@@ -259,7 +264,7 @@ impl Trial<'_> {
         &self,
         model: &AugmentedModel,
         lengths: &[f64],
-        tried: &mut Vec<Tried>,
+        tried: &mut Vec<TriedAxis>,
     ) -> Result<(f64, f64), AxisError> {
         let mut best: Option<(f64, f64, usize)> = None;
         for length in lengths {
@@ -269,7 +274,7 @@ impl Trial<'_> {
             {
                 best = Some((error, *length, tried.len()));
             }
-            tried.push(Tried {
+            tried.push(TriedAxis {
                 window_s: *length,
                 effect: None,
                 held_out,

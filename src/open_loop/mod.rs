@@ -14,7 +14,7 @@ mod numbers;
 mod stepper;
 mod windows;
 
-pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, Tried, fit_axis};
+pub use choose::{AxisError, AxisFit, BLOCKS, PositionErrors, TriedAxis, fit_axis};
 
 pub use stepper::Stepper;
 pub use windows::{JointDrift, OpenLoop, WindowLength, along};

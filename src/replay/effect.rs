@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Replay;
 use crate::effect::empirical::ways;
-use crate::effect::{Added, AugmentedModel, Family, Role, Search, Signal};
+use crate::effect::{Added, AugmentedModel, CurveSignal, Family, Role, Search};
 use crate::motion::{MotionError, Stretch};
 use crate::robot::JointKind;
 
@@ -149,7 +149,7 @@ impl OfSignal {
             return OfSignal::Wave(1.0 / order);
         }
         match (effect.curve(), effect.family()) {
-            (Some((Signal::Way, _)), _) | (_, Family::Memory) => OfSignal::Way,
+            (Some((CurveSignal::Way, _)), _) | (_, Family::Memory) => OfSignal::Way,
             (_, Family::Position | Family::Own) => OfSignal::Position,
             (_, Family::Velocity) => OfSignal::Velocity,
             (_, Family::Cross) => OfSignal::OtherVelocity(effect.place.from().unwrap_or(joint)),

@@ -10,7 +10,7 @@ mod torque;
 pub use effect::EffectRows;
 pub use friction::{FrictionRows, is_beyond_curve, speeds};
 pub use poses::Poses;
-pub use residual::{JointResidual, ResidualEvidence};
+pub use residual::{ResidualEvidence, ResidualPair};
 pub use torque::{JointSeries, TorqueSeries};
 
 use serde::Serialize;

@@ -9,7 +9,7 @@ use crate::motion::{MotionError, Stretch};
 
 /// The residual of one joint.
 #[derive(Debug, Clone, Serialize)]
-pub struct JointResidual {
+pub struct ResidualPair {
     pub before: JointEvidence,
     /// By a second model, where there is one.
     pub after: Option<JointEvidence>,
@@ -22,7 +22,7 @@ pub struct JointResidual {
 pub struct ResidualEvidence {
     /// Names of the logs.
     pub logs: Vec<String>,
-    pub joints: Vec<JointResidual>,
+    pub joints: Vec<ResidualPair>,
 }
 
 /// The residual of the first model, and of the second where there is one, along some logs.
@@ -52,7 +52,7 @@ pub(super) fn residual(
     Ok(ResidualEvidence {
         logs: replay.named(logs),
         joints: joints
-            .map(|(before, orders)| JointResidual {
+            .map(|(before, orders)| ResidualPair {
                 before,
                 after: after.next(),
                 orders,

@@ -6,7 +6,7 @@ use crate::validate::JointError;
 
 /// One estimated parameter, as a table shows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Parameter<'a> {
+pub struct ParameterRow<'a> {
     /// Joint or group that it belongs to; may be empty.
     pub joint: &'a str,
     /// Name of the parameter.
@@ -27,7 +27,7 @@ pub struct Parameter<'a> {
 
 /// The parameters as a table. Columns without a single entry are left out; next to the truth stands
 /// the deviation from it in standard deviations.
-pub fn parameters(caption: &str, rows: &[Parameter]) -> Table {
+pub fn parameters(caption: &str, rows: &[ParameterRow]) -> Table {
     let joints = rows.iter().any(|row| !row.joint.is_empty());
     let thetas = rows.iter().any(|row| row.theta.is_some());
     let truths = rows.iter().any(|row| row.truth.is_some());
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn parameters_stand_beside_their_truth_in_80_columns() {
         let rows = [
-            Parameter {
+            ParameterRow {
                 joint: "q1",
                 name: "viscous",
                 theta: Some(13),
@@ -116,7 +116,7 @@ mod tests {
                 verdict: "identified",
                 truth: Some(52.1),
             },
-            Parameter {
+            ParameterRow {
                 joint: "q1",
                 name: "slope_1",
                 theta: Some(16),
@@ -135,7 +135,7 @@ q1     viscous       13   52.41  0.31  52.10       +1.0  N s/m  identified
 q1     slope_1       16  812.00     -      -          -  s/m    lower-bound
 ";
         assert_eq!(parameters("Friction", &rows).to_string(), expected);
-        let plain = Parameter {
+        let plain = ParameterRow {
             joint: "",
             theta: None,
             truth: None,

@@ -24,7 +24,7 @@ pub enum DriveKind {
 /// `[drive.NAME]` of a joint; what is absent is unknown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Drive {
+pub struct JointDrive {
     /// Kind.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<DriveKind>,
@@ -36,7 +36,7 @@ pub struct Drive {
     pub presliding_max: Option<f64>,
 }
 
-impl Drive {
+impl JointDrive {
     /// Largest play of a joint [m or rad]: as declared, none of a drive that has none, else what a worn gear has.
     pub fn backlash(&self, joint: JointKind) -> f64 {
         self.backlash_max.unwrap_or(match (self.kind, joint) {

@@ -4,7 +4,7 @@
 //! Vectors of motors and of joints have one number each per joint. Where the motors are at the joints
 //! their coordinates are the joints' own, and one volt stands for one unit of torque.
 
-use super::cft::actuation::{self, ENCODER_SCALE, Limits, Setup};
+use super::cft::actuation::{self, ActuationLimits, ENCODER_SCALE, Setup};
 use super::cft::pantograph::{self, TURN_OFFSET};
 use super::cft::{COORDINATES, geometry};
 use super::error::RobotError;
@@ -74,7 +74,7 @@ impl Transmission {
     }
 
     /// Limits of the motors' coordinates (Table 5); `None` where only the robot's file knows them.
-    pub fn limits(&self) -> Option<Limits> {
+    pub fn limits(&self) -> Option<ActuationLimits> {
         self.pantograph.map(Setup::limits)
     }
 

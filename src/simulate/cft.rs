@@ -8,8 +8,8 @@ use super::effects::{EffectSpec, EffectValue, Effects, Sites};
 use super::joint_friction::SmoothFriction;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
-use super::reference::{Fourier, Frame, Path, Reference};
-use super::run::{Drive, Start, run};
+use super::reference::{Fourier, Path, Reference, ReferenceFrame};
+use super::run::{MotorInput, Start, run};
 use super::settings::Settings;
 use super::simulated_run::SimulatedRun;
 use crate::robot::Robot;
@@ -120,7 +120,7 @@ pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
 
 fn excitation_of(series: Fourier<4>) -> Reference<4> {
     Reference {
-        frame: Frame::Motors,
+        frame: ReferenceFrame::Motors,
         path: Path::Fourier(series),
     }
 }
@@ -149,7 +149,7 @@ pub fn follow(
     let plant = truth.plant()?;
     plant.check()?;
     let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
-    let drive = Drive::Follow {
+    let drive = MotorInput::Follow {
         reference,
         control: plant.control(),
     };

@@ -9,7 +9,7 @@ use super::SimulateError;
 
 /// Gains and limits of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Control<const J: usize> {
+pub struct ControllerSettings<const J: usize> {
     /// Proportional gains, V/m or V/rad.
     pub proportional: [f64; J],
     /// Derivative gains, V s/m or V s/rad; all zero gives the report's P controller.
@@ -18,7 +18,7 @@ pub struct Control<const J: usize> {
     pub filter_hz: f64,
 }
 
-impl<const J: usize> Control<J> {
+impl<const J: usize> ControllerSettings<J> {
     /// # Errors
     /// [`SimulateError::Parameter`] when a gain is negative or not finite, or all of kp are zero.
     pub fn check(&self) -> Result<(), SimulateError> {
@@ -55,14 +55,14 @@ impl<const J: usize> Control<J> {
 /// The controller with its memory.
 #[derive(Debug, Clone)]
 pub struct Controller<const J: usize> {
-    control: Control<J>,
+    control: ControllerSettings<J>,
     last: Option<(f64, [f64; J])>,
     speed: [f64; J],
 }
 
 impl<const J: usize> Controller<J> {
     /// Controller before its first sample.
-    pub fn new(control: Control<J>) -> Self {
+    pub fn new(control: ControllerSettings<J>) -> Self {
         Self {
             control,
             last: None,
@@ -102,7 +102,7 @@ impl<const J: usize> Controller<J> {
 mod tests {
     use super::*;
 
-    const CONTROL: Control<2> = Control {
+    const CONTROL: ControllerSettings<2> = ControllerSettings {
         proportional: [100.0, 50.0],
         derivative: [2.0, 0.0],
         filter_hz: 100.0,
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn unusable_gains_are_refused() {
-        let refuse = |change: fn(&mut Control<2>)| {
+        let refuse = |change: fn(&mut ControllerSettings<2>)| {
             let mut control = CONTROL;
             change(&mut control);
             control.check().is_err()

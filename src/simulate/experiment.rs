@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::SimulateError;
-use super::controller::Control;
+use super::controller::ControllerSettings;
 use super::mechanism::Mechanism;
 use super::one_joint::{Mover, OneJointMove};
 use super::plant::Plant;
-use super::reference::{Fourier, Frame, Path, Points, Reference};
+use super::reference::{Fourier, Path, Points, Reference, ReferenceFrame};
 use crate::config::trajectory::{self, Coordinates, Trajectory};
 
 /// Duration of a motion that sets none \[s\].
@@ -78,8 +78,8 @@ pub fn of_file<const J: usize>(
     seed: u64,
 ) -> Result<Reference<J>, SimulateError> {
     let frame = |coordinates| match coordinates {
-        Coordinates::Cartesian if !mechanism.motors_at_joints() => Frame::Motors,
-        _ => Frame::Joints,
+        Coordinates::Cartesian if !mechanism.motors_at_joints() => ReferenceFrame::Motors,
+        _ => ReferenceFrame::Joints,
     };
     match file {
         Trajectory::Fourier(file) => fourier(mechanism, file, frame(file.coordinates)),
@@ -93,13 +93,13 @@ pub fn of_file<const J: usize>(
 
 fn fourier<const J: usize>(
     mechanism: &Mechanism<J>,
-    file: &trajectory::Fourier,
-    frame: Frame,
+    file: &trajectory::FourierSection,
+    frame: ReferenceFrame,
 ) -> Result<Reference<J>, SimulateError> {
     let middle = mechanism.middle();
     let (names, rest) = match frame {
-        Frame::Motors => (mechanism.robot.coordinate_names(), middle),
-        Frame::Joints => (
+        ReferenceFrame::Motors => (mechanism.robot.coordinate_names(), middle),
+        ReferenceFrame::Joints => (
             mechanism.robot.joint_names().to_vec(),
             mechanism.pose(&middle)?,
         ),
@@ -136,8 +136,8 @@ fn fourier<const J: usize>(
 
 fn points<const J: usize>(
     mechanism: &Mechanism<J>,
-    file: &trajectory::Points,
-    frame: Frame,
+    file: &trajectory::PointsSection,
+    frame: ReferenceFrame,
 ) -> Result<Reference<J>, SimulateError> {
     let mut list = Vec::with_capacity(file.points.len());
     let first = file.points.first().map_or(0.0, |point| point.t);
@@ -167,7 +167,7 @@ fn usual<const J: usize>(
 ) -> Result<Reference<J>, SimulateError> {
     if let Some(practice) = &mechanism.practice {
         return Ok(Reference {
-            frame: Frame::Motors,
+            frame: ReferenceFrame::Motors,
             path: Path::Fourier(Fourier::of(&practice.excitation)),
         });
     }
@@ -191,7 +191,7 @@ fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
         }
     }
     Reference {
-        frame: Frame::Joints,
+        frame: ReferenceFrame::Joints,
         path: Path::Fourier(Fourier {
             offset: mechanism.middle(),
             a,
@@ -214,11 +214,11 @@ const CORNER: f64 = 50.0;
 impl<const J: usize> Plant<J> {
     /// Gains that hold and track well at 1 kHz: those of the laboratory, or by the inertia of each joint in
     /// the middle of its travel.
-    pub fn control(&self) -> Control<J> {
+    pub fn control(&self) -> ControllerSettings<J> {
         let m = &self.mechanism;
         if let Some(practice) = &m.practice {
             let [proportional, derivative] = &practice.control;
-            return Control {
+            return ControllerSettings {
                 proportional: m.widened(proportional, 1.0).unwrap_or([1.0; J]),
                 derivative: m.widened(derivative, 0.0).unwrap_or([0.0; J]),
                 filter_hz: CORNER,
@@ -233,7 +233,7 @@ impl<const J: usize> Plant<J> {
         for (j, gain) in proportional.iter_mut().enumerate().take(m.joints()) {
             *gain = stiffness(j);
         }
-        Control {
+        ControllerSettings {
             proportional,
             derivative: m.filled(|j| 2.0 * damping / frequency * stiffness(j)),
             filter_hz,

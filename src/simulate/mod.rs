@@ -42,7 +42,7 @@ pub mod truth;
 pub mod volts;
 
 pub use cft::CftTruth;
-pub use controller::Control;
+pub use controller::ControllerSettings;
 pub use effects::{EffectSpec, Effects};
 pub use error::SimulateError;
 pub use experiment::Experiment;
@@ -50,14 +50,15 @@ pub use joint_friction::SmoothFriction;
 pub use mechanism::Mechanism;
 pub use one_joint::{Mover, OneJointMove};
 pub use order::{
-    InitialConditions, Order, Rows, Simulated, SimulatedLog, simulate, simulate_from, simulate_rows,
+    InitialConditions, Order, Rows, SimulatedLog, SimulationSummary, simulate, simulate_from,
+    simulate_rows,
 };
 pub use plant::Plant;
-pub use reference::{Frame, Path, Reference};
-pub use run::{Drive, Start, run};
+pub use reference::{Path, Reference, ReferenceFrame};
+pub use run::{MotorInput, Start, run};
 pub use sensors::{Noise, Sensors};
 pub use settings::{OnLimit, Settings};
-pub use simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
+pub use simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 pub use single_joint::SingleJointTruth;
 pub use truth::TruthFile;
 pub use volts::VoltSeries;

@@ -2,7 +2,7 @@
 //!
 //! Its state is (q, v, z): z are the states of the effects.
 
-use super::effects::{Effects, Motion};
+use super::effects::{Effects, PlantState};
 use super::integrate::System;
 use super::plant::{Plant, gather, spread};
 
@@ -57,13 +57,13 @@ impl<const J: usize> Moving<'_, J> {
         let (q, v) = self.motor_side(link, speed, z);
         let friction = self.plant.friction(&v);
         let n = self.plant.joints();
-        let motion = Motion {
+        let motion = PlantState {
             t,
             q: &q[..n],
             v: &v[..n],
             z,
             friction: &friction[..n],
-            ..Motion::default()
+            ..PlantState::default()
         };
         let mut acting = [1.0; J];
         self.effects.drive(&mut acting);
@@ -117,7 +117,7 @@ impl<const J: usize> Moving<'_, J> {
     fn implicit(
         &self,
         respond: &impl Fn(&[f64; J]) -> ([f64; J], [f64; J], [f64; J]),
-        motion: &Motion,
+        motion: &PlantState,
     ) -> [f64; J] {
         const MOST_STEPS: usize = 30;
         let mut joints: Vec<usize> = self.effects.implicit_joints().collect();
@@ -130,7 +130,7 @@ impl<const J: usize> Moving<'_, J> {
         let n = self.plant.joints();
         let left = |taken: &[f64; J]| {
             let (net, load, a) = respond(taken);
-            let motion = Motion {
+            let motion = PlantState {
                 a: &a[..n],
                 load: &load[..n],
                 ..*motion
@@ -178,12 +178,12 @@ impl<const J: usize> Moving<'_, J> {
     fn body(&self, t: f64, q: &[f64; J], v: &[f64; J], z: &[f64]) -> ([[f64; J]; J], [f64; J]) {
         let n = self.plant.joints();
         let (mut mass, mut bias) = self.plant.rigid(q, v);
-        let motion = Motion {
+        let motion = PlantState {
             t,
             q: &q[..n],
             v: &v[..n],
             z,
-            ..Motion::default()
+            ..PlantState::default()
         };
         gather(&mut mass, n);
         let flat = &mut mass.as_flattened_mut()[..n * n];
@@ -197,18 +197,18 @@ impl<const J: usize> Moving<'_, J> {
         let load = self.load(t, q, v, z);
         let n = self.plant.joints();
         let friction = self.plant.friction(v);
-        let motion = Motion {
+        let motion = PlantState {
             t,
             q: &q[..n],
             v: &v[..n],
             z,
             friction: &friction[..n],
-            ..Motion::default()
+            ..PlantState::default()
         };
         let mut torque = self.plant.offset;
         self.effects.torque(&motion, &mut torque);
         let still = [0.0; J];
-        let at_rest = Motion {
+        let at_rest = PlantState {
             a: &still[..n],
             load: &load[..n],
             ..motion
@@ -239,7 +239,7 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
         dydt[J..2 * J].copy_from_slice(&balance.acceleration);
         dydt[2 * J..].fill(0.0);
         let n = self.plant.joints();
-        let motion = Motion {
+        let motion = PlantState {
             t,
             q: &balance.q[..n],
             v: &balance.v[..n],
@@ -247,7 +247,7 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
             friction: &balance.friction[..n],
             a: &balance.acceleration[..n],
             net: &balance.net[..n],
-            ..Motion::default()
+            ..PlantState::default()
         };
         self.effects.rates(&motion, &mut dydt[2 * J..]);
     }
@@ -259,12 +259,12 @@ impl<const J: usize, const N: usize> System<N> for Moving<'_, J> {
         let z = &y[2 * J..];
         let n = self.plant.joints();
         let (q, v) = self.motor_side(&part::<J, N>(y, 0), &part::<J, N>(y, J), z);
-        self.effects.moved(&Motion {
+        self.effects.moved(&PlantState {
             t,
             q: &q[..n],
             v: &v[..n],
             z,
-            ..Motion::default()
+            ..PlantState::default()
         })
     }
 }

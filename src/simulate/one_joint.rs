@@ -2,7 +2,9 @@
 
 use super::SimulateError;
 use super::mechanism::Mechanism;
-use super::reference::{Frame, LadderPlan, Path, Reference, TURN, Travel, middle_part, travel};
+use super::reference::{
+    LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
+};
 use crate::config::trajectory::SingleJointMove;
 use crate::robot::Robot;
 
@@ -163,7 +165,7 @@ impl OneJointMove {
     fn room<const J: usize>(
         &self,
         m: &Mechanism<J>,
-    ) -> Result<(Frame, [f64; J], Travel), SimulateError> {
+    ) -> Result<(ReferenceFrame, [f64; J], Travel), SimulateError> {
         let (place, middle) = (self.mover.index(), m.middle());
         let speeds = match &m.practice {
             Some(practice) => m.filled(|i| practice.speeds[i]),
@@ -172,7 +174,7 @@ impl OneJointMove {
         if let (Mover::Joint(_), false) = (self.mover, m.motors_at_joints()) {
             let pose = m.pose(&middle)?;
             let room = travel(m, &pose, place, MARGIN, &speeds)?;
-            return Ok((Frame::Joints, pose, room));
+            return Ok((ReferenceFrame::Joints, pose, room));
         }
         let gap = MARGIN * (m.upper[place] - m.lower[place]);
         let room = Travel {
@@ -190,8 +192,8 @@ impl OneJointMove {
             });
         }
         let frame = match self.mover {
-            Mover::Joint(_) => Frame::Joints,
-            Mover::Motor(_) => Frame::Motors,
+            Mover::Joint(_) => ReferenceFrame::Joints,
+            Mover::Motor(_) => ReferenceFrame::Motors,
         };
         Ok((frame, middle, room))
     }
@@ -201,7 +203,7 @@ impl OneJointMove {
         m: &Mechanism<J>,
         range: (f64, f64),
         room: &Travel,
-    ) -> Result<super::reference::Ladder, SimulateError> {
+    ) -> Result<super::reference::LadderReference, SimulateError> {
         let place = self.mover.index();
         let given = m.given.get(&self.mover.name(&m.robot));
         let of_practice = m.practice.as_ref().map(|practice| match self.mover {

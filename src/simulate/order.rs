@@ -9,15 +9,15 @@ use super::mechanism::Mechanism;
 use super::plant::Plant;
 use super::recorder::{Recorder, Waiting};
 use super::reference::Path;
-use super::run::{Drive, Start, run_in_blocks};
+use super::run::{MotorInput, Start, run_in_blocks};
 use super::settings::Settings;
 use super::settings_file;
-use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
+use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
 use crate::config::ModelFile;
 use crate::config::robot_file::RobotFile;
-use crate::log::{Channel, Channels, Layout};
+use crate::log::{Channel, DeclaredChannels, Layout};
 
 /// What is asked of the simulator.
 #[derive(Debug, Clone)]
@@ -35,10 +35,10 @@ pub struct Order<'a> {
 
 /// What is known of a simulated log beside its rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Simulated {
+pub struct SimulationSummary {
     pub truth: TruthFile,
     pub limits: Vec<LimitEvent>,
-    pub ending: Ending,
+    pub ending: RunEnding,
     /// Share of the rows at which each motor channel is saturated, by coordinate.
     pub saturated: Vec<(String, f64)>,
 }
@@ -52,7 +52,7 @@ pub struct SimulatedLog {
     pub values: Vec<f64>,
     pub truth: TruthFile,
     pub limits: Vec<LimitEvent>,
-    pub ending: Ending,
+    pub ending: RunEnding,
     /// Share of the rows at which each motor channel is saturated, by coordinate.
     pub saturated: Vec<(String, f64)>,
 }
@@ -157,7 +157,7 @@ pub fn simulate_rows(
     order: &Order,
     initial: Option<&InitialConditions>,
     rows: &mut dyn Rows,
-) -> Result<Simulated, SimulateError> {
+) -> Result<SimulationSummary, SimulateError> {
     run_any(order, initial, rows, false)
 }
 
@@ -166,7 +166,7 @@ fn run_any(
     initial: Option<&InitialConditions>,
     rows: &mut dyn Rows,
     in_memory: bool,
-) -> Result<Simulated, SimulateError> {
+) -> Result<SimulationSummary, SimulateError> {
     match order.robot.joint_names().len() {
         1 => run_order::<1>(order, initial, rows, in_memory),
         2 => run_order::<2>(order, initial, rows, in_memory),
@@ -183,7 +183,7 @@ fn run_order<const J: usize>(
     initial: Option<&InitialConditions>,
     rows: &mut dyn Rows,
     in_memory: bool,
-) -> Result<Simulated, SimulateError> {
+) -> Result<SimulationSummary, SimulateError> {
     let plant = Plant::<J>::of(order.robot, order.model)?;
     let (effects, effect_values) = built_effects(order, &Sites::of(&plant)?)?;
     let mechanism = &plant.mechanism;
@@ -237,7 +237,7 @@ fn run_order<const J: usize>(
             }
         }
     }
-    Ok(Simulated {
+    Ok(SimulationSummary {
         truth: truth_of(order, &plant, &run, effect_values),
         saturated: saturated.shares(&run.coordinates),
         ending: run.ending,
@@ -283,7 +283,7 @@ impl Saturated {
 fn drive<const J: usize>(
     order: &Order,
     plant: &Plant<J>,
-) -> Result<(Drive<J>, Option<f64>), SimulateError> {
+) -> Result<(MotorInput<J>, Option<f64>), SimulateError> {
     let mechanism = &plant.mechanism;
     let experiment = order.experiment;
     if let Some(reference) = experiment.reference(mechanism, order.seconds, order.seed)? {
@@ -294,7 +294,7 @@ fn drive<const J: usize>(
             _ => None,
         };
         let control = settings_file::control(order.robot, plant)?;
-        return Ok((Drive::Follow { reference, control }, seconds));
+        return Ok((MotorInput::Follow { reference, control }, seconds));
     }
     let Experiment::Volts { times, volts } = experiment else {
         return Err(SimulateError::Reference {
@@ -314,7 +314,7 @@ fn drive<const J: usize>(
     let times: Vec<f64> = times.iter().map(|t| t - first).collect();
     let series = VoltSeries::new(times, rows)?;
     let seconds = Some(series.seconds()).filter(|s| s.is_finite());
-    Ok((Drive::Volts(series), seconds))
+    Ok((MotorInput::Volts(series), seconds))
 }
 
 /// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
@@ -347,7 +347,7 @@ fn built_effects(
     }
     asked.extend(order.effects.iter().cloned());
     let (effects, values) = Effects::build(&asked, sites)?;
-    let joint_channels = order.robot.layout().channels == Channels::Joint;
+    let joint_channels = order.robot.layout().channels == DeclaredChannels::Joint;
     match effects.first_fault() {
         Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
             effect: fault.to_owned(),
@@ -369,8 +369,8 @@ fn truth_of<const J: usize>(
     let robot = &plant.mechanism.robot;
     let n = robot.joints();
     let mut ending = match recording.ending {
-        Ending::Completed => "completed".to_owned(),
-        Ending::StoppedAtLimit => "stopped at a limit".to_owned(),
+        RunEnding::Completed => "completed".to_owned(),
+        RunEnding::StoppedAtLimit => "stopped at a limit".to_owned(),
     };
     for event in &recording.limits {
         ending += &format!(
@@ -441,8 +441,8 @@ impl LogLayout {
 /// The parts of a layout that read joint channels, and motor channels.
 fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
     match layout.channels {
-        Channels::Joint => (Some(layout), layout.otherwise.as_deref()),
-        Channels::Actuator => (None, Some(layout)),
+        DeclaredChannels::Joint => (Some(layout), layout.otherwise.as_deref()),
+        DeclaredChannels::Actuator => (None, Some(layout)),
     }
 }
 

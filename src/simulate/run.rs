@@ -1,25 +1,25 @@
 //! The experiment: sample, control, hold the volts, integrate to the next sample.
 
 use super::SimulateError;
-use super::controller::{Control, Controller};
+use super::controller::{Controller, ControllerSettings};
 use super::effects::{Beginning, Effects};
 use super::integrate::DormandPrince;
 use super::mechanism::Mechanism;
 use super::moving::{Moving, part};
 use super::plant::Plant;
 use super::recorder::Recorder;
-use super::reference::{Frame, Reference, Target};
+use super::reference::{Reference, ReferenceFrame, Target};
 use super::settings::{OnLimit, Settings};
-use super::simulated_run::{Ending, LimitEvent, MotorStatus, SimulatedRun};
+use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 use super::volts::VoltSeries;
 
 /// What drives the motors.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Drive<const J: usize> {
+pub enum MotorInput<const J: usize> {
     /// The controller follows a reference.
     Follow {
         reference: Reference<J>,
-        control: Control<J>,
+        control: ControllerSettings<J>,
     },
     /// Volts are played back without looking at the robot.
     Volts(VoltSeries<J>),
@@ -61,7 +61,7 @@ pub fn run<const J: usize>(
     plant: &Plant<J>,
     effects: Effects,
     start: &Start<J>,
-    drive: &Drive<J>,
+    drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<SimulatedRun<J>, SimulateError> {
     settings.samples_in_memory()?;
@@ -84,13 +84,13 @@ pub(super) fn run_in_blocks<const J: usize>(
     plant: &Plant<J>,
     effects: Effects,
     start: &Start<J>,
-    drive: &Drive<J>,
+    drive: &MotorInput<J>,
     settings: &Settings<J>,
     block: Option<usize>,
     hand_on: HandOn<J>,
 ) -> Result<(SimulatedRun<J>, Effects), SimulateError> {
     settings.check()?;
-    if let Drive::Follow { reference, control } = drive {
+    if let MotorInput::Follow { reference, control } = drive {
         reference.path.check()?;
         control.check()?;
     }
@@ -142,7 +142,7 @@ impl<const J: usize> Running<'_, J> {
 fn march<const J: usize, const N: usize>(
     mut moving: Moving<J>,
     start: &Start<J>,
-    drive: &Drive<J>,
+    drive: &MotorInput<J>,
     settings: &Settings<J>,
     block: Option<usize>,
     hand_on: HandOn<J>,
@@ -157,10 +157,10 @@ fn march<const J: usize, const N: usize>(
     let mut integrator = DormandPrince::new(settings.tolerance);
     let mut y = initial_state::<J, N>(&mut moving, start, drive, settings)?;
     let mut drive = match drive {
-        Drive::Follow { reference, control } => {
+        MotorInput::Follow { reference, control } => {
             Running::Follow(reference, Controller::new(*control))
         }
-        Drive::Volts(series) => Running::Volts(series),
+        MotorInput::Volts(series) => Running::Volts(series),
     };
     let mut t = instants.next().unwrap_or(0.0);
     for k in 0..samples {
@@ -194,7 +194,7 @@ fn march<const J: usize, const N: usize>(
         actual.a.push(moving.acceleration(t, &y));
         actual.target.push(wanted);
         if beyond.contains(&true) && settings.on_limit == OnLimit::Stop {
-            recording.ending = Ending::StoppedAtLimit;
+            recording.ending = RunEnding::StoppedAtLimit;
             break;
         }
         if k + 1 < samples {
@@ -219,8 +219,8 @@ fn wanted<const J: usize>(
 ) -> Result<Target<J>, SimulateError> {
     let target = reference.path.at(t);
     Ok(match reference.frame {
-        Frame::Motors => target,
-        Frame::Joints => Target {
+        ReferenceFrame::Motors => target,
+        ReferenceFrame::Joints => Target {
             position: mechanism.coordinates(&target.position),
             velocity: mechanism.coordinate_speeds(&target.position, &target.velocity),
         },
@@ -311,7 +311,7 @@ fn stop_at<const J: usize>(
 fn initial_state<const J: usize, const N: usize>(
     moving: &mut Moving<J>,
     start: &Start<J>,
-    drive: &Drive<J>,
+    drive: &MotorInput<J>,
     settings: &Settings<J>,
 ) -> Result<[f64; N], SimulateError> {
     let mechanism = &moving.plant.mechanism;
@@ -321,14 +321,14 @@ fn initial_state<const J: usize, const N: usize>(
             let q = mechanism.pose(position)?;
             (*position, q, mechanism.joint_speeds(&q, speed)?)
         }
-        (Start::Settled, Drive::Volts(_)) => {
+        (Start::Settled, MotorInput::Volts(_)) => {
             let middle = std::array::from_fn(|i| {
                 let middle = 0.5 * (lower[i] + upper[i]);
                 if middle.is_finite() { middle } else { 0.0 }
             });
             (middle, mechanism.pose(&middle)?, [0.0; J])
         }
-        (Start::Settled, Drive::Follow { reference, control }) => {
+        (Start::Settled, MotorInput::Follow { reference, control }) => {
             let target = wanted(mechanism, reference, 0.0)?;
             settle(moving, &target, control)?
         }
@@ -372,7 +372,7 @@ type Pose<const J: usize> = ([f64; J], [f64; J], [f64; J]);
 fn settle<const J: usize>(
     moving: &Moving<J>,
     target: &Target<J>,
-    control: &Control<J>,
+    control: &ControllerSettings<J>,
 ) -> Result<Pose<J>, SimulateError> {
     let mechanism = &moving.plant.mechanism;
     let (lower, upper) = (&mechanism.lower, &mechanism.upper);

@@ -1,7 +1,7 @@
 //! Controller and settings of an experiment, as the robot file has them.
 
 use super::SimulateError;
-use super::controller::Control;
+use super::controller::ControllerSettings;
 use super::experiment::SECONDS;
 use super::mechanism::Mechanism;
 use super::plant::Plant;
@@ -16,7 +16,7 @@ use crate::config::robot_file::{self, RobotFile};
 pub(super) fn control<const J: usize>(
     file: &RobotFile,
     plant: &Plant<J>,
-) -> Result<Control<J>, SimulateError> {
+) -> Result<ControllerSettings<J>, SimulateError> {
     let (section, usual) = (&file.control, plant.control());
     let gains = |name: &'static str, given: &[f64], usual: [f64; J]| match given {
         [] => Ok(usual),
@@ -35,7 +35,7 @@ pub(super) fn control<const J: usize>(
     } else {
         [0.0; J]
     };
-    Ok(Control {
+    Ok(ControllerSettings {
         proportional: gains("number of gains kp", &section.kp, usual.proportional)?,
         derivative: gains("number of gains kd", &section.kd, derivative)?,
         filter_hz: section.derivative_filter_hz.unwrap_or(usual.filter_hz),

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::effects::Log;
+use super::effects::LoggedChannels;
 use super::integrate::Effort;
 use super::mechanism::Mechanism;
 
@@ -48,7 +48,7 @@ pub struct LimitEvent {
 /// How the run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ending {
+pub enum RunEnding {
     /// After the time that was asked for.
     Completed,
     /// At the first limit reached; the last row shows it.
@@ -89,7 +89,7 @@ pub struct SimulatedRun<const J: usize> {
     pub actual: Actual<J>,
     /// The first time that each coordinate reached a limit.
     pub limits: Vec<LimitEvent>,
-    pub ending: Ending,
+    pub ending: RunEnding,
     /// Standard deviation of the noise on the volts \[V\].
     pub volt_noise: [f64; J],
     /// Standard deviation of the noise on the torques themselves, N or N m.
@@ -117,7 +117,7 @@ impl<const J: usize> SimulatedRun<J> {
                 target: Vec::with_capacity(rows),
             },
             limits: Vec::new(),
-            ending: Ending::Completed,
+            ending: RunEnding::Completed,
             volt_noise: [0.0; J],
             torque_noise: [0.0; J],
             effort: Effort::default(),
@@ -163,8 +163,8 @@ impl<const J: usize> SimulatedRun<J> {
     }
 
     /// The joint channels as faults of the data see them.
-    pub(super) fn joint_channels(&mut self) -> Log<'_> {
-        Log {
+    pub(super) fn joint_channels(&mut self) -> LoggedChannels<'_> {
+        LoggedChannels {
             t: &self.t,
             q: self.q.as_flattened_mut(),
             torque: self.torque.as_flattened_mut(),

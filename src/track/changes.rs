@@ -21,7 +21,7 @@ pub enum ChangeKind {
 
 /// A change of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Change {
+pub struct ParameterChange {
     pub kind: ChangeKind,
     /// Index of the first log that it shows in.
     pub at: usize,

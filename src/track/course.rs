@@ -1,6 +1,6 @@
 //! One parameter of one robot over its logs.
 
-use super::changes::{Change, ChangeKind, seek};
+use super::changes::{ChangeKind, ParameterChange, seek};
 use super::local_level::{Variances, smooth};
 use super::together::{About, Member};
 use super::walk::{Sizes, median};
@@ -23,7 +23,7 @@ pub struct Course {
     pub values: Vec<f64>,
     pub std: Vec<f64>,
     /// In order of time.
-    pub changes: Vec<Change>,
+    pub changes: Vec<ParameterChange>,
     /// Standard deviation of the walk over a usual time between two logs.
     pub walk: f64,
     /// Standard deviation by which estimates scatter beyond their variances.
@@ -77,7 +77,7 @@ pub fn follow_together(
     let (sizes, found) = seek(about, level);
     let each = signals.iter().zip(&sizes).enumerate();
     each.map(|(i, (signal, sizes))| {
-        let changes = found.iter().map(|change| Change {
+        let changes = found.iter().map(|change| ParameterChange {
             kind: change.kind,
             at: change.at,
             size: change.sizes[i][0],
@@ -118,7 +118,7 @@ impl Signal {
     }
 
     /// Its course with these changes.
-    fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<Change>) -> Course {
+    fn course(&self, sizes: &Sizes, spacings: &[f64], changes: Vec<ParameterChange>) -> Course {
         let mut all: Variances = sizes.variances(&self.variances, spacings);
         for change in &changes {
             match change.kind {

@@ -18,7 +18,7 @@ pub struct Level {
 
 /// A robot that differs from the others in one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Apart {
+pub struct RobotApart {
     pub level: Level,
     /// Median over all robots \[unit\].
     pub usual: f64,
@@ -33,8 +33,8 @@ const LEAST: usize = 5;
 
 /// Robots that differ from the others at `level`, all comparisons together; the clearest first. Robots that are alike
 /// differ by what their own parameters vary, which is taken from the middle of the fleet.
-pub fn apart(levels: &[Level], level: f64) -> Vec<Apart> {
-    let mut all: Vec<Apart> = Vec::new();
+pub fn apart(levels: &[Level], level: f64) -> Vec<RobotApart> {
+    let mut all: Vec<RobotApart> = Vec::new();
     let mut parameters: Vec<usize> = levels.iter().map(|l| l.parameter).collect();
     parameters.sort_unstable();
     parameters.dedup();
@@ -53,7 +53,7 @@ pub fn apart(levels: &[Level], level: f64) -> Vec<Apart> {
         for own in known {
             let std = (1.4826 * spread).max(own.std);
             let clear = ((own.value - usual) / std).abs();
-            all.push(Apart {
+            all.push(RobotApart {
                 level: *own,
                 usual,
                 std,

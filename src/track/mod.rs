@@ -13,6 +13,6 @@ mod local_level;
 mod together;
 mod walk;
 
-pub use changes::{Change, ChangeKind};
+pub use changes::{ChangeKind, ParameterChange};
 pub use course::{Course, Estimate, follow, follow_together};
-pub use fleet::{Apart, Level, apart};
+pub use fleet::{Level, RobotApart, apart};

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)]
 
-use cft_ident::robot::cft::{Limits, Setup, pantograph};
+use cft_ident::robot::cft::{ActuationLimits, Setup, pantograph};
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 
@@ -150,7 +150,7 @@ impl Draw {
     }
 
     /// A Cartesian position inside the limits of a set-up.
-    pub fn position(&mut self, limits: &Limits) -> [f64; 4] {
+    pub fn position(&mut self, limits: &ActuationLimits) -> [f64; 4] {
         std::array::from_fn(|i| self.between(limits.lower[i], limits.upper[i]))
     }
 

@@ -6,7 +6,7 @@ use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::simulate::cft::{excitation, follow};
 use cft_ident::simulate::single_joint::{self, SingleJointTruth};
 use cft_ident::simulate::{
-    CftTruth, Drive, EffectSpec, Noise, Sensors, Settings, SimulateError, SimulatedRun,
+    CftTruth, EffectSpec, MotorInput, Noise, Sensors, Settings, SimulateError, SimulatedRun,
     SmoothFriction, Start, VoltSeries, run,
 };
 
@@ -138,7 +138,7 @@ pub fn pushed(
         position: [0.0],
         speed: [0.0],
     };
-    let drive = Drive::Volts(VoltSeries::new(times, volts).expect("a series"));
+    let drive = MotorInput::Volts(VoltSeries::new(times, volts).expect("a series"));
     let recording = run(&truth.plant()?, effects, &start, &drive, &perfect(8.0))?;
     let actual = &recording.actual;
     let missing = (0..recording.rows()).map(|k| {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use cft_ident::config::model_file::{Effect, EffectParameter};
+use cft_ident::config::model_file::{EffectParameter, EffectSection};
 use cft_ident::config::{ModelFile, RobotFile};
 use cft_ident::effect::{Places, Unit};
 use cft_ident::robot::JointKind;
@@ -221,7 +221,7 @@ fn units_follow_the_joint() {
 }
 
 /// A model of the robot with the synthetic parameters.
-fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
+fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
     ModelFile {
         friction_prior: Vec::new(),
         held_out: Vec::new(),
@@ -241,7 +241,7 @@ fn model(robot: &RobotFile, effects: Vec<Effect>) -> ModelFile {
     }
 }
 
-fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> Effect {
+fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSection {
     let number = |(key, value): &(&str, f64)| {
         let parameter = EffectParameter {
             value: *value,
@@ -251,7 +251,7 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> Effect {
         };
         ((*key).to_owned(), parameter)
     };
-    Effect {
+    EffectSection {
         name: name.to_owned(),
         joint: joint.map(str::to_owned),
         parameters: numbers.iter().map(number).collect(),
@@ -261,7 +261,7 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> Effect {
 #[test]
 fn effects_of_a_model_run_as_those_of_the_command_line_do() {
     let robot = robot();
-    let run = |effects: Vec<Effect>, texts: &[&str]| {
+    let run = |effects: Vec<EffectSection>, texts: &[&str]| {
         let model = model(&robot, effects);
         let order = Order {
             robot: &robot,
@@ -289,7 +289,7 @@ fn effects_of_a_model_run_as_those_of_the_command_line_do() {
     .expect("runs");
     assert_eq!(from_model, from_line);
 
-    let refused = |effects: Vec<Effect>| run(effects, &[]).expect_err("refused").to_string();
+    let refused = |effects: Vec<EffectSection>| run(effects, &[]).expect_err("refused").to_string();
     let mut unknown = in_model.clone();
     unknown.push(effect("stiction", Some("q4"), &[]));
     let text = refused(unknown);

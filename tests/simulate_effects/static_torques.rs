@@ -277,7 +277,7 @@ fn tilted_gravity_pulls_at_every_link_of_the_chain() {
     let (gx, gy) = (0.7, -0.4);
     let potential = |q: &[f64; 4]| -> f64 {
         let frames = chain::frames(q);
-        let pull = |(link, frame): (&MassProperties, &chain::Frame)| {
+        let pull = |(link, frame): (&MassProperties, &chain::RigidTransform)| {
             let p = frame.point(&link.centre);
             -link.mass * (gx * p[0] + gy * p[1])
         };

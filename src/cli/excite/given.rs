@@ -6,8 +6,8 @@ use super::Bench;
 use crate::cli::error::CliError;
 use crate::cli::files;
 use crate::config::RobotFile;
-use crate::excite::machine::Machine;
-use crate::excite::{Given, Motion, foresee};
+use crate::excite::machine::ForeseenRobot;
+use crate::excite::{GivenInformation, Motion, foresee};
 use crate::identify::{IdentifyError, Log, LoggedRobot};
 use crate::inertia::accumulate;
 use crate::log::LogSpec;
@@ -16,7 +16,7 @@ use crate::log::LogSpec;
 const NOISE_SHARE: f64 = 0.01;
 
 /// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque.
-pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut Machine) {
+pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot) {
     let names = machine.model.robot.joint_names();
     for ((noise, name), usual) in machine.noise.iter_mut().zip(names).zip(usual) {
         let given = file.noise.joint.get(name).and_then(|n| n.torque_std);
@@ -32,7 +32,7 @@ pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut Machine) {
 pub(super) fn add(
     bench: &mut Bench,
     name: &str,
-    given: &mut Given,
+    given: &mut GivenInformation,
     warnings: &mut Vec<String>,
 ) -> Result<(), CliError> {
     let args = bench.args;

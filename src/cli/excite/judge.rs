@@ -2,16 +2,16 @@
 
 use super::Bench;
 use crate::cli::error::CliError;
-use crate::excite::limits::Channel;
-use crate::excite::{Given, Judgement, LawForeseen, Motion, Terms, judge};
+use crate::excite::limits::BoundedQuantity;
+use crate::excite::{GivenInformation, Judgement, LawForeseen, Motion, Terms, judge};
 use crate::number;
 
 /// Judges a motion by the limits given.
 pub(super) fn judged(
     bench: &Bench,
     motion: &Motion,
-    channels: &[Channel],
-    given: Option<&Given>,
+    channels: &[BoundedQuantity],
+    given: Option<&GivenInformation>,
     friction: Option<LawForeseen>,
 ) -> Result<Judgement, CliError> {
     let terms = Terms {

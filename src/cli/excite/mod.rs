@@ -14,17 +14,17 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
-use crate::config::trajectory::Fourier;
+use crate::config::trajectory::FourierSection;
 use crate::config::{RobotFile, Trajectory};
 use crate::excite::blend::Blend;
 use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
-use crate::excite::machine::Machine;
-use crate::excite::search::{Found, Task, design};
+use crate::excite::machine::ForeseenRobot;
+use crate::excite::search::{FoundMotion, Task, design};
 use crate::excite::series::Series;
 use crate::excite::usage::check_pose;
 use crate::excite::{
-    Criterion, ExciteError, Given, Judgement, Judgements, LawForeseen, Motion, PriorInformation,
-    foresee, machine, series_of, trajectory, usual_torque,
+    Criterion, ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion,
+    PriorInformation, foresee, machine, series_of, trajectory, usual_torque,
 };
 use crate::log::{Provenance, escape};
 use crate::report::json::Document;
@@ -198,7 +198,7 @@ struct Bench<'a> {
     args: &'a Args,
     context: &'a Context,
     file: RobotFile,
-    machine: Machine,
+    machine: ForeseenRobot,
     rate_hz: f64,
     inputs: Vec<Provenance>,
 }
@@ -343,7 +343,7 @@ fn designs(bench: &mut Bench, names: &[Names]) -> Result<Outcome, CliError> {
         check_pose(&bench.machine, from)?;
     }
     let mut task = task(bench)?;
-    let mut given = Given::nothing(&bench.machine);
+    let mut given = GivenInformation::nothing(&bench.machine);
     let mut warnings = Vec::new();
     let mut any = false;
     for name in &args.with {
@@ -411,7 +411,7 @@ fn task(bench: &mut Bench) -> Result<Task, CliError> {
 }
 
 /// The search, with its bar.
-fn searched(bench: &Bench, task: &Task) -> Result<Found, CliError> {
+fn searched(bench: &Bench, task: &Task) -> Result<FoundMotion, CliError> {
     let context = bench.context;
     let bar = context.progress("designing", Some(task.most_evaluations()));
     let found = design(
@@ -427,7 +427,7 @@ fn searched(bench: &Bench, task: &Task) -> Result<Found, CliError> {
 }
 
 /// The motion from rest to rest, and as a file.
-fn blended(bench: &Bench, series: Series) -> Result<(Motion, Fourier), CliError> {
+fn blended(bench: &Bench, series: Series) -> Result<(Motion, FourierSection), CliError> {
     let (args, machine) = (bench.args, &bench.machine);
     let reserved = machine.channels.iter().map(|c| c.reserved(args.margin));
     let reserved: Vec<_> = reserved.collect();
@@ -438,7 +438,7 @@ fn blended(bench: &Bench, series: Series) -> Result<(Motion, Fourier), CliError>
         args.periods,
         args.from.as_deref(),
     )?;
-    let fourier = Fourier {
+    let fourier = FourierSection {
         start_s: Some(blend.start),
         blend_s: Some(blend.seconds),
         periods: blend.periods,
@@ -491,7 +491,7 @@ fn written(
 }
 
 /// 1/noise per joint where the criterion weighs rows, else ones.
-fn weights(machine: &Machine, criterion: &Criterion) -> Vec<f64> {
+fn weights(machine: &ForeseenRobot, criterion: &Criterion) -> Vec<f64> {
     if criterion.weighted() {
         machine.noise.iter().map(|s| 1.0 / s).collect()
     } else {

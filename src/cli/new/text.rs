@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::Shape;
 use crate::config::{Capsules, UrdfChain};
 use crate::log::{escape, list};
-use crate::mapping::{Clock, JointColumns, Mapping, Seen};
+use crate::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 use crate::number;
 use crate::robot::JointKind;
 
@@ -14,7 +14,7 @@ pub(super) struct Draft<'a> {
     pub name: String,
     pub shape: Shape,
     pub mapping: &'a Mapping,
-    pub seen: Option<&'a Seen>,
+    pub seen: Option<&'a SeenColumns>,
     pub chain: Option<&'a UrdfChain>,
     /// About the collision shapes of the URDF.
     pub capsules: Capsules,
@@ -231,7 +231,7 @@ impl Draft<'_> {
             }
             return;
         }
-        let recording = self.seen.is_some_and(Seen::is_recording);
+        let recording = self.seen.is_some_and(SeenColumns::is_recording);
         let joints = self.mapping.joints.iter();
         let lines: Vec<String> = joints.filter_map(|j| columns(j, recording)).collect();
         for check in &self.mapping.checks {
@@ -264,13 +264,13 @@ impl Draft<'_> {
     }
 
     /// Where the times come from, and which topic of a recording is read.
-    fn clock(&self, seen: &Seen, out: &mut String) {
+    fn clock(&self, seen: &SeenColumns, out: &mut String) {
         match &seen.clock {
-            Clock::Messages => {}
-            Clock::Rate(rate) => {
+            ClockSource::Messages => {}
+            ClockSource::Rate(rate) => {
                 let _ = writeln!(out, "rate_hz = {rate:?}   # the log has no times");
             }
-            Clock::Column {
+            ClockSource::Column {
                 name,
                 seconds,
                 guessed,

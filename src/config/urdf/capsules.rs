@@ -8,7 +8,7 @@ use crate::config::check_limits::MOST_CAPSULES;
 use crate::config::limits::CapsuleSection;
 use crate::log::escape;
 use crate::number::is_usable;
-use crate::robot::tree::enclosing::{Ball, Piece, enclosing, volume};
+use crate::robot::tree::enclosing::{Ball, EnclosedPiece, enclosing, volume};
 use crate::robot::tree::space::{UNTURNED, Vector};
 
 /// What a robot file declares of collision shapes.
@@ -25,9 +25,9 @@ pub struct Capsules {
 /// The capsules of one link.
 struct Held {
     link: String,
-    each: Vec<Piece>,
+    each: Vec<EnclosedPiece>,
     /// One that holds all.
-    all: Option<Piece>,
+    all: Option<EnclosedPiece>,
 }
 
 impl UrdfChain {
@@ -63,7 +63,7 @@ impl UrdfChain {
             *each = vec![*all];
         }
         let sections = held.into_iter().flat_map(|held| {
-            let section = move |([from, to], radius): Piece| CapsuleSection {
+            let section = move |([from, to], radius): EnclosedPiece| CapsuleSection {
                 link: held.link.clone(),
                 from,
                 to,
@@ -84,7 +84,7 @@ fn of_link<'c>(
     left: &mut u64,
     out: &mut Capsules,
 ) -> Held {
-    let (mut balls, mut each): (Vec<Ball>, Vec<Piece>) = (Vec::new(), Vec::new());
+    let (mut balls, mut each): (Vec<Ball>, Vec<EnclosedPiece>) = (Vec::new(), Vec::new());
     for collision in collisions {
         let begin = balls.len();
         match add(collision, folder, left, &mut balls) {
@@ -119,7 +119,7 @@ fn add(
     folder: &Path,
     left: &mut u64,
     balls: &mut Vec<Ball>,
-) -> Result<Option<Piece>, String> {
+) -> Result<Option<EnclosedPiece>, String> {
     let unreadable = || "a shape that cannot be read".to_owned();
     let shape = collision.shape.as_ref().ok_or_else(unreadable)?;
     Ok(match &shape.form {
@@ -144,6 +144,6 @@ fn add(
 }
 
 /// The same with a radius that holds it still when its ends are written to the micrometre.
-fn written((ends, radius): Piece) -> Piece {
+fn written((ends, radius): EnclosedPiece) -> EnclosedPiece {
     (ends, ((radius * 1e6).ceil() + 1.0) / 1e6)
 }

@@ -2,7 +2,7 @@
 
 use super::xml::Element;
 use crate::number::is_usable;
-use crate::robot::tree::enclosing::Piece;
+use crate::robot::tree::enclosing::EnclosedPiece;
 use crate::robot::tree::space::{Rotation, Vector, add, of_roll_pitch_yaw, product, turn};
 
 /// A shape in the frame of its link.
@@ -16,7 +16,7 @@ pub(super) struct Shape {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Form {
     /// A capsule that holds it.
-    Within(Piece),
+    Within(EnclosedPiece),
     /// The mesh of a file, as the URDF names it, and the factors of its coordinates.
     Mesh(String, Vector),
 }

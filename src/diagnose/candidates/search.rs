@@ -25,7 +25,7 @@ const HOPELESS: f64 = 0.2;
 const LEAST_KEPT: f64 = 0.2;
 
 /// What a round of candidates comes to.
-pub struct Found<'a> {
+pub struct RoundResult<'a> {
     /// Not yet decided on.
     pub candidates: Vec<Candidate>,
     /// What each was tried with.
@@ -49,7 +49,7 @@ pub fn search<'a>(
     torques: &'a [Torques],
     (wanted, needed): (&Wanted<'_>, f64),
     (watch, name): (Watch, &str),
-) -> Result<Found<'a>, MotionError> {
+) -> Result<RoundResult<'a>, MotionError> {
     let round = SearchRound {
         at,
         problem,
@@ -86,7 +86,7 @@ pub fn search<'a>(
         })
         .collect::<Result<_, MotionError>>()?;
     let (candidates, tried) = found.into_iter().unzip();
-    Ok(Found {
+    Ok(RoundResult {
         candidates,
         tried,
         test: round.test,

@@ -6,7 +6,7 @@ use super::unknowns::FreeParameters;
 use super::wide_motion::WideMotion;
 use crate::effect::{AugmentedModel, Law, Torques};
 use crate::motion::{ParallelFilters, Stretch};
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 
 /// What a diagnosis works on.
 pub struct Case {
@@ -25,7 +25,7 @@ pub struct Case {
     /// Speed up to which each joint rests [m/s or rad/s].
     pub rest_speed: Vec<f64>,
     /// What turns each joint, as far as it is declared.
-    pub drives: Vec<Drive>,
+    pub drives: Vec<JointDrive>,
     /// Torque unit per joint.
     pub units: Vec<String>,
     /// Torques are means of two rows, as by a zero-order hold.

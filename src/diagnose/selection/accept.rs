@@ -4,7 +4,7 @@ use crate::diagnose::candidates::baseline::Baseline;
 use crate::diagnose::candidates::candidate::Candidate;
 use crate::diagnose::candidates::columns::columns;
 use crate::diagnose::candidates::score::spread;
-use crate::diagnose::candidates::search::Found;
+use crate::diagnose::candidates::search::RoundResult;
 use crate::diagnose::placebo::draws::Placebos;
 use crate::diagnose::placebo::processing::Artefact;
 use crate::diagnose::problem::case::SelectionLimits;
@@ -66,7 +66,7 @@ pub(crate) fn accept<'a>(
 /// # Errors
 /// [`MotionError`] of the filters.
 pub(crate) fn beyond_chance(
-    found: &mut Found,
+    found: &mut RoundResult,
     limits: &SelectionLimits,
     (at, problem): (&FittedModel, &FitProblem),
     torques: &[Torques],

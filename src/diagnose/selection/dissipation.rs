@@ -7,7 +7,7 @@ use crate::diagnose::problem::fit::FittedModel;
 use crate::diagnose::problem::fit_problem::FitProblem;
 use crate::diagnose::problem::rows::{friction_columns, scene};
 use crate::diagnose::problem::unknowns::Unknown;
-use crate::effect::{Added, Signal, Torques};
+use crate::effect::{Added, CurveSignal, Torques};
 use crate::motion::Stretch;
 
 /// Deviations of the power that count for nothing.
@@ -108,7 +108,9 @@ fn terms(
             own: false,
         });
         let friction = |(_, e): &(usize, &Added)| {
-            let curve = e.curve().is_some_and(|(over, _)| over != Signal::Position);
+            let curve = e
+                .curve()
+                .is_some_and(|(over, _)| over != CurveSignal::Position);
             (e.law.entry.friction || curve) && e.place.touches(j)
         };
         for (e, added) in at.model.effects.iter().enumerate().filter(friction) {

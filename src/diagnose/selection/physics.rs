@@ -11,7 +11,7 @@ use crate::diagnose::problem::unknowns::Unknown;
 use crate::diagnose::uncertainty::covariance;
 use crate::effect::{Added, AugmentedModel, Cover, Place, Seen};
 use crate::motion::MotionError;
-use crate::robot::drive::Drive;
+use crate::robot::drive::JointDrive;
 
 /// Deviations that a number must be away from zero, or may be beyond a limit, to count.
 const DEVIATIONS: f64 = 2.0;
@@ -43,7 +43,7 @@ enum Judged {
 pub(crate) fn seen<'a>(
     model: &'a AugmentedModel,
     cover: &'a Cover,
-    drives: &'a [Drive],
+    drives: &'a [JointDrive],
     place: Place,
 ) -> Seen<'a> {
     let j = place.joint().unwrap_or(0);
@@ -255,7 +255,7 @@ mod tests {
             duration_s: 60.0,
             kind: JointKind::Revolute,
             friction: &friction,
-            drive: &Drive::default(),
+            drive: &JointDrive::default(),
             weight: true,
         };
         judged_by(&added, &seen, &covariance, limits)

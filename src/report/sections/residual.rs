@@ -4,7 +4,7 @@ use super::first_of;
 use crate::diagnose::JointEvidence;
 use crate::identify::LoggedRobot;
 use crate::number;
-use crate::replay::{JointResidual, ResidualEvidence};
+use crate::replay::{ResidualEvidence, ResidualPair};
 use crate::report::Writer;
 use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 
@@ -16,7 +16,7 @@ pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
         false => "Residual",
     };
     let joints = machine.robot.joint_names().iter().zip(&of.joints);
-    let panels = |(j, (name, of)): (usize, (&String, &JointResidual))| {
+    let panels = |(j, (name, of)): (usize, (&String, &ResidualPair))| {
         let mut panels = panels(machine, j, &of.before, of.after.as_ref());
         let marks = of.orders.iter().map(|order| (*order, short(*order)));
         let over_order = panels.iter_mut().filter(|panel| panel.over.0 == ORDER);

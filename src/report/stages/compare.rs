@@ -1,7 +1,7 @@
 //! The report of `compare`.
 
 use crate::compare::{Apart, Difference, ParameterEstimate, ParameterPair, Reason, SideBySide};
-use crate::identify::{Compared, Curves, DIFFERENT, Tried};
+use crate::identify::{Compared, Curves, DIFFERENT, TriedOnLogs};
 use crate::log::{Provenance, escape};
 use crate::number;
 use crate::replay::{ReplayedPair, is_beyond_curve, speeds};
@@ -274,7 +274,7 @@ fn apart_table(only: &[Apart], letter: &str, name: &str) -> Option<Table> {
 }
 
 /// Errors of both on the same logs.
-fn error_table(tried: &Tried, logs: &str) -> Table {
+fn error_table(tried: &TriedOnLogs, logs: &str) -> Table {
     let mut table = Table::new(&[
         ("joint", Align::Left),
         ("A", Align::Decimal),

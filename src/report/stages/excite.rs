@@ -2,8 +2,8 @@
 
 use crate::excite::foresee::Expected;
 use crate::excite::judgement::{Judgement, LimitUse};
-use crate::excite::limits::{Channel, Quantity};
-use crate::excite::machine::Machine;
+use crate::excite::limits::{BoundedQuantity, Quantity};
+use crate::excite::machine::ForeseenRobot;
 use crate::excite::motion::Motion;
 use crate::log::escape;
 use crate::number;
@@ -286,7 +286,12 @@ fn spectrum(page: &mut Writer, judged: &Judgement) {
 const POINTS: usize = 1500;
 
 /// The picture of a motion.
-pub fn figure(machine: &Machine, motion: &Motion, judged: &Judgement, title: &str) -> MotionFigure {
+pub fn figure(
+    machine: &ForeseenRobot,
+    motion: &Motion,
+    judged: &Judgement,
+    title: &str,
+) -> MotionFigure {
     let seconds = motion.seconds();
     let t: Vec<f64> = (0..=POINTS)
         .map(|k| seconds * k as f64 / POINTS as f64)
@@ -297,7 +302,7 @@ pub fn figure(machine: &Machine, motion: &Motion, judged: &Judgement, title: &st
         .collect();
     let panel = |kind: Quantity, (i, name): (usize, &str), unit: String| {
         let found = judged.limit(name, kind);
-        let of = Channel::symmetric(kind, i, "", "", 1.0);
+        let of = BoundedQuantity::symmetric(kind, i, "", "", 1.0);
         let value = |state| machine.quantities(state).of(&of);
         MotionPanel {
             quantity: quantity(kind, &unit).into(),

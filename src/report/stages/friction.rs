@@ -68,9 +68,9 @@ pub fn pictures(
 fn law(machine: &LoggedRobot, found: &FrictionOfJoint) -> Table {
     let e = &found.estimate;
     let parameters = found.parameters.each();
-    let rows: Vec<summary::Parameter> = parameters
+    let rows: Vec<summary::ParameterRow> = parameters
         .iter()
-        .map(|(name, p)| summary::Parameter {
+        .map(|(name, p)| summary::ParameterRow {
             joint: &found.joint,
             name,
             theta: p.theta,

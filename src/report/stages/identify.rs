@@ -127,13 +127,13 @@ pub fn identify(of: &Identify) -> Report {
 
 /// Every parameter of the model, beside its truth where that is known.
 fn beside_truth(of: &Identify) -> Table {
-    let rows: Vec<summary::Parameter> = of
+    let rows: Vec<summary::ParameterRow> = of
         .model()
         .parameters
         .iter()
         .map(|p| {
             let unknown = p.verdict == Some(Verdict::NotIdentifiable);
-            summary::Parameter {
+            summary::ParameterRow {
                 joint: p.joint.as_deref().unwrap_or(""),
                 name: &p.name,
                 theta: p.theta,
@@ -160,7 +160,7 @@ pub struct Origin<'a> {
 
 /// What the logs show beside the model.
 #[derive(Debug, Clone, Copy)]
-pub enum Shown<'a> {
+pub enum ShownLogs<'a> {
     /// There are no unseen logs, or they are too long to be held.
     Nothing,
     /// The unseen logs, where nothing was diagnosed.
@@ -170,7 +170,7 @@ pub enum Shown<'a> {
 }
 
 /// What a page has room for besides.
-pub fn pictures(page: &mut Writer, of: &Identify, shown: Shown, origin: &Origin) {
+pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Origin) {
     let (machine, found) = (of.machine, of.found);
     if let Some((laws, _)) = &found.friction {
         page.heading("Friction");
@@ -180,12 +180,12 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: Shown, origin: &Origin)
              in the fit.",
         );
         page.figures(&filter::figure(machine, laws).cells());
-    } else if let Shown::Model(Replayed {
+    } else if let ShownLogs::Model(Replayed {
         friction: rows,
         logs,
         ..
     })
-    | Shown::Diagnosis(ReplayedDiagnosis {
+    | ShownLogs::Diagnosis(ReplayedDiagnosis {
         friction: rows,
         logs,
         ..
@@ -194,10 +194,10 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: Shown, origin: &Origin)
         friction::section(page, machine, rows, logs);
     }
     match (shown, of.diagnosed()) {
-        (Shown::Diagnosis(replayed), Some(diagnosed)) => {
+        (ShownLogs::Diagnosis(replayed), Some(diagnosed)) => {
             diagnose::sections(page, machine, diagnosed, replayed);
         }
-        (Shown::Model(replayed), _) => {
+        (ShownLogs::Model(replayed), _) => {
             if let Some(validated) = &found.validated {
                 let errors = validated.validation.joints.iter();
                 let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();

@@ -234,10 +234,10 @@ fn known_friction(writer: &mut Writer, friction: &[FrictionOfFit]) {
 
 /// The parameters for a terminal.
 fn fitted(terminal: &mut Writer, found: &IdentifiedDynamics) {
-    let rows: Vec<summary::Parameter> = found
+    let rows: Vec<summary::ParameterRow> = found
         .unknowns
         .iter()
-        .map(|u| summary::Parameter {
+        .map(|u| summary::ParameterRow {
             joint: u.joint.as_deref().unwrap_or(""),
             name: &u.key,
             theta: None,

@@ -26,12 +26,12 @@ pub enum Setup {
 
 /// Lower and upper limits of x_c1..x_c4 in m and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct ActuationLimits {
     pub lower: [f64; 4],
     pub upper: [f64; 4],
 }
 
-impl Limits {
+impl ActuationLimits {
     /// Index 0..3 of the first coordinate that lies outside (or is not a number).
     pub fn first_outside(&self, x: &[f64; 4]) -> Option<usize> {
         (0..4).find(|&i| !(self.lower[i]..=self.upper[i]).contains(&x[i]))
@@ -63,12 +63,12 @@ impl Setup {
     }
 
     /// Limits of x_c1..x_c4 (Table 5, Remark 5).
-    pub const fn limits(self) -> Limits {
+    pub const fn limits(self) -> ActuationLimits {
         let (lower, upper) = match self {
             Self::Tuedacs => (-0.0606, 0.5344),
             Self::Dspace => (-0.55, 0.05),
         };
-        Limits {
+        ActuationLimits {
             lower: [-0.2918, -0.0269, -0.2892, lower],
             upper: [0.0232, 0.5801, 5.8708, upper],
         }

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A frame seen from another: its axes as the columns of `rotation`, its origin in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct RigidTransform {
     pub rotation: [[f64; 3]; 3],
     pub origin: [f64; 3],
 }
@@ -17,7 +17,7 @@ pub struct Frame {
 /// A frame's row of Table 2 in the convention of eq. (2) (Craig): alpha and a of the link before
 /// it, then d and the angle of its own joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row {
+pub struct CraigRow {
     /// alpha_(i-1) in rad, about x_(i-1).
     pub alpha: f64,
     /// a_(i-1) in m, along x_(i-1).
@@ -28,7 +28,7 @@ pub struct Row {
     pub angle: f64,
 }
 
-impl Frame {
+impl RigidTransform {
     /// The reference frame itself.
     pub(crate) const IDENTITY: Self = Self {
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -36,7 +36,7 @@ impl Frame {
     };
 
     /// The transformation T of eq. (2).
-    pub fn of_row(row: &Row) -> Self {
+    pub fn of_row(row: &CraigRow) -> Self {
         let (s, c) = row.angle.sin_cos();
         let (sa, ca) = row.alpha.sin_cos();
         Self {
@@ -73,9 +73,9 @@ pub(crate) fn dependent_joints(q: &[f64; 4]) -> [f64; 3] {
 }
 
 /// The nine rows of Table 2 at the pose q.
-pub fn rows(q: &[f64; 4]) -> [Row; 9] {
+pub fn rows(q: &[f64; 4]) -> [CraigRow; 9] {
     let [q3, q6, q7] = dependent_joints(q);
-    let row = |alpha, a, d, angle| Row { alpha, a, d, angle };
+    let row = |alpha, a, d, angle| CraigRow { alpha, a, d, angle };
     [
         row(-FRAC_PI_2, 0.0, q[0], 0.0),
         row(FRAC_PI_2, 0.0, L2, q[1]),
@@ -90,10 +90,10 @@ pub fn rows(q: &[f64; 4]) -> [Row; 9] {
 }
 
 /// Frames 1..9 seen from frame 0 (eq. (58)); the last is the tool's.
-pub fn frames(q: &[f64; 4]) -> [Frame; 9] {
-    let mut frame = Frame::IDENTITY;
+pub fn frames(q: &[f64; 4]) -> [RigidTransform; 9] {
+    let mut frame = RigidTransform::IDENTITY;
     rows(q).map(|row| {
-        frame = frame.then(&Frame::of_row(&row));
+        frame = frame.then(&RigidTransform::of_row(&row));
         frame
     })
 }

@@ -4,7 +4,7 @@
 use super::geometry::{D, D6, GRAVITY, L2, L4, L5, L6, L7};
 use super::links::PseudoInertia;
 use crate::robot::joint::JointKind;
-use crate::robot::tree::{Coordinate, Dependence, Link, Sine, Tree, TreeError};
+use crate::robot::tree::{Coordinate, DependentCoordinate, Link, Sine, Tree, TreeError};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Moving links 1..8; link 8 is at rest on link 7 and a frame of its own in Table 2.
@@ -22,7 +22,7 @@ pub fn chain() -> Result<Tree, TreeError> {
         of,
     };
     let follows = |offset, linear, sines| {
-        Coordinate::Follows(Dependence {
+        Coordinate::Follows(DependentCoordinate {
             offset,
             linear,
             sines,

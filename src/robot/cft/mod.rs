@@ -29,7 +29,7 @@ pub mod regressor;
 
 mod parameters;
 
-pub use actuation::{Limits, Setup};
+pub use actuation::{ActuationLimits, Setup};
 pub use dynamics::Coefficients;
 pub use parameters::{EXTENDED, FRICTION, PRINTED, UNPRINTED};
 

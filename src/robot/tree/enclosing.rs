@@ -10,12 +10,12 @@ use super::space::{Vector, add, cross, dot, times};
 pub type Ball = (Vector, f64);
 
 /// Ends of the piece and radius \[m\] of a capsule.
-pub type Piece = ([Vector; 2], f64);
+pub type EnclosedPiece = ([Vector; 2], f64);
 
 /// The smallest capsule that holds every ball among those along a direction of `axes`, unit vectors, or along a
 /// principal axis of the centres: about the smallest circle that holds what is seen along it, no longer than the round
 /// ends allow. `None` without balls.
-pub fn enclosing(balls: &[Ball], axes: &[Vector]) -> Option<Piece> {
+pub fn enclosing(balls: &[Ball], axes: &[Vector]) -> Option<EnclosedPiece> {
     let own = principal_axes(balls);
     let along = own.iter().chain(axes).map(|axis| of_axis(balls, axis));
     along
@@ -24,7 +24,7 @@ pub fn enclosing(balls: &[Ball], axes: &[Vector]) -> Option<Piece> {
 }
 
 /// \[m^3\]
-pub fn volume((ends, radius): &Piece) -> f64 {
+pub fn volume((ends, radius): &EnclosedPiece) -> f64 {
     let along = add(&ends[1], &times(-1.0, &ends[0]));
     PI * radius * radius * (dot(&along, &along).sqrt() + 4.0 / 3.0 * radius)
 }
@@ -48,7 +48,7 @@ fn principal_axes(balls: &[Ball]) -> Vec<Vector> {
 }
 
 /// The smallest capsule along one direction.
-fn of_axis(balls: &[Ball], axis: &Vector) -> Option<Piece> {
+fn of_axis(balls: &[Ball], axis: &Vector) -> Option<EnclosedPiece> {
     // the unit vector that lies most across, for directions across
     let least = (0..3).min_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()))?;
     let mut unit = [0.0; 3];
@@ -132,7 +132,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn holds(piece: &Piece, ball: &Ball) -> bool {
+    fn holds(piece: &EnclosedPiece, ball: &Ball) -> bool {
         let off = of_pieces(&piece.0, &[ball.0, ball.0]);
         off + ball.1 <= piece.1 + 1e-12
     }

@@ -27,7 +27,7 @@ pub struct Sine {
 /// A coordinate that follows the independent joints:
 /// u = offset + sum c_j q_j + sum A sin(phase + sum k_j q_j).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Dependence {
+pub struct DependentCoordinate {
     /// Constant part [m or rad].
     pub offset: f64,
     /// c_j by independent joint.
@@ -42,7 +42,7 @@ pub enum Coordinate {
     /// The independent joint of this index.
     Joint(usize),
     /// A function of the independent joints.
-    Follows(Dependence),
+    Follows(DependentCoordinate),
 }
 
 /// One moving link and the joint before it.

@@ -21,5 +21,7 @@ pub mod pose;
 pub mod space;
 
 pub use base::Grouping;
-pub use links::{Coordinate, Dependence, Link, MOST_JOINTS, MOST_LINKS, Sine, Tree, TreeError};
+pub use links::{
+    Coordinate, DependentCoordinate, Link, MOST_JOINTS, MOST_LINKS, Sine, Tree, TreeError,
+};
 pub use parameters::{Coupling, Parameters};

@@ -3,7 +3,7 @@
 //! With the speed v_a = J_4 v4 + J_5 v5 of x_r or y_r and the force f = viscous v_a + coulomb tanh(slope v_a)
 //! the joints q4 and q5 feel J_4 f and J_5 f: their friction depends on the pose and couples them.
 
-use super::{Built, Effect, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantState, Site};
 use crate::effect::Place;
 use crate::effect::actuator_friction::ENTRY;
 use crate::robot::cft::pantograph::reference_jacobian;
@@ -15,7 +15,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, _: &super::Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, _: &super::PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let Place::Actuator(row) = site.place else {
         return Err(site.refuse(ENTRY.name, "it sits at the screws x_r and y_r"));
     };
@@ -36,7 +36,7 @@ struct ActuatorFriction {
 }
 
 impl Effect for ActuatorFriction {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let (Some(q), Some(&[_, _, v4, v5]), [_, _, tau4, tau5]) =
             (motion.q.first_chunk(), motion.v.first_chunk(), torque)
         else {

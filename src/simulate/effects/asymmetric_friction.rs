@@ -2,7 +2,7 @@
 //!
 //! E(v) = (coulomb + viscous v) H(v), with H a step as steep as the joint allows.
 
-use super::{Built, Effect, Motion, PlantLaw, step};
+use super::{Built, Effect, PlantLaw, PlantState, step};
 use crate::effect::asymmetric_friction::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -27,7 +27,7 @@ struct AsymmetricFriction {
 }
 
 impl Effect for AsymmetricFriction {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let v = motion.v[self.joint];
         torque[self.joint] += (self.coulomb + self.viscous * v) * step(self.slope, v);
     }

@@ -7,7 +7,7 @@
 //! but continuous contact that the error control steps through. Where it opens, at a reversal, c sgn(v) passes
 //! through zero of itself.
 
-use super::{Beginning, Built, Effect, Motion, PlantLaw, sign};
+use super::{Beginning, Built, Effect, PlantLaw, PlantState, sign};
 use crate::effect::backlash::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -38,7 +38,7 @@ struct Backlash {
 }
 
 impl Effect for Backlash {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let Some(centre) = self.centre else {
             return;
         };
@@ -57,7 +57,7 @@ impl Effect for Backlash {
         self.centre = beginning.q.get(self.joint).copied();
     }
 
-    fn moved(&mut self, motion: &Motion) -> bool {
+    fn moved(&mut self, motion: &PlantState) -> bool {
         let q = motion.q[self.joint];
         if let Some(centre) = &mut self.centre {
             *centre = centre.clamp(q - self.half, q + self.half);

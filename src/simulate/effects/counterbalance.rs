@@ -5,7 +5,7 @@
 //! supplies d/dq of stiffness (l - free_length)^2/2. A moment that was found and not built is a cubic B-spline
 //! with the coefficients m_1..m_6 on three equal pieces between `from` and `to`, constant beyond them.
 
-use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::effect::counterbalance::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -29,7 +29,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, _: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
         effect: ENTRY.name.to_owned(),
         key: key.to_owned(),
@@ -108,7 +108,7 @@ impl Counterbalance {
 }
 
 impl Effect for Counterbalance {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let q = motion.q[self.joint];
         if self.stiffness != 0.0 {
             torque[self.joint] += self.lever(q);

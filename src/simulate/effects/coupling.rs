@@ -3,7 +3,7 @@
 //! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
 //! symmetric, and the plant solves it by elimination.
 
-use super::{Built, Effect, Motion, PlantLaw, sign};
+use super::{Built, Effect, PlantLaw, PlantState, sign};
 use crate::effect::coupling::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -58,13 +58,13 @@ struct Coupling {
 }
 
 impl Effect for Coupling {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let other = motion.v[self.from];
         let together = motion.v[self.joint] + self.ratio * other;
         torque[self.joint] += self.viscous * other + self.coulomb * sign(self.slope, together);
     }
 
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
         mass[self.joint * motion.q.len() + self.from] += self.inertia;
     }
 }

@@ -4,7 +4,7 @@
 //! t_k - d and the same time of the next row: a share of a step is a share of two rows. The plant knows
 //! nothing of it; the noise of the torque comes after it.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::delay::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -29,7 +29,7 @@ impl Fault for Delay {
         true
     }
 
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         let acting: Vec<f64> = log.torques(self.joint).map(|x| *x).collect();
         let times = log.t;
         let rows = times.len().min(acting.len());

@@ -3,7 +3,7 @@
 //! The torque jumps in time: the step across an edge is refused by the error control until it is so short
 //! that the edge does not show.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::disturbance::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -28,7 +28,7 @@ struct Disturbance {
 }
 
 impl Effect for Disturbance {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         if (self.from..self.to).contains(&motion.t) {
             torque[self.joint] += self.c;
         }

@@ -6,7 +6,7 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::{Beginning, Built, Effect, Motion, PlantLaw};
+use super::{Beginning, Built, Effect, PlantLaw, PlantState};
 use crate::effect::drift::ENTRY;
 use crate::simulate::chance::{Purpose, stream_of};
 
@@ -36,7 +36,7 @@ struct Drift {
 }
 
 impl Effect for Drift {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let at = (motion.t / KNOT).max(0.0);
         let (before, share) = (at.floor(), at.fract());
         let knot = |k: usize| self.knots.get(k).or(self.knots.last()).copied();

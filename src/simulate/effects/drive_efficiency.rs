@@ -3,7 +3,7 @@
 //! E = k tau_l H(tau_l v) with tau_l = M a + C v + G, solved with the balance as in `load-friction`; the step
 //! is as steep in v as the joint allows and exact in tau_l, where the torque is continuous.
 
-use super::{Built, Effect, Motion, PlantLaw, step};
+use super::{Built, Effect, PlantLaw, PlantState, step};
 use crate::effect::drive_efficiency::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -26,7 +26,7 @@ struct DriveEfficiency {
 }
 
 impl Effect for DriveEfficiency {
-    fn load(&self, motion: &Motion, share: &mut [[f64; 2]]) {
+    fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
         let forward = step(self.slope, motion.v[self.joint]);
         let [positive, negative] = &mut share[self.joint];
         *positive += self.k * forward;

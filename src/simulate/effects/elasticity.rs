@@ -7,7 +7,7 @@
 //! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
 //! motor's side. Both sides are integrated.
 
-use super::{Beginning, Built, Effect, Motion, PlantLaw, Site, Twist};
+use super::{Beginning, Built, Effect, PlantLaw, PlantState, Site, Twist};
 use crate::effect::elasticity::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -74,7 +74,7 @@ impl Effect for Elasticity {
         2
     }
 
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
         mass[self.joint * (motion.q.len() + 1)] -= self.rotor;
     }
 
@@ -90,7 +90,7 @@ impl Effect for Elasticity {
         })
     }
 
-    fn rates(&self, motion: &Motion, dz: &mut [f64]) {
+    fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
         let (&[deflection, rate], [speed, acceleration]) = (motion.z, dz) else {
             return;
         };

@@ -7,7 +7,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::{Beginning, Built, Effect, Machine, Motion, PlantLaw, Site, sign};
+use super::{Beginning, Built, Effect, PlantLaw, PlantRobot, PlantState, Site, sign};
 use crate::effect::empirical::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -25,7 +25,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, _: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let (signal, from, to) = (values[0].round() as u32, values[1], values[2]);
     if to <= from {
         return Err(SimulateError::EffectNumber {
@@ -101,7 +101,7 @@ impl Curve {
 }
 
 impl Effect for Curve {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let (q, v) = (motion.q[self.joint], motion.v[self.joint]);
         let direction = sign(self.slope, v);
         torque[self.joint] += match self.signal {
@@ -116,7 +116,7 @@ impl Effect for Curve {
         self.turning = [beginning.q.get(self.joint).copied().unwrap_or(0.0); 2];
     }
 
-    fn moved(&mut self, motion: &Motion) -> bool {
+    fn moved(&mut self, motion: &PlantState) -> bool {
         if self.signal != 5 {
             return false;
         }

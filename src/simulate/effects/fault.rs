@@ -2,7 +2,7 @@
 
 /// The joint channels of a log, row by row.
 #[derive(Debug)]
-pub struct Log<'a> {
+pub struct LoggedChannels<'a> {
     /// Times of the rows \[s\].
     pub t: &'a [f64],
     /// Positions by the encoders, m or rad.
@@ -16,7 +16,7 @@ pub struct Log<'a> {
 /// A fault of the log.
 pub trait Fault: std::fmt::Debug + Send {
     /// Spoils the channels.
-    fn apply(&self, log: &mut Log);
+    fn apply(&self, log: &mut LoggedChannels);
 
     /// Whether it lies between the motor and the noise of the torque, and not behind both.
     fn before_noise(&self) -> bool {
@@ -24,7 +24,7 @@ pub trait Fault: std::fmt::Debug + Send {
     }
 }
 
-impl Log<'_> {
+impl LoggedChannels<'_> {
     /// Torques of one joint.
     pub(super) fn torques(&mut self, joint: usize) -> impl Iterator<Item = &mut f64> {
         self.torque

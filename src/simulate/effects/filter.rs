@@ -3,7 +3,7 @@
 //! dy/dt = 2 pi cutoff (x - y) with the input straight from row to row and the output settled at the first
 //! row, solved exactly.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::filter::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -27,7 +27,7 @@ struct Filter {
 }
 
 impl Fault for Filter {
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         let mut before: Option<(f64, f64, f64)> = None;
         for (t, value) in log.channel(self.joint, self.torque) {
             let x = *value;

@@ -3,8 +3,8 @@
 //! Accelerations and loads hang on the torque that they decide; what is in them is solved for
 //! ([`super::Effect::implicit`]).
 
-use super::{Effect, EffectParameter, EffectSpec, EffectValue, LAWS, Motion, Site, Sites, sign};
-use crate::config::candidates::Candidate;
+use super::{Effect, EffectSpec, EffectValue, LAWS, PlantParameter, PlantState, Site, Sites, sign};
+use crate::config::candidates::CandidateSection;
 use crate::effect::Places;
 use crate::math::formula::{Formula, MOST_NAMES};
 use crate::robot::FormulaSignal;
@@ -42,7 +42,7 @@ type OfPlant = (Box<dyn Effect>, EffectValue);
 /// What an asked effect of a candidate is built into, joint by joint.
 pub(super) fn build(
     spec: &EffectSpec,
-    candidate: &Candidate,
+    candidate: &CandidateSection,
     sites: &Sites,
 ) -> Result<Vec<OfPlant>, SimulateError> {
     if LAWS.iter().any(|law| law.entry.name == candidate.name) {
@@ -86,7 +86,7 @@ pub(super) fn build(
     }
 }
 
-fn wrong(candidate: &Candidate, what: &str) -> SimulateError {
+fn wrong(candidate: &CandidateSection, what: &str) -> SimulateError {
     SimulateError::Candidate {
         name: candidate.name.clone(),
         what: what.to_owned(),
@@ -106,7 +106,7 @@ fn number(spec: &EffectSpec, key: &str) -> Result<f64, SimulateError> {
 /// The effect as the truth tells it.
 fn value(
     spec: &EffectSpec,
-    candidate: &Candidate,
+    candidate: &CandidateSection,
     site: &Site,
 ) -> Result<EffectValue, SimulateError> {
     let shapes = candidate.shapes.iter();
@@ -117,7 +117,7 @@ fn value(
     });
     let parameters = shapes.chain(sizes).map(|(key, unit)| {
         let value = number(spec, key)?;
-        Ok((key.clone(), EffectParameter { value, unit }))
+        Ok((key.clone(), PlantParameter { value, unit }))
     });
     Ok(EffectValue {
         effect: candidate.name.clone(),
@@ -130,7 +130,7 @@ fn value(
 impl Own {
     fn of(
         spec: &EffectSpec,
-        candidate: &Candidate,
+        candidate: &CandidateSection,
         site: &Site,
         sites: &Sites,
     ) -> Result<Self, SimulateError> {
@@ -191,7 +191,7 @@ impl Own {
         })
     }
 
-    fn add(&self, motion: &Motion, torque: &mut [f64]) {
+    fn add(&self, motion: &PlantState, torque: &mut [f64]) {
         let mut values = [0.0; MOST_NAMES];
         for term in &self.terms {
             for (value, input) in values.iter_mut().zip(&term.inputs) {
@@ -205,7 +205,7 @@ impl Own {
         }
     }
 
-    fn signal(&self, motion: &Motion, signal: FormulaSignal, j: usize) -> f64 {
+    fn signal(&self, motion: &PlantState, signal: FormulaSignal, j: usize) -> f64 {
         match signal {
             FormulaSignal::Position => motion.q[j],
             FormulaSignal::Speed => motion.v[j],
@@ -224,7 +224,7 @@ impl Own {
 }
 
 impl Effect for Own {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         if !self.implicit {
             self.add(motion, torque);
         }
@@ -234,7 +234,7 @@ impl Effect for Own {
         self.implicit.then_some(self.joint)
     }
 
-    fn implicit(&self, motion: &Motion, torque: &mut [f64]) {
+    fn implicit(&self, motion: &PlantState, torque: &mut [f64]) {
         if self.implicit {
             self.add(motion, torque);
         }

@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::effect::gravity_tilt::ENTRY;
 use crate::robot::cft::dynamics::Coefficients;
 use crate::robot::standard::STANDARD;
@@ -24,9 +24,9 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let [gx, gy] = [values[0], values[1]];
-    let Machine { robot, theta } = *machine;
+    let PlantRobot { robot, theta } = *machine;
     if let Some(chain) = robot.coefficients(theta) {
         return Built::plant(Tilt { gx, gy, chain });
     }
@@ -58,7 +58,7 @@ struct Tilt {
 }
 
 impl Effect for Tilt {
-    fn inertia(&self, motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
         let (Some(&[_, q2, q4, q5]), [tau1, tau2, tau4, tau5]) = (motion.q.first_chunk(), torque)
         else {
             return;
@@ -86,7 +86,7 @@ struct Constant {
 }
 
 impl Effect for Constant {
-    fn inertia(&self, _motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, _motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
         if let Some(torque) = torque.first_mut() {
             *torque += self.force;
         }
@@ -121,7 +121,7 @@ struct Askew {
 }
 
 impl Effect for Askew {
-    fn inertia(&self, motion: &Motion, _mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, _mass: &mut [f64], torque: &mut [f64]) {
         frames(&self.chain, motion.q, motion.v, |link, frame: &Frame| {
             let (mass, moment) = self.moments[link];
             let arm = frame.rotation * moment;

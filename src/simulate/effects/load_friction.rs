@@ -4,7 +4,7 @@
 //! As the friction is piecewise linear in tau_l, the plant solves tau_l (1 + s) = what is left of the motor's
 //! torque in closed form, without iteration ([`super::Effect::load`]).
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::load_friction::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -44,7 +44,7 @@ struct LoadFriction {
 }
 
 impl Effect for LoadFriction {
-    fn load(&self, motion: &Motion, share: &mut [[f64; 2]]) {
+    fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
         let v = motion.v[self.joint];
         // Speeds far beyond the joint's own, as a rejected trial step has them, must not turn the balance over.
         let mu = (self.mu_c + self.mu_v * v.abs()).clamp(-MOST, MOST);

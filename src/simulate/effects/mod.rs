@@ -17,16 +17,16 @@ mod plant_law;
 mod site;
 mod spec;
 
-pub use fault::{Fault, Log};
+pub use fault::{Fault, LoggedChannels};
 pub use plant_law::{Built, PlantLaw};
-pub use site::{Machine, Site, Sites};
-pub use spec::{EffectParameter, EffectSpec, EffectValue};
+pub use site::{PlantRobot, Site, Sites};
+pub use spec::{EffectSpec, EffectValue, PlantParameter};
 
 use super::SimulateError;
 
 /// State of the plant as an effect sees it: the motor's side of every joint.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Motion<'a> {
+pub struct PlantState<'a> {
     /// Time \[s\].
     pub t: f64,
     /// Joint positions, m or rad.
@@ -72,7 +72,7 @@ pub struct Twist {
 /// One effect on the plant. Everything has a default: most effects are static torques.
 pub trait Effect: std::fmt::Debug + Send {
     /// Adds to `torque` what the motors must supply because of the effect, in N or N m per joint.
-    fn torque(&self, _motion: &Motion, _torque: &mut [f64]) {}
+    fn torque(&self, _motion: &PlantState, _torque: &mut [f64]) {}
 
     /// Joint whose torque hangs on accelerations or loads, which hang on it in turn.
     fn implicit_joint(&self) -> Option<usize> {
@@ -80,7 +80,7 @@ pub trait Effect: std::fmt::Debug + Send {
     }
 
     /// Adds that torque, N or N m per joint, for accelerations and loads that are tried.
-    fn implicit(&self, _motion: &Motion, _torque: &mut [f64]) {}
+    fn implicit(&self, _motion: &PlantState, _torque: &mut [f64]) {}
 
     /// How many states of its own the effect integrates.
     fn states(&self) -> usize {
@@ -88,14 +88,14 @@ pub trait Effect: std::fmt::Debug + Send {
     }
 
     /// Time derivatives of its own states.
-    fn rates(&self, _motion: &Motion, _dz: &mut [f64]) {}
+    fn rates(&self, _motion: &PlantState, _dz: &mut [f64]) {}
 
     /// Adds to the inertia matrix (row-major) and to the rigid-body torque without acceleration.
-    fn inertia(&self, _motion: &Motion, _mass: &mut [f64], _torque: &mut [f64]) {}
+    fn inertia(&self, _motion: &PlantState, _mass: &mut [f64], _torque: &mut [f64]) {}
 
     /// Adds, per joint, the torque that the effect takes per unit of a positive and of a negative load
     /// tau_l = M a + C v + G.
-    fn load(&self, _motion: &Motion, _share: &mut [[f64; 2]]) {}
+    fn load(&self, _motion: &PlantState, _share: &mut [[f64; 2]]) {}
 
     /// Multiplies, per joint, the torque that acts per unit of logged torque.
     fn drive(&self, _acting: &mut [f64]) {}
@@ -109,7 +109,7 @@ pub trait Effect: std::fmt::Debug + Send {
     fn begin(&mut self, _beginning: &Beginning, _z: &mut [f64]) {}
 
     /// Takes an accepted step into its memory; `true` when that changes its torque at this point.
-    fn moved(&mut self, _motion: &Motion) -> bool {
+    fn moved(&mut self, _motion: &PlantState) -> bool {
         false
     }
 }
@@ -224,7 +224,7 @@ impl Effects {
     }
 
     /// Adds every effect's torque.
-    pub fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    pub fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.torque(&own(motion, states), torque);
         }
@@ -238,21 +238,21 @@ impl Effects {
     }
 
     /// Adds every effect's torque that hangs on accelerations or loads.
-    pub fn implicit(&self, motion: &Motion, torque: &mut [f64]) {
+    pub fn implicit(&self, motion: &PlantState, torque: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.implicit(&own(motion, states), torque);
         }
     }
 
     /// Adds every effect's inertia.
-    pub fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    pub fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.inertia(&own(motion, states), mass, torque);
         }
     }
 
     /// Adds every effect's share of the load.
-    pub fn load(&self, motion: &Motion, share: &mut [[f64; 2]]) {
+    pub fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
         for (effect, states) in &self.list {
             effect.load(&own(motion, states), share);
         }
@@ -274,7 +274,7 @@ impl Effects {
     }
 
     /// Writes the rates of every effect's states.
-    pub fn rates(&self, motion: &Motion, dz: &mut [f64]) {
+    pub fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
         for (effect, states) in &self.list {
             effect.rates(&own(motion, states), &mut dz[states.clone()]);
         }
@@ -288,7 +288,7 @@ impl Effects {
     }
 
     /// Tells every effect of an accepted step; `true` when one of them changed.
-    pub fn moved(&mut self, motion: &Motion) -> bool {
+    pub fn moved(&mut self, motion: &PlantState) -> bool {
         let mut changed = false;
         for (effect, states) in &mut self.list {
             changed |= effect.moved(&own(motion, states));
@@ -297,7 +297,7 @@ impl Effects {
     }
 
     /// Puts the faults into a log: those that come before the noise of the torque, or those after.
-    pub fn spoil(&self, log: &mut Log, before_noise: bool) {
+    pub fn spoil(&self, log: &mut LoggedChannels, before_noise: bool) {
         for (_, fault) in &self.faults {
             if fault.before_noise() == before_noise {
                 fault.apply(log);
@@ -307,8 +307,8 @@ impl Effects {
 }
 
 /// The motion with the states of one effect.
-fn own<'a>(motion: &Motion<'a>, states: &std::ops::Range<usize>) -> Motion<'a> {
-    Motion {
+fn own<'a>(motion: &PlantState<'a>, states: &std::ops::Range<usize>) -> PlantState<'a> {
+    PlantState {
         z: &motion.z[states.clone()],
         ..*motion
     }

@@ -3,7 +3,7 @@
 //! Below p = 1 the slope at rest is infinite: the law is then c v (v^2 + v0^2)^((p - 1)/2), which is the
 //! power beyond the small speed v0 = 1/w within which signs change.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::nonlinear_viscous::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -30,7 +30,7 @@ struct NonlinearViscous {
 }
 
 impl Effect for NonlinearViscous {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let v = motion.v[self.joint];
         let power = if self.p < 1.0 {
             v.hypot(self.rest).powf(self.p - 1.0)

@@ -9,7 +9,7 @@
 use nalgebra::Vector3;
 
 use super::frames::{Frame, frames};
-use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::effect::payload::ENTRY;
 use crate::robot::JointKind;
 use crate::robot::cft::geometry::{D, GRAVITY, L4, L5, L6, L8, U};
@@ -22,7 +22,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(_: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(_: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     let [mass, mx, my, mz, inertia] = [values[0], values[1], values[2], values[3], values[4]];
     let robot = machine.robot;
     if !robot.knows_links() {
@@ -60,7 +60,7 @@ struct Carried {
 }
 
 impl Effect for Carried {
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         let (Some(&[_, q2, q4, q5]), Some(&[v1, v2, v4, v5])) =
             (motion.q.first_chunk(), motion.v.first_chunk())
         else {
@@ -107,7 +107,7 @@ struct AtOneJoint {
 }
 
 impl Effect for AtOneJoint {
-    fn inertia(&self, _motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+    fn inertia(&self, _motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
         if let Some(mass) = mass.first_mut() {
             *mass += self.inertia;
         }
@@ -127,7 +127,7 @@ struct LinkLoad {
 }
 
 impl Effect for LinkLoad {
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         let n = self.chain.joints();
         let last = self.chain.links().len() - 1;
         let gravity = Vector3::from(self.chain.gravity());

@@ -1,6 +1,6 @@
 //! How the plant has an effect: default values of the entry's keys, and how it is built from one value each.
 
-use super::{Effect, Fault, Machine, Site};
+use super::{Effect, Fault, PlantRobot, Site};
 use crate::effect::Entry;
 use crate::simulate::SimulateError;
 
@@ -9,7 +9,7 @@ pub struct PlantLaw {
     pub entry: &'static Entry,
     /// Of every key of the entry, in its order, at a site.
     pub defaults: fn(&Site) -> Vec<f64>,
-    pub build: fn(&Site, &Machine, &[f64]) -> Result<Built, SimulateError>,
+    pub build: fn(&Site, &PlantRobot, &[f64]) -> Result<Built, SimulateError>,
 }
 
 /// What a law is built into.
@@ -40,7 +40,7 @@ impl PlantLaw {
     pub(super) fn built(
         &self,
         site: &Site,
-        machine: &Machine,
+        machine: &PlantRobot,
         numbers: &[f64],
     ) -> Result<Built, SimulateError> {
         let built = (self.build)(site, machine, numbers)?;

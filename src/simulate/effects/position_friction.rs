@@ -2,7 +2,7 @@
 //!
 //! E = sgn(v) (sin sin(k q) + cos cos(k q)), k as in `ripple`, the sign as steep as the joint allows.
 
-use super::{Built, Effect, Motion, PlantLaw, ripple, sign};
+use super::{Built, Effect, PlantLaw, PlantState, ripple, sign};
 use crate::effect::position_friction::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -33,7 +33,7 @@ struct PositionFriction {
 }
 
 impl Effect for PositionFriction {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let (s, c) = (self.wavenumber * motion.q[self.joint]).sin_cos();
         let direction = sign(self.slope, motion.v[self.joint]);
         torque[self.joint] += direction * (self.sin * s + self.cos * c);

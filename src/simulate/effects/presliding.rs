@@ -4,7 +4,7 @@
 //! constant level), where the level Fc is `fc`, by default that of the joint's law at speed. The law's own Coulomb part
 //! F(v) - viscous v is taken out. The state is integrated with the plant; |v| has a kink and no jump.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::presliding::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -52,7 +52,7 @@ struct Presliding {
 }
 
 impl Presliding {
-    fn bending(&self, motion: &Motion) -> f64 {
+    fn bending(&self, motion: &PlantState) -> f64 {
         let v = motion.v[self.joint];
         let z = motion.z.first().copied().unwrap_or(0.0);
         v - self.per_level * v.abs() * z
@@ -60,7 +60,7 @@ impl Presliding {
 }
 
 impl Effect for Presliding {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let z = motion.z.first().copied().unwrap_or(0.0);
         let bristles = self.sigma0 * z + self.sigma1 * self.bending(motion);
         let own = motion.friction[self.joint] - self.viscous * motion.v[self.joint];
@@ -71,7 +71,7 @@ impl Effect for Presliding {
         1
     }
 
-    fn rates(&self, motion: &Motion, dz: &mut [f64]) {
+    fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
         if let Some(dz) = dz.first_mut() {
             *dz = self.bending(motion);
         }

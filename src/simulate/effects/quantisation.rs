@@ -1,6 +1,6 @@
 //! `quantisation`: the logged torque of a joint is rounded to whole steps.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::quantisation::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -21,7 +21,7 @@ struct Quantisation {
 }
 
 impl Fault for Quantisation {
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         for torque in log.torques(self.joint) {
             *torque = (*torque / self.step).round() * self.step;
         }

@@ -2,7 +2,7 @@
 //!
 //! M, C and G are linear in the parameters, so the ten alone make the inertia and the torque that are added.
 
-use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::effect::rigid_body_terms::ENTRY;
 use crate::robot::cft::dynamics::{Coefficients, inertia_and_bias};
 use crate::simulate::SimulateError;
@@ -18,7 +18,7 @@ pub static LAW: PlantLaw = PlantLaw {
     build,
 };
 
-fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, machine: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     if machine.robot.coefficients(machine.theta).is_none() {
         return Err(site.refuse(
             ENTRY.name,
@@ -36,7 +36,7 @@ fn build(site: &Site, machine: &Machine, values: &[f64]) -> Result<Built, Simula
 struct RigidBodyTerms(Coefficients);
 
 impl Effect for RigidBodyTerms {
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
             return;
         };

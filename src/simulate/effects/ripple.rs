@@ -3,7 +3,7 @@
 //! E(q) = sum over h = 1, 2, 3 of sin_h sin(h k q) + cos_h cos(h k q), with k = order per radian of a
 //! joint that turns (order 1/rev) and k = 2 pi order per metre of one that slides (order 1/m).
 
-use super::{Built, Effect, Machine, Motion, PlantLaw, Site};
+use super::{Built, Effect, PlantLaw, PlantRobot, PlantState, Site};
 use crate::effect::ripple::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -24,7 +24,7 @@ pub(super) fn wavenumber(site: &Site, order: f64) -> f64 {
     }
 }
 
-fn build(site: &Site, _: &Machine, values: &[f64]) -> Result<Built, SimulateError> {
+fn build(site: &Site, _: &PlantRobot, values: &[f64]) -> Result<Built, SimulateError> {
     Built::plant(Ripple {
         joint: site.joint(),
         wavenumber: wavenumber(site, values[0]),
@@ -42,7 +42,7 @@ struct Ripple {
 }
 
 impl Effect for Ripple {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let angle = self.wavenumber * motion.q[self.joint];
         for (h, [sin, cos]) in self.amplitudes.iter().enumerate() {
             if *sin != 0.0 || *cos != 0.0 {

@@ -3,7 +3,7 @@
 //! At x_r or y_r, J is a mass in kg on the screw's nut and the joints feel J_a^T J (J_a a + dJ_a/dt v) with the
 //! Jacobian J_a of the pantograph; at a joint they feel J a.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::Place;
 use crate::effect::rotor_inertia::ENTRY;
 use crate::robot::cft::pantograph::{reference_jacobian, reference_jacobian_rate};
@@ -30,7 +30,7 @@ struct AtJoint {
 }
 
 impl Effect for AtJoint {
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], _torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
         mass[self.joint * (motion.q.len() + 1)] += self.inertia;
     }
 }
@@ -42,7 +42,7 @@ struct AtScrew {
 }
 
 impl Effect for AtScrew {
-    fn inertia(&self, motion: &Motion, mass: &mut [f64], torque: &mut [f64]) {
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], torque: &mut [f64]) {
         let (Some(q), Some(v)) = (motion.q.first_chunk(), motion.v.first_chunk()) else {
             return;
         };

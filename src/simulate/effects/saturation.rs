@@ -1,6 +1,6 @@
 //! `saturation`: the logged torque of a joint stops at a limit.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::saturation::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -21,7 +21,7 @@ struct Saturation {
 }
 
 impl Fault for Saturation {
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         for torque in log.torques(self.joint) {
             *torque = torque.clamp(-self.limit, self.limit);
         }

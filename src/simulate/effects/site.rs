@@ -80,13 +80,13 @@ impl Site {
 
 /// The robot that effects are built for.
 #[derive(Debug, Clone, Copy)]
-pub struct Machine<'a> {
+pub struct PlantRobot<'a> {
     pub robot: &'a Robot,
     /// Its inertial parameters.
     pub theta: &'a [f64],
 }
 
-impl Machine<'_> {
+impl PlantRobot<'_> {
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.robot.joints()
@@ -101,7 +101,7 @@ impl Machine<'_> {
 /// All places of one robot.
 #[derive(Debug, Clone)]
 pub struct Sites<'a> {
-    pub machine: Machine<'a>,
+    pub machine: PlantRobot<'a>,
     pub joints: Vec<Site>,
     pub screws: Vec<Site>,
     pub whole: Vec<Site>,
@@ -126,7 +126,7 @@ impl<'a> Sites<'a> {
             ..first.clone()
         });
         Ok(Self {
-            machine: Machine {
+            machine: PlantRobot {
                 robot,
                 theta: plant.theta(),
             },

@@ -2,7 +2,7 @@
 //!
 //! fc tanh(v/vs) stands where F(v) - viscous v stood, which is taken out.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::smooth_coulomb::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -30,7 +30,7 @@ struct SmoothCoulomb {
 }
 
 impl Effect for SmoothCoulomb {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let v = motion.v[self.joint];
         let own = motion.friction[self.joint] - self.viscous * v;
         torque[self.joint] += self.level * (self.per_speed * v).tanh() - own;

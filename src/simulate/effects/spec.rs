@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::{LAWS, Machine, PlantLaw, Site, Sites};
-use crate::config::candidates::Candidate;
+use super::{LAWS, PlantLaw, PlantRobot, Site, Sites};
+use crate::config::candidates::CandidateSection;
 use crate::effect::{Entry, Key, Place, Places};
 use crate::number::is_usable;
 use crate::robot::JointKind;
@@ -22,7 +22,7 @@ pub struct EffectSpec {
     pub values: Vec<(String, f64)>,
     /// Its formulas, where it is the user's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub own: Option<Candidate>,
+    pub own: Option<CandidateSection>,
 }
 
 /// An effect as it acts: all its values, with units.
@@ -34,12 +34,12 @@ pub struct EffectValue {
     #[serde(default)]
     pub joint: Option<String>,
     /// By key, in alphabetical order.
-    pub parameters: BTreeMap<String, EffectParameter>,
+    pub parameters: BTreeMap<String, PlantParameter>,
 }
 
 /// One value of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct EffectParameter {
+pub struct PlantParameter {
     pub value: f64,
     pub unit: String,
 }
@@ -92,7 +92,7 @@ impl FromStr for EffectSpec {
 
 impl EffectSpec {
     /// The same with its formulas, where a candidate has its name.
-    pub fn or_own(mut self, candidates: &[Candidate]) -> Self {
+    pub fn or_own(mut self, candidates: &[CandidateSection]) -> Self {
         self.own = candidates.iter().find(|c| c.name == self.name).cloned();
         self
     }
@@ -185,7 +185,7 @@ impl EffectSpec {
 }
 
 impl EffectValue {
-    pub(super) fn new(entry: &Entry, site: &Site, machine: &Machine, numbers: &[f64]) -> Self {
+    pub(super) fn new(entry: &Entry, site: &Site, machine: &PlantRobot, numbers: &[f64]) -> Self {
         let pairs = || entry.keys.iter().zip(numbers);
         let kind = |turns: bool| match turns {
             true => JointKind::Revolute,
@@ -200,7 +200,7 @@ impl EffectValue {
         let torque = if site.turns { "Nm" } else { "N" };
         let parameter = |(key, &value): (&Key, &f64)| {
             let unit = key.unit.text(own, from, torque);
-            (key.name.to_owned(), EffectParameter { value, unit })
+            (key.name.to_owned(), PlantParameter { value, unit })
         };
         Self {
             effect: entry.name.to_owned(),

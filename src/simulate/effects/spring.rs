@@ -1,6 +1,6 @@
 //! `spring`: k (q - q0) + k3 (q - q0)^3, a cable or a return spring.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::spring::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -25,7 +25,7 @@ struct Spring {
 }
 
 impl Effect for Spring {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let x = motion.q[self.joint] - self.rest;
         torque[self.joint] += x * (self.k + self.cubic * x * x);
     }

@@ -1,6 +1,6 @@
 //! `stribeck`: more friction near standstill, c sgn(v) exp(-(v/vs)^2).
 
-use super::{Built, Effect, Motion, PlantLaw, sign};
+use super::{Built, Effect, PlantLaw, PlantState, sign};
 use crate::effect::stribeck::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -25,7 +25,7 @@ struct Stribeck {
 }
 
 impl Effect for Stribeck {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let v = motion.v[self.joint];
         let hump = (-(v * self.per_speed).powi(2)).exp();
         torque[self.joint] += self.c * sign(self.slope, v) * hump;

@@ -1,6 +1,6 @@
 //! `stuck-channel`: a channel shows its last value from the time `at` on for `seconds`.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::stuck_channel::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -25,7 +25,7 @@ struct StuckChannel {
 }
 
 impl Fault for StuckChannel {
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         let mut last = None;
         for (t, value) in log.channel(self.joint, self.torque) {
             match last {

@@ -1,6 +1,6 @@
 //! `torque-offset`: a constant torque, in both directions and at standstill.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::torque_offset::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -21,7 +21,7 @@ struct TorqueOffset {
 }
 
 impl Effect for TorqueOffset {
-    fn torque(&self, _motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, _motion: &PlantState, torque: &mut [f64]) {
         torque[self.joint] += self.c;
     }
 }

@@ -1,6 +1,6 @@
 //! `warm-up`: the joint's friction times 1 + k (1 - exp(-t/T)), with k < 0 when it falls.
 
-use super::{Built, Effect, Motion, PlantLaw};
+use super::{Built, Effect, PlantLaw, PlantState};
 use crate::effect::warm_up::ENTRY;
 
 pub static LAW: PlantLaw = PlantLaw {
@@ -23,7 +23,7 @@ struct WarmUp {
 }
 
 impl Effect for WarmUp {
-    fn torque(&self, motion: &Motion, torque: &mut [f64]) {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
         let change = -self.k * (-motion.t / self.time).exp_m1();
         torque[self.joint] += change * motion.friction[self.joint];
     }

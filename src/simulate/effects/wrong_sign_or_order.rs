@@ -3,7 +3,7 @@
 //! `sign=1` turns the sign, `swap` is the number of the joint, counted from one, whose torque channel changes
 //! places with this one's.
 
-use super::{Built, Fault, Log, PlantLaw};
+use super::{Built, Fault, LoggedChannels, PlantLaw};
 use crate::effect::wrong_sign_or_order::ENTRY;
 use crate::simulate::SimulateError;
 
@@ -46,7 +46,7 @@ struct WrongSignOrOrder {
 }
 
 impl Fault for WrongSignOrOrder {
-    fn apply(&self, log: &mut Log) {
+    fn apply(&self, log: &mut LoggedChannels) {
         if self.turned {
             for torque in log.torques(self.joint) {
                 *torque = -*torque;

@@ -31,7 +31,7 @@ pub struct LadderPlan {
 
 /// The motion: strokes between turning points, in time order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ladder {
+pub struct LadderReference {
     strokes: Vec<Stroke>,
     end: f64,
     seconds: f64,
@@ -86,7 +86,7 @@ impl LadderPlan {
         acceleration: f64,
         seconds: f64,
         seed: Option<u64>,
-    ) -> Result<Ladder, SimulateError> {
+    ) -> Result<LadderReference, SimulateError> {
         let build = |count: usize| {
             let plan = Self {
                 range,
@@ -111,7 +111,7 @@ impl LadderPlan {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<Ladder, SimulateError> {
+    pub(crate) fn build_seeded(&self, seed: Option<u64>) -> Result<LadderReference, SimulateError> {
         let mut chance = seed.map(|seed| stream(seed, Purpose::Reference));
         self.build(chance.as_mut())
     }
@@ -121,7 +121,7 @@ impl LadderPlan {
     /// # Errors
     /// [`SimulateError::Reference`] when the range is empty, a speed does not fit into it, or the time
     /// does not suffice for one pass.
-    pub fn build(&self, chance: Option<&mut ChaCha8Rng>) -> Result<Ladder, SimulateError> {
+    pub fn build(&self, chance: Option<&mut ChaCha8Rng>) -> Result<LadderReference, SimulateError> {
         self.check()?;
         let mut speeds = self.speeds.clone();
         speeds.sort_by(|a, b| b.total_cmp(a));
@@ -215,7 +215,7 @@ impl LadderPlan {
         (PEAK * before.max(after) / self.turn).min(self.acceleration)
     }
 
-    fn lay_out(&self, order: &[Rung], plateau: f64, mirrored: bool) -> Ladder {
+    fn lay_out(&self, order: &[Rung], plateau: f64, mirrored: bool) -> LadderReference {
         let (low, high) = self.range;
         let mut strokes = Vec::with_capacity(order.len());
         let (mut position, mut direction) = if mirrored { (high, -1.0) } else { (low, 1.0) };
@@ -255,7 +255,7 @@ impl LadderPlan {
             direction = -direction;
             strokes.push(stroke);
         }
-        Ladder {
+        LadderReference {
             strokes,
             end: start,
             seconds: self.seconds,
@@ -287,7 +287,7 @@ fn interleave(fast: &[f64], slow: &[f64], order: &mut Vec<Rung>) {
     }
 }
 
-impl Ladder {
+impl LadderReference {
     /// Duration that was asked for \[s\]; after the last stroke the coordinate rests.
     pub fn seconds(&self) -> f64 {
         self.seconds

@@ -9,7 +9,7 @@ mod travel;
 
 pub use clock::Clock;
 pub use fourier::Fourier;
-pub use ladder::{Ladder, LadderPlan, TURN};
+pub use ladder::{LadderPlan, LadderReference, TURN};
 pub use points::Points;
 pub use travel::{Travel, middle_part, travel};
 
@@ -26,7 +26,7 @@ pub struct Target<const J: usize> {
 
 /// Coordinates that a reference is written in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
+pub enum ReferenceFrame {
     /// Joint coordinates (q1, q2, q4, q5).
     Joints,
     /// Motor coordinates (x_c1, x_c2, x_c3, x_c4).
@@ -44,7 +44,7 @@ pub enum Path<const J: usize> {
     Ladder {
         moving: usize,
         pose: [f64; J],
-        ladder: Ladder,
+        ladder: LadderReference,
     },
     /// Poses at times.
     Points(Points<J>),
@@ -53,7 +53,7 @@ pub enum Path<const J: usize> {
 /// A path and the frame that it is written in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference<const J: usize> {
-    pub frame: Frame,
+    pub frame: ReferenceFrame,
     pub path: Path<J>,
 }
 
