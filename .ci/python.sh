@@ -18,8 +18,10 @@ trap 'rm -rf "$work"' EXIT
 "$python" -m venv "$work/venv" || skip "python3 has no venv (on Debian: apt install python3-venv)"
 "$work/venv/bin/pip" install -q 'maturin>=1.7,<2' numpy pandas pytest ||
   skip "pip cannot install maturin, numpy, pandas and pytest"
-# the cluster's test is skipped aloud by pytest without it
-"$work/venv/bin/pip" install -q distributed || echo "SKIPPED: distributed cannot be installed"
+# the tests of a cluster are skipped aloud by pytest without them
+for cluster in distributed 'ray[data]'; do
+  "$work/venv/bin/pip" install -q "$cluster" || echo "SKIPPED: $cluster cannot be installed"
+done
 export VIRTUAL_ENV=$work/venv PATH=$work/venv/bin:$PATH PYTHONDONTWRITEBYTECODE=1
 # the crates below are built once for the program and the package
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
@@ -30,7 +32,7 @@ installed=$work/venv/bin/cft-ident
 [ "$("$installed" --version)" = "$("$tool" --version)" ]
 (cd "$work" && "$installed" example ur10 && "$installed" inspect ur10/ur10.csv -r ur10/ur10.toml -q)
 
-CFT_IDENT=$tool timeout 300 pytest -q -rs -p no:cacheprovider python/tests
+CFT_IDENT=$tool timeout 600 pytest -q -rs -p no:cacheprovider python/tests
 
 if pip install -q nbclient ipykernel > "$work/pip.log" 2>&1; then
   for notebook in python/notebooks/*.ipynb; do

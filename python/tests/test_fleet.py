@@ -69,13 +69,14 @@ def slow_kill(pid):
     os.kill(pid, signal.SIGKILL)
 
 
-def test_ray_gives_the_same_bytes(logs, tmp_path):
+def test_ray_gives_the_same_bytes_and_tells_a_bad_log(logs, tmp_path):
     ray = pytest.importorskip("ray")
     from cft_ident.fleet import reduce_ray
 
     ray.init(num_cpus=2, include_dashboard=False)
     try:
-        found = reduce_ray(logs, str(tmp_path / "robot.toml"))
+        found = reduce_ray([*logs, str(tmp_path / "bad.csv")], str(tmp_path / "robot.toml"))
     finally:
         ray.shutdown()
-    assert found.part.to_bytes() == in_one_process(logs, SLIDE) and not found.failures
+    assert found.part.to_bytes() == in_one_process(logs, SLIDE)
+    assert [os.path.basename(row["url"]) for row in found.failures] == ["bad.csv"]
