@@ -190,6 +190,64 @@ fn own_formulas(robot: &Robot) -> Vec<Added> {
     vec![at(0, 12.0), at(3, 70.0)]
 }
 
+/// A model with one formula at its second joint, along a motion in which every drive warms up.
+fn warm(robot: &Robot, name: &str, formula: &str) -> Case {
+    let definition = Definition {
+        name: name.to_owned(),
+        coefficients: vec![["c".to_owned(), "Nm".to_owned(), formula.to_owned()]],
+        ..Definition::default()
+    };
+    let law = own::law(&definition, robot).unwrap();
+    let mut along = swing(robot.joints());
+    let of = |j: usize| move |t: &f64| 21.5 + 3.0 * j as f64 + 2.0 * t;
+    let temperature = (0..robot.joints()).map(|j| along.t.iter().map(of(j)).collect());
+    along.temperature = temperature.collect();
+    Case {
+        name: name.to_owned(),
+        model: AugmentedModel {
+            effects: vec![Added::new(law, Place::Joint(1), Vec::new(), vec![0.7])],
+            model: model(robot.clone()),
+        },
+        along,
+    }
+}
+
+#[test]
+fn formulas_of_temperatures_have_an_input_for_them_in_c_and_rust_and_other_models_have_none() {
+    let robot = parsed(include_str!("../configs/ur10.toml"));
+    let grease = "exp(-0.04 * (temperature - 20)) * v + 0.1 * temperature_q4";
+    let cases = [
+        warm(&robot, "grease", grease),
+        warm(&robot, "grease-over-time", &format!("t * ({grease})")),
+    ];
+    let texts = |case: &Case| {
+        let program = Program::with_effects(&case.model).unwrap();
+        let note = note(&case.model.model);
+        [
+            export::header::header(&program, "arm", &note),
+            export::module::module(&program, &note),
+        ]
+    };
+    for text in texts(&cases[0]) {
+        assert!(text.contains("of the drive of each joint [degC]"));
+    }
+    let plain = Case {
+        model: AugmentedModel::plain(model(robot.clone())),
+        name: "plain".to_owned(),
+        along: swing(robot.joints()),
+    };
+    for text in texts(&plain) {
+        assert!(!text.contains("temperature") && !text.contains("WARM") && !text.contains("@TO_"));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    if there("cc") {
+        compare("C", &cases, &by_c(folder.path(), &cases));
+    }
+    if there("rustc") {
+        compare("Rust", &cases, &by_rust(folder.path(), &cases));
+    }
+}
+
 #[test]
 fn formulas_of_a_user_are_the_tools_own_in_c_and_rust() {
     let config = include_str!("../configs/ur10.toml");

@@ -111,10 +111,12 @@ class Log:
         return cls(_native.Log.load(os.fspath(path)))
 
     @classmethod
-    def arrays(cls, t: Any, q: Any, tau: Any, *, reference: Any = None, name: str = "arrays") -> Log:
+    def arrays(cls, t: Any, q: Any, tau: Any, *, reference: Any = None, temperature: Any = None,
+               name: str = "arrays") -> Log:
         """Times ``t`` [s], positions ``q`` and torques ``tau``, one row per sample, one column per joint, SI units.
 
-        ``reference`` are the positions that the controller was asked for, for ``estimator="iv"``.
+        ``reference`` are the positions that the controller was asked for, for ``estimator="iv"``; ``temperature``
+        those of the drives [degC], a column of NaN for a joint without one.
         """
         flat = np.ascontiguousarray(t, dtype=np.float64)
 
@@ -123,7 +125,8 @@ class Log:
             return values.reshape(len(flat), -1) if values.ndim == 1 and len(flat) else values
 
         other = None if reference is None else matrix(reference)
-        return cls(_native.Log.arrays(name, flat, matrix(q), matrix(tau), other))
+        warm = None if temperature is None else matrix(temperature)
+        return cls(_native.Log.arrays(name, flat, matrix(q), matrix(tau), other, warm))
 
     @classmethod
     def frame(cls, frame: Any, joints: Sequence[str], *, t: str = "t", q: str = "q_{}", tau: str = "tau_{}",

@@ -30,6 +30,7 @@ class Log:
         q: NDArray[np.float64],
         tau: NDArray[np.float64],
         reference: NDArray[np.float64] | None = None,
+        temperature: NDArray[np.float64] | None = None,
     ) -> Log: ...
     @property
     def name(self) -> str: ...

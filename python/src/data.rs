@@ -73,15 +73,17 @@ impl Log {
         })
     }
 
-    /// Arrays: times `[s]`, positions and torques with one row per sample and one column per joint, in SI units.
+    /// Arrays: times `[s]`, positions and torques with one row per sample and one column per joint, in SI units;
+    /// temperatures of the drives in degC, a column of NaN for a joint without one.
     #[staticmethod]
-    #[pyo3(signature = (name, t, q, tau, reference=None))]
+    #[pyo3(signature = (name, t, q, tau, reference=None, temperature=None))]
     fn arrays(
         name: &str,
         t: PyReadonlyArray1<f64>,
         q: PyReadonlyArray2<f64>,
         tau: PyReadonlyArray2<f64>,
         reference: Option<PyReadonlyArray2<f64>>,
+        temperature: Option<PyReadonlyArray2<f64>>,
     ) -> PyResult<Self> {
         let whole = "arrays must be contiguous, row after row: use numpy.ascontiguousarray";
         let rows = |x: &PyReadonlyArray2<f64>| -> PyResult<Vec<f64>> {
@@ -92,6 +94,21 @@ impl Log {
         let log = identify::Log::of_rows(name, t, &rows(&q)?, &rows(&tau)?).map_err(of_stage)?;
         let log = match reference {
             Some(reference) => log.with_references(&rows(&reference)?).map_err(of_stage)?,
+            None => log,
+        };
+        let log = match temperature {
+            Some(temperature) => {
+                let all = rows(&temperature)?;
+                let joints = all.len().checked_div(t.len()).unwrap_or(0);
+                (0..joints).try_fold(log, |log, j| {
+                    let own: Vec<f64> = all.iter().skip(j).step_by(joints).copied().collect();
+                    // a joint without a sensor has a column of NaN
+                    match own.iter().all(|x| x.is_nan()) {
+                        true => Ok(log),
+                        false => log.with_temperature(j, &own).map_err(of_stage),
+                    }
+                })?
+            }
             None => log,
         };
         Ok(Log {

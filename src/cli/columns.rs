@@ -12,7 +12,7 @@ use crate::log::{self, DeclaredChannels, Layout, RawReader};
 ///
 /// # Errors
 /// Where no column is a time.
-pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFault>), CliError> {
+pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>), CliError> {
     let time = match log.is_timed() && !log.is_recording() {
         true => None,
         false => Some(time_column(log)?),
@@ -27,7 +27,7 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Option<LogFaul
         held: None,
         band_hz: None,
     };
-    Ok((plan, None))
+    Ok((plan, Vec::new()))
 }
 
 /// Place of the time, and seconds per unit of it.
@@ -56,7 +56,7 @@ pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError>
 
 /// Channels by the robot file; what it does not name, by names. The fault is what keeps a fit from
 /// reading the log.
-pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Option<LogFault>) {
+pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, Vec<LogFault>) {
     let layout = log.layout();
     let names = log.names();
     let time = log.find(&layout.time);
@@ -69,6 +69,7 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
         // A log may hold both sides of the gears.
         place(log, machine, other, &mut known);
     }
+    let missing = temperatures(log, machine, &mut known);
     let columns = known.into_iter().enumerate();
     let channels = columns
         .filter(|(column, _)| Some(*column) != time)
@@ -81,7 +82,49 @@ pub(super) fn of_robot(log: &RawReader, machine: &LoggedRobot) -> (ColumnPlan, O
         held: None,
         band_hz: Some(machine.settings().cutoff_hz),
     };
-    (plan, log.refused().map(|error| refusal(error.to_string())))
+    let refused = log.refused().map(|error| refusal(error.to_string()));
+    (plan, refused.into_iter().chain(missing).collect())
+}
+
+/// Finds the temperatures that the robot file names among the columns of a text log; what is not there.
+fn temperatures(
+    log: &RawReader,
+    machine: &LoggedRobot,
+    known: &mut [Option<ChannelColumn>],
+) -> Vec<LogFault> {
+    let Some((_, layout)) = (machine.file.temperature_layout()).filter(|_| !log.is_recording())
+    else {
+        return Vec::new();
+    };
+    let mut missing = Vec::new();
+    for (channel, joint) in layout.positions.iter().zip(&layout.joints) {
+        let Some(column) = log.find(channel) else {
+            let effect = format!(
+                "no column `{}`, which the robot file names as the temperature of {joint}: it is no signal of this log",
+                log::escape(&channel.column)
+            );
+            let remedy =
+                "name the right column in [log.joint] of the robot file, or take the key out";
+            let kind = FaultKind::MissingChannel;
+            missing.push(LogFault::whole(
+                Severity::Warning,
+                kind,
+                0.0,
+                effect,
+                remedy,
+            ));
+            continue;
+        };
+        let (name, role) = (&log.names()[column], ChannelRole::Temperature);
+        known[column] = Some(ChannelColumn {
+            column,
+            factor: 1.0,
+            offset: 0.0,
+            wrap: None,
+            channel: InspectedChannel::new(name, role, Some(joint), Some("degC")),
+        });
+    }
+    missing
 }
 
 /// Finds the channels of a layout among the columns that are not known yet.

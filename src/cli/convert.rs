@@ -211,15 +211,24 @@ fn of_robot(
     let named = kinds
         .iter()
         .flat_map(|kind| joints.iter().map(move |joint| format!("{kind}_{joint}")));
-    target.begin(spec, std::iter::once("t".to_owned()).chain(named).collect())?;
+    let warm = machine.file.temperature_layout();
+    let warm = warm.map_or(Vec::new(), |(joints, _)| joints);
+    let temperatures = warm.iter().map(|j| format!("temperature_{}", joints[*j]));
+    let columns = std::iter::once("t".to_owned()).chain(named);
+    target.begin(spec, columns.chain(temperatures).collect())?;
     let mut block = Block::default();
     let mut first = true;
+    let mut courses = None;
     while reader.read(&mut block)? {
         context.check()?;
         let origin = reader.origin();
+        if courses.is_none() {
+            courses = Some(machine.temperatures(&spec.into(), origin)?);
+        }
         for (k, t) in block.t.iter().enumerate() {
             let parts = [&block.q, &block.tau, &block.dq].map(|x| x.get(k * n..(k + 1) * n));
             let values = parts.into_iter().flatten().flatten().copied();
+            let values = values.chain(warm.iter().filter_map(|j| courses.as_ref()?.at(*j, *t)));
             target.row(spec, origin, first, *t, values)?;
             first = false;
         }

@@ -27,7 +27,7 @@ pub struct CandidateSection {
     /// Joints whose torque it may be, each by itself; all of them where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<String>>,
-    /// Formula of each coefficient, by its name, in q, v, a, load and direction of the joint itself, the same of others as
+    /// Formula of each coefficient, by its name, in q, v, a, load, direction and temperature of the joint itself, the same of others as
     /// `q_NAME` (in braces where the name has more than letters, digits and underscores: `{q_arm 2}`), the time t since the begin of the log and
     /// the shapes. SI units and radians.
     pub formulas: BTreeMap<String, String>,

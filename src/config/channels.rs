@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use super::robot_file::{ModelKind, RobotFile};
 use crate::log::{
-    ActuatorChannels, ChannelChoice, Conversion, DeclaredChannels, JointChannels, Layout,
-    PositionUnit, TorqueUnit, channel,
+    ActuatorChannels, Channel, ChannelChoice, Conversion, DeclaredChannels, JointChannels, Layout,
+    LogSection, PositionUnit, TorqueUnit, channel,
 };
 use crate::robot::JointKind;
 use crate::robot::cft::actuation::ENCODER_SCALE;
@@ -100,6 +100,32 @@ impl RobotFile {
         }
         layout.velocities.clear();
         Some(layout)
+    }
+
+    /// The layout of the temperatures of a log as if they were positions, and which joints have one; `None` where
+    /// the file names none.
+    pub fn temperature_layout(&self) -> Option<(Vec<usize>, Layout)> {
+        let names = self.joint_names();
+        let named = names.iter().enumerate().filter_map(|(j, joint)| {
+            let column = &self.log.joint.get(joint)?.temperature;
+            let key = || format!("[log.joint.{joint}] temperature");
+            column.as_ref()?;
+            Some((j, channel(column, String::new(), "degC", [1.0, 0.0], key)))
+        });
+        let (joints, positions): (Vec<usize>, Vec<Channel>) = named.unzip();
+        let of: Vec<&String> = joints.iter().map(|j| &names[*j]).collect();
+        let layout = Layout {
+            time: self.log.time_channel(),
+            positions,
+            section: LogSection {
+                topic: self.log.temperature_topic.clone(),
+                torque_topic: None,
+                ..self.log.clone()
+            },
+            temperatures: true,
+            ..Layout::joint_columns(&of)
+        };
+        (!joints.is_empty()).then(|| (joints, layout.without_torques()))
     }
 
     /// The matrix R of `[log] gears`, p = R q; `None` where the motors are at the joints.

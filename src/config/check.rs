@@ -236,6 +236,18 @@ fn simulator(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
             ));
         }
     }
+    document.known_names(
+        &["sensors", "temperature"],
+        &sensors.temperature,
+        &file.joint_names(),
+    )?;
+    for (joint, course) in &sensors.temperature {
+        let at = |key| ["sensors", "temperature", joint.as_str(), key];
+        document.positive(&at("time_constant_s"), course.time_constant_s)?;
+        if let Some(cycle) = course.cycle_s {
+            document.positive(&at("cycle_s"), cycle)?;
+        }
+    }
     per_joint(
         document,
         &["sensors", "torque_noise"],

@@ -51,6 +51,7 @@ pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigE
             ("velocity", &channels.velocity),
             ("reference", &channels.reference),
             ("torque", &channels.torque),
+            ("temperature", &channels.temperature),
         ];
         for (key, column) in named {
             claim(

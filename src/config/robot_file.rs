@@ -260,6 +260,24 @@ pub struct SensorsSection {
     /// Fraction of samples that are lost.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dropouts: Option<f64>,
+    /// How warm the drives of joints are, by joint; their logs get a column of it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub temperature: BTreeMap<String, TemperatureCourse>,
+}
+
+/// Temperature of a simulated drive: start + rise (1 - exp(-t/T)), and back again in the second half of each cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TemperatureCourse {
+    /// At the begin [degC].
+    pub start: f64,
+    /// By how much it would be warmer in the end [degC].
+    pub rise: f64,
+    /// Time constant T [s].
+    pub time_constant_s: f64,
+    /// Time after which it begins anew [s]: work in the first half, a pause in the second; work alone where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cycle_s: Option<f64>,
 }
 
 /// A robot file. Every section but `[robot]` may be left out.

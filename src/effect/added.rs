@@ -87,6 +87,12 @@ impl Added {
         }
     }
 
+    /// Joints whose temperature it takes.
+    pub fn temperatures(&self) -> Vec<usize> {
+        let formula = self.law.formula.zip(self.place.joint());
+        formula.map_or(Vec::new(), |(formula, j)| formula.temperatures(j))
+    }
+
     /// As results and files name it.
     pub fn name(&self) -> &'static str {
         self.law.entry.name

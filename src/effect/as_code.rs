@@ -99,6 +99,7 @@ impl EffectsCode {
                     FormulaSignal::Acceleration => format!("a[{j}]"),
                     FormulaSignal::Load => format!("load[{j}]"),
                     FormulaSignal::Direction => direction(refined, j, &format!("v[{j}]")),
+                    FormulaSignal::Temperature => format!("temperature[{j}]"),
                     FormulaSignal::Time => "state.t".to_owned(),
                 })
             };

@@ -35,6 +35,11 @@ impl AugmentedModel {
         }
     }
 
+    /// Whether an effect takes a temperature.
+    pub fn takes_temperatures(&self) -> bool {
+        self.effects.iter().any(|e| !e.temperatures().is_empty())
+    }
+
     /// Torque before shifts, and load torque.
     pub fn torques(&self, stretch: &Stretch) -> Torques {
         let n = self.model.robot.joints();

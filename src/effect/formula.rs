@@ -49,8 +49,8 @@ pub enum FormulaError {
         why: String,
     },
     #[error(
-        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load and direction of \
-         the joint, the same of others (q_{joint}), t{shapes}"
+        "candidate `{name}`, `{coefficient}`: `{variable}` is not known; known are q, v, a, load, direction and \
+         temperature of the joint, the same of others (q_{joint}), t{shapes}"
     )]
     Variable {
         name: String,
@@ -143,6 +143,25 @@ impl Formulas {
     /// Whether it may sit at a place.
     pub(super) fn fits(&self, place: Place) -> bool {
         place.joint().is_some_and(|j| self.joints.contains(&j))
+    }
+
+    /// Joints at which it may sit.
+    pub fn joints(&self) -> &[usize] {
+        &self.joints
+    }
+
+    /// Joints whose temperature it takes at a joint.
+    pub fn temperatures(&self, joint: usize) -> Vec<usize> {
+        let inputs = self.columns.iter().flat_map(|column| &column.inputs);
+        let mut of: Vec<usize> = inputs
+            .filter_map(|input| match input {
+                Input::Signal(FormulaSignal::Temperature, of) => Some(of.unwrap_or(joint)),
+                _ => None,
+            })
+            .collect();
+        of.sort_unstable();
+        of.dedup();
+        of
     }
 
     /// Shapes to try: a few over the range of each, in equal ratios where the range is of one sign.
@@ -248,6 +267,10 @@ fn signal_at(scene: &Scene, signal: FormulaSignal, joint: usize, k: usize) -> f6
         FormulaSignal::Acceleration => s.a[joint][k],
         FormulaSignal::Load => scene.load[joint][k],
         FormulaSignal::Direction => scene.direction(joint, k),
+        FormulaSignal::Temperature => {
+            let known = s.temperature.get(joint).and_then(|x| x.get(k));
+            known.copied().unwrap_or(f64::NAN)
+        }
         // since the begin of the log, whatever its clock shows
         FormulaSignal::Time => s.began + k as f64 * s.dt,
     }

@@ -149,7 +149,8 @@ mod tests {
     #[test]
     fn a_formula_is_its_column_along_the_motion() {
         let robot = robot();
-        let law = law(&definition("cos(q) * tanh(w * v_q1) + a^2 - t"), &robot).unwrap();
+        let formula = "cos(q) * tanh(w * v_q1) + a^2 - t + temperature_q1 - temperature";
+        let law = law(&definition(formula), &robot).unwrap();
         let wave = |f: fn(f64) -> f64| vec![(0..20).map(|k| f(0.1 * f64::from(k))).collect()];
         let stretch = Stretch {
             dt: 0.1,
@@ -158,6 +159,7 @@ mod tests {
             v: wave(f64::cos),
             a: wave(|t| -t.sin()),
             tau: wave(|_| 0.0),
+            temperature: wave(|t| 20.0 + t),
             ..Stretch::default()
         };
         let load = vec![vec![0.0; 20]];
@@ -203,7 +205,8 @@ mod tests {
             ("2 q", "no formula"),
             ("cos(q_q2)", "`q_q2` is not known"),
             ("t_q1", "`t_q1` is not known"),
-            ("temperature", "`temperature` is not known"),
+            ("temperature_q2", "`temperature_q2` is not known"),
+            ("temp", "direction and temperature of"),
             ("", "no formula"),
         ] {
             let error = told(formula).unwrap();

@@ -43,6 +43,7 @@ impl Sampled {
                 v: one(),
                 a: one(),
                 tau: one(),
+                temperature: vec![vec![f64::NAN]; n],
                 ..Stretch::default()
             },
             hat: one(),
@@ -64,6 +65,13 @@ impl Sampled {
     /// Says that the next sample begins a stretch.
     pub fn begin(&mut self) {
         self.kept.iter_mut().for_each(|kept| kept.fill(f64::NAN));
+    }
+
+    /// Takes the temperature of every joint \[degC\], for the samples from here on; what is not known is no number.
+    pub fn set_temperatures(&mut self, of: impl Fn(usize) -> Option<f64>) {
+        for (j, x) in self.stretch.temperature.iter_mut().enumerate() {
+            x[0] = of(j).unwrap_or(f64::NAN);
+        }
     }
 
     /// Torque of every joint, before shifts, `since` seconds after the begin of the log.

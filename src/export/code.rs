@@ -19,6 +19,8 @@ pub(super) struct Language {
     comment: &'static str,
     /// What stands for the marks of statements: `$f(`, `state.`, `let `, `&state.`.
     marks: [&'static str; 4],
+    /// The input of the temperatures.
+    temperature: &'static str,
 }
 
 pub(super) const C: Language = Language {
@@ -31,6 +33,7 @@ pub(super) const C: Language = Language {
     close: '}',
     comment: " * ",
     marks: ["@name@_", "state->", "const double ", "state->"],
+    temperature: ", const double temperature[@N@]",
 };
 
 pub(super) const RUST: Language = Language {
@@ -45,6 +48,7 @@ pub(super) const RUST: Language = Language {
     close: ']',
     comment: "//! ",
     marks: ["", "state.", "let ", "&mut state."],
+    temperature: ", temperature: &[f64; JOINTS]",
 };
 
 impl Language {
@@ -180,6 +184,16 @@ impl Language {
         out.trim_end().to_owned()
     }
 
+    /// The text with the input of temperatures where a law takes one, and without it elsewhere.
+    pub(super) fn with_inputs(&self, text: &str, effects: &EffectsCode) -> String {
+        let [added, steps] = [&effects.added, &effects.steps].map(|lines| warm(lines));
+        let of = |there: bool, text: &'static str| if there { text } else { "" };
+        text.replace("@WARM_NOW@", of(added, self.temperature))
+            .replace("@WARM@", of(added || steps, self.temperature))
+            .replace("@TO_NOW@", of(added, ", temperature"))
+            .replace("@TO_STEP@", of(added || steps, ", temperature"))
+    }
+
     /// What the file is, line by line.
     pub(super) fn header(&self, program: &Program, note: &Note) -> String {
         let mut lines = note.lines.clone();
@@ -192,6 +206,13 @@ impl Language {
                 "  {j}  {name}: q [{unit}], v [{unit}/s], a [{unit}/s^2], tau [{torque}]"
             ));
         }
+        let effects = &program.effects;
+        if warm(&effects.added) || warm(&effects.steps) {
+            lines.push(
+                "temperature: of the drive of each joint [degC], as its column in the logs had it"
+                    .to_owned(),
+            );
+        }
         let shown: Vec<String> = lines
             .iter()
             .map(|line| {
@@ -202,6 +223,11 @@ impl Language {
             .collect();
         shown.join("\n")
     }
+}
+
+/// Whether statements take a temperature.
+fn warm(lines: &[String]) -> bool {
+    lines.iter().any(|line| line.contains("temperature["))
 }
 
 /// Statements for the friction of each joint.

@@ -81,11 +81,11 @@ pub fn header(program: &Program, name: &str, note: &Note) -> String {
         ),
     };
     let observer = program.observer.as_ref();
-    TEMPLATE
-        .replace(
-            "@OBSERVER@\n",
-            &observer.map_or(String::new(), |recipe| recipe.in_c(program)),
-        )
+    let text = TEMPLATE.replace(
+        "@OBSERVER@\n",
+        &observer.map_or(String::new(), |recipe| recipe.in_c(program)),
+    );
+    C.with_inputs(&text, effects)
         .replace("@TABLES@", tables.trim_end())
         .replace("@BODY@", C.bodies("BODY", &program.bodies).trim_end())
         .replace("@FALL@", C.vector("FALL", &fall(program)).trim_end())

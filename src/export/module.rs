@@ -80,11 +80,11 @@ pub fn module(program: &Program, note: &Note) -> String {
         false => text + "\n",
     };
     let observer = program.observer.as_ref();
-    TEMPLATE
-        .replace(
-            "@OBSERVER@\n",
-            &observer.map_or(String::new(), |recipe| recipe.in_rust(program)),
-        )
+    let text = TEMPLATE.replace(
+        "@OBSERVER@\n",
+        &observer.map_or(String::new(), |recipe| recipe.in_rust(program)),
+    );
+    RUST.with_inputs(&text, effects)
         .replace("@TABLES@\n", &tables)
         .replace("@BESIDE@", &beside)
         .replace("@WEIGHT@\n", weight)

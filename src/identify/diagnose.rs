@@ -14,6 +14,7 @@ use super::model::{in_file, new_model, own_laws, refined};
 use super::position_cutoff::known;
 use super::prior::{information, moved_alone, open};
 use super::repeated::each_row_once;
+use super::temperatures;
 use crate::config::ModelFile;
 use crate::config::candidates::CandidateSection;
 use crate::config::model_file::{FrictionPrior, Parameter};
@@ -158,6 +159,12 @@ pub fn diagnose(
     let each = each.collect::<Result<Vec<_>, IdentifyError>>()?;
     let machine = &machine.with_position_cutoffs(&all, &laws, control)?;
     let mut in_memory = read_each(machine, &each, &all, control)?;
+    let mut taken = temperatures::of_model(&given);
+    taken.extend(temperatures::of_laws(&own_laws(
+        &settings.candidates,
+        &machine.robot,
+    )?));
+    machine.check_temperatures(&taken, &all, &in_memory.stretches)?;
     let fitted = match settings.keep {
         true => &[],
         false => &in_memory.inputs[..logs.train.len()],

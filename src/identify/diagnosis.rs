@@ -381,6 +381,7 @@ pub fn signal_words(names: &[String], own: usize, signal: Signal) -> String {
         Signal::Load => "load".to_owned(),
         Signal::Direction => "direction".to_owned(),
         Signal::SinceReversal => "time since reversal".to_owned(),
+        Signal::Temperature(j) => of("temperature", j),
         Signal::Time => "time".to_owned(),
     }
 }

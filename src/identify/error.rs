@@ -97,6 +97,14 @@ pub enum IdentifyError {
     /// A formula of the user's own that is none on this robot.
     #[error("{0}; correct the [[candidate]] table")]
     Formula(FormulaError),
+    /// A log without a temperature that a formula takes.
+    #[error("{log}: `{effect}` takes the temperature of {joint}, and none is known: {why}")]
+    NoTemperature {
+        log: String,
+        effect: String,
+        joint: String,
+        why: String,
+    },
     /// A candidate whose name the given model has for something else.
     #[error(
         "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table; give the candidate another name, or leave it as it is there"
@@ -159,6 +167,7 @@ impl IdentifyError {
             | Self::TooManySamples { .. }
             | Self::Effect { .. }
             | Self::Formula(_)
+            | Self::NoTemperature { .. }
             | Self::NothingHeldOut { .. }
             | Self::CandidateOfModel { .. }
             | Self::OtherRobot { .. } => ErrorKind::Input,

@@ -189,7 +189,7 @@ impl<'a> Trial<'a> {
         for (index, log) in self.logs.iter().enumerate() {
             let mut open = self.machine.open(log, self.control)?;
             let mut first = None;
-            let (found, _) = stretches(index, n, &self.settings, &mut |block| {
+            let (mut found, _) = stretches(index, n, &self.settings, &mut |block| {
                 let more = open.read(block)?;
                 if let Some(t) = block.t.first() {
                     let first = *first.get_or_insert(*t);
@@ -198,6 +198,13 @@ impl<'a> Trial<'a> {
                 Ok(more)
             })
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            if self.model.takes_temperatures() {
+                let temperatures =
+                    (self.machine).temperatures_for(self.model, log, open.origin())?;
+                for stretch in &mut found {
+                    stretch.temperature = temperatures.along(&stretch.t, n);
+                }
+            }
             all.extend(found);
         }
         Ok(all)
@@ -228,7 +235,7 @@ impl<'a> Trial<'a> {
                 let until = of_fold.iter().rposition(|f| *f == fold).unwrap_or(from) + 1;
                 // effects remember from the begin of the stretch
                 let begin = if model.effects.is_empty() { from } else { 0 };
-                let hat = model.reconstruct(&part(stretch, begin, until));
+                let hat = model.reconstruct(&stretch.part(begin, until));
                 for k in (from..until).step_by(every) {
                     stretch.at(k, &mut q, &mut v, &mut a);
                     deviation.variances([&q, &v, &a], &mut variances);
@@ -278,10 +285,14 @@ impl<'a> Trial<'a> {
         for (index, log) in self.logs.iter().enumerate() {
             let failed = |error| IdentifyError::motion(&log.name(), error);
             let mut open = self.machine.open(log, self.control)?;
+            let temperatures = (self.machine).temperatures_for(self.model, log, open.origin())?;
             let mut watched: Vec<Watched> = (models.iter().enumerate())
                 .map(|(fold, model)| Watched::new((index, fold), (model, &uncertain), &settings))
                 .collect::<Result<_, _>>()
                 .map_err(failed)?;
+            for watched in &mut watched {
+                watched.observer.set_temperatures(temperatures.clone());
+            }
             let (mut block, mut first, mut more) = (Block::default(), None, true);
             while more {
                 more = open.read(&mut block)?;
@@ -385,22 +396,6 @@ impl Watched {
     fn kept_s(&self) -> f64 {
         let step = self.observer.step_s().unwrap_or(self.every);
         step * (self.every / step).ceil().max(1.0)
-    }
-}
-
-/// Samples `from..until` of a stretch.
-fn part(stretch: &Stretch, from: usize, until: usize) -> Stretch {
-    let of = |x: &Vec<Vec<f64>>| x.iter().map(|x| x[from..until].to_vec()).collect();
-    Stretch {
-        log: stretch.log,
-        dt: stretch.dt,
-        began: stretch.began + stretch.dt * from as f64,
-        t: stretch.t[from..until].to_vec(),
-        zero: stretch.zero,
-        q: of(&stretch.q),
-        v: of(&stretch.v),
-        a: of(&stretch.a),
-        tau: of(&stretch.tau),
     }
 }
 

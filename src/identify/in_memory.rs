@@ -62,8 +62,9 @@ pub(super) fn read_wider(
         };
         let wide = settings.widened(times, 1.0 / dt);
         let mut open = machine.open(log, control)?;
-        let (found, _) = stretches(index, n, &wide, &mut |block| open.read(block))
+        let (mut found, _) = stretches(index, n, &wide, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+        machine.put_temperatures(log, open.origin(), &mut found)?;
         all.extend(found);
     }
     Ok(all)
@@ -102,6 +103,7 @@ pub(super) fn read_each(
             });
         }
         warnings.extend(open.told(&summary));
+        warnings.extend(machine.put_temperatures(log, open.origin(), &mut found)?);
         inputs.push(open.provenance()?);
         all.extend(found);
         last = Some(summary);

@@ -60,6 +60,20 @@ impl Log {
         }
     }
 
+    /// The same log with the temperature of the drive of joint `joint` [degC], one value per row. A file names its
+    /// column in the robot file instead.
+    ///
+    /// # Errors
+    /// Another number of values than there are rows, and one that is no number.
+    pub fn with_temperature(self, joint: usize, temperatures: &[f64]) -> Result<Self, LogError> {
+        match self {
+            Self::File(_) | Self::Reduced(_) => Ok(self),
+            Self::Arrays(arrays) => Ok(Self::Arrays(Arc::new(
+                Arrays::clone(&arrays).with_temperature(joint, temperatures.to_vec())?,
+            ))),
+        }
+    }
+
     /// The log, where it is reduced.
     pub fn reduced(&self) -> Option<&ReducedLog> {
         match self {

@@ -59,6 +59,7 @@ mod separate;
 mod setup;
 mod setup_words;
 mod speeds;
+mod temperatures;
 mod told;
 mod torque;
 mod track;

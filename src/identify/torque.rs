@@ -108,10 +108,12 @@ pub fn torque(
     } else {
         // effects remember: they need a stretch from its begin
         let (found, summary) = motion::stretches(0, n, &settings, &mut read).map_err(failed)?;
+        let temperatures = machine.temperatures_for(refined, log, origin)?;
         let mut values = vec![0.0; kinds * n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for stretch in &found {
-            let hat = refined.reconstruct(stretch);
+        for mut stretch in found {
+            stretch.temperature = temperatures.along(&stretch.t, n);
+            let hat = refined.reconstruct(&stretch);
             for (k, t) in stretch.t.iter().enumerate() {
                 stretch.at(k, &mut q, &mut v, &mut a);
                 for (x, hat) in values.iter_mut().zip(&hat) {

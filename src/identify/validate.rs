@@ -12,6 +12,7 @@ use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::ReducedLog;
 use super::repeated::repeated_rows;
+use super::temperatures;
 use super::unknowns::columns;
 use crate::band::{Band, NO_BAND, Reach};
 use crate::config::ModelFile;
@@ -172,7 +173,10 @@ fn reconstruct(
             last = Some(summary);
         } else {
             // effects remember: they need a stretch from its begin
-            let whole = read_whole(machine, std::slice::from_ref(log), control)?;
+            let one = std::slice::from_ref(log);
+            let whole = read_whole(machine, one, control)?;
+            let taken = temperatures::of_model(refined);
+            machine.check_temperatures(&taken, one, &whole.stretches)?;
             all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);

@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::hold_out::{Held, on_other_logs};
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
+use super::temperatures;
 use crate::band::Directions;
 use crate::config::ModelFile;
 use crate::config::held_out::{Excesses, HeldOut};
@@ -159,7 +160,12 @@ pub fn watch(
         .map_err(|error| IdentifyError::motion(name, error))?
         .with_uncertain(Directions::of(file, &refined.model, &held.joints));
     let layout = machine.file.layout();
+    let takes = refined.takes_temperatures();
+    let mut warm = None;
     let (mut reader, of) = match input {
+        Watchable::Stream(_) if takes => {
+            return Err(temperatures::none_on(STREAM, refined));
+        }
         Watchable::Stream(stream) => (
             Reader::of_stream(STREAM, stream, &layout)?,
             STREAM.to_owned(),
@@ -169,6 +175,7 @@ pub fn watch(
                 Some(file) => Reader::of_stream(&log.name(), Box::new(file), &layout)?,
                 None => log.reader(&layout, machine.robot.joint_names())?,
             };
+            warm = takes.then(|| log.clone());
             (reader, log.name())
         }
     };
@@ -199,6 +206,10 @@ pub fn watch(
             hold.centre(&machine.robot, &mut block);
         }
         let origin = reader.origin();
+        // from the first row on it is known where times are counted from
+        if let Some(log) = warm.take_if(|_| !block.is_empty()) {
+            observer.set_temperatures(machine.temperatures_for(refined, &log, origin)?);
+        }
         let pushed = observer.push(&block, !more, &mut |o| {
             over.extend(alarms.take(o));
             if alarms.open().is_some() {

@@ -83,6 +83,8 @@ pub enum FaultKind {
     Stall,
     /// A torque of exactly 0 while the joint moves.
     MotorOff,
+    /// A temperature that leaps as no drive's does.
+    TemperatureStep,
 }
 
 impl FaultKind {
@@ -114,6 +116,7 @@ impl FaultKind {
             Self::WrappedEncoder => "wrapped-encoder",
             Self::Stall => "stall",
             Self::MotorOff => "motor-off",
+            Self::TemperatureStep => "temperature-step",
         }
     }
 

@@ -24,6 +24,10 @@ const SHAPED: usize = 512;
 /// Channels that are compared with each other.
 const COMPARED: usize = 64;
 
+/// What no drive warms up by within so short a time: 5 degC, 1 s.
+const LEAP: f64 = 5.0;
+const LEAP_S: f64 = 1.0;
+
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Depth {
@@ -53,8 +57,12 @@ pub(super) struct Track {
     pub(super) excitation: Option<Excitation>,
     /// The channel with the position of the same joint.
     pub(super) position: Option<usize>,
-    /// Its number in the row before.
+    /// Its number in the row before, and where it is a temperature the time of that row.
     latest: f64,
+    before: f64,
+    /// Leaps of a temperature, and the highest of them.
+    pub(super) leaps_of_heat: Episodes,
+    pub(super) highest: f64,
     /// Whether its shape is looked at, or only its numbers.
     shaped: bool,
 }
@@ -82,6 +90,9 @@ impl Track {
             excitation: None,
             position,
             latest: f64::NAN,
+            before: f64::NAN,
+            leaps_of_heat: Episodes::default(),
+            highest: 0.0,
             shaped,
         }
     }
@@ -123,6 +134,9 @@ impl Track {
                 continue;
             }
             self.number(t, value, join);
+            if self.channel.role == ChannelRole::Temperature {
+                self.heat(t, value, join);
+            }
             if *step == RowStep::Unusable || !self.shaped {
                 continue;
             }
@@ -148,6 +162,16 @@ impl Track {
                 excitation.take(t, value);
             }
         }
+    }
+
+    /// Looks for a leap between two rows of a temperature.
+    fn heat(&mut self, t: f64, value: f64, join: f64) {
+        let height = (value - self.latest).abs();
+        if height > LEAP && t - self.before < LEAP_S {
+            self.leaps_of_heat.add(self.before, t, 1, join);
+            self.highest = self.highest.max(height);
+        }
+        (self.before, self.latest) = (t, value);
     }
 
     #[inline]

@@ -35,6 +35,7 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     let track = &judge.tracks[place];
     match track.channel.role {
         ChannelRole::Position | ChannelRole::Velocity | ChannelRole::Torque => {}
+        ChannelRole::Temperature => return heat(track, draft),
         ChannelRole::Acceleration | ChannelRole::Command | ChannelRole::Other => return,
     }
     if track.rows == 0 {
@@ -75,6 +76,29 @@ pub(super) fn faults(judge: &LogJudge, place: usize, clock: &ClockFacts, draft: 
     if judge.depth == Depth::Whole {
         coarse(judge, track, clock, draft);
     }
+}
+
+/// A temperature that never changes, or that leaps.
+fn heat(track: &Track, draft: &mut FaultList) {
+    if track.rows > 0 && track.travel() == 0.0 {
+        let effect = format!(
+            "{} in all {} rows: nothing can be seen to depend on it",
+            track.low, track.rows
+        );
+        let remedy = "check the sensor; log from a cold start on, or over a pause";
+        draft.whole(Warning, FaultKind::StuckChannel, track, effect, remedy);
+    }
+    let highest = track.highest;
+    let effect = |_: u64, times: usize| {
+        let times = if times > 1 { "leaps" } else { "leap" };
+        format!("{times} of up to {highest:.1} degC from row to row: no drive warms up so fast")
+    };
+    let remedy = "check the sensor and its wiring, and whether logs were joined there";
+    let (kind, name) = (
+        FaultKind::TemperatureStep,
+        Some(track.channel.name.as_str()),
+    );
+    draft.stretches(kind, Warning, name, &track.leaps_of_heat, &effect, remedy);
 }
 
 /// A channel that never changes.

@@ -268,13 +268,15 @@ fn number_faults(track: &Track, draft: &mut FaultList) {
         // A column of words is no channel.
         return;
     }
-    let severity = if used { Error } else { Info };
+    let (severity, then) = match track.channel.role {
+        _ if used => (Error, "a fit refuses the log"),
+        ChannelRole::Temperature => (
+            Warning,
+            "a fit does not read it, `diagnose` and what takes the temperature refuse the log",
+        ),
+        _ => (Info, "a fit does not read this channel"),
+    };
     let effect = |rows: u64, times: usize| {
-        let then = if used {
-            "a fit refuses the log"
-        } else {
-            "a fit does not read this channel"
-        };
         format!("{} without a finite number: {then}", rows_text(rows, times))
     };
     let remedy =

@@ -18,6 +18,8 @@ pub enum ChannelRole {
     Acceleration,
     /// Torque, force, current or voltage.
     Torque,
+    /// Temperature of a drive, where the robot file says so.
+    Temperature,
     /// What was commanded or wanted.
     Command,
     /// Anything else.

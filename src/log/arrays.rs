@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::layout::Layout;
 use super::rows::LogRows;
 use super::source::Checksum;
+use super::temperatures::Temperatures;
 use super::time::Stamped;
 use super::{Block, LogError};
 use crate::number::{beyond, is_usable};
@@ -18,6 +19,8 @@ pub struct Arrays {
     tau: Vec<f64>,
     /// The positions that the controller was asked for, as a log of their own.
     references: Option<Arc<Arrays>>,
+    /// Temperatures of joints [degC], each with one value per row.
+    temperatures: Vec<(usize, Vec<f64>)>,
     sha256: String,
 }
 
@@ -54,6 +57,7 @@ impl Arrays {
             q,
             tau,
             references: None,
+            temperatures: Vec::new(),
             sha256: checksum.hexadecimal(),
         })
     }
@@ -77,6 +81,45 @@ impl Arrays {
         Ok(self)
     }
 
+    /// The same with the temperature of a joint [degC], one value per row.
+    ///
+    /// # Errors
+    /// Another number of values than there are rows, and one that is no number.
+    pub fn with_temperature(
+        mut self,
+        joint: usize,
+        temperatures: Vec<f64>,
+    ) -> Result<Self, LogError> {
+        let channel = "the temperature";
+        if temperatures.len() != self.t.len() {
+            return Err(LogError::Shape {
+                log: self.name,
+                channel,
+                values: temperatures.len(),
+                rows: self.t.len(),
+                remedy: "give one temperature per row",
+            });
+        }
+        if let Some(row) = temperatures.iter().position(|x| !is_usable(*x)) {
+            let value = temperatures[row];
+            return Err(LogError::NotFinite {
+                at: format!("{}, row {}", self.name, row + 1),
+                column: channel.to_owned(),
+                text: format!("{value:?}{}", beyond(value)),
+                remedy: "give the last temperature before it again, or leave the rows out",
+            });
+        }
+        self.temperatures.retain(|(j, _)| *j != joint);
+        self.temperatures.push((joint, temperatures));
+        Ok(self)
+    }
+
+    /// The temperatures that were given.
+    pub fn temperatures(&self) -> Temperatures {
+        let columns = self.temperatures.iter();
+        Temperatures::of_columns(&self.t, columns.map(|(j, x)| (*j, x.as_slice())))
+    }
+
     /// The same log with the torques of each joint times a factor of its own.
     ///
     /// # Errors
@@ -84,9 +127,12 @@ impl Arrays {
     pub fn with_torques_times(&self, factors: &[f64]) -> Result<Self, LogError> {
         let tau = self.tau.chunks(factors.len().max(1));
         let tau = tau.flat_map(|row| row.iter().zip(factors).map(|(tau, factor)| tau * factor));
-        let references = self.references.clone();
         let of = Self::new(&self.name, self.t.clone(), self.q.clone(), tau.collect())?;
-        Ok(Self { references, ..of })
+        Ok(Self {
+            references: self.references.clone(),
+            temperatures: self.temperatures.clone(),
+            ..of
+        })
     }
 
     /// Name of the log.

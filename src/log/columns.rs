@@ -42,7 +42,7 @@ impl Header<'_> {
             Some(_) => None,
             None => Some(self.find(&layout.time, "time")?),
         };
-        let positions = each(&layout.positions, "position")?;
+        let positions = each(&layout.positions, layout.what())?;
         let torques = each(&layout.torques, "torque")?;
         // A velocity is optional unless the robot file names its column.
         let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();

@@ -134,6 +134,8 @@ pub struct Layout {
     pub zero_order_hold: bool,
     /// How the logs are written: delimiter, topics, stamps, names of joints in messages.
     pub section: LogSection,
+    /// What stands in the places of positions are temperatures.
+    pub temperatures: bool,
     /// Layout to use instead where the log has none of this layout's positions.
     pub otherwise: Option<Box<Layout>>,
 }
@@ -158,7 +160,16 @@ impl Layout {
             conversion: None,
             zero_order_hold: false,
             section: LogSection::default(),
+            temperatures: false,
             otherwise: None,
+        }
+    }
+
+    /// What its positions are, in words.
+    pub(super) fn what(&self) -> &'static str {
+        match self.temperatures {
+            true => "temperature",
+            false => "position",
         }
     }
 

@@ -26,6 +26,7 @@ mod source;
 mod spec;
 mod stale;
 mod stream;
+mod temperatures;
 mod text;
 mod time;
 mod time_unit;
@@ -49,6 +50,7 @@ pub use section::{
 pub use shared::shares_rows;
 pub use source::{DataRole, Provenance, sha256};
 pub use spec::{LogSpec, Span};
+pub use temperatures::Temperatures;
 pub use time::Instant;
 
 pub(crate) use columns::unit_of;

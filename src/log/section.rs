@@ -250,6 +250,10 @@ pub struct JointChannels {
     /// position; `lsq --estimator iv` simulates along it where every joint has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<ColumnName>,
+    /// Column of the temperature of the joint's drive \[degC\]; a signal of formulas and of what is left of a
+    /// residual. No temperature is read where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ColumnName>,
     /// Column of the torque; `tau_NAME` where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque: Option<ColumnName>,
@@ -321,6 +325,9 @@ pub struct LogSection {
     /// Topic of the torques, where they have one of their own; found where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_topic: Option<String>,
+    /// Topic of the temperatures; found where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_topic: Option<String>,
     /// Which time of a message counts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub stamp: Stamp,

@@ -8,7 +8,7 @@ use super::family::{Family, How, Key, families, fit};
 use super::look::{ClockSource, SeenColumns};
 use super::units::{Unit, of_positions, of_torques};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{joint, words};
+use crate::inspect::words::{Word, joint, words};
 use crate::log::escape;
 use crate::robot::JointKind;
 
@@ -34,6 +34,9 @@ pub struct JointColumns {
     pub velocity: Option<String>,
     /// Column of its torque.
     pub torque: Option<String>,
+    /// Column that looks like the temperature of its drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<String>,
     #[serde(skip)]
     pub position_unit: Option<&'static str>,
     #[serde(skip)]
@@ -143,7 +146,9 @@ impl Mapping {
             columns_of(&torque),
         );
         out.units(&joints, &q, &tau);
+        let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
+            joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
             let name = |column: &Option<LogColumn>| column.as_ref().map(|c| c.name.clone());
             (joint.position, joint.velocity, joint.torque) =
                 (name(&q[k]), name(&dq[k]), name(&tau[k]));
@@ -255,6 +260,7 @@ fn plain(known: &Known) -> JointColumns {
         position: None,
         velocity: None,
         torque: None,
+        temperature: None,
         position_unit: None,
         position_scale: None,
         wrap: None,
@@ -341,6 +347,24 @@ fn best<'a>(
         others,
         tie,
     })
+}
+
+/// A column of temperatures for every joint, where a family of them fits.
+fn temperatures(columns: &[LogColumn], joints: &[&str]) -> Option<Vec<String>> {
+    let said = |c: &&LogColumn| {
+        let spoken = words(&c.name);
+        let warm =
+            |word: &Word| ["temp", "temps", "temperature", "temperatures"].contains(&&*word.text);
+        !c.commanded && spoken.iter().any(warm)
+    };
+    let of: Vec<&LogColumn> = columns.iter().filter(said).collect();
+    let mut found = families(&of, joints);
+    found.sort_by_key(|family| family.penalty);
+    let fitting = found.iter().filter_map(|family| fit(family, joints));
+    let mut whole = fitting.filter(|(how, _)| *how != How::InPart);
+    let (_, columns) = whole.next()?;
+    let name = |column: Option<&LogColumn>| Some(column?.name.clone());
+    columns.into_iter().map(name).collect()
 }
 
 /// The joints that a log shows: the members of the family of positions that has torques beside it and is

@@ -30,6 +30,8 @@ pub struct Stretch {
     pub a: Vec<Vec<f64>>,
     /// Torques, unfiltered [N or Nm].
     pub tau: Vec<Vec<f64>>,
+    /// Temperatures as logged \[degC\]; empty of joints without one, and of all where no log has any.
+    pub temperature: Vec<Vec<f64>>,
 }
 
 impl Stretch {
@@ -57,18 +59,34 @@ impl Stretch {
         if !alike(self.dt, other.dt) || from < 0.0 || to > self.len() as f64 {
             return None;
         }
-        let range = from as usize..to as usize;
-        let part =
-            |channels: &[Vec<f64>]| channels.iter().map(|x| x[range.clone()].to_vec()).collect();
+        let began = other.began;
         Some(Stretch {
-            t: self.t[range.clone()].to_vec(),
-            q: part(&self.q),
-            v: part(&self.v),
-            a: part(&self.a),
-            tau: part(&self.tau),
-            began: other.began,
-            ..*self
+            began,
+            ..self.part(from as usize, to as usize)
         })
+    }
+
+    /// Samples `from..until`; of a channel that is not there nothing.
+    pub fn part(&self, from: usize, until: usize) -> Stretch {
+        let of = |channels: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let part = |x: &Vec<f64>| x.get(from..until).unwrap_or_default().to_vec();
+            channels.iter().map(part).collect()
+        };
+        Stretch {
+            began: self.began + self.dt * from as f64,
+            t: self.t[from..until].to_vec(),
+            q: of(&self.q),
+            v: of(&self.v),
+            a: of(&self.a),
+            tau: of(&self.tau),
+            temperature: of(&self.temperature),
+            ..*self
+        }
+    }
+
+    /// Whether it has the temperature of a joint.
+    pub fn has_temperature(&self, joint: usize) -> bool {
+        self.temperature.get(joint).is_some_and(|x| !x.is_empty())
     }
 
     /// Number of joints.

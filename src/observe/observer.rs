@@ -2,7 +2,7 @@
 
 use crate::band::Directions;
 use crate::effect::{AugmentedModel, Sampled};
-use crate::log::Block;
+use crate::log::{Block, Temperatures};
 use crate::math::causal::{Causal, delay_samples};
 use crate::math::sos::Sos;
 use crate::motion::{CausalMotion, FilterSettings, MotionError, MotionSample};
@@ -40,6 +40,7 @@ pub struct Observer {
     cutoff_hz: f64,
     core: Option<Core>,
     first: Option<f64>,
+    temperatures: Temperatures,
 }
 
 /// What is there once the sampling step is known.
@@ -82,6 +83,7 @@ impl Observer {
             cutoff_hz: settings.cutoff_hz,
             core: None,
             first: None,
+            temperatures: Temperatures::default(),
         })
     }
 
@@ -92,6 +94,11 @@ impl Observer {
             uncertain: Some(directions),
             ..self
         }
+    }
+
+    /// Takes the temperatures of the log that it observes.
+    pub fn set_temperatures(&mut self, temperatures: Temperatures) {
+        self.temperatures = temperatures;
     }
 
     /// Time by which external torques are late, once the sampling step is known \[s\].
@@ -118,7 +125,7 @@ impl Observer {
         self.first = self.first.or(rows.t.first().copied());
         let (core, model, cutoff) = (&mut self.core, &self.model, self.cutoff_hz);
         let first = self.first.unwrap_or(0.0);
-        let uncertain = &mut self.uncertain;
+        let (uncertain, temperatures) = (&mut self.uncertain, &self.temperatures);
         let mut failed = None;
         self.motion.push(rows, last, &mut |dt, sample| {
             if failed.is_some() {
@@ -134,6 +141,8 @@ impl Observer {
                     }
                 },
             };
+            let t = sample.motion.t;
+            core.plant.set_temperatures(|j| temperatures.at(j, t));
             core.take(first, &sample.motion, sample.begins, uncertain, out);
         })?;
         failed.map_or(Ok(()), Err)

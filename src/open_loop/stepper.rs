@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::effect::{AugmentedModel, Sampled};
+use crate::motion::Stretch;
 use crate::robot::dynamics::Dynamics;
 use crate::robot::model::JointFriction;
 
@@ -65,6 +66,12 @@ impl Stepper {
         self.v.copy_from_slice(v);
         self.a.fill(0.0);
         self.effects.begin();
+    }
+
+    /// Takes the temperatures of sample `k` for the steps from here on.
+    pub fn set_temperatures(&mut self, stretch: &Stretch, k: usize) {
+        let of = |j: usize| stretch.temperature.get(j)?.get(k).copied();
+        self.effects.set_temperatures(of);
     }
 
     /// Goes one step on under these torques, `since` seconds after the begin of the log; false where the inertia

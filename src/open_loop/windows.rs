@@ -164,6 +164,7 @@ pub(super) fn run(
     stepper.begin(&q, &v);
     for k in begin..end {
         if k > begin {
+            stepper.set_temperatures(stretch, k);
             for part in 0..parts as usize {
                 let share = (part as f64 + 0.5) / parts;
                 for (now, tau) in now.iter_mut().zip(tau) {

@@ -13,17 +13,20 @@ pub enum FormulaSignal {
     Load,
     /// Saturating part of its friction over its level, -1 to 1.
     Direction,
+    /// Temperature of its drive as logged \[degC\].
+    Temperature,
     /// Time since the begin of the log \[s\].
     Time,
 }
 
 impl FormulaSignal {
-    const ALL: [(&'static str, Self); 6] = [
+    const ALL: [(&'static str, Self); 7] = [
         ("q", Self::Position),
         ("v", Self::Speed),
         ("a", Self::Acceleration),
         ("load", Self::Load),
         ("direction", Self::Direction),
+        ("temperature", Self::Temperature),
         ("t", Self::Time),
     ];
 

@@ -11,6 +11,7 @@
 //! | [`reference`] | Fourier series (43), one-joint ladder, point list |
 //! | [`controller`] | Cartesian P or PD controller with zero-order hold |
 //! | [`sensors`] | encoders, sampling, noise, all from one seed |
+//! | [`temperature`] | how warm the drives are |
 //! | [`run`](mod@run) | the experiment, with limits and saturation |
 //! | [`simulated_run`] | the log, and beside it what was true |
 //! | [`order`], [`truth`] | the same from files, and to files |
@@ -38,6 +39,7 @@ pub mod settings;
 mod settings_file;
 pub mod simulated_run;
 pub mod single_joint;
+pub mod temperature;
 pub mod truth;
 pub mod volts;
 
@@ -60,5 +62,6 @@ pub use sensors::{Noise, Sensors};
 pub use settings::{OnLimit, Settings};
 pub use simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
 pub use single_joint::SingleJointTruth;
+pub use temperature::PlantTemperatures;
 pub use truth::TruthFile;
 pub use volts::VoltSeries;

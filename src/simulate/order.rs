@@ -13,6 +13,7 @@ use super::run::{MotorInput, Start, run_in_blocks};
 use super::settings::Settings;
 use super::settings_file;
 use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
+use super::temperature::PlantTemperatures;
 use super::truth::TruthFile;
 use super::volts::VoltSeries;
 use crate::config::ModelFile;
@@ -185,7 +186,13 @@ fn run_order<const J: usize>(
     in_memory: bool,
 ) -> Result<SimulationSummary, SimulateError> {
     let plant = Plant::<J>::of(order.robot, order.model)?;
-    let (effects, effect_values) = built_effects(order, &Sites::of(&plant)?)?;
+    let declared = &order.robot.sensors.temperature;
+    let warm = PlantTemperatures::of(declared, plant.mechanism.robot.joint_names());
+    let sites = Sites {
+        temperatures: warm.clone(),
+        ..Sites::of(&plant)?
+    };
+    let (effects, effect_values) = built_effects(order, &sites)?;
     let mechanism = &plant.mechanism;
     let mut settings = settings_file::settings(order.robot, mechanism)?;
     settings.seconds = order.seconds.unwrap_or(SECONDS);
@@ -220,7 +227,7 @@ fn run_order<const J: usize>(
         },
     )?;
     recorder.hear(&run);
-    let layout = LogLayout::of(order.robot, &run);
+    let layout = LogLayout::of(order.robot, &run, warm);
     let mut saturated = Saturated::default();
     let mut give = |run: &mut SimulatedRun<J>| {
         recorder.measure(run, mechanism, &effects);
@@ -399,10 +406,17 @@ fn truth_of<const J: usize>(
 struct LogLayout {
     layout: Layout,
     header: Vec<String>,
+    /// Joints that have a temperature.
+    warm: Vec<usize>,
+    temperatures: PlantTemperatures,
 }
 
 impl LogLayout {
-    fn of<const J: usize>(robot: &RobotFile, run: &SimulatedRun<J>) -> Self {
+    fn of<const J: usize>(
+        robot: &RobotFile,
+        run: &SimulatedRun<J>,
+        temperatures: PlantTemperatures,
+    ) -> Self {
         let layout = robot.layout();
         let mut header = vec![layout.time.column.clone()];
         let (joint, actuator) = parts(&layout);
@@ -414,7 +428,20 @@ impl LogLayout {
             let motors = 1..=run.coordinates.len();
             header.extend(motors.map(|i| format!("status_{i}")));
         }
-        Self { layout, header }
+        let warm = |j: &usize| temperatures.at(*j, 0.0).is_some();
+        let warm: Vec<usize> = (0..run.joints.len()).filter(warm).collect();
+        header.extend(warm.iter().map(|j| {
+            let joint = &run.joints[*j];
+            let named = robot.log.joint.get(joint);
+            let named = named.and_then(|of| of.temperature.as_ref());
+            named.map_or(format!("temperature_{joint}"), |name| name.0.clone())
+        }));
+        Self {
+            layout,
+            header,
+            warm,
+            temperatures,
+        }
     }
 
     /// The rows as the log shows them, one after the other.
@@ -433,6 +460,8 @@ impl LogLayout {
                 let status = run.status[k].iter().take(run.coordinates.len());
                 values.extend(status.map(|s| f64::from(s.code())));
             }
+            let warm = self.warm.iter();
+            values.extend(warm.filter_map(|j| self.temperatures.at(*j, run.t[k])));
         }
         values
     }

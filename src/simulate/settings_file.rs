@@ -60,6 +60,7 @@ pub(super) fn settings<const J: usize>(
         torque_noise_relative,
         jitter,
         dropouts,
+        ..
     } = file.sensors;
     let torque_noise = match (torque_noise.as_slice(), torque_noise_relative) {
         ([], None) => Noise::None,

@@ -120,13 +120,19 @@ pub fn note(model: &Model) -> Note {
     }
 }
 
-/// q, v and a, sample by sample, as bytes.
+/// q, v and a, and temperatures where there are some, sample by sample, as bytes.
 fn motion(s: &Stretch) -> Vec<u8> {
     let rows = (0..s.len()).flat_map(|k| {
-        let channels = [&s.q, &s.v, &s.a].into_iter().flatten();
+        let channels = [&s.q, &s.v, &s.a, &s.temperature].into_iter().flatten();
         channels.map(move |channel| channel[k])
     });
     rows.flat_map(f64::to_ne_bytes).collect()
+}
+
+/// Channels of each joint in it, and whether temperatures are among them.
+fn channels(s: &Stretch) -> (usize, bool) {
+    let warm = !s.temperature.is_empty();
+    (3 + usize::from(warm), warm)
 }
 
 /// Torques of every case by its C header: `[case][joint][sample]`.
@@ -143,7 +149,12 @@ pub fn by_c(folder: &Path, cases: &[Case]) -> Vec<Vec<Vec<f64>>> {
         };
         std::fs::write(folder.join(format!("m{i}.h")), header).unwrap();
         std::fs::write(folder.join(format!("m{i}.bin")), motion(&case.along)).unwrap();
-        let (row, middle) = (3 * n, 3 * n * (samples / 2));
+        let (parts, warm) = channels(&case.along);
+        let (row, middle) = (parts * n, parts * n * (samples / 2));
+        let temperature = match warm {
+            true => format!(", x + 3 * {n}"),
+            false => String::new(),
+        };
         let _ = write!(
             driver,
             "#include \"m{i}.h\"\nstatic int run{i}(void)\n{{\n  double x[{row}], t[{n}], middle[{row}];\n  \
@@ -152,7 +163,7 @@ pub fn by_c(folder: &Path, cases: &[Case]) -> Vec<Vec<Vec<f64>>> {
              if (fread(middle, sizeof(double), {row}, f) != {row}) return 1;\n  rewind(f);\n  \
              for (k = 0; k < {samples}; k++) {{\n    if (fread(x, sizeof(double), {row}, f) != {row}) return 1;\n    \
              if (k == 0) {{ m{i}_init(&s, x); s.t = {began:?}; }}\n{about}    \
-             m{i}_step(&s, {dt:?}, x, x + {n}, x + 2 * {n}, t);\n    \
+             m{i}_step(&s, {dt:?}, x, x + {n}, x + 2 * {n}{temperature}, t);\n    \
              fwrite(t, sizeof(double), {n}, stdout);\n  }}\n  (void)middle;\n  fclose(f);\n  return 0;\n}}\n",
             began = case.along.began,
             dt = case.along.dt,
@@ -196,14 +207,16 @@ pub fn by_rust(folder: &Path, cases: &[Case]) -> Vec<Vec<Vec<f64>>> {
         std::fs::write(folder.join(format!("m{i}.rs")), module).unwrap();
         std::fs::write(folder.join(format!("m{i}.bin")), motion(&case.along)).unwrap();
         let _ = writeln!(driver, "#[allow(dead_code)]\nmod m{i};");
+        let (parts, warm) = channels(&case.along);
+        let temperature = if warm { ", &at(k, 3)" } else { "" };
         let _ = write!(
             calls,
             "  {{\n    let x = std::fs::read(\"m{i}.bin\").unwrap();\n    \
              let at = |k: usize, part: usize| -> [f64; {n}] {{\n      std::array::from_fn(|j| {{\n        \
-             let at = 8 * (3 * {n} * k + part * {n} + j);\n        \
+             let at = 8 * ({parts} * {n} * k + part * {n} + j);\n        \
              f64::from_ne_bytes(x[at..at + 8].try_into().unwrap())\n      }})\n    }};\n    \
              let mut s = m{i}::init(&at(0, 0));\n{about}    s.t = {began:?};\n    \
-             for k in 0..{samples} {{\n      for x in m{i}::step(&mut s, {dt:?}, &at(k, 0), &at(k, 1), &at(k, 2)) {{\n        \
+             for k in 0..{samples} {{\n      for x in m{i}::step(&mut s, {dt:?}, &at(k, 0), &at(k, 1), &at(k, 2){temperature}) {{\n        \
              out.write_all(&x.to_ne_bytes()).unwrap();\n      }}\n    }}\n  }}\n",
             began = case.along.began,
             dt = case.along.dt,

@@ -244,6 +244,7 @@ impl Draft<'_> {
                 self.mapping.others.join(", ")
             );
         }
+        self.temperatures(out);
         if lines.is_empty() {
             out.push_str(
                 "# The log has the tool's own names for its columns: nothing is to be mapped.\n",
@@ -260,6 +261,27 @@ impl Draft<'_> {
         for line in lines {
             out.push_str(&line);
             out.push('\n');
+        }
+    }
+
+    /// Columns that may be the temperatures of the drives: a guess by their names, which nothing reads unasked.
+    fn temperatures(&self, out: &mut String) {
+        let joints = self.mapping.joints.iter();
+        let found = joints.filter_map(|joint| Some((joint, joint.temperature.as_ref()?)));
+        let lines: Vec<String> = found
+            .map(|(joint, name)| {
+                format!(
+                    "#   {}: temperature = {}\n",
+                    key(&joint.joint),
+                    column(name)
+                )
+            })
+            .collect();
+        if !lines.is_empty() {
+            out.push_str(
+                "# CHECK IT: temperatures of the drives? This key in the line of each joint in [log.joint] makes them signals:\n",
+            );
+            out.push_str(&lines.concat());
         }
     }
 

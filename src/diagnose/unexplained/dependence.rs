@@ -73,13 +73,16 @@ fn of_joint(
     }
     let joints = at.weights.len();
     let moving = |i: &usize| !problem.cover.joints[*i].stationary;
+    let warm = |i: &usize| problem.stretches.iter().all(|s| s.has_temperature(*i));
     let mut signals = vec![
         Signal::Acceleration,
         Signal::Load,
         Signal::Direction,
         Signal::SinceReversal,
-        Signal::Time,
     ];
+    // before the time: what warms up steadily tells the same
+    signals.extend((0..joints).filter(warm).map(Signal::Temperature));
+    signals.push(Signal::Time);
     for i in (0..joints).filter(moving) {
         signals.extend([Signal::Position(i), Signal::Speed(i)]);
     }

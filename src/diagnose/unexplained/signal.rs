@@ -3,7 +3,7 @@
 use crate::effect::Torques;
 use crate::motion::Stretch;
 
-/// What a residual may depend on; positions and speeds of any joint, all else of its own.
+/// What a residual may depend on; positions, speeds and temperatures of any joint, all else of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
     Position(usize),
@@ -12,6 +12,8 @@ pub enum Signal {
     Load,
     Direction,
     SinceReversal,
+    /// Of any joint that has one.
+    Temperature(usize),
     Time,
 }
 
@@ -36,6 +38,7 @@ pub(super) fn values(
             Signal::Load => torques[*i].load.get(j).map_or(0.0, |load| load[*k]),
             Signal::Direction => s.v[j][*k].signum(),
             Signal::SinceReversal => since[*i][*k],
+            Signal::Temperature(of) => s.temperature[of][*k],
             Signal::Time => s.began + s.dt * *k as f64,
         }
     };

@@ -45,7 +45,14 @@ impl RobotFields {
                     places.push(FieldPath::parse(&channel.column));
                 }
                 if let Some(joint) = layout.name_in_messages(index) {
-                    places.push(FieldPath::named(field, "name", joint));
+                    // no list of messages is usually one of temperatures: as an entry of the column's name among
+                    // others, but for a topic that is said to hold them
+                    let among_others = layout.temperatures && layout.section.topic.is_none();
+                    let name = match among_others {
+                        true => &channel.column,
+                        false => joint,
+                    };
+                    places.push(FieldPath::named(field, "name", name));
                 }
                 paths.push(places);
             }

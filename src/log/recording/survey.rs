@@ -210,13 +210,18 @@ fn pick(
         }
     };
     let is = |c: &TopicCandidate, name: &Option<String>| name.as_ref().is_none_or(|n| *n == c.name);
+    let key = match layout.temperatures {
+        true => "temperature_topic",
+        false => "topic",
+    };
     let separate = asked.torque_topic.is_some() && asked.torque_topic != asked.topic;
     let both = match separate {
         true => None,
         false => one(
             &|c| c.both && is(c, &asked.topic),
-            "topic",
+            key,
             match fields.torques.is_empty() {
+                true if layout.temperatures => "temperatures",
                 true => "positions",
                 false => "positions and torques",
             },
@@ -225,11 +230,7 @@ fn pick(
     let (first, second) = match both {
         Some(candidate) => (candidate, None),
         None => {
-            let q = one(
-                &|c| c.positions && is(c, &asked.topic),
-                "topic",
-                "positions",
-            )?;
+            let q = one(&|c| c.positions && is(c, &asked.topic), key, "positions")?;
             let tau = one(
                 &|c| c.torques && is(c, &asked.torque_topic),
                 "torque_topic",
@@ -310,7 +311,7 @@ fn missing(
     let (range, channels, what) = match positions {
         Some(_) => (&fields.torques, &layout.torques, "torque"),
         None if fields.positions.is_empty() => (&fields.torques, &layout.torques, "torque"),
-        None => (&fields.positions, &layout.positions, "position"),
+        None => (&fields.positions, &layout.positions, layout.what()),
     };
     let count = |c: &TopicCandidate| c.missing[range.clone()].iter().filter(|m| !**m).count();
     let best = found

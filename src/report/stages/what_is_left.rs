@@ -62,6 +62,7 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
             Signal::Load => torque.to_owned(),
             Signal::Direction => "1".to_owned(),
             Signal::SinceReversal | Signal::Time => "s".to_owned(),
+            Signal::Temperature(_) => "degC".to_owned(),
         };
         (signal_words(names, joint, signal), unit)
     });

@@ -9,6 +9,7 @@ use crate::effect::Places;
 use crate::math::formula::{Formula, MOST_NAMES};
 use crate::robot::FormulaSignal;
 use crate::simulate::SimulateError;
+use crate::simulate::temperature::PlantTemperatures;
 
 /// A coefficient's formula with its number.
 #[derive(Debug)]
@@ -32,6 +33,7 @@ struct Own {
     terms: Vec<Term>,
     /// Of every joint: Coulomb level, viscous coefficient and a steep slope.
     friction: Vec<[f64; 3]>,
+    temperatures: PlantTemperatures,
     /// In accelerations or loads.
     implicit: bool,
 }
@@ -155,7 +157,16 @@ impl Own {
                 let what = format!("`{key}`: `{name}` is no signal of this robot and no shape");
                 wrong(candidate, &what)
             })?;
-            Ok(Input::Signal(signal, of.unwrap_or(site.joint())))
+            let of = of.unwrap_or(site.joint());
+            if signal == FormulaSignal::Temperature && sites.temperatures.at(of, 0.0).is_none() {
+                let joint = &joints[of];
+                let what = format!(
+                    "`{key}` takes the temperature of {joint}, and no course of it is declared; give one in the robot \
+                     file: `[sensors.temperature.{joint}]` with start, rise and time_constant_s"
+                );
+                return Err(wrong(candidate, &what));
+            }
+            Ok(Input::Signal(signal, of))
         };
         let term = |(key, text): (&String, &String)| {
             let formula = Formula::parse(text).map_err(|why| {
@@ -183,6 +194,7 @@ impl Own {
             joint: site.joint(),
             implicit: terms.iter().any(|term| term.inputs.iter().any(implicit)),
             terms,
+            temperatures: sites.temperatures.clone(),
             friction: sites
                 .joints
                 .iter()
@@ -218,6 +230,7 @@ impl Own {
                     false => sign(slope, motion.v[j]),
                 }
             }
+            FormulaSignal::Temperature => self.temperatures.at(j, motion.t).unwrap_or(f64::NAN),
             FormulaSignal::Time => motion.t,
         }
     }

@@ -7,6 +7,7 @@ use crate::robot::cft::pantograph;
 use crate::robot::{JointKind, Robot};
 use crate::simulate::SimulateError;
 use crate::simulate::plant::Plant;
+use crate::simulate::temperature::PlantTemperatures;
 
 /// Middling speeds of a joint that slides \[m/s\] and of one that turns \[rad/s\].
 const SLIDING_SPEED: f64 = 0.2;
@@ -105,6 +106,8 @@ pub struct Sites<'a> {
     pub joints: Vec<Site>,
     pub screws: Vec<Site>,
     pub whole: Vec<Site>,
+    /// How warm its drives are.
+    pub temperatures: PlantTemperatures,
 }
 
 impl<'a> Sites<'a> {
@@ -133,6 +136,7 @@ impl<'a> Sites<'a> {
             joints,
             screws,
             whole: whole.into_iter().collect(),
+            temperatures: PlantTemperatures::default(),
         })
     }
 }
