@@ -314,3 +314,48 @@ fn a_diagnosis_of_a_log_with_a_turned_torque_is_a_fault_of_the_data() {
     assert_eq!(short(&found["setup"][0]), ("sign", "torque", "q2", true));
     assert_eq!(found["faults"][0]["channel"], "q2");
 }
+
+/// Adds to each torque what changes every 25 rows and is half of that torque, by its root mean square.
+fn disturb(log: &mut Log) {
+    let mut seed = 7_u64;
+    for joint in 1..=6 {
+        let j = log.column(&format!("tau{joint}"));
+        let square: f64 = log.rows.iter().map(|row| row[j] * row[j]).sum();
+        let rms = (square / log.rows.len() as f64).sqrt();
+        let mut added = 0.0;
+        for (k, row) in log.rows.iter_mut().enumerate() {
+            if k % 25 == 0 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let chance = (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+                added = 0.5 * rms * 12.0_f64.sqrt() * chance;
+            }
+            row[j] += added;
+        }
+    }
+}
+
+#[test]
+fn what_leaves_more_than_a_third_unexplained_is_a_warning_with_both_readings_and_the_fit_goes_on() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let turned = Altered::new(&log, "configs/ur10.toml", |log| {
+        log.map("tau2", |x| -x);
+        disturb(log);
+    });
+    // status 0, and no robot file that is right by the torques
+    let fit = turned.mended();
+    let told = &fit["setup"];
+    assert_eq!(told.as_array().map(Vec::len), Some(1), "{told}");
+    assert_eq!(short(&told[0]), ("sign", "torque", "q2", false));
+    assert_eq!(told[0]["severity"], "warning");
+    assert!(told[0]["error_after"].as_f64() > Some(0.33), "{told}");
+    assert!(!turned.folder.path().join("new.toml").exists());
+    let warnings = fit["warnings"].to_string();
+    for reading in [
+        "torque_sign = -1.0",
+        "the set-up as declared is possible too",
+    ] {
+        assert!(warnings.contains(reading), "{warnings}");
+    }
+}

@@ -80,3 +80,69 @@ fn nothing_is_said_of_right_set_ups_and_of_their_spans() {
         });
     }
 }
+
+/// What is said of the simulated arm under an altered robot file or log.
+fn said_of_arm(alter: &dyn Fn(&mut Machine)) -> Vec<serde_json::Value> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut arm = machine("arm", folder.path()).expect("it is simulated");
+    alter(&mut arm);
+    heard_of_right(&arm, folder.path())
+}
+
+#[test]
+fn a_base_that_leans_a_little_is_a_hint_that_names_the_command() {
+    assert!(said_of_arm(&|_| {}).is_empty());
+    let lean = 8.0_f64.to_radians();
+    let said = said_of_arm(&|arm| {
+        let gravity = [9.81 * lean.sin(), 0.0, -9.81 * lean.cos()];
+        bench::robot_text::declare_gravity(&mut arm.robot, gravity);
+    });
+    let [hint] = &said[..] else {
+        panic!("{said:?}");
+    };
+    assert_eq!(
+        (&hint["severity"], &hint["kind"]),
+        (&"hint".into(), &"gravity".into())
+    );
+    assert_eq!(hint["sure"], false);
+    let found: Vec<f64> = hint["found"]
+        .as_array()
+        .expect("a vector")
+        .iter()
+        .filter_map(|x| x.as_f64())
+        .collect();
+    // as it is: upright to half a degree
+    let off = found[0].hypot(found[1]).atan2(-found[2]).to_degrees();
+    assert!(off < 0.5, "{hint}");
+    let command = hint["remedy"].as_str().expect("a command");
+    assert!(
+        command.starts_with("cft-ident diagnose log1.csv -m"),
+        "{command}"
+    );
+}
+
+#[test]
+fn torques_that_come_late_are_a_hint_with_their_delay() {
+    let rows = 10;
+    let said = said_of_arm(&|arm| {
+        let log = &mut arm.logs[0];
+        for joint in &arm.joints {
+            let torque = log.column_mut(&joint.torque);
+            torque.rotate_right(rows);
+        }
+        // what was rotated to the front is of the end
+        let (t, all) = (log.columns[0].clone(), log.rows());
+        log.retain(|k| k >= rows);
+        assert_eq!((log.columns[0][0], log.rows()), (t[rows], all - rows));
+    });
+    let [hint] = &said[..] else {
+        panic!("{said:?}");
+    };
+    assert_eq!(
+        (&hint["severity"], &hint["kind"]),
+        (&"hint".into(), &"delay".into())
+    );
+    let late = hint["found"].as_f64().expect("a number");
+    let step = 1e-3;
+    assert!((late / (rows as f64 * step) - 1.0).abs() < 0.1, "{hint}");
+}

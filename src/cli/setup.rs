@@ -6,7 +6,7 @@ use super::{CliError, Context};
 use crate::config::correction::{Edit, edited};
 use crate::config::{self, ModelFile, RobotFile};
 use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
-use crate::setup::{Finding, SetupReport};
+use crate::setup::{Finding, SetupReport, Severity};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -69,9 +69,11 @@ pub fn checked(
     let mut warnings: Vec<String> = report
         .findings
         .iter()
-        .filter(|f| !f.sure)
+        .filter(|f| f.severity == Severity::Warning)
         .map(likely)
         .collect();
+    let hints = (report.findings.iter()).filter(|f| f.severity == Severity::Hint);
+    hints.for_each(|hint| context.note(&format!("hint: {}", hint.told())));
     for power in &report.friction_power {
         warnings.push(power.sentence());
     }

@@ -72,7 +72,7 @@ pub fn check_setup(
     );
     let searched = search(&problem, &|| control.stopped());
     control.check()?;
-    Ok(told(machine, &problem, &searched))
+    Ok(told(machine, logs, &problem, &searched))
 }
 
 /// What a search of the set-up looks at.
@@ -105,7 +105,7 @@ fn sampled(
             channels = Some(channels_of(machine, log, open.layout()));
         }
         let (mut last, mut step) = (None, 0.0);
-        motion::run(
+        let run = motion::run(
             &mut |block| open.read(block),
             n,
             &settings,
@@ -126,10 +126,11 @@ fn sampled(
                     step = row.t - t;
                 }
                 last = Some((row.segment, row.t));
-                thinner.add(index, step, row.filtered);
+                thinner.add((index, row.segment), row.t, step, row.filtered);
             },
-        )
-        .map_err(|error| IdentifyError::of_run(&log.name(), error))?;
+        );
+        let run = run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
+        thinner.logged_every(run.dt);
     }
     let held = (EstimatorKind::Ols, true);
     let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
@@ -142,8 +143,13 @@ fn sampled(
     })
 }
 
-fn told(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> CheckedSetup {
-    let report = setup_words::report(machine, problem, searched);
+fn told(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    problem: &Problem,
+    searched: &Searched,
+) -> CheckedSetup {
+    let report = setup_words::report(machine, logs, problem, searched);
     let motors = problem.channels.drive == Drive::Motors;
     let edits = match report.refusals().next() {
         Some(_) => setup_words::edits(&machine.file, &searched.correction, motors),

@@ -1,5 +1,6 @@
 //! What a search of the set-up found, as the user reads it and as the robot file has it.
 
+use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use crate::config::RobotFile;
 use crate::config::correction::Edit;
@@ -10,11 +11,16 @@ use crate::robot::cft::COORDINATES;
 use crate::setup::tells_friction;
 use crate::setup::{
     Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind, Found,
-    FrictionPower, Problem, Searched, Setting, SetupReport,
+    FrictionPower, Hint, Problem, Searched, Setting, SetupReport, Severity, Small,
 };
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
-pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
+pub(super) fn report(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    problem: &Problem,
+    searched: &Searched,
+) -> SetupReport {
     let words = Words {
         file: &machine.file,
         names: match problem.channels.drive {
@@ -28,6 +34,7 @@ pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Search
         .found
         .iter()
         .flat_map(|found| words.findings(found))
+        .chain(searched.hint.iter().map(|hint| words.hint(hint, logs)))
         .collect();
     let power = |negative: &crate::setup::Negative| FrictionPower {
         joint: machine.robot.joint_names()[negative.joint].clone(),
@@ -95,6 +102,10 @@ impl Words<'_> {
                 error_before: Some(found.error[0]),
                 error_after: Some(found.error[1]),
                 remedy: self.remedy(&change),
+                severity: match found.sure {
+                    true => Severity::Error,
+                    false => Severity::Warning,
+                },
                 sure: found.sure,
                 evidence: Evidence {
                     held_out_gain: found.gain,
@@ -108,6 +119,115 @@ impl Words<'_> {
             }
         };
         split(&found.change).into_iter().map(finding).collect()
+    }
+
+    /// A small thing, which is no fault.
+    fn hint(&self, hint: &Hint, logs: &[Log]) -> Finding {
+        let names: Vec<String> = logs.iter().map(Log::name).collect();
+        let remedy = format!("cft-ident diagnose {} -m MODEL.toml", names.join(" "));
+        let (kind, channel, joint, [declared, found]) = self.small(&hint.small);
+        let alternative = |small: &Small| {
+            let (kind, channel, joint, [_, found]) = self.small(small);
+            Alternative {
+                kind,
+                channel,
+                joint,
+                with: None,
+                found,
+                remedy: remedy.clone(),
+            }
+        };
+        let looks = |small: &Small| match small {
+            Small::Zero(j, angle, _) => format!(
+                "a zero of {} that is off by {} degrees",
+                self.names[*j],
+                number::significant(angle.to_degrees(), 2)
+            ),
+            Small::Tilt(g) => {
+                let dot = g.iter().zip(&self.gravity).map(|(a, b)| a * b).sum::<f64>();
+                let square = |x: &[f64; 3]| x.iter().map(|x| x * x).sum::<f64>();
+                let lean = (dot / (square(g) * square(&self.gravity)).sqrt()).acos();
+                format!(
+                    "a base that leans by {} degrees",
+                    number::significant(lean.to_degrees(), 2)
+                )
+            }
+            Small::Delay(late, _) => format!(
+                "torques {} ms {} the positions",
+                number::significant(1e3 * late.abs(), 2),
+                if *late < 0.0 { "ahead of" } else { "behind" }
+            ),
+        };
+        let like: Vec<String> = [&hint.small]
+            .into_iter()
+            .chain(&hint.tied)
+            .map(looks)
+            .collect();
+        let [before, after] = hint.error.map(number::percent);
+        let meaning = format!(
+            "the misfit looks like {}: the model misses {before} of the torque without it, {after} with it",
+            like.join(", or as well like ")
+        );
+        Finding {
+            channel,
+            found_std: match hint.small {
+                Small::Zero(_, _, std) | Small::Delay(_, std) => Some(std),
+                Small::Tilt(_) => None,
+            },
+            error_before: Some(hint.error[0]),
+            error_after: Some(hint.error[1]),
+            severity: Severity::Hint,
+            evidence: Evidence {
+                held_out_gain: hint.gain,
+                needed: hint.needed,
+                tried: hint.tried,
+                ..Evidence::default()
+            },
+            tied_with: hint.tied.iter().map(alternative).collect(),
+            ..Finding::new(
+                kind,
+                joint,
+                [declared, found],
+                meaning,
+                remedy.clone(),
+                false,
+            )
+        }
+    }
+
+    /// Kind, channel, joint, and what is declared and found.
+    fn small(
+        &self,
+        small: &Small,
+    ) -> (
+        FindingKind,
+        Option<ChannelKind>,
+        Option<String>,
+        [Setting; 2],
+    ) {
+        match small {
+            Small::Zero(j, angle, _) => {
+                let offset = Declared::of(self.file, &self.names[*j], self.motors).offset;
+                (
+                    FindingKind::Zero,
+                    Some(ChannelKind::Position),
+                    Some(self.names[*j].clone()),
+                    [offset, offset + angle].map(Setting::Number),
+                )
+            }
+            Small::Tilt(g) => (
+                FindingKind::Gravity,
+                None,
+                None,
+                [self.gravity, *g].map(Setting::Vector),
+            ),
+            Small::Delay(late, _) => (
+                FindingKind::Delay,
+                Some(ChannelKind::Torque),
+                None,
+                [0.0, *late].map(Setting::Number),
+            ),
+        }
     }
 
     fn alternative(&self, change: &Change) -> Alternative {

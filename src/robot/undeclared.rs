@@ -12,7 +12,7 @@ use super::tree::newton_euler::{torques, walk};
 use super::tree::{MOST_JOINTS, Tree};
 use super::{Form, Robot, four};
 
-/// Torques of a gravity of one along the base's x and along its y. Masses m_i at p_i have the potential
+/// Torques of a gravity of one along two directions of the base, its x and its y as a rule. Masses m_i at p_i have the potential
 /// -sum m_i (gx p_x + gy p_y); the first moments of the CFT robot's chain are those of its kinetic energy
 /// (eq. (60)), those of other links are their base parameters. First moments that are no parameter, as those
 /// about a vertical first axis, count as none.
@@ -30,6 +30,11 @@ enum Moments {
 impl Robot {
     /// What a base that stands askew adds, for inertial parameters `theta`.
     pub fn tilt(&self, theta: &[f64]) -> Tilt {
+        self.tilt_along(theta, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    }
+
+    /// The same along two other directions; of the CFT robot, whose gravity is along its z, always x and y.
+    pub fn tilt_along(&self, theta: &[f64], directions: [[f64; 3]; 2]) -> Tilt {
         Tilt(match &self.0.form {
             Form::Inertia => Moments::Unknown,
             Form::Report(_) => match self.coefficients(theta) {
@@ -38,10 +43,7 @@ impl Robot {
             },
             Form::Recursion(_) => {
                 let along = |gravity| self.tree().in_gravity(gravity);
-                Moments::Links(
-                    Box::new([along([1.0, 0.0, 0.0]), along([0.0, 1.0, 0.0])]),
-                    self.link_parameters(theta),
-                )
+                Moments::Links(Box::new(directions.map(along)), self.link_parameters(theta))
             }
         })
     }

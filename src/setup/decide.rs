@@ -3,6 +3,7 @@
 use super::confirm;
 use super::correction::Change;
 use super::finding::ChannelKind;
+use super::fitted;
 use super::normal::Problem;
 use super::physics::{Positive, Quantity, credit, positives};
 use super::trial::Trial;
@@ -10,7 +11,7 @@ use super::trial::Trial;
 /// Blocks of time that are held out in turn.
 pub(super) const BLOCKS: usize = 24;
 /// Log-likelihood that one right hypothesis must gain: odds of e^8, some 3000 to 1.
-const ODDS: f64 = 8.0;
+pub(super) const ODDS: f64 = 8.0;
 /// The same for a reading that is likely, and no more: 20 to 1.
 const LIKELY: f64 = 3.0;
 /// Times what is needed that physics alone must say where the fit does not confirm it.
@@ -18,9 +19,9 @@ const FORCED: f64 = 2.0;
 /// Share of the most that any reading gains, below which another one is not looked at.
 const SHADOW: f64 = 0.5;
 /// Readings that are as likely to within e^3, 20 to 1, are reported as tied.
-const TIED: f64 = 3.0;
+pub(super) const TIED: f64 = 3.0;
 /// The error must move by more than a tenth..
-const TENTH: f64 = 1.1;
+pub(super) const TENTH: f64 = 1.1;
 /// .. or a quantity that is negative by so many deviations become positive.
 const FORBIDDEN: f64 = -4.0;
 /// Ratio by which its relative error over the joints may be larger by chance, where physics decides ..
@@ -30,18 +31,18 @@ const BETTER: f64 = 0.99;
 /// A relative error that is more than what real machines leave of a right set-up.
 const THIRD: f64 = 0.33;
 /// Deviations by which the mean gain of the blocks is above zero ..
-const DEVIATIONS: f64 = 2.5;
+pub(super) const DEVIATIONS: f64 = 2.5;
 /// .. and where there are few rows.
-const MORE_DEVIATIONS: f64 = 4.0;
+pub(super) const MORE_DEVIATIONS: f64 = 4.0;
 /// Independent rows for each unknown that are few.
-const FEW: f64 = 3.0;
+pub(super) const FEW: f64 = 3.0;
 /// Strokes of all joints, and of these for each unknown, that show a wrong set-up in all its motions: what fewer
 /// say must be said by each half of them.
-const STROKES: [f64; 2] = [20.0, 0.4];
+pub(super) const STROKES: [f64; 2] = [20.0, 0.4];
 /// Strokes for each unknown below which a residual is no evidence.
-const HARDLY: f64 = 0.2;
+pub(super) const HARDLY: f64 = 0.2;
 /// Share of a gain that one half of the logs may lose.
-const LOST: f64 = 0.1;
+pub(super) const LOST: f64 = 0.1;
 /// Log-likelihood by which what is right may predict worse by chance.
 const WORSE: f64 = 1.0;
 /// Logarithm of a factor by which scales differ that cannot both be right.
@@ -361,12 +362,14 @@ fn wins_in_halves(
         })
 }
 
-/// Whether two factors of the same channel differ by no more than badly known torque constants do.
+/// Whether two factors of the same channel differ by no more than badly known torque constants do, or two zeros of the
+/// same joint by no more than calibration.
 fn calibrated(a: &Option<Change>, b: &Option<Change>) -> bool {
     match (a, b) {
         (Some(Change::Scale(_, _, f)), Some(Change::Scale(_, _, g))) => {
             (f / g).ln().abs() < CALIBRATION
         }
+        (Some(Change::Zero(_, a)), Some(Change::Zero(_, b))) => (a - b).abs() < fitted::CALIBRATION,
         _ => false,
     }
 }

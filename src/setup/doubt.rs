@@ -1,7 +1,8 @@
 //! Is there anything to look for? A right set-up is to cost little: few rows, and no trial of every hypothesis.
 //!
 //! Signs, order and scales of torques are quadratic forms of one set of normal equations; zeros are looked
-//! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried.
+//! for along their derivative at the set-up as it is; of the positions only signs and neighbours are tried, of
+//! gravity the axes of the base.
 
 use std::cell::OnceCell;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -23,7 +24,7 @@ use crate::robot::JointKind;
 /// A robot of so few joints has all hypotheses tried: that costs little.
 const SMALL: usize = 3;
 /// Gain of log-likelihood, by few rows that are nearly independent, beyond which all is looked for.
-const GAIN: f64 = 6.0;
+pub(super) const GAIN: f64 = 6.0;
 /// Deviations below zero at which a quantity that must be positive is looked into.
 const BELOW: f64 = -3.0;
 /// A joint whose relative error is larger ..
@@ -41,7 +42,7 @@ const FIRST: [usize; 2] = [40, 3];
 /// .. rows on which those that do well there are tried again ..
 const FEWER: usize = 100;
 /// .. and those that do well there too.
-const MORE: usize = 500;
+pub(super) const MORE: usize = 500;
 /// Difference of scores below which a zero is a turned axis of the link's own description.
 const SAME: f64 = 1e-3;
 /// Ratio of factors that leave a joint to itself where both gain as much.
@@ -142,7 +143,8 @@ fn torques(
     changes.retain(simple);
     let known = problem.columns.known.iter().any(Option::is_some);
     if problem.channels.drive != Drive::Joints || known {
-        return changes.iter().filter(|c| c.joints().len() < 2).any(gains);
+        let simple = |c: &&Change| c.joints().len() < 2 || matches!(c, Change::Scale(..));
+        return changes.iter().filter(simple).any(gains);
     }
     // friction is each joint's own whatever the weights are: without its columns a fit is small
     let Some(shared) = declared.normal.shared(problem.robot.parameters().len()) else {
@@ -283,7 +285,8 @@ fn slopes(problem: &Problem, declared: &Trial, rows: &[usize]) -> Vec<(usize, f6
     (0..n).filter_map(of).collect()
 }
 
-/// Whether turned positions, joints in each other's place, or zeros a quarter turn away gain.
+/// Whether turned positions, joints in each other's place, zeros a quarter turn away, or gravity along another axis
+/// gain.
 fn positions(problem: &Problem, race: &Race, moving: &[usize]) -> bool {
     if moving.len() < 2 {
         return false;
@@ -305,6 +308,12 @@ fn positions(problem: &Problem, race: &Race, moving: &[usize]) -> bool {
         _ => false,
     };
     changes.extend(hypotheses::of_zeros(problem).into_iter().filter(quarter));
+    let axis = |change: &Change| match change {
+        Change::Gravity(g) => g.iter().filter(|x| **x != 0.0).count() == 1,
+        _ => false,
+    };
+    let gravity = hypotheses::of_gravity(problem, race.by);
+    changes.extend(gravity.into_iter().filter(axis));
     changes.iter().any(|change| race.won(change))
 }
 

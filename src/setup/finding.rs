@@ -41,6 +41,30 @@ impl FindingKind {
     }
 }
 
+/// What becomes of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(rename = "SetupSeverity")]
+pub enum Severity {
+    /// The evidence is overwhelming: a fit refuses the logs.
+    Error,
+    /// Likely, and the set-up as declared is possible too.
+    Warning,
+    /// The set-up is right, and what the fit looks like is an effect, which `diagnose` finds.
+    Hint,
+}
+
+impl Severity {
+    /// As it is written.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+            Self::Hint => "hint",
+        }
+    }
+}
+
 /// Which channel of a joint it is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -107,8 +131,9 @@ pub struct Finding {
     pub error_before: Option<f64>,
     /// The same with this put right.
     pub error_after: Option<f64>,
-    /// What to write into the robot file.
+    /// What to write into the robot file; of a hint, the command that finds it.
     pub remedy: String,
+    pub severity: Severity,
     /// Whether the evidence is overwhelming: a fit refuses the log then.
     pub sure: bool,
     pub evidence: Evidence,
@@ -122,6 +147,9 @@ impl Finding {
     /// As it is told: what is wrong, what to write, and what these data say as well.
     pub fn told(&self) -> String {
         let mut out = self.meaning.clone();
+        if self.severity == Severity::Hint {
+            return format!("{out}; `{}` finds it", self.remedy);
+        }
         if !self.remedy.is_empty() {
             out += &format!("; write {}", self.remedy);
         }
@@ -181,6 +209,11 @@ impl Finding {
             error_before: None,
             error_after: None,
             remedy,
+            severity: if sure {
+                Severity::Error
+            } else {
+                Severity::Warning
+            },
             sure,
             evidence: Evidence::default(),
             tied_with: Vec::new(),

@@ -15,7 +15,7 @@ const NEAR: f64 = 0.8;
 /// Smaller zeros are calibration, and no fault of a set-up \[rad\].
 pub(super) const CALIBRATION: f64 = 2.5 * std::f64::consts::PI / 180.0;
 /// Gravity that is off by less is a tilt, and no fault of a set-up \[rad\].
-const TILT: f64 = 20.0 * std::f64::consts::PI / 180.0;
+pub(super) const TILT: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Logarithm of a factor below which a torque constant is badly known, and no unit mistaken.
 const LEAST_SCALE: f64 = 0.4;
 /// No joint turns farther than this in a log, by its cables \[rad\].
@@ -42,6 +42,11 @@ pub(super) struct Fitted<'a> {
 }
 
 impl Fitted<'_> {
+    fn gravity(&self) -> [f64; 3] {
+        let declared = || self.problem.robot.tree().gravity();
+        self.base.gravity.unwrap_or_else(declared)
+    }
+
     fn score(&self, change: &Change) -> Option<f64> {
         let by = self.base.with(change);
         Some(
@@ -89,11 +94,20 @@ impl Fitted<'_> {
                 }
             }
         }
-        let gravity = better().filter(|(c, _)| matches!(c, Change::Gravity(_)));
-        if let Some((Change::Gravity(g), score)) = gravity.max_by(|a, b| a.1.total_cmp(&b.1)) {
-            let (g, score) = self.turned(*g, score);
-            let now = self.base.gravity.unwrap_or(robot.tree().gravity());
-            if angle(&g, &now) > TILT {
+        let gravity = better().filter_map(|(c, score)| match c {
+            Change::Gravity(g) => Some((*g, score)),
+            _ => None,
+        });
+        let now = self.gravity();
+        // a base that leans a little is to stand beside the zeros that look like it
+        let here = self.problem.in_gravity.map(|_| (now, declared));
+        let starts = gravity
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .into_iter()
+            .chain(here);
+        for (g, score) in starts {
+            let (g, score) = self.turned(g, score);
+            if angle(&g, &now) > CALIBRATION && score > declared {
                 out.push((Change::Gravity(g), score));
             }
         }

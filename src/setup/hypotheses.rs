@@ -24,6 +24,10 @@ pub(super) fn of_torques(problem: &Problem, moving: &[usize]) -> Vec<Change> {
         for j in moving {
             out.extend(FACTORS.map(|f| Change::Scale(Torque, vec![*j], f)));
         }
+        // but where friction is known
+        if problem.columns.known.iter().any(Option::is_some) {
+            out.extend(FACTORS.map(|f| Change::Scale(Torque, moving.to_vec(), f)));
+        }
     }
     out
 }

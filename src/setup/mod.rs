@@ -21,6 +21,7 @@
 //! | `fitted` | corrections whose number is fitted: zeros, scales, gravity of any direction |
 //! | `trial` | one hypothesis, fitted |
 //! | `decide` | the best one, and whether the evidence is enough |
+//! | `hints` | small tilts, zeros and delays: what a fit looks like where the set-up is right |
 //! | `search` | all of it, round by round |
 
 mod channels;
@@ -31,6 +32,7 @@ mod doubt;
 mod finding;
 mod fit;
 mod fitted;
+mod hints;
 mod hypotheses;
 mod normal;
 mod physics;
@@ -45,7 +47,9 @@ pub use correction::{Change, Correction};
 pub use decide::{Found, Negative};
 pub use finding::{
     Alternative, ChannelKind, Evidence, Finding, FindingKind, FrictionPower, Setting, SetupReport,
+    Severity,
 };
+pub use hints::{Hint, Small};
 pub use normal::Problem;
 pub use physics::tells_friction;
 pub use sample::{MOST_ROWS, Sample, Thinner};

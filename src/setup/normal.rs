@@ -12,6 +12,13 @@ use crate::robot::{JointKind, Robot};
 /// and zeros \[rad, m\].
 const STILL: [f64; 2] = [0.01, 0.003];
 
+/// Columns beside those of the declared model.
+pub(super) struct Added<'a> {
+    pub count: usize,
+    /// Writes those of a row of the sample, joint after joint.
+    pub fill: &'a dyn Fn(usize, &Carried, &mut [f64]),
+}
+
 /// A robot file and a sample of its logs.
 pub struct Problem<'a> {
     pub robot: &'a Robot,
@@ -146,12 +153,33 @@ impl<'a> Problem<'a> {
         rows: &[usize],
         blocks: usize,
     ) -> Option<Normal> {
+        let none = Added {
+            count: 0,
+            fill: &|_, _, _| {},
+        };
+        self.normal_with(robot, by, rows, blocks, &none)
+    }
+
+    /// The same with columns added, whose unknowns are behind all others.
+    pub(super) fn normal_with(
+        &self,
+        robot: &Robot,
+        by: &Correction,
+        rows: &[usize],
+        blocks: usize,
+        added: &Added,
+    ) -> Option<Normal> {
         let (n, p) = (robot.joints(), robot.parameters().len());
         let moving = self.moving();
-        let places = match by.gravity {
+        let mut places = match by.gravity {
             None => self.places.clone(),
             Some(_) => self.places_of(robot),
         };
+        let declared = self.first_own(robot, n);
+        for places in places.iter_mut().filter(|places| !places.is_empty()) {
+            places.extend(declared..declared + added.count);
+        }
+        let mut beside = vec![0.0; n * added.count];
         let widths: Vec<usize> = places.iter().map(|c| c.len() + n + 1).collect();
         let mut carried = Carried::new(n);
         let mut y = vec![0.0; n * p];
@@ -173,11 +201,13 @@ impl<'a> Problem<'a> {
                     continue;
                 }
                 good += 1;
+                (added.fill)(k, &carried, &mut beside);
                 for (j, data) in data.iter_mut().enumerate().filter(|(j, _)| moving[*j]) {
-                    let shared = places[j].len() - self.columns.own[j].len();
+                    let shared = places[j].len() - self.columns.own[j].len() - added.count;
                     data.extend(places[j][..shared].iter().map(|c| y[j * p + c]));
                     let own = self.columns.own[j].iter();
                     data.extend(own.map(|own| own_column(*own, &carried, j)));
+                    data.extend_from_slice(&beside[j * added.count..(j + 1) * added.count]);
                     data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
                     let known = self.columns.known[j].as_ref();
                     data.push(known.map_or(0.0, |known| known.law.torque(carried.v[j])));
@@ -203,7 +233,7 @@ impl<'a> Problem<'a> {
         Some(Normal {
             total: (0..n).map(sum).collect(),
             blocks: out,
-            unknowns: self.first_own(robot, n),
+            unknowns: declared + added.count,
             places,
             joints: n,
             rows: good,
@@ -248,6 +278,33 @@ impl Normal {
             joints: self.joints,
             rows: self.rows,
         })
+    }
+
+    /// The same without the unknowns from `first` on, but for these.
+    pub(super) fn only(&self, first: usize, kept: &[usize]) -> Self {
+        let new = |at: usize| match at < first {
+            true => Some(at),
+            false => kept.iter().position(|k| *k == at).map(|k| first + k),
+        };
+        let left: Vec<Vec<usize>> = (self.places.iter().zip(&self.total))
+            .map(|(places, gram)| {
+                let stays = |c: &usize| places.get(*c).is_none_or(|at| new(*at).is_some());
+                (0..gram.nrows()).filter(stays).collect()
+            })
+            .collect();
+        let part = |(gram, left): (&DMatrix<f64>, &Vec<usize>)| {
+            gram.select_rows(left).select_columns(left)
+        };
+        let parts = |of: &Vec<DMatrix<f64>>| of.iter().zip(&left).map(part).collect();
+        let place = |places: &Vec<usize>| places.iter().filter_map(|at| new(*at)).collect();
+        Self {
+            blocks: self.blocks.iter().map(parts).collect(),
+            total: parts(&self.total),
+            places: self.places.iter().map(place).collect(),
+            unknowns: first + kept.len(),
+            joints: self.joints,
+            rows: self.rows,
+        }
     }
 
     /// Weights of the columns behind the unknowns of a joint: torques, then known friction.

@@ -21,10 +21,14 @@ pub struct Sample {
     pub sign: Vec<f64>,
     /// Torques [N or N m], joint side as declared.
     pub tau: Vec<f64>,
+    /// How fast the torques change \[N/s or N m/s\].
+    pub rate: Vec<f64>,
     /// Of each row, its log.
     pub log: Vec<usize>,
     /// Time that a row stands for \[s\].
     pub spacing_s: f64,
+    /// Time from one row of the logs to the next, the longest of them \[s\].
+    pub logged_s: f64,
     /// Cut-off of the filter that the rows came through \[Hz\].
     pub cutoff_hz: f64,
 }
@@ -109,12 +113,19 @@ impl Sample {
         if kept.len() < self.len() / 4 {
             return;
         }
+        self.keep(&kept);
+    }
+
+    /// Keeps these rows, in order.
+    fn keep(&mut self, kept: &[usize]) {
+        let n = self.joints;
         for list in [
             &mut self.q,
             &mut self.v,
             &mut self.a,
             &mut self.sign,
             &mut self.tau,
+            &mut self.rate,
         ] {
             for (to, from) in kept.iter().enumerate() {
                 list.copy_within(from * n..(from + 1) * n, to * n);
@@ -143,6 +154,30 @@ pub struct Thinner {
     seen: u64,
     /// Time that all rows stand for \[s\].
     seconds: f64,
+    /// The last two rows that came, the later one first.
+    before: [Passed; 2],
+    /// Whether the later one was kept: its rate waits for the row behind it.
+    kept: bool,
+}
+
+/// A row that has passed.
+#[derive(Debug, Clone, Default)]
+struct Passed {
+    /// Log and stretch of it; none before the first row.
+    stretch: Option<(usize, usize)>,
+    t: f64,
+    tau: Vec<f64>,
+}
+
+impl Passed {
+    /// How fast each torque changes from this row to another one; 0 across a gap.
+    fn rates<'a>(&'a self, to: &'a Self) -> impl Iterator<Item = f64> + 'a {
+        let joined = self.stretch.is_some() && self.stretch == to.stretch && to.t > self.t;
+        (0..to.tau.len()).map(move |j| match joined {
+            true => (to.tau[j] - self.tau[j]) / (to.t - self.t),
+            false => 0.0,
+        })
+    }
 }
 
 impl Thinner {
@@ -157,44 +192,58 @@ impl Thinner {
             every: 1,
             seen: 0,
             seconds: 0.0,
+            before: Default::default(),
+            kept: false,
         }
     }
 
-    /// Adds a row of `log` that stands for `seconds`: positions, velocities, accelerations, signs of the
-    /// velocities and torques, one after the other.
-    pub fn add(&mut self, log: usize, seconds: f64, channels: &[f64]) {
+    /// The rows to come are of a log whose rows are so far apart \[s\].
+    pub fn logged_every(&mut self, seconds: f64) {
+        self.sample.logged_s = self.sample.logged_s.max(seconds);
+    }
+
+    /// Adds the row at time `t` \[s\] of a stretch without gaps, which stands for `seconds`: positions, velocities,
+    /// accelerations, signs of the velocities and torques, one after the other. A stretch is a log and a number in it.
+    pub fn add(&mut self, stretch: (usize, usize), t: f64, seconds: f64, channels: &[f64]) {
         let n = self.sample.joints;
         self.seconds += seconds;
         let take = self.seen.is_multiple_of(self.every);
         self.seen += 1;
-        if !take || channels.len() != 5 * n || channels.iter().any(|x| !x.is_finite()) {
+        if channels.len() != 5 * n || channels.iter().any(|x| !x.is_finite()) {
             return;
         }
+        let now = Passed {
+            stretch: Some(stretch),
+            t,
+            tau: channels[4 * n..].to_vec(),
+        };
+        let [last, earlier] = &self.before;
         let s = &mut self.sample;
-        let lists = [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau];
-        for (list, x) in lists.into_iter().zip(channels.chunks_exact(n)) {
-            list.extend_from_slice(x);
+        // around a row where both its neighbours are of its stretch
+        if self.kept && last.stretch == now.stretch {
+            let from = match earlier.stretch == now.stretch {
+                true => earlier,
+                false => last,
+            };
+            s.rate.truncate((s.log.len() - 1) * n);
+            s.rate.extend(from.rates(&now));
         }
-        s.log.push(log);
-        if s.len() > MOST_ROWS {
-            self.thin();
-        }
-    }
-
-    fn thin(&mut self) {
-        self.every *= 2;
-        let s = &mut self.sample;
-        let (n, rows) = (s.joints, s.log.len());
-        for list in [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau] {
-            for (to, from) in (0..rows).step_by(2).enumerate() {
-                list.copy_within(from * n..(from + 1) * n, to * n);
+        self.kept = take;
+        if take {
+            let lists = [&mut s.q, &mut s.v, &mut s.a, &mut s.sign, &mut s.tau];
+            for (list, x) in lists.into_iter().zip(channels.chunks_exact(n)) {
+                list.extend_from_slice(x);
             }
-            list.truncate(rows.div_ceil(2) * n);
+            s.rate.extend(last.rates(&now));
+            s.log.push(stretch.0);
+            if s.len() > MOST_ROWS {
+                self.every *= 2;
+                let kept: Vec<usize> = (0..s.len()).step_by(2).collect();
+                s.keep(&kept);
+            }
         }
-        for (to, from) in (0..rows).step_by(2).enumerate() {
-            s.log[to] = s.log[from];
-        }
-        s.log.truncate(rows.div_ceil(2));
+        self.before.rotate_right(1);
+        self.before[0] = now;
     }
 
     /// The rows that were kept.
@@ -214,12 +263,17 @@ mod tests {
         let mut thinner = Thinner::new(1, 10.0);
         for k in 0..30_000 {
             let x = f64::from(k);
-            thinner.add(k as usize / 10_000, 0.01, &[x, 1.0, x, x, x]);
+            let log = (k as usize / 10_000, 0);
+            thinner.add(log, 0.01 * x, 0.01, &[x, 1.0, x, x, x]);
         }
         let sample = thinner.finish();
         assert!((MOST_ROWS / 2..=MOST_ROWS).contains(&sample.len()));
         let steps: Vec<f64> = sample.q.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(steps.iter().all(|s| *s == steps[0]), "{steps:?}");
+        // torques grow by one a row of 0.01 s, within each log and at its ends
+        assert!(sample.rate.len() == sample.len());
+        let known = |rate: &f64| (rate - 100.0).abs() < 1e-6;
+        assert!(sample.rate[1..].iter().all(known), "{:?}", sample.rate);
         assert_eq!(sample.log[sample.len() - 1], 2);
         let all = sample.spacing_s * sample.len() as f64;
         assert!((all - 300.0).abs() < 1e-6, "{all}");
@@ -231,7 +285,8 @@ mod tests {
         for k in 0..100 {
             let (v, w) = if k % 4 == 0 { (0.0, 0.0) } else { (0.0, 1.0) };
             let q = f64::from(k);
-            thinner.add(0, 0.01, &[q, q, v, w, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+            let row = [q, q, v, w, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0];
+            thinner.add((0, 0), 0.01 * q, 0.01, &row);
         }
         let sample = thinner.finish();
         assert_eq!(sample.len(), 75);

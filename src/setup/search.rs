@@ -12,7 +12,8 @@ use super::decide::{
     BLOCKS, Found, Judged, NEGATIVE, Negative, decide, joints_below, judged, negative,
 };
 use super::doubt::doubtful;
-use super::fitted::Fitted;
+use super::fitted::{Fitted, TILT};
+use super::hints::{Hint, Small, hint};
 use super::hypotheses;
 use super::normal::Problem;
 use super::trial::Trial;
@@ -33,6 +34,8 @@ pub struct Searched {
     pub correction: Correction,
     /// Joints whose friction drives them, under the correction.
     pub negative: Vec<Negative>,
+    /// What the fit looks like where nothing was found.
+    pub hint: Option<Hint>,
 }
 
 /// Looks for what is wrong with the set-up. `stopped` ends it early with what is found so far.
@@ -42,6 +45,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         found: Vec::new(),
         correction: Correction::none(n),
         negative: Vec::new(),
+        hint: None,
     };
     let moving = problem.channels_that_move();
     if moving.is_empty()
@@ -50,11 +54,21 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         return out;
     }
     for _ in 0..ROUNDS {
-        let Some((found, negative)) = round(problem, &out.correction, &moving, stopped) else {
+        let Some((found, negative, declared)) = round(problem, &out.correction, &moving, stopped)
+        else {
             break;
         };
         out.negative = negative;
-        let Some(found) = found else { break };
+        let Some(found) = found else {
+            if out.found.is_empty() {
+                out.hint = hint(problem, &declared, stopped);
+            }
+            break;
+        };
+        if let Some(tilt) = leans(problem, &out.correction, &found) {
+            out.hint = out.found.is_empty().then_some(tilt);
+            break;
+        }
         let sure = found.sure;
         if sure {
             out.correction = out.correction.with(&found.change);
@@ -67,7 +81,28 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
     out
 }
 
-type Round = (Option<Found>, Vec<Negative>);
+/// A gravity that is off by less than a fault is: a base that leans.
+fn leans(problem: &Problem, base: &Correction, found: &Found) -> Option<Hint> {
+    let Change::Gravity(gravity) = found.change else {
+        return None;
+    };
+    let now = base.gravity.unwrap_or(problem.robot.tree().gravity());
+    let small = |change: &Change| match change {
+        Change::Zero(j, angle) => Some(Small::Zero(*j, *angle, 0.0)),
+        _ => None,
+    };
+    (hypotheses::angle(&gravity, &now) < TILT).then(|| Hint {
+        small: Small::Tilt(gravity),
+        error: found.error,
+        gain: found.gain,
+        needed: found.needed,
+        tried: found.tried,
+        tied: found.tied.iter().filter_map(small).collect(),
+    })
+}
+
+/// What was found, joints whose friction drives them, and the set-up as it is, fitted to few rows.
+type Round = (Option<Found>, Vec<Negative>, Trial);
 
 fn round(
     problem: &Problem,
@@ -81,7 +116,7 @@ fn round(
     let few_judged = judged(problem, None, None, declared);
     let declared = &few_judged.trial;
     if !doubtful(problem, declared, &few_judged.positives, &few, moving) {
-        return Some((None, negative(&few_judged.positives)));
+        return Some((None, negative(&few_judged.positives), few_judged.trial));
     }
     let mut changes = hypotheses::of_torques(problem, moving);
     changes.extend(hypotheses::of_positions(problem, moving));
@@ -168,5 +203,6 @@ fn round(
         Some(judged(problem, Some(change), std, trial))
     };
     let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
-    Some((decide(problem, &whole, list, tried), negative))
+    let found = decide(problem, &whole, list, tried);
+    Some((found, negative, few_judged.trial))
 }

@@ -281,6 +281,12 @@ impl Heard {
             };
         }
         let first = |entry: &Value| fault.is_told_by(machine, entry);
+        // a hint at something else is no word on the fault
+        let entries: Vec<Value> = (entries.iter())
+            .filter(|entry| entry["severity"] != "hint" || first(entry))
+            .cloned()
+            .collect();
+        let entries = &entries[..];
         let told = match entries {
             [] => false,
             // all channels at once may be told one by one

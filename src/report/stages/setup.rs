@@ -1,7 +1,7 @@
 //! What the check of a set-up found, for every report.
 
 use crate::report::Writer;
-use crate::setup::SetupReport;
+use crate::setup::{SetupReport, Severity};
 
 /// The findings, nothing where there is none.
 pub fn section(out: &mut Writer, report: &SetupReport) {
@@ -10,9 +10,14 @@ pub fn section(out: &mut Writer, report: &SetupReport) {
     }
     out.line("set-up of the robot file");
     for finding in &report.findings {
-        let severity = if finding.sure { "error" } else { "warning" };
+        let severity = finding.severity;
         out.line("");
-        out.note("", &format!("{severity} {}", finding.kind.word()), 0);
+        let head = format!("{} {}", severity.word(), finding.kind.word());
+        out.note("", &head, 0);
+        if severity == Severity::Hint {
+            out.note("    ", &finding.told(), 4);
+            continue;
+        }
         out.note("    ", &finding.meaning, 4);
         if !finding.remedy.is_empty() {
             out.note("    ", &format!("-> write {}", finding.remedy), 4);
