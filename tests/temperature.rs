@@ -308,11 +308,12 @@ fn a_temperature_that_is_missing_or_is_no_number_is_told_with_log_and_column() {
             format!("validate --open-loop {log} -m {model}"),
             format!("torque {log} -m {model} -o new.csv"),
             format!("compare {model} {model} {log}"),
+            format!("export {log} -m {model} --mjcf new.xml"),
         ] {
             told(&line, says);
         }
     }
-    for output in ["new.toml", "new.csv"] {
+    for output in ["new.toml", "new.csv", "new.xml"] {
         assert!(!at.join(output).exists());
     }
     // what takes no temperature goes on without it, and says so

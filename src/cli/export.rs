@@ -191,6 +191,8 @@ impl Along {
         let machine = LoggedRobot::new(&given.name, given.value.robot.clone());
         let logs: Vec<Log> = args.logs.iter().map(Log::from).collect();
         let whole = identify::read_whole(&machine, &logs, context.control())?;
+        let refined = identify::refined(&given.value, &given.name)?;
+        machine.check_temperatures(&refined, &logs, &whole.stretches)?;
         Ok(Self {
             stretches: whole.stretches,
             names: logs.iter().map(|log| escape(&log.name())).collect(),

@@ -12,7 +12,6 @@ use super::logged_robot::LoggedRobot;
 use super::model::{refined, refined_or_friction};
 use super::position_cutoff::known;
 use super::repeated::repeated_rows;
-use super::temperatures;
 use crate::compare::{self, Difference, ErrorDifferences, ParameterPair, SideBySide};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
@@ -277,8 +276,7 @@ fn on_logs(
     let machine = &machine.with_position_cutoffs(logs, &laws, control)?;
     let in_memory = read_whole(machine, logs, control)?;
     for side in sides {
-        let taken = temperatures::of_model(&side.model);
-        machine.check_temperatures(&taken, logs, &in_memory.stretches)?;
+        machine.check_temperatures(&side.model, logs, &in_memory.stretches)?;
     }
     let settings = machine.settings();
     let named = |error| IdentifyError::motion(&machine.name, error);

@@ -164,7 +164,7 @@ pub fn diagnose(
         &settings.candidates,
         &machine.robot,
     )?));
-    machine.check_temperatures(&taken, &all, &in_memory.stretches)?;
+    machine.check_taken(&taken, &all, &in_memory.stretches)?;
     let fitted = match settings.keep {
         true => &[],
         false => &in_memory.inputs[..logs.train.len()],

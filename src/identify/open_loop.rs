@@ -6,7 +6,6 @@ use super::in_memory::read_each;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::position_cutoff::known;
-use super::temperatures;
 use crate::effect::AugmentedModel;
 use crate::motion::FilterSettings;
 use crate::open_loop::{OpenLoop, WindowLength, along};
@@ -33,8 +32,7 @@ pub fn open_loop(
         ..machine.settings()
     };
     let whole = read_each(machine, &vec![settings; logs.len()], logs, control)?;
-    let taken = temperatures::of_model(refined);
-    machine.check_temperatures(&taken, logs, &whole.stretches)?;
+    machine.check_temperatures(refined, logs, &whole.stretches)?;
     let length = match window {
         Some(s) => WindowLength::Seconds(s),
         None if machine.robot.joints() == 1 => WindowLength::Whole,

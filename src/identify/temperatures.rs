@@ -94,11 +94,21 @@ impl LoggedRobot {
         }
     }
 
-    /// Refuses logs without the temperatures that effects take.
+    /// Refuses logs, read as these stretches, without the temperatures that the effects of a model take.
     ///
     /// # Errors
     /// [`IdentifyError::NoTemperature`].
-    pub(super) fn check_temperatures(
+    pub fn check_temperatures(
+        &self,
+        model: &AugmentedModel,
+        logs: &[Log],
+        stretches: &[Stretch],
+    ) -> Result<(), IdentifyError> {
+        self.check_taken(&of_model(model), logs, stretches)
+    }
+
+    /// The same of effects in any place.
+    pub(super) fn check_taken(
         &self,
         taken: &[Taken],
         logs: &[Log],

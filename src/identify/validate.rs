@@ -12,7 +12,6 @@ use super::position_cutoff::known;
 use super::reduced::error::ReducedError;
 use super::reduced::reduced_log::ReducedLog;
 use super::repeated::repeated_rows;
-use super::temperatures;
 use super::unknowns::columns;
 use crate::band::{Band, NO_BAND, Reach};
 use crate::config::ModelFile;
@@ -175,8 +174,7 @@ fn reconstruct(
             // effects remember: they need a stretch from its begin
             let one = std::slice::from_ref(log);
             let whole = read_whole(machine, one, control)?;
-            let taken = temperatures::of_model(refined);
-            machine.check_temperatures(&taken, one, &whole.stretches)?;
+            machine.check_temperatures(refined, one, &whole.stretches)?;
             all.count_from(whole.origin.seconds());
             for stretch in &whole.stretches {
                 let hat = refined.reconstruct(stretch);
