@@ -179,7 +179,7 @@ impl OfSignal {
             OfSignal::Velocity => (name("velocity", joint), format!("{}/s", unit(joint))),
             OfSignal::OtherVelocity(j) => (name("velocity", j), format!("{}/s", unit(j))),
             OfSignal::Way => (
-                name("way since the last reversal", joint),
+                name("travel since the last reversal", joint),
                 unit(joint).to_owned(),
             ),
             OfSignal::Load => (name(&format!("load {force}"), joint), torque.to_owned()),

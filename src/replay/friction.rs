@@ -85,11 +85,9 @@ pub(super) fn friction_rows(
             let less =
                 |x: &[f64]| -> Vec<f64> { x.iter().zip(&rest[j]).map(|(x, y)| x - y).collect() };
             let (measured, friction) = (less(&stretch.tau[j]), less(&full[j]));
-            let filtered = parallel.run(&[&measured, &friction])?;
-            rows.extend((0..filtered[0].len()).map(|i| {
-                let v = stretch.v[j][parallel.sample_of(i)];
-                [v, filtered[0][i], filtered[1][i]]
-            }));
+            // speeds through the same filter, or a slope comes out flatter than it is
+            let filtered = parallel.run(&[&stretch.v[j], &measured, &friction])?;
+            rows.extend((0..filtered[0].len()).map(|i| std::array::from_fn(|k| filtered[k][i])));
         }
     }
     Ok(all)

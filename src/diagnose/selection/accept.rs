@@ -141,7 +141,7 @@ fn decide(
     };
     let doubt = if s.delta_bic <= 0.0 {
         Some(format!(
-            "not worth its parameters: BIC changes by {:.1} with {:.0} effective rows",
+            "not worth its parameters: its gain in BIC is {:.1} with {:.0} effective rows",
             s.delta_bic, s.effective_rows
         ))
     } else if s.cv_gain < limits.cv_gain {

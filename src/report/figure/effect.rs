@@ -39,8 +39,9 @@ impl EffectFigure {
         let every = known.len().div_ceil(ROWS).max(1);
         let drawn: Vec<&[f64; 3]> = known.into_iter().step_by(every).collect();
         let signals = axis::interval(drawn.iter().map(|row| row[0]), 0.03);
-        let torques = axis::interval(drawn.iter().flat_map(|row| [row[1], row[2]]), 0.06);
         let left = |row: &[f64; 3]| row[1] - row[2];
+        let shown = drawn.iter().flat_map(|row| [row[1], row[2], left(row)]);
+        let torques = axis::interval(shown, 0.06);
         let clouds: [&[Cloud]; 2] = [
             &[
                 (&|row| row[1], colour::VERMILLION, 1.3),

@@ -113,7 +113,7 @@ impl FrictionFigure {
             !panel.beyond_curve && !lines(&panel.curve, |a, b| !panel.covers(a.v, b.v)).is_empty()
         };
         if self.panels.iter().any(beyond) {
-            entries.push((Key::Line(BEYOND), "beyond the data"));
+            entries.push((Key::Line(BEYOND), "beyond these logs"));
         }
         if any(|panel| !panel.plateaus.is_empty()) {
             entries.push((Key::Dot(colour::INK), "plateaus, 95 %"));
@@ -122,7 +122,7 @@ impl FrictionFigure {
             entries.push((Key::Line(TRUTH), "truth"));
         }
         if any(|panel| !panel.covered.is_empty()) {
-            entries.push((Key::Patch(colour::COVERED), "speeds covered"));
+            entries.push((Key::Patch(colour::COVERED), "speeds in these logs"));
         }
         entries
     }
@@ -406,7 +406,11 @@ mod tests {
         };
         assert_eq!(
             names(&figure),
-            ["estimated, 95 % band", "beyond the data", "speeds covered"]
+            [
+                "estimated, 95 % band",
+                "beyond these logs",
+                "speeds in these logs"
+            ]
         );
         figure.panels[0].truth = vec![[0.0, 0.0], [1.0, 2.0]];
         figure.panels[0].plateaus = vec![figure.panels[0].curve[3]];

@@ -62,7 +62,7 @@ impl Sketch {
             (Key::Spot(colour::BLUE), between.as_str()),
             (Key::Spot(colour::VERMILLION), high.as_str()),
             (Key::Line(EARLIER), "other poses"),
-            (Key::Line(WAY), "way of the last joint"),
+            (Key::Line(WAY), "path of the last joint"),
         ];
         Cells {
             title: self.title.clone(),

@@ -66,15 +66,15 @@ fn shown(part: &Part) -> String {
     match part {
         Part::Verdict { text, good } => {
             let class = if *good { "verdict" } else { "verdict bad" };
-            format!("<p class=\"{class}\">{}</p>\n", escaped(text))
+            format!("<p class=\"{class}\">{}</p>\n", prose(text))
         }
         Part::Heading(_) => String::new(),
-        Part::Paragraph(text) | Part::Line(text) => format!("<p>{}</p>\n", escaped(text)),
+        Part::Paragraph(text) | Part::Line(text) => format!("<p>{}</p>\n", prose(text)),
         Part::Note { head, text, .. } => {
-            format!("<p>{}{}</p>\n", escaped(head.trim_start()), escaped(text))
+            format!("<p>{}{}</p>\n", escaped(head.trim_start()), prose(text))
         }
         Part::List(items) => {
-            let item = |item: &String| format!("<li>{}</li>\n", escaped(item));
+            let item = |item: &String| format!("<li>{}</li>\n", prose(item));
             let items: String = items.iter().map(item).collect();
             format!("<ul>\n{items}</ul>\n")
         }
@@ -85,7 +85,7 @@ fn shown(part: &Part) -> String {
         }
         Part::Figures(cells) => figures(cells),
         Part::Folded { summary, cells } => format!(
-            "<details><summary>{}</summary>{}</details>\n",
+            "<details class=\"table\"><summary>{}</summary>{}</details>\n",
             escaped(summary),
             figures(cells)
         ),
@@ -127,7 +127,7 @@ fn figures(cells: &Cells) -> String {
     }
     out.push_str("</div>");
     for words in &cells.words {
-        let _ = write!(out, "<p>{}</p>", escaped(words));
+        let _ = write!(out, "<p>{}</p>", prose(words));
     }
     out.push_str("</figure>\n");
     out
@@ -278,6 +278,27 @@ fn fingerprint() -> String {
     format!("sha256-{}", encode::base64(&bytes))
 }
 
+/// Sentences as HTML: what stands between two backticks is code, and no line ends between a number and its percent sign.
+fn prose(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let parts: Vec<&str> = text.split('`').collect();
+    for (k, part) in parts.iter().enumerate() {
+        let safe = escaped(part);
+        match (k % 2 == 1, k + 1 < parts.len()) {
+            (true, true) => {
+                let _ = write!(out, "<code>{safe}</code>");
+            }
+            // a backtick without another
+            (true, false) => {
+                out.push('`');
+                out.push_str(&safe);
+            }
+            (false, _) => out.push_str(&safe.replace(" %", "\u{a0}%")),
+        }
+    }
+    out
+}
+
 /// Text as HTML may hold it.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -319,6 +340,15 @@ mod tests {
         assert_eq!(html.matches("<script").count(), 2);
         assert_eq!(html.matches("</script>").count(), 2);
         assert!(html.matches("&lt;script&gt;").count() >= 16);
+    }
+
+    #[test]
+    fn commands_in_a_sentence_are_code_and_percent_signs_stay_with_their_number() {
+        assert_eq!(
+            prose("4.5 % off: `lsq <LOG>` says so"),
+            "4.5\u{a0}% off: <code>lsq &lt;LOG&gt;</code> says so"
+        );
+        assert_eq!(prose("one ` alone"), "one ` alone");
     }
 
     #[test]

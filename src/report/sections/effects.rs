@@ -26,8 +26,7 @@ pub fn card(
         .map(|rms| format!("{} {unit}", number::significant(rms, 3)));
     let torque = if unit == "N" { "force" } else { "torque" };
     let told = format!(
-        "The residual of {joint} on {data} is {without} rms with this {torque} left out and nothing else fitted anew, and \
-         {with} with it."
+        "The residual of {joint} on {data} is {without} rms with this {torque} left out and the rest as it is, and {with} with it."
     );
     let along = match of.along_motion {
         true => ", along the motion",

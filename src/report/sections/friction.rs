@@ -22,8 +22,11 @@ fn figure(machine: &LoggedRobot, of: &[FrictionRows], logs: &[String]) -> Fricti
             truth: Vec::new(),
         }
     };
+    let mut names = logs.to_vec();
+    // spans of one log have its name
+    names.dedup();
     FrictionFigure {
-        title: format!("Friction of the model along {}", first_of(logs)),
+        title: format!("Friction of the model along {}", first_of(&names)),
         panels: of.iter().map(panel).collect(),
     }
 }

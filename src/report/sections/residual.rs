@@ -47,6 +47,11 @@ fn panels(
     let torque = machine.file.torque_unit(j).to_owned();
     let position = machine.robot.joint_kind(j).position_unit();
     let wave = if position == "m" { "1/m" } else { "1/rev" };
+    let load = if torque == "N" {
+        "load force"
+    } else {
+        "load torque"
+    };
     let panel = |over: &str, unit: &str, of: &str, lines| ResidualPanel {
         over: (over.into(), unit.into()),
         of: (of.into(), torque.clone()),
@@ -75,7 +80,7 @@ fn panels(
             "mean residual",
             one(|e| &e.velocity),
         ),
-        panel("load torque", &torque, "mean residual", two(|e| &e.load)),
+        panel(load, &torque, "mean residual", two(|e| &e.load)),
         panel("time", "s", "residual", one(|e| &e.time)),
         panel(ORDER, wave, "amplitude", one(|e| &e.order)),
         panel("frequency", "Hz", "amplitude", one(|e| &e.frequency)),

@@ -134,6 +134,10 @@ pub fn section(
             true => format!("{}, the first of {} logs", first.log, of.len() / 2),
             false => title.to_owned(),
         };
+        let title = match models {
+            [.., last] if models.len() > 1 => format!("{title}: {}", last.names[0]),
+            _ => title,
+        };
         still(machine, first, &title).by_joint()
     });
     page.traces(&traces(machine, of, models), &figure);

@@ -83,11 +83,11 @@ pub fn pictures(
         let models = [
             Drawn {
                 names: ["A", "residual of A"],
-                styles: [TraceStyle::Before, TraceStyle::Before],
+                styles: [TraceStyle::After, TraceStyle::After],
             },
             Drawn {
                 names: ["B", "residual of B"],
-                styles: [TraceStyle::Model, TraceStyle::After],
+                styles: [TraceStyle::Before, TraceStyle::Before],
             },
         ];
         let title = replayed.logs.join(", ");

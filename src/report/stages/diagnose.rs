@@ -240,7 +240,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     let mut out = Vec::new();
     if !open.is_empty() && !d.steps.is_empty() {
         out.push(format!(
-            "the residual of {} is not noise yet: treat the effects above as approximations, for the cause may be \
+            "the residual of {} is not noise yet: treat the effects found as approximations, for the cause may be \
              one that no known effect describes",
             open.join(", ")
         ));
@@ -260,7 +260,7 @@ fn doubts(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
     if !names.is_empty() {
         let doubt = match d.steps.is_empty() {
             true => "",
-            false => "; treat the effects above as approximations",
+            false => "; treat the effects found as approximations",
         };
         out.push(format!(
             "significant, too small to add: {}{doubt}",
@@ -331,8 +331,19 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             let mut text =
                 "A residual above the noise is left that no known effect explains.".to_owned();
             if !titles.is_empty() {
+                let errors = match (&d.before.holdout, &d.after.holdout) {
+                    (Some(before), Some(after)) => ("held-out error", [before, after]),
+                    _ => (
+                        "error of the fitted data",
+                        [&d.before.train, &d.after.train],
+                    ),
+                };
+                let [before, after] = errors
+                    .1
+                    .map(|e| number::percent(e.overall.mean_relative_error));
                 text += &format!(
-                    " What comes near to it was added, and lowers the error: {}.",
+                    " What comes near to it was added, and takes the {} from {before} to {after}: {}.",
+                    errors.0,
                     titles.join("; ")
                 );
             }

@@ -36,7 +36,7 @@ fn words(machine: &LoggedRobot, found: &Diagnosed, step: &AcceptedEffect) -> Vec
     let mut words = Vec::new();
     if let Some([before, after]) = step.holdout {
         words.push(format!(
-            "Held-out error, as the rms over the joints: {} before it was added, {} after{}.",
+            "Held-out error, as the rms over the joints, parameters refitted: {} without it, {} with it{}.",
             number::percent(before),
             number::percent(after),
             worsened(step)

@@ -107,7 +107,7 @@ fn words(of: &Friction) -> (String, bool) {
         if !found.estimate.missed_plateaus().is_empty() {
             good = false;
             text += &format!(
-                " The curve of {} misses the mean torque at constant speed (see the notes).",
+                " The curve of {} misses the mean torque at constant speed (see the warnings).",
                 found.joint
             );
         }

@@ -219,7 +219,6 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
     quality::section(page, origin.quality, origin.warnings);
     let (file, summary) = (&machine.file, Some(&found.dynamics.summary));
     provenance::section(page, file, origin.inputs, &[], summary, origin.command);
-    page.details("campaign file", origin.campaign);
     let names = machine.robot.joint_names().iter().enumerate();
     let noise = names.filter_map(|(j, joint)| {
         let std = of.model().residual_std.get(joint)?;
@@ -227,7 +226,8 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
         Some(format!("{joint} {} {unit}", number::significant(*std, 3)))
     });
     page.paragraph(&format!(
-        "Noise of the torque that is left, by joint: {}.",
+        "Standard deviation of the torque residual before the parallel filter, by joint: {}.",
         noise.collect::<Vec<_>>().join(", ")
     ));
+    page.details("campaign file", origin.campaign);
 }

@@ -77,6 +77,7 @@ pub fn pictures(
     quality: &[Inspected],
     command: &str,
 ) {
+    page.paragraph(&first_words(of.found));
     parameters::section(page, of.file, &|_| None);
     if let Some(replayed) = replayed {
         let (machine, logs) = (of.machine, &replayed.logs);
@@ -91,6 +92,24 @@ pub fn pictures(
     let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
     let (file, summary) = (&of.machine.file, Some(&of.found.summary));
     provenance::section(page, file, &inputs, &[], summary, command);
+}
+
+/// How good the fit is, and what to do next.
+fn first_words(found: &IdentifiedDynamics) -> String {
+    let square = |x: f64| x * x;
+    let sum: f64 = found.joints.iter().map(|j| square(j.relative_error)).sum();
+    let rms = number::percent((sum / found.joints.len().max(1) as f64).sqrt());
+    let worst = found.joints.iter();
+    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let fit = match worst.filter(|_| found.joints.len() > 1) {
+        Some(worst) => format!(
+            "The fit leaves {rms} of the torque, as the rms over the joints; most at {}: {}.",
+            worst.joint,
+            number::percent(worst.relative_error)
+        ),
+        None => format!("The fit leaves {rms} of the torque."),
+    };
+    format!("{fit} Next: `cft-ident validate` on a log that was not fitted.")
 }
 
 /// The residual of the fit, joint by joint.

@@ -9,11 +9,18 @@ use crate::number;
 pub(super) fn worsened(step: &AcceptedEffect) -> String {
     let joints = step.joints.iter().filter(|j| j.worsened).map(|j| {
         let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
+        let digits = |x: f64| number::significant(100.0 * x, 4);
+        // a change too small for the usual digits is told with one more
+        let (before, after) = match number::percent(j.before) == number::percent(j.after) {
+            true => (
+                format!("{} %", digits(j.before)),
+                format!("{} %", digits(j.after)),
+            ),
+            false => (number::percent(j.before), number::percent(j.after)),
+        };
         format!(
-            "{} from {} to {} (95 % CI of the change {low}..{high} points)",
+            "{} from {before} to {after} (95 % CI of the change {low}..{high} points)",
             j.joint,
-            number::percent(j.before),
-            number::percent(j.after)
         )
     });
     let joints: Vec<String> = joints.collect();

@@ -76,6 +76,9 @@ pub fn pictures(
 ) {
     let validation = &of.found.validation;
     let title = escaped(of.logs);
+    page.paragraph(
+        "Next: `cft-ident diagnose` with this log as `--holdout` tells which effects the model lacks.",
+    );
     parameters::section(page, of.file, &|_| None);
     match replayed {
         Some(replayed) => {
