@@ -249,7 +249,14 @@ impl Judge<'_> {
             && a.fit.error() <= no_worse * b.fit.error()
             && held_out.half + 0.5 * physics >= -LOST * held_out.all
             && held_out.deviations >= deviations;
-        if !confirmed && physics < FORCED * needed {
+        // what physics forbids tells a turned or exchanged channel though the rows fit worse; a direction, a zero or a factor
+        // that is chosen among many only where they do not
+        let turned = matches!(
+            chosen.change,
+            Some(Change::Sign(..) | Change::Exchange(..) | Change::Reverse)
+        );
+        let worse = a.fit.error() > NO_WORSE * b.fit.error();
+        if !confirmed && (physics < FORCED * needed || (worse && !turned)) {
             return None;
         }
         if (strokes < HARDLY * unknowns && physics < needed)
@@ -282,6 +289,9 @@ impl Judge<'_> {
             let below = of.iter().filter(|p| p.told && p.deviations() < NEGATIVE);
             below.map(name).collect()
         };
+        let [before, after] = [declared, chosen].map(|j| violated(&j.positives));
+        // what puts one thing right puts no other wrong
+        let spoils = after.iter().any(|quantity| !before.contains(quantity));
         Some(Found {
             tied: tied(list, chosen),
             change: chosen.change.clone()?,
@@ -291,8 +301,8 @@ impl Judge<'_> {
             gain,
             needed: self.needed,
             tried: self.tried,
-            violated: [violated(&declared.positives), violated(&chosen.positives)],
-            sure: sure && !poor,
+            violated: [before, after],
+            sure: sure && !poor && !spoils,
         })
     }
 }
