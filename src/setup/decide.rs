@@ -289,9 +289,6 @@ impl Judge<'_> {
             let below = of.iter().filter(|p| p.told && p.deviations() < NEGATIVE);
             below.map(name).collect()
         };
-        let [before, after] = [declared, chosen].map(|j| violated(&j.positives));
-        // what puts one thing right puts no other wrong
-        let spoils = after.iter().any(|quantity| !before.contains(quantity));
         Some(Found {
             tied: tied(list, chosen),
             change: chosen.change.clone()?,
@@ -301,8 +298,8 @@ impl Judge<'_> {
             gain,
             needed: self.needed,
             tried: self.tried,
-            violated: [before, after],
-            sure: sure && !poor && !spoils,
+            violated: [violated(&declared.positives), violated(&chosen.positives)],
+            sure: sure && !poor,
         })
     }
 }
