@@ -189,14 +189,18 @@ fn execute(
         limit: campaign.settings.max_relative_error,
     };
     let mut report = stages::identify::identify(&of);
+    let numbers = (&found.model, &found.numbers);
+    let smoothed = match unseen.is_empty() {
+        true => machine.clone(),
+        false => machine.smoothed_for(&role_logs.validation, &found.numbers, control)?,
+    };
     let in_memory = match &replayed_diagnosis {
         None if !unseen.is_empty() => {
-            pictures::in_memory(&machine, &role_logs.validation, context)?
+            pictures::in_memory(&smoothed, &role_logs.validation, context)?
         }
         _ => None,
     };
-    let numbers = (&found.model, &found.numbers);
-    let replayed = pictures::replayed(&machine, in_memory.as_ref(), &unseen_names, numbers)?;
+    let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers)?;
     let shown = match (&replayed_diagnosis, &replayed) {
         (Some(replayed), _) => ShownLogs::Diagnosis(replayed),
         (None, Some(replayed)) => ShownLogs::Model(replayed),

@@ -144,12 +144,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::lsq::lsq(&of);
     if let Some(path) = &args.report {
+        let smoothed = machine.smoothed_as(&found.position_cutoffs);
         let in_memory = match logs.iter().any(|log| log.reduced().is_some()) {
             true => None,
-            false => pictures::in_memory(machine, &logs, context)?,
+            false => pictures::in_memory(&smoothed, &logs, context)?,
         };
         let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let replayed = pictures::replayed(machine, in_memory.as_ref(), &names, (&model, &numbers))?;
+        let replayed =
+            pictures::replayed(&smoothed, in_memory.as_ref(), &names, (&model, &numbers))?;
         let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
         let quality = pictures::inspected(files, machine, context)?;
         stages::lsq::pictures(

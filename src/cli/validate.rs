@@ -212,8 +212,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         report.terminal().line(&drifts(found));
     }
     if args.report.is_some() {
-        let in_memory = pictures::in_memory(&machine, &logs, context)?;
-        let replayed = pictures::replayed(&machine, in_memory.as_ref(), &names, (&file, &model))?;
+        // pictures are of the rows that the numbers are of
+        let smoothed = machine.smoothed_for(&logs, &model, context.control())?;
+        let in_memory = pictures::in_memory(&smoothed, &logs, context)?;
+        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &names, (&file, &model))?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();
         let replayed = replayed.as_ref();

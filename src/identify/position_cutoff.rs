@@ -13,6 +13,7 @@ use super::logged_robot::LoggedRobot;
 use super::open_log::OpenLog;
 use super::own_settings::{CutoffCosts, JointCost, OwnSettings};
 use crate::config::held_out::HeldOut;
+use crate::effect::AugmentedModel;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::inertia::solve::Fit;
 use crate::log::Block;
@@ -240,8 +241,21 @@ impl LoggedRobot {
         machine
     }
 
+    /// The same robot with the position cut-offs by which a model is validated on these logs, where none are declared.
+    ///
+    /// # Errors
+    /// Logs that cannot be read.
+    pub fn smoothed_for(
+        &self,
+        logs: &[Log],
+        model: &AugmentedModel,
+        control: &Control,
+    ) -> Result<LoggedRobot, IdentifyError> {
+        self.with_position_cutoffs(logs, &known(&model.model), control)
+    }
+
     /// The same robot with the position cut-offs that a fit took, where it found them.
-    pub(super) fn smoothed_as(&self, fit: &[PositionCutoff]) -> LoggedRobot {
+    pub fn smoothed_as(&self, fit: &[PositionCutoff]) -> LoggedRobot {
         let mut machine = self.clone();
         if self.finds_cutoffs() {
             let plain = self.settings().plain_q_cutoff_hz(f64::INFINITY);
