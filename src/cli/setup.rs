@@ -6,7 +6,7 @@ use super::{CliError, Context};
 use crate::config::correction::{Edit, edited};
 use crate::config::{self, ModelFile, RobotFile};
 use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
-use crate::setup::{Finding, SetupReport, Severity};
+use crate::setup::{Finding, FindingSeverity, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -69,10 +69,10 @@ pub fn checked(
     let mut warnings: Vec<String> = report
         .findings
         .iter()
-        .filter(|f| f.severity == Severity::Warning)
+        .filter(|f| f.severity == FindingSeverity::Warning)
         .map(likely)
         .collect();
-    let hints = (report.findings.iter()).filter(|f| f.severity == Severity::Hint);
+    let hints = (report.findings.iter()).filter(|f| f.severity == FindingSeverity::Hint);
     hints.for_each(|hint| context.note(&format!("hint: {}", hint.told())));
     for power in &report.friction_power {
         warnings.push(power.sentence());

@@ -257,7 +257,8 @@ impl LoggedRobot {
     /// The same robot with the position cut-offs that a fit took, where it found them.
     pub fn smoothed_as(&self, fit: &[PositionCutoff]) -> LoggedRobot {
         let mut machine = self.clone();
-        if self.finds_cutoffs() {
+        // where none was looked for, the plain one is as high as the sampling rate carries
+        if self.finds_cutoffs() && !fit.is_empty() {
             let plain = self.settings().plain_q_cutoff_hz(f64::INFINITY);
             let of = |joint: &String| {
                 let own = fit.iter().find(|of| of.joint == *joint);

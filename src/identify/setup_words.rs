@@ -10,8 +10,8 @@ use crate::robot::JointKind;
 use crate::robot::cft::COORDINATES;
 use crate::setup::tells_friction;
 use crate::setup::{
-    Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind, Found,
-    FrictionPower, Hint, Problem, Searched, Setting, SetupReport, Severity, Small,
+    Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind,
+    FindingSeverity, Found, FrictionPower, Hint, Problem, Searched, Setting, SetupReport, Small,
 };
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
@@ -103,8 +103,8 @@ impl Words<'_> {
                 error_after: Some(found.error[1]),
                 remedy: self.remedy(&change),
                 severity: match found.sure {
-                    true => Severity::Error,
-                    false => Severity::Warning,
+                    true => FindingSeverity::Error,
+                    false => FindingSeverity::Warning,
                 },
                 sure: found.sure,
                 evidence: Evidence {
@@ -176,7 +176,7 @@ impl Words<'_> {
             },
             error_before: Some(hint.error[0]),
             error_after: Some(hint.error[1]),
-            severity: Severity::Hint,
+            severity: FindingSeverity::Hint,
             evidence: Evidence {
                 held_out_gain: hint.gain,
                 needed: hint.needed,

@@ -45,7 +45,7 @@ impl FindingKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "SetupSeverity")]
-pub enum Severity {
+pub enum FindingSeverity {
     /// The evidence is overwhelming: a fit refuses the logs.
     Error,
     /// Likely, and the set-up as declared is possible too.
@@ -54,7 +54,7 @@ pub enum Severity {
     Hint,
 }
 
-impl Severity {
+impl FindingSeverity {
     /// As it is written.
     pub fn word(self) -> &'static str {
         match self {
@@ -133,7 +133,7 @@ pub struct Finding {
     pub error_after: Option<f64>,
     /// What to write into the robot file; of a hint, the command that finds it.
     pub remedy: String,
-    pub severity: Severity,
+    pub severity: FindingSeverity,
     /// Whether the evidence is overwhelming: a fit refuses the log then.
     pub sure: bool,
     pub evidence: Evidence,
@@ -147,7 +147,7 @@ impl Finding {
     /// As it is told: what is wrong, what to write, and what these data say as well.
     pub fn told(&self) -> String {
         let mut out = self.meaning.clone();
-        if self.severity == Severity::Hint {
+        if self.severity == FindingSeverity::Hint {
             return format!("{out}; `{}` finds it", self.remedy);
         }
         if !self.remedy.is_empty() {
@@ -210,9 +210,9 @@ impl Finding {
             error_after: None,
             remedy,
             severity: if sure {
-                Severity::Error
+                FindingSeverity::Error
             } else {
-                Severity::Warning
+                FindingSeverity::Warning
             },
             sure,
             evidence: Evidence::default(),

@@ -46,8 +46,8 @@ pub use channels::{Channels, Drive};
 pub use correction::{Change, Correction};
 pub use decide::{Found, Negative};
 pub use finding::{
-    Alternative, ChannelKind, Evidence, Finding, FindingKind, FrictionPower, Setting, SetupReport,
-    Severity,
+    Alternative, ChannelKind, Evidence, Finding, FindingKind, FindingSeverity, FrictionPower,
+    Setting, SetupReport,
 };
 pub use hints::{Hint, Small};
 pub use normal::Problem;

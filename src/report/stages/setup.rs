@@ -1,7 +1,7 @@
 //! What the check of a set-up found, for every report.
 
 use crate::report::Writer;
-use crate::setup::{SetupReport, Severity};
+use crate::setup::{FindingSeverity, SetupReport};
 
 /// The findings, nothing where there is none.
 pub fn section(out: &mut Writer, report: &SetupReport) {
@@ -14,7 +14,7 @@ pub fn section(out: &mut Writer, report: &SetupReport) {
         out.line("");
         let head = format!("{} {}", severity.word(), finding.kind.word());
         out.note("", &head, 0);
-        if severity == Severity::Hint {
+        if severity == FindingSeverity::Hint {
             out.note("    ", &finding.told(), 4);
             continue;
         }
