@@ -125,6 +125,42 @@ fn rms(folder: &Path, log: &str, model: &str, joint: usize) -> f64 {
     number(&document["joints"][joint]["rmse"])
 }
 
+/// A diagnosis with the user's own formulas, after these checks: a signal is among the first
+/// two of what is left without the formulas; with them one step is found and leaves the noise of a log without it.
+fn found_by_its_formula(
+    at: &Path,
+    (joint, number): (&str, usize),
+    signal: &str,
+    name: &str,
+) -> Value {
+    let words = [
+        "diagnose",
+        "id.csv",
+        "-m",
+        "truth.toml",
+        "--holdout",
+        "unseen.csv",
+    ];
+    let left = done(at, &words);
+    let signals = signals(&left, joint);
+    assert!(
+        signals.iter().any(|s| s == signal),
+        "{signals:?} {}",
+        left["steps"]
+    );
+    let own = ["--candidates", "own.toml", "-o", "refined.toml"];
+    let found = done(at, &[&words[..], &own].concat());
+    let steps = found["steps"].as_array().unwrap();
+    assert!(steps.len() == 1 && steps[0]["effect"] == name, "{steps:?}");
+    let floor = rms(at, "plain.csv", "truth.toml", number);
+    let [without, with] = ["truth.toml", "refined.toml"].map(|m| rms(at, "unseen.csv", m, number));
+    assert!(
+        with < 1.1 * floor && without > 3.0 * floor,
+        "{floor} {without} {with}"
+    );
+    found
+}
+
 #[test]
 fn grease_that_thins_is_seen_in_what_is_left_and_found_by_its_formula() {
     let folder = tempfile::tempdir().unwrap();
@@ -135,41 +171,13 @@ fn grease_that_thins_is_seen_in_what_is_left_and_found_by_its_formula() {
     simulate(at, "plain.csv", &["--seconds", "40", "--seed", "5"]);
     let header = fs::read_to_string(at.join("id.csv")).unwrap();
     assert!(header.starts_with("t,q_x,tau_x,motor_temperature\n"));
-    let words = [
-        "diagnose",
-        "id.csv",
-        "-m",
-        "truth.toml",
-        "--holdout",
-        "unseen.csv",
-    ];
-    let left = done(at, &words);
-    let signals = signals(&left, "x");
-    assert!(
-        signals.iter().any(|s| s == "temperature"),
-        "{signals:?} {}",
-        left["steps"]
-    );
-
-    let own = ["--candidates", "own.toml", "-o", "refined.toml"];
-    let found = done(at, &[&words[..], &own].concat());
-    let steps = found["steps"].as_array().unwrap();
-    assert!(
-        steps.len() == 1 && steps[0]["effect"] == "grease",
-        "{steps:?}"
-    );
+    let found = found_by_its_formula(at, ("x", 0), "temperature", "grease");
     for (key, truth) in [("c", SIZE), ("k", FALL)] {
-        let [value, std] = told(&steps[0], key);
+        let [value, std] = told(&found["steps"][0], key);
         assert!((value - truth).abs() < 3.0 * std, "{key}: {value} +- {std}");
         assert!(std < 0.2 * truth, "{key}: {value} +- {std}");
     }
-    // what is left is the noise of a log without it, and nothing depends on the temperature
-    let floor = rms(at, "plain.csv", "truth.toml", 0);
-    let [without, with] = ["truth.toml", "refined.toml"].map(|m| rms(at, "unseen.csv", m, 0));
-    assert!(
-        with < 1.1 * floor && without > 3.0 * floor,
-        "{floor} {without} {with}"
-    );
+    // nothing depends on the temperature any more
     assert_eq!(found["dependence"].as_array().unwrap().len(), 0);
 
     // the same torque by every command: along the unseen log it is what was measured less its noise
@@ -183,6 +191,7 @@ fn grease_that_thins_is_seen_in_what_is_left_and_found_by_its_formula() {
     ];
     done(at, &torque);
     let compared = done(at, &["compare", "truth.toml", "refined.toml", "unseen.csv"]);
+    let with = rms(at, "unseen.csv", "refined.toml", 0);
     let b = &compared["logs"]["joints"][0]["b"]["rmse"];
     assert!((number(b) - with).abs() < 1e-9 * with, "{b} {with}");
 }
@@ -207,36 +216,9 @@ fn a_joint_of_an_arm_hangs_on_the_temperature_of_another() {
     simulate(at, "id.csv", &[&["--seconds", "60"], &effect[..]].concat());
     let more = ["--seconds", "20", "--seed", "5"];
     simulate(at, "unseen.csv", &[&more[..], &effect].concat());
-    let words = [
-        "diagnose",
-        "id.csv",
-        "-m",
-        "truth.toml",
-        "--holdout",
-        "unseen.csv",
-    ];
-    let left = done(at, &words);
-    let signals = signals(&left, "shoulder");
-    assert!(
-        signals.iter().any(|s| s == "temperature of elbow"),
-        "{signals:?} {}",
-        left["steps"]
-    );
-    let own = ["--candidates", "own.toml", "-o", "refined.toml"];
-    let found = done(at, &[&words[..], &own].concat());
-    let steps = found["steps"].as_array().unwrap();
-    assert!(
-        steps.len() == 1 && steps[0]["effect"] == "sump",
-        "{steps:?}"
-    );
-    let [value, std] = told(&steps[0], "c");
+    let found = found_by_its_formula(at, ("shoulder", 0), "temperature of elbow", "sump");
+    let [value, std] = told(&found["steps"][0], "c");
     assert!((value + 0.06).abs() < 3.0 * std, "{value} +- {std}");
-    let floor = rms(at, "plain.csv", "truth.toml", 0);
-    let [without, with] = ["truth.toml", "refined.toml"].map(|m| rms(at, "unseen.csv", m, 0));
-    assert!(
-        with < 1.1 * floor && without > 3.0 * floor,
-        "{floor} {without} {with}"
-    );
 }
 
 #[test]

@@ -142,8 +142,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let mut report = stages::diagnose::diagnose(&of);
     context.check()?;
+    let refined = found.model(&machine, &file);
     if !args.plot.is_empty() || args.report.is_some() {
-        let refined = found.model(&machine, &file);
         let replayed =
             ReplayedDiagnosis::new(&machine, &found, &refined).map_err(CliError::input)?;
         if !args.plot.is_empty() {
@@ -155,12 +155,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         if let Some(path) = &args.report {
             let quality = pictures::inspected(specs, &machine, context)?;
             let mut page = report.page();
-            stages::diagnose::pictures(&mut page, &of, &replayed, &quality, context.command());
+            let shown = (&refined, &replayed);
+            stages::diagnose::pictures(&mut page, &of, shown, &quality, context.command());
             context.write_text(path, &report.html())?;
         }
     }
     if let Some(path) = &args.output {
-        context.write_text(path, &found.model(&machine, &file).to_toml()?)?;
+        context.write_text(path, &refined.to_toml()?)?;
         let unchanged = match found.diagnosis.steps.is_empty() {
             true => ", the given model unchanged: nothing was added",
             false => "",

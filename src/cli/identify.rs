@@ -190,17 +190,15 @@ fn execute(
     };
     let mut report = stages::identify::identify(&of);
     let numbers = (&found.model, &found.numbers);
-    let smoothed = match unseen.is_empty() {
-        true => machine.clone(),
-        false => machine.smoothed_for(&role_logs.validation, &found.numbers, control)?,
-    };
-    let in_memory = match &replayed_diagnosis {
+    let replayed = match &replayed_diagnosis {
         None if !unseen.is_empty() => {
-            pictures::in_memory(&smoothed, &role_logs.validation, context)?
+            let logs = &role_logs.validation;
+            let smoothed = machine.smoothed_for(logs, &found.numbers, control)?;
+            let in_memory = pictures::in_memory(&smoothed, logs, context)?;
+            pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers)?
         }
         _ => None,
     };
-    let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers)?;
     let shown = match (&replayed_diagnosis, &replayed) {
         (Some(replayed), _) => ShownLogs::Diagnosis(replayed),
         (None, Some(replayed)) => ShownLogs::Model(replayed),

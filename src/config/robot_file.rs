@@ -316,7 +316,7 @@ pub struct RobotFile {
 }
 
 /// Sentences about the reading of a file. They are no part of what it says: two files that say the same
-/// are equal, whatever was told of them.
+/// are equal, whatever was noted of them.
 #[derive(Debug, Clone, Default)]
 pub struct Notes(pub Vec<String>);
 

@@ -49,7 +49,7 @@ use practice::{Nominal, Practice};
 pub use transmission::Transmission;
 
 /// A robot whose inverse dynamics are linear in its inertial parameters: links on joints, what a fit can
-/// tell of them, and how the motors move the joints. Cheap to clone.
+/// determine of them, and how the motors move the joints. Cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot(Arc<Parts>);
 

@@ -42,22 +42,21 @@ pub fn diagnose(of: &Diagnose) -> Report {
     report
 }
 
-/// What a page has room for besides.
+/// What a page has room for besides; `refined` is the file of the model that was found.
 pub fn pictures(
     page: &mut Writer,
     of: &Diagnose,
-    replayed: &ReplayedDiagnosis,
+    (refined, replayed): (&ModelFile, &ReplayedDiagnosis),
     quality: &[Inspected],
     command: &str,
 ) {
     let (machine, found) = (of.machine, of.found);
     sections(page, machine, found, replayed);
-    let refined = found.model(machine, of.file);
-    parameters::section(page, &refined, &|_| None);
+    parameters::section(page, refined, &|_| None);
     let logs: Vec<String> = found.logs.iter().map(|name| escape(name)).collect();
     friction::section(page, machine, &replayed.friction, &logs);
     page.heading("Correlated parameters");
-    fit::pairs(page, &refined);
+    fit::pairs(page, refined);
     quality::section(page, quality, &found.in_memory.warnings);
     let mut inputs = vec![of.given.clone()];
     inputs.extend(found.in_memory.inputs.iter().cloned());
