@@ -209,22 +209,26 @@ impl RobotFile {
                 PositionUnit::Counts => ENCODER_SCALE[index],
                 other => other.in_si(),
             };
+            let scale = size * given.position_scale.unwrap_or(1.0);
             layout.positions[index] = channel(
                 &given.position,
                 (*name).to_owned(),
                 unit.label(),
                 [
-                    given.position_sign.unwrap_or(1.0) * size,
+                    given.position_sign.unwrap_or(1.0) * scale,
                     given.home.unwrap_or(0.0),
                 ],
                 || key("position"),
             );
-            layout.positions[index].wrap = given.wrap.map(|range| range * size);
+            layout.positions[index].wrap = given.wrap.map(|range| (range * scale).abs());
             layout.torques[index] = channel(
                 &given.volts,
                 format!("u_{}", index + 1),
                 "V",
-                [given.volts_sign.unwrap_or(1.0), 0.0],
+                [
+                    given.volts_sign.unwrap_or(1.0) * given.volts_scale.unwrap_or(1.0),
+                    0.0,
+                ],
                 || key("volts"),
             );
         }

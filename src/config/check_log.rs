@@ -240,6 +240,8 @@ fn actuator_channels(
     }
     sign(document, &at("position_sign"), channels.position_sign)?;
     sign(document, &at("volts_sign"), channels.volts_sign)?;
+    scale(document, &at("position_scale"), channels.position_scale)?;
+    scale(document, &at("volts_scale"), channels.volts_scale)?;
     range(document, &at("wrap"), channels.wrap)?;
     Ok(())
 }

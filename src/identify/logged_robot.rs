@@ -336,6 +336,18 @@ impl LoggedRobot {
         Ok(Some(LoggedReference::new(self.reader(&log, &layout)?)))
     }
 
+    /// Opens a log as it was logged, in SI units: motors' channels stay what they are.
+    ///
+    /// # Errors
+    /// A log that cannot be read or is refused, and interruption.
+    pub(super) fn open_channels<'a>(
+        &self,
+        log: &Log,
+        control: &'a Control,
+    ) -> Result<OpenLog<'a>, IdentifyError> {
+        self.open_as(log, &self.file.layout().as_logged(), control)
+    }
+
     /// Opens a log with every torque at the time and pose of its row.
     ///
     /// # Errors

@@ -96,27 +96,41 @@ fn sampled(
     let n = machine.robot.joints();
     let settings = machine.settings();
     let _work = control.begin("checking the set-up", None);
+    let held = (EstimatorKind::Ols, true);
+    let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
+    let known = known.transpose()?;
+    let known = known.as_ref().map(|before| before.known.as_slice());
     let mut thinner = Thinner::new(n, settings.cutoff_hz);
-    let mut channels = None;
+    let mut channels: Option<Channels> = None;
     let whole = logs.iter().filter(|log| log.reduced().is_none());
     for (index, log) in whole.enumerate() {
         let mut open = machine.open(log, control)?;
-        if channels.is_none() {
-            channels = Some(channels_of(machine, log, open.layout()));
+        let of_log = channels_of(machine, log, open.layout());
+        let drive = of_log.drive.clone();
+        if drive == Drive::Motors {
+            // positions that belong to no pose are what is looked for
+            open = machine.open_channels(log, control)?;
         }
+        channels.get_or_insert(of_log);
+        // at a reversal the law's mean is not the law at the mean speed
+        let laws = known.filter(|_| drive == Drive::Joints);
         let (mut last, mut step) = (None, 0.0);
         let run = motion::run(
             &mut |block| open.read(block),
             n,
             &settings,
             None,
-            5 * n,
+            if laws.is_some() { 6 * n } else { 5 * n },
             &|s, out| {
                 for (out, x) in out.chunks_exact_mut(n).zip([s.q, s.v, s.a, s.v, s.tau]) {
                     out.copy_from_slice(x);
                 }
                 for x in &mut out[3 * n..4 * n] {
                     *x = sign(*x);
+                }
+                let friction = laws.into_iter().flatten().zip(s.v);
+                for (out, (known, v)) in out[5 * n..].iter_mut().zip(friction) {
+                    *out = known.law.torque(*v);
                 }
             },
             &mut |row| {
@@ -132,10 +146,6 @@ fn sampled(
         let run = run.map_err(|error| IdentifyError::of_run(&log.name(), error))?;
         thinner.logged_every(run.dt);
     }
-    let held = (EstimatorKind::Ols, true);
-    let known = friction.map(|given| FrictionBefore::of(machine, given, logs, held, control));
-    let known = known.transpose()?;
-    let known = known.as_ref().map(|before| before.known.as_slice());
     Ok(SampledLogs {
         channels: channels.ok_or(IdentifyError::NoLog)?,
         columns: columns(machine, known),

@@ -8,7 +8,6 @@ use crate::log::{ActuatorChannels, ColumnName, JointChannels, PositionUnit};
 use crate::number;
 use crate::robot::JointKind;
 use crate::robot::cft::COORDINATES;
-use crate::setup::tells_friction;
 use crate::setup::{
     Alternative, Change, ChannelKind, Correction, Drive, Evidence, Finding, FindingKind,
     FindingSeverity, Found, FrictionPower, Hint, Problem, Searched, Setting, SetupReport, Small,
@@ -50,7 +49,7 @@ pub(super) fn report(
 
 /// Why a friction may come out negative.
 fn cause(problem: &Problem, joint: usize) -> &'static str {
-    match tells_friction(&problem.sample, joint) {
+    match problem.tells_friction(joint) {
         false => {
             "the log has too few reversals or speeds to tell friction from a constant torque; log the joint at several speeds in both directions"
         }
@@ -99,7 +98,7 @@ impl Words<'_> {
                 declared,
                 found: value,
                 found_std: found.std,
-                error_before: Some(found.error[0]),
+                error_before: found.error[0].is_finite().then_some(found.error[0]),
                 error_after: Some(found.error[1]),
                 remedy: self.remedy(&change),
                 severity: match found.sure {
@@ -362,9 +361,15 @@ impl Words<'_> {
             ),
         };
         let [before, after] = found.error.map(number::percent);
-        let mut out = format!(
-            "{what}: as declared the model misses {before} of the torque, with that put right {after}"
-        );
+        let mut out = match found.error[0].is_finite() {
+            true => format!(
+                "{what}: as declared the model misses {before} of the torque, with that put right {after}"
+            ),
+            false => format!(
+                "{what}: as declared the positions belong to no pose of the robot, with that put right the model misses \
+                 {after} of the torque"
+            ),
+        };
         if !found.violated[0].is_empty() && found.violated[1].is_empty() {
             out += &format!(
                 "; as declared these are negative: {}",
@@ -399,9 +404,9 @@ impl Declared {
             let c = file.log.actuator.get(name).unwrap_or(&plain);
             return Self {
                 torque_sign: c.volts_sign.unwrap_or(1.0),
-                torque_scale: 1.0,
+                torque_scale: c.volts_scale.unwrap_or(1.0),
                 position_sign: c.position_sign.unwrap_or(1.0),
-                position_scale: 1.0,
+                position_scale: c.position_scale.unwrap_or(1.0),
                 offset: c.home.unwrap_or(0.0),
             };
         }
@@ -425,6 +430,8 @@ pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> Robo
         true => COORDINATES.map(str::to_owned).to_vec(),
         false => file.joint_names(),
     };
+    let robot = file.robot();
+    let drive = robot.transmission();
     for (j, name) in names.iter().enumerate() {
         let (p, t) = (by.position_from[j], by.torque_from[j]);
         let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
@@ -450,8 +457,18 @@ pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> Robo
             if pf < 0.0 {
                 c.position_sign = Some(-declared.position_sign);
             }
+            if pf.abs() != 1.0 {
+                let kind = drive.coordinate_kind(j).unwrap_or(JointKind::Prismatic);
+                match other_unit(c.position_unit, kind, pf.abs()) {
+                    Some(unit) => c.position_unit = Some(unit),
+                    None => c.position_scale = Some(declared.position_scale * pf.abs()),
+                }
+            }
             if tf < 0.0 {
                 c.volts_sign = Some(-declared.torque_sign);
+            }
+            if tf.abs() != 1.0 {
+                c.volts_scale = Some(declared.torque_scale * tf.abs());
             }
             if by.zero[j] != 0.0 {
                 c.home = Some(declared.offset + by.zero[j]);

@@ -284,6 +284,9 @@ pub struct ActuatorChannels {
     /// 1 or -1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_sign: Option<f64>,
+    /// What the column is multiplied with beside its unit, 1 where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_scale: Option<f64>,
     /// Homing offset: the coordinate where the encoder reads 0 [m or rad].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home: Option<f64>,
@@ -296,6 +299,9 @@ pub struct ActuatorChannels {
     /// 1 or -1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub volts_sign: Option<f64>,
+    /// Volts per unit of the column, 1 where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volts_scale: Option<f64>,
 }
 
 /// `[log]`: how the logs of this machine are written.

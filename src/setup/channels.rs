@@ -36,11 +36,12 @@ pub(super) struct Carried {
     /// What each channel gives to each joint, n x n row-major by joint: summed with the weights of
     /// [`Channels::mix`].
     pub tau: Vec<f64>,
+    /// Known friction of each joint, where the row has it: no number elsewhere.
+    pub friction: Vec<f64>,
     /// Work space.
     x: [Vec<f64>; 3],
     before: [Vec<f64>; 3],
     u: Vec<f64>,
-    volts: Vec<f64>,
     force: Vec<f64>,
 }
 
@@ -53,10 +54,10 @@ impl Carried {
             a: zeros(),
             sign: zeros(),
             tau: vec![0.0; n * n],
+            friction: vec![f64::NAN; n],
             x: [zeros(), zeros(), zeros()],
             before: [zeros(), zeros(), zeros()],
             u: zeros(),
-            volts: zeros(),
             force: zeros(),
         }
     }
@@ -116,6 +117,9 @@ impl Channels {
                     out.a[j] = f * row.a[k];
                     out.sign[j] = f.signum() * row.sign[k];
                     out.tau[j * n..(j + 1) * n].copy_from_slice(row.tau);
+                    // the law is odd; at another speed it is not in the row
+                    let friction = row.friction.get(j).filter(|_| k == j && f.abs() == 1.0);
+                    out.friction[j] = friction.map_or(f64::NAN, |friction| f * friction);
                 }
                 true
             }
@@ -181,25 +185,18 @@ impl Channels {
             v,
             a,
             x,
-            before,
             u,
-            volts,
             force,
             ..
         } = out;
-        let [position, velocity, acceleration] = before;
-        drive.positions(row.q, position);
-        drive.velocities(row.q, row.v, velocity);
-        drive.accelerations(row.q, row.v, row.a, acceleration);
-        drive.volts(row.q, row.tau, volts).ok()?;
         let offset = &self.position_offset;
         let [moved, speed, change] = x;
         let coordinates = moved.iter_mut().zip(speed).zip(change).enumerate();
         for (j, ((x, xd), xdd)) in coordinates {
             let (k, f) = (by.position_from[j], self.position_factor(by, j));
-            *x = f * (position[k] - offset[k]) + offset[j] + by.zero[j];
-            *xd = f * velocity[k];
-            *xdd = f * acceleration[k];
+            *x = f * (row.q[k] - offset[k]) + offset[j] + by.zero[j];
+            *xd = f * row.v[k];
+            *xdd = f * row.a[k];
         }
         let [moved, speed, change] = x;
         drive.joints(moved, q).ok()?;
@@ -208,7 +205,7 @@ impl Channels {
         for k in 0..n {
             let from = by.torque_from[k];
             u.fill(0.0);
-            u[k] = volts[from] * self.torque_gain[k] / self.torque_gain[from];
+            u[k] = row.tau[from] * self.torque_gain[k] / self.torque_gain[from];
             drive.torques(q, u, force);
             for (j, force) in force.iter().enumerate() {
                 out.tau[j * n + k] = *force;
@@ -239,6 +236,7 @@ mod tests {
             a,
             sign: &sign,
             tau,
+            friction: &[],
         };
         assert!(channels.carry(robot, row, by, &mut out));
         out

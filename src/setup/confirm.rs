@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::channels::Carried;
 use super::correction::Correction;
-use super::fit::Fit;
+use super::fit::{Fit, Power};
 use super::normal::{Normal, Problem, own_column};
 use crate::robot::Robot;
 
@@ -32,28 +32,35 @@ pub(super) struct Gain {
 /// Gain of `after` over `before` on held-out blocks. `independent` is the share of the rows of each joint that are
 /// worth an independent one.
 pub(super) fn gain(
-    (before, of_before, power_before): (&Fit, &Normal, &[f64]),
-    (after, of_after, power_after): (&Fit, &Normal, &[f64]),
+    (before, of_before, power_before): (&Fit, &Normal, &Power),
+    (after, of_after, power_after): (&Fit, &Normal, &Power),
     independent: &[f64],
 ) -> Option<Gain> {
     let (b, a) = (before.held_out(of_before)?, after.held_out(of_after)?);
     let rows = of_after.rows as f64;
     let of_joint = |blocks: Range<usize>, j: usize| -> f64 {
-        if power_before[j] <= 0.0 || power_after[j] <= 0.0 || before.weights[j] == 0.0 {
+        let [was, is] = [power_before.joints[j], power_after.joints[j]];
+        if was <= 0.0 || is <= 0.0 || before.weights[j] == 0.0 {
             return 0.0;
         }
         let share = blocks.len() as f64 / b.len() as f64;
         let sum = |of: &[Vec<f64>]| of[blocks.clone()].iter().map(|x| x[j]).sum::<f64>();
         // beyond the torque itself a prediction is worth no more than none
         let left = |x: f64, power: f64| (x / (share * power)).clamp(1e-8, 1.0);
-        let ratio = left(sum(&b), power_before[j]) / left(sum(&a), power_after[j]);
+        let ratio = left(sum(&b), was) / left(sum(&a), is);
         0.5 * rows * share * independent[j] * ratio.ln()
     };
+    let count = b.len();
+    // what the joints' torques are of the channels' is of both hypotheses
+    let active = before.weights.iter().zip(independent);
+    let active = active.filter(|(w, _)| **w > 0.0).map(|(_, x)| *x);
+    let mean = active.clone().sum::<f64>() / active.count().max(1) as f64;
+    let sizes = 0.5 * rows * mean * (power_before.size - power_after.size) / count as f64;
     let of = |blocks: Range<usize>| -> f64 {
         let joints = 0..of_after.joints;
-        joints.map(|j| of_joint(blocks.clone(), j)).sum()
+        let gains = joints.map(|j| of_joint(blocks.clone(), j));
+        gains.sum::<f64>() + sizes * blocks.len() as f64
     };
-    let count = b.len();
     let all = of(0..count);
     let each = (0..count).map(|k| of(k..k + 1)).collect();
     let mut deviations = deviations(each);
@@ -125,8 +132,8 @@ pub(super) fn left(problem: &Problem, robot: &Robot, fit: &Fit, row: &Carried, j
     let target = &fit.targets[j];
     let torques = row.tau[j * n..(j + 1) * n].iter();
     let mut r: f64 = torques.zip(target.iter()).map(|(x, w)| x * w).sum();
-    if let Some(known) = &problem.columns.known[j] {
-        r += target[n] * known.law.torque(row.v[j]);
+    if let Some(known) = problem.known_friction(row, j) {
+        r += target[n] * known;
     }
     let first = problem.first_own(robot, j);
     for (i, own) in problem.columns.own[j].iter().enumerate() {

@@ -29,7 +29,7 @@ const NO_WORSE: f64 = 1.005;
 /// .. and below which it must be where the residual does.
 const BETTER: f64 = 0.99;
 /// A relative error that is more than what real machines leave of a right set-up.
-const THIRD: f64 = 0.33;
+pub(super) const THIRD: f64 = 0.33;
 /// Deviations by which the mean gain of the blocks is above zero ..
 pub(super) const DEVIATIONS: f64 = 2.5;
 /// .. and where there are few rows.
@@ -91,7 +91,7 @@ pub(super) struct Judged {
     pub trial: Trial,
     pub positives: Vec<Positive>,
     /// Log-posterior but for a constant.
-    worth: f64,
+    pub worth: f64,
 }
 
 pub(super) fn judged(
@@ -174,7 +174,7 @@ pub(super) fn decide(
 
 /// The most probable of the list; where several are, the simplest, and a round number before a fitted one.
 /// `from` is what the set-up as it is declared is worth.
-fn choose(list: &[Judged], from: f64) -> Option<usize> {
+pub(super) fn choose(list: &[Judged], from: f64) -> Option<usize> {
     let most = list
         .iter()
         .map(|j| j.worth)
@@ -305,7 +305,7 @@ impl Judge<'_> {
 }
 
 /// Readings that explain as much as a chosen one: of other places, else another factor of the same channel.
-fn tied(list: &[Judged], chosen: &Judged) -> Vec<Change> {
+pub(super) fn tied(list: &[Judged], chosen: &Judged) -> Vec<Change> {
     let fitted = |j: &Judged| j.std.is_some();
     let as_much = |j: &&Judged| j.worth >= chosen.worth - TIED;
     let mut order: Vec<&Judged> = list.iter().filter(as_much).collect();

@@ -69,6 +69,7 @@ pub(super) fn doubtful(
     moving: &[usize],
 ) -> bool {
     problem.robot.joints() <= SMALL
+        || problem.channels.drive == Drive::Motors
         || positives.iter().any(|p| p.told && p.deviations() < BELOW)
         || implausible(problem, moving)
         || contradicts(declared)
@@ -113,7 +114,7 @@ fn contradicts(declared: &Trial) -> bool {
             return false;
         };
         let k = gram.view((c, c), (target.len(), target.len())) * target;
-        let alone = (target.dot(&k) - g.dot(&theta)).max(0.0) / declared.power[j];
+        let alone = (target.dot(&k) - g.dot(&theta)).max(0.0) / declared.power.joints[j];
         // as many unknowns as there are take their share of the rows
         let rows = normal.rows as f64;
         let fair = alone * rows / (rows - c as f64);
@@ -153,7 +154,8 @@ fn torques(
     let score = |by: &Correction| {
         let mix = problem.channels.mix(by);
         let targets = mix.iter().map(|mix| Normal::target(mix, 1.0)).collect();
-        let power = super::trial::power(problem, by, &declared.normal, &mix, rows);
+        let robot = &declared.robot;
+        let power = super::trial::power(problem, robot, by, &declared.normal, &mix, rows);
         Fit::new(&shared, targets, &power).map_or(f64::NEG_INFINITY, |fit| fit.score)
     };
     let before = score(&declared.by);

@@ -12,6 +12,16 @@ const SWEEPS: usize = 3;
 /// A residual below this share of the torque's power is rounding and smoothing.
 const ROUNDING: f64 = 1e-8;
 
+/// By what residuals are measured.
+#[derive(Debug, Clone)]
+pub(super) struct Power {
+    /// Squares of each joint's torque.
+    pub joints: Vec<f64>,
+    /// Logarithm of their product over that of the channels' squares, as this hypothesis has one from the other: 0 where
+    /// each channel is a joint's.
+    pub size: f64,
+}
+
 /// Least squares under one hypothesis.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
@@ -63,7 +73,8 @@ impl Solver {
 impl Fit {
     /// Fits a hypothesis: `targets` are the weights of the torques of each joint, `power` the squares of
     /// its torque. None where the numbers are not finite.
-    pub fn new(normal: &Normal, targets: Vec<DVector<f64>>, power: &[f64]) -> Option<Self> {
+    pub fn new(normal: &Normal, targets: Vec<DVector<f64>>, by: &Power) -> Option<Self> {
+        let power = &by.joints;
         let n = normal.joints;
         let active = |j: &usize| !normal.places[*j].is_empty() && power[*j] > 0.0;
         let mut weights: Vec<f64> = (0..n)
@@ -91,7 +102,7 @@ impl Fit {
                 weights[j] = rows / (left[j] * power[j]);
             }
             let logs = (0..n).filter(active).map(|j| left[j].ln());
-            let score = -0.5 * rows * logs.sum::<f64>();
+            let score = -0.5 * rows * (logs.sum::<f64>() + by.size);
             found = Some(Self {
                 theta,
                 weights: weights.clone(),

@@ -121,6 +121,12 @@ impl Fitted<'_> {
         out
     }
 
+    /// Factors beside round ones of these scores.
+    pub fn beside(&self, changes: &[Change], scores: &[Option<f64>]) -> Vec<(Change, f64)> {
+        let known = changes.iter().zip(scores);
+        self.unrounded(known.filter_map(|(c, s)| s.map(|s| (c, s))))
+    }
+
     /// Of each scale that does better by a round factor, the factor nearby that does best.
     fn unrounded<'b>(&self, better: impl Iterator<Item = (&'b Change, f64)>) -> Vec<(Change, f64)> {
         let mut best: Vec<(&Change, f64)> = Vec::new();

@@ -10,7 +10,7 @@ use super::decide::{
     BLOCKS, DEVIATIONS, FEW, HARDLY, LOST, MORE_DEVIATIONS, ODDS, STROKES, TENTH, TIED,
 };
 use super::doubt::{GAIN, MORE};
-use super::fit::Fit;
+use super::fit::{Fit, Power};
 use super::fitted::{CALIBRATION, TILT};
 use super::normal::{Added, Normal, Problem};
 use super::trial::{Trial, power};
@@ -128,7 +128,7 @@ struct Fits<'a> {
     problem: &'a Problem<'a>,
     declared: (Normal, Fit),
     of: Vec<(Kind, Normal, Fit)>,
-    power: Vec<f64>,
+    power: Power,
 }
 
 impl<'a> Looks<'a> {
@@ -197,7 +197,7 @@ impl<'a> Looks<'a> {
         let whole = problem.normal_with(robot, &at.by, rows, BLOCKS, &added)?;
         let first = whole.unknowns - count;
         let mix = problem.channels.mix(&at.by);
-        let power = power(problem, &at.by, &whole, &mix, rows);
+        let power = power(problem, robot, &at.by, &whole, &mix, rows);
         let fit = |kept: &[usize]| -> Option<(Normal, Fit)> {
             let kept: Vec<usize> = kept.iter().map(|k| first + k).collect();
             let normal = whole.only(first, &kept);

@@ -19,7 +19,7 @@ const FREE_FALL: f64 = 9.81;
 pub(super) fn of_torques(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let mut out = signs(moving);
     out.extend(pairs(moving).map(|(a, b)| Change::Exchange(Torque, a, b)));
-    if moving.len() > 1 && problem.channels.drive != Drive::Motors {
+    if moving.len() > 1 {
         // a factor that all torques share leaves no trace, nor does that of a joint alone
         for j in moving {
             out.extend(FACTORS.map(|f| Change::Scale(Torque, vec![*j], f)));
@@ -71,9 +71,6 @@ pub(super) fn of_positions(problem: &Problem, moving: &[usize]) -> Vec<Change> {
     let joints = problem.robot.joints();
     if joints > 2 && moving.len() == joints {
         out.push(Change::Reverse);
-    }
-    if problem.channels.drive == Drive::Motors {
-        return out;
     }
     for f in FACTORS {
         out.push(Change::Scale(Position, moving.to_vec(), f));

@@ -15,6 +15,7 @@
 //! | `normal` | normal equations of the sample under a correction, by joint and block of time |
 //! | `fit` | their solution, with weights of its own, and its likelihood |
 //! | `physics` | inertia and friction power of a solution with their deviations |
+//! | `poses` | positions that belong to no pose as they are declared |
 //! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
 //! | `doubt` | whether there is any reason to try them all |
 //! | `hypotheses` | which corrections are tried |
@@ -36,6 +37,7 @@ mod hints;
 mod hypotheses;
 mod normal;
 mod physics;
+mod poses;
 mod sample;
 mod search;
 #[cfg(test)]
@@ -51,6 +53,5 @@ pub use finding::{
 };
 pub use hints::{Hint, Small};
 pub use normal::Problem;
-pub use physics::tells_friction;
 pub use sample::{MOST_ROWS, Sample, Thinner};
 pub use search::{Searched, search};

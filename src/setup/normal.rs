@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
+use super::physics::tells_friction;
 use super::sample::Sample;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::{JointKind, Robot};
@@ -28,6 +29,8 @@ pub struct Problem<'a> {
     /// Friction terms of each joint, fitted or known.
     pub columns: &'a RegressorColumns,
     pub sample: Sample,
+    /// Of motors behind a linkage, the rows as the joints move by the set-up as it is declared.
+    as_joints: Option<Sample>,
     /// Joints that move, and whose torques are not all zero.
     moving: Vec<bool>,
     /// Of each joint, the unknowns of the declared robot that its rows are about.
@@ -65,9 +68,11 @@ impl<'a> Problem<'a> {
             channels,
             columns,
             sample,
+            as_joints: None,
             moving: Vec::new(),
             places: Vec::new(),
         };
+        out.as_joints = out.through_linkage();
         out.moving = out.joints_that_move();
         out.places = out.places_of(robot);
         out
@@ -82,8 +87,9 @@ impl<'a> Problem<'a> {
     /// thousandths of its unit.
     fn joints_that_move(&self) -> Vec<bool> {
         let n = self.sample.joints;
+        let joints = self.of_joints();
         let travels = |j: usize| {
-            let q = self.sample.q.iter().skip(j).step_by(n.max(1));
+            let q = joints.q.iter().skip(j).step_by(n.max(1));
             let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
             let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
             let least = match self.robot.joint_kind(j) {
@@ -94,10 +100,46 @@ impl<'a> Problem<'a> {
         };
         let moved: Vec<bool> = (0..n).map(travels).collect();
         let alone = n > 1 && moved.iter().filter(|m| **m).count() == 1;
-        let torques = self.sample.rms(&self.sample.tau);
-        let speeds = self.sample.rms(&self.sample.v);
+        let torques = joints.rms(&joints.tau);
+        let speeds = joints.rms(&joints.v);
         let moving = |j: usize| torques[j] > 0.0 && speeds[j] > 0.0 && (moved[j] || !alone);
         (0..n).map(moving).collect()
+    }
+
+    /// The rows as the joints move by the set-up as it is declared; those of the channels where hardly any is a pose of
+    /// the robot.
+    pub(super) fn of_joints(&self) -> &Sample {
+        self.as_joints.as_ref().unwrap_or(&self.sample)
+    }
+
+    fn through_linkage(&self) -> Option<Sample> {
+        if self.channels.drive != Drive::Motors {
+            return None;
+        }
+        let n = self.sample.joints;
+        let none = Correction::none(n);
+        let mut out = Sample {
+            joints: n,
+            ..Sample::default()
+        };
+        let mut carried = Carried::new(n);
+        for k in 0..self.sample.len() {
+            let row = self.sample.row(k);
+            if !self.channels.carry(self.robot, row, &none, &mut carried) {
+                continue;
+            }
+            out.q.extend_from_slice(&carried.q);
+            out.v.extend_from_slice(&carried.v);
+            let torques = carried.tau.chunks_exact(n.max(1));
+            out.tau.extend(torques.map(|of| of.iter().sum::<f64>()));
+            out.log.push(self.sample.log[k]);
+        }
+        (2 * out.len() >= self.sample.len()).then_some(out)
+    }
+
+    /// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
+    pub fn tells_friction(&self, joint: usize) -> bool {
+        tells_friction(self.of_joints(), joint)
     }
 
     /// Channels whose motion or torque the joints that move feel.
@@ -129,6 +171,15 @@ impl<'a> Problem<'a> {
     /// Unknowns: shared parameters of this robot, then each joint's own.
     pub(super) fn first_own(&self, robot: &Robot, j: usize) -> usize {
         robot.parameters().len() + self.columns.own[..j].iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Known friction of a joint in a row [N or N m]: as the row has it, else the law at the row's speed.
+    pub(super) fn known_friction(&self, row: &Carried, j: usize) -> Option<f64> {
+        let known = self.columns.known[j].as_ref()?;
+        Some(match row.friction[j] {
+            friction if friction.is_finite() => friction,
+            _ => known.law.torque(row.v[j]),
+        })
     }
 
     fn places_of(&self, robot: &Robot) -> Vec<Vec<usize>> {
@@ -209,8 +260,7 @@ impl<'a> Problem<'a> {
                     data.extend(own.map(|own| own_column(*own, &carried, j)));
                     data.extend_from_slice(&beside[j * added.count..(j + 1) * added.count]);
                     data.extend_from_slice(&carried.tau[j * n..(j + 1) * n]);
-                    let known = self.columns.known[j].as_ref();
-                    data.push(known.map_or(0.0, |known| known.law.torque(carried.v[j])));
+                    data.push(self.known_friction(&carried, j).unwrap_or(0.0));
                 }
             }
             let gram = |(data, width): (&Vec<f64>, &usize)| {

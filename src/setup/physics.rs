@@ -136,7 +136,8 @@ pub(super) fn positives(
         }
     }
     let all = f64::max(all, 1.0);
-    let torque = torque_rms(problem, &fit.targets);
+    let joints = problem.of_joints();
+    let torque = torque_rms(problem, joints, &fit.targets);
     let missed = |j: usize| ALIKE * fit.left[j].sqrt() * torque[j];
     let mut out = Vec::new();
     for j in (0..n).filter(|j| !normal.places[*j].is_empty()) {
@@ -152,7 +153,7 @@ pub(super) fn positives(
         if problem.columns.known[j].is_some() || !problem.columns.own[j].is_empty() {
             let f = &power[j] / all;
             let friction = fit.targets[j][n];
-            let told = tells_friction(&problem.sample, j);
+            let told = tells_friction(joints, j);
             out.push(Positive {
                 joint: j,
                 quantity: Quantity::FrictionPower,
@@ -168,7 +169,7 @@ pub(super) fn positives(
 }
 
 /// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
-pub fn tells_friction(sample: &Sample, joint: usize) -> bool {
+pub(super) fn tells_friction(sample: &Sample, joint: usize) -> bool {
     let of_joint = sample.v.iter().skip(joint);
     let speeds = || of_joint.clone().step_by(sample.joints.max(1)).copied();
     let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
@@ -178,8 +179,8 @@ pub fn tells_friction(sample: &Sample, joint: usize) -> bool {
 }
 
 /// Root mean square of each joint's torque.
-fn torque_rms(problem: &Problem, targets: &[DVector<f64>]) -> Vec<f64> {
-    let rms = problem.sample.rms(&problem.sample.tau);
+fn torque_rms(problem: &Problem, joints: &Sample, targets: &[DVector<f64>]) -> Vec<f64> {
+    let rms = joints.rms(&joints.tau);
     let n = rms.len();
     // an exchange moves torques between joints
     let of = |j: usize| {

@@ -9,7 +9,8 @@ const RESTING: f64 = 0.01;
 /// A speed below this share of the rms speed tells no direction.
 const SLOW: f64 = 0.1;
 
-/// Rows of smoothed motion and torque; each list holds n numbers a row.
+/// Rows of smoothed motion and torque; each list holds n numbers a row. Of motors behind a linkage they are what the
+/// channels have: it is to be told which of them belong to no pose.
 #[derive(Debug, Clone, Default)]
 pub struct Sample {
     pub joints: usize,
@@ -21,6 +22,8 @@ pub struct Sample {
     pub sign: Vec<f64>,
     /// Torques [N or N m], joint side as declared.
     pub tau: Vec<f64>,
+    /// Known friction of each joint [N or N m], filtered as the torques are; empty where none is known.
+    pub friction: Vec<f64>,
     /// How fast the torques change \[N/s or N m/s\].
     pub rate: Vec<f64>,
     /// Of each row, its log.
@@ -41,6 +44,8 @@ pub struct Row<'a> {
     pub a: &'a [f64],
     pub sign: &'a [f64],
     pub tau: &'a [f64],
+    /// Known friction; empty where none is known.
+    pub friction: &'a [f64],
 }
 
 impl Sample {
@@ -62,7 +67,11 @@ impl Sample {
             v: &self.v[at.clone()],
             a: &self.a[at.clone()],
             sign: &self.sign[at.clone()],
-            tau: &self.tau[at],
+            tau: &self.tau[at.clone()],
+            friction: match self.friction.is_empty() {
+                true => &[],
+                false => &self.friction[at],
+            },
         }
     }
 
@@ -126,7 +135,11 @@ impl Sample {
             &mut self.sign,
             &mut self.tau,
             &mut self.rate,
+            &mut self.friction,
         ] {
+            if list.is_empty() {
+                continue;
+            }
             for (to, from) in kept.iter().enumerate() {
                 list.copy_within(from * n..(from + 1) * n, to * n);
             }
@@ -203,19 +216,20 @@ impl Thinner {
     }
 
     /// Adds the row at time `t` \[s\] of a stretch without gaps, which stands for `seconds`: positions, velocities,
-    /// accelerations, signs of the velocities and torques, one after the other. A stretch is a log and a number in it.
+    /// accelerations, signs of the velocities and torques, one after the other; then friction
+    /// where it is known. A stretch is a log and a number in it.
     pub fn add(&mut self, stretch: (usize, usize), t: f64, seconds: f64, channels: &[f64]) {
         let n = self.sample.joints;
         self.seconds += seconds;
         let take = self.seen.is_multiple_of(self.every);
         self.seen += 1;
-        if channels.len() != 5 * n || channels.iter().any(|x| !x.is_finite()) {
+        if ![5 * n, 6 * n].contains(&channels.len()) || channels.iter().any(|x| !x.is_finite()) {
             return;
         }
         let now = Passed {
             stretch: Some(stretch),
             t,
-            tau: channels[4 * n..].to_vec(),
+            tau: channels[4 * n..5 * n].to_vec(),
         };
         let [last, earlier] = &self.before;
         let s = &mut self.sample;
@@ -234,6 +248,7 @@ impl Thinner {
             for (list, x) in lists.into_iter().zip(channels.chunks_exact(n)) {
                 list.extend_from_slice(x);
             }
+            s.friction.extend_from_slice(&channels[5 * n..]);
             s.rate.extend(last.rates(&now));
             s.log.push(stretch.0);
             if s.len() > MOST_ROWS {

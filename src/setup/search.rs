@@ -16,6 +16,7 @@ use super::fitted::{Fitted, TILT};
 use super::hints::{Hint, Small, hint};
 use super::hypotheses;
 use super::normal::Problem;
+use super::poses::impossible;
 use super::trial::Trial;
 
 /// Rows that hypotheses are chosen by.
@@ -60,7 +61,7 @@ pub fn search(problem: &Problem, stopped: &(dyn Fn() -> bool + Sync)) -> Searche
         };
         out.negative = negative;
         let Some(found) = found else {
-            if out.found.is_empty() {
+            if let Some(declared) = declared.filter(|_| out.found.is_empty()) {
                 out.hint = hint(problem, &declared, stopped);
             }
             break;
@@ -101,8 +102,8 @@ fn leans(problem: &Problem, base: &Correction, found: &Found) -> Option<Hint> {
     })
 }
 
-/// What was found, joints whose friction drives them, and the set-up as it is, fitted to few rows.
-type Round = (Option<Found>, Vec<Negative>, Trial);
+/// What was found, joints whose friction drives them, and the set-up as it is, fitted to few rows where they are poses.
+type Round = (Option<Found>, Vec<Negative>, Option<Trial>);
 
 fn round(
     problem: &Problem,
@@ -112,11 +113,15 @@ fn round(
 ) -> Option<Round> {
     let few = problem.sample.spread(SCREENED);
     let all: Vec<usize> = (0..problem.sample.len()).collect();
-    let declared = Trial::new(problem, base.clone(), &few, BLOCKS, None)?;
+    let Some(declared) = Trial::new(problem, base.clone(), &few, BLOCKS, None) else {
+        let found = impossible(problem, base, moving, [&few, &all])?;
+        return Some((Some(found), Vec::new(), None));
+    };
     let few_judged = judged(problem, None, None, declared);
     let declared = &few_judged.trial;
     if !doubtful(problem, declared, &few_judged.positives, &few, moving) {
-        return Some((None, negative(&few_judged.positives), few_judged.trial));
+        let negative = negative(&few_judged.positives);
+        return Some((None, negative, Some(few_judged.trial)));
     }
     let mut changes = hypotheses::of_torques(problem, moving);
     changes.extend(hypotheses::of_positions(problem, moving));
@@ -204,5 +209,5 @@ fn round(
     };
     let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
     let found = decide(problem, &whole, list, tried);
-    Some((found, negative, few_judged.trial))
+    Some((found, negative, Some(few_judged.trial)))
 }

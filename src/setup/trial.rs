@@ -2,13 +2,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
+use super::channels::Carried;
 use super::channels::Drive;
 use super::correction::Correction;
-use super::fit::Fit;
+use super::fit::{Fit, Power};
 use super::normal::{Normal, Problem};
 use crate::robot::Robot;
+
+/// Rows whose poses stand for all of them.
+const POSES: usize = 40;
 
 /// A hypothesis as it was fitted.
 pub(super) struct Trial {
@@ -16,7 +20,7 @@ pub(super) struct Trial {
     pub robot: Robot,
     pub normal: Arc<Normal>,
     pub fit: Fit,
-    pub power: Vec<f64>,
+    pub power: Power,
 }
 
 impl Trial {
@@ -37,7 +41,7 @@ impl Trial {
             }
         };
         let mix = problem.channels.mix(&by);
-        let power = power(problem, &by, &normal, &mix, rows);
+        let power = power(problem, &robot, &by, &normal, &mix, rows);
         // friction that is known may have been found with the sign as it is declared, or without
         let known = |turned: bool| {
             let of = |(j, mix): (usize, &DVector<f64>)| {
@@ -66,28 +70,34 @@ impl Trial {
     }
 }
 
-/// Squares of each joint's torque, by which residuals are measured.
+/// By what the residuals of a hypothesis are measured, from these rows.
 pub(super) fn power(
     problem: &Problem,
+    robot: &Robot,
     by: &Correction,
     normal: &Normal,
     mix: &[DVector<f64>],
     rows: &[usize],
-) -> Vec<f64> {
+) -> Power {
     let n = normal.joints;
+    let own = |j: usize| {
+        let first = normal.places[j].len();
+        match normal.total[j].nrows() == first + n + 1 && first > 0 {
+            true => {
+                let k = normal.total[j].view((first, first), (n, n));
+                mix[j].dot(&(k * &mix[j]))
+            }
+            false => 0.0,
+        }
+    };
+    let alone = |joints: Vec<f64>| Power { joints, size: 0.0 };
     match problem.channels.drive {
-        Drive::Joints => (0..n)
-            .map(|j| {
-                let first = normal.places[j].len();
-                match normal.total[j].nrows() == first + n + 1 && first > 0 {
-                    true => {
-                        let k = normal.total[j].view((first, first), (n, n));
-                        mix[j].dot(&(k * &mix[j]))
-                    }
-                    false => 0.0,
-                }
-            })
-            .collect(),
+        Drive::Joints => alone((0..n).map(own).collect()),
+        Drive::Motors => {
+            let joints: Vec<f64> = (0..n).map(own).collect();
+            let size = through_linkage(problem, robot, by, (&joints, normal.rows), rows);
+            Power { joints, size }
+        }
         // channels share joints: their sizes count together
         _ => {
             let scale = (2.0 * by.torque_size() / n as f64).exp();
@@ -98,10 +108,54 @@ pub(super) fn power(
                 }
             }
             let moving = problem.moving();
-            sums.iter()
-                .zip(moving)
-                .map(|(s, m)| if *m { *s } else { 0.0 })
-                .collect()
+            let felt = sums.iter().zip(moving);
+            alone(felt.map(|(s, m)| if *m { *s } else { 0.0 }).collect())
         }
     }
+}
+
+/// Logarithm of the product of the joints' mean squares over that of the motors', by the volume that the linkage and the
+/// correction make of the motors' torques.
+fn through_linkage(
+    problem: &Problem,
+    robot: &Robot,
+    by: &Correction,
+    (joints, good): (&[f64], usize),
+    rows: &[usize],
+) -> f64 {
+    let n = joints.len();
+    let mut squares = vec![0.0; n];
+    for &k in rows {
+        for (sum, tau) in squares.iter_mut().zip(problem.sample.row(k).tau) {
+            *sum += tau * tau;
+        }
+    }
+    let mean = |sums: &[f64], rows: usize| -> f64 {
+        let all = sums.iter().filter(|s| **s > 0.0);
+        all.map(|s| (s / rows.max(1) as f64).ln()).sum()
+    };
+    let drive = robot.transmission();
+    let mut carried = Carried::new(n);
+    let (mut unit, mut torque) = (vec![0.0; n], vec![0.0; n]);
+    let (mut volume, mut count) = (0.0, 0.0);
+    for k in rows.iter().step_by(rows.len().div_ceil(POSES).max(1)) {
+        let row = problem.sample.row(*k);
+        if !problem.channels.carry(robot, row, by, &mut carried) {
+            continue;
+        }
+        let mut gains = DMatrix::zeros(n, n);
+        for c in 0..n {
+            unit[c] = 1.0;
+            drive.torques(&carried.q, &unit, &mut torque);
+            unit[c] = 0.0;
+            gains.column_mut(c).copy_from_slice(&torque);
+        }
+        let size = gains.determinant().abs();
+        if size > 0.0 {
+            volume += size.ln();
+            count += 1.0;
+        }
+    }
+    let volume = volume / f64::max(count, 1.0) + by.torque_size();
+    mean(joints, good) - mean(&squares, rows.len()) - 2.0 * volume
 }
