@@ -213,6 +213,7 @@ fn errors(
                 .add(&processing(), &mut source(&log), &mut |_| {})
                 .expect("a log");
             all.finish(summary)
+                .errors
                 .joints
                 .iter()
                 .map(|j| j.relative_error)

@@ -56,11 +56,19 @@ pub struct Overall {
     pub mean_relative_error: f64,
 }
 
-/// One reconstructed log.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Validation {
+/// Errors joint by joint, and over the joints.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TorqueErrors {
     pub joints: Vec<JointError>,
     pub overall: Overall,
+}
+
+/// Reconstructed logs.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Validation {
+    /// Over all logs.
+    #[serde(flatten)]
+    pub errors: TorqueErrors,
     #[serde(rename = "processing")]
     pub summary: Summary,
     #[serde(skip)]
@@ -116,6 +124,27 @@ impl ErrorSums {
         let d = measured - self.mean;
         self.mean += d / self.rows as f64;
         self.scatter += d * (measured - self.mean);
+    }
+
+    /// Adds the rows of another log.
+    fn merge(&mut self, other: &Self) {
+        // Chan, Golub and LeVeque 1983: the scatter about the mean of both
+        let rows = (self.rows + other.rows).max(1) as f64;
+        let apart = other.mean - self.mean;
+        self.scatter += other.scatter + apart * apart * self.rows as f64 * other.rows as f64 / rows;
+        self.mean += apart * other.rows as f64 / rows;
+        self.error += other.error;
+        self.torque += other.torque;
+        self.largest = self.largest.max(other.largest);
+        self.rows += other.rows;
+        self.raw_error += other.raw_error;
+        self.raw_torque += other.raw_torque;
+        self.raw_rows += other.raw_rows;
+        self.inside += other.inside;
+        self.widths += other.widths;
+        self.rest[0] += other.rest[0];
+        self.rest[1] += other.rest[1];
+        self.resting += other.resting;
     }
 
     fn add_raw(&mut self, measured: f64, reconstructed: f64, half_width: f64) {
@@ -195,7 +224,9 @@ pub struct Reconstruction<'a> {
     /// Speed up to which each joint rests [m/s or rad/s]; below 0 where its rows always count.
     rest_speed: Vec<f64>,
     band: Option<HalfWidths<'a>>,
+    /// Of the present log, joint by joint, and of those before it.
     sums: Vec<ErrorSums>,
+    before: Vec<Vec<ErrorSums>>,
     traces: TorqueTraces,
     /// Time of the log's own clock where the times of its rows are 0 [s].
     zero: f64,
@@ -227,16 +258,28 @@ impl<'a> Reconstruction<'a> {
             rest_speed: model.friction.iter().enumerate().map(speed).collect(),
             band,
             sums: vec![ErrorSums::default(); model.robot.joints()],
+            before: Vec::new(),
             traces: TorqueTraces::default(),
             zero: 0.0,
             summed: false,
         }
     }
 
-    /// Says from where the times of the next log are counted, by its own clock [s]: traces have that
-    /// clock's times.
+    /// Says from where the times of the log are counted, by its own clock [s]: traces have that clock's times.
     pub fn count_from(&mut self, zero: f64) {
         self.zero = zero;
+    }
+
+    /// Ends a log: what is added from here on is of another one.
+    pub fn end_log(&mut self) {
+        let next = vec![ErrorSums::default(); self.sums.len()];
+        self.before.push(std::mem::replace(&mut self.sums, next));
+    }
+
+    /// Errors over those of the logs that were ended, in their order, of which `wanted` is true.
+    pub fn errors_of(&self, wanted: impl Fn(usize) -> bool) -> TorqueErrors {
+        let logs = self.before.iter().enumerate();
+        self.errors(logs.filter(|(log, _)| wanted(*log)).map(|(_, sums)| sums))
     }
 
     /// Runs one log through with the processing that the model declares. `row` gets every raw
@@ -400,40 +443,53 @@ impl<'a> Reconstruction<'a> {
 
     /// Errors over all logs that were added, with the last log's summary.
     pub fn finish(self, summary: Summary) -> Validation {
+        let all = self.before.iter().chain([&self.sums]);
+        Validation {
+            errors: self.errors(all),
+            summary,
+            traces: self.traces,
+        }
+    }
+
+    fn errors<'s>(&self, logs: impl Iterator<Item = &'s Vec<ErrorSums>>) -> TorqueErrors {
+        let mut all = vec![ErrorSums::default(); self.sums.len()];
+        for log in logs {
+            for (sum, of_log) in all.iter_mut().zip(log) {
+                sum.merge(of_log);
+            }
+        }
         let robot = &self.model.robot;
         let n = robot.joints();
         let has_band = self.band.is_some();
         let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
-        let joints: Vec<JointError> = (0..n)
-            .map(|j| {
-                let s = &self.sums[j];
-                let [error, torque] = [s.error - s.rest[0], s.torque - s.rest[1]];
-                JointError {
-                    joint: robot.joint_names()[j].clone(),
-                    unit: robot.joint_unit(j),
-                    rmse: (s.error / s.rows.max(1) as f64).sqrt(),
-                    relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
-                    relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
-                    relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
-                    relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
-                    coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
-                    half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
-                    max_abs: known(Some(s.largest)),
-                    r2: if s.scatter > 0.0 && !self.summed {
-                        1.0 - s.error / s.scatter
-                    } else {
-                        f64::NAN
-                    },
-                    samples: s.rows,
-                    resting: s.resting,
-                }
-            })
-            .collect();
+        let joint = |(j, s): (usize, &ErrorSums)| {
+            let [error, torque] = [s.error - s.rest[0], s.torque - s.rest[1]];
+            JointError {
+                joint: robot.joint_names()[j].clone(),
+                unit: robot.joint_unit(j),
+                rmse: (s.error / s.rows.max(1) as f64).sqrt(),
+                relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
+                relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
+                relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
+                relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
+                coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
+                half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
+                max_abs: known(Some(s.largest)),
+                r2: if s.scatter > 0.0 && !self.summed {
+                    1.0 - s.error / s.scatter
+                } else {
+                    f64::NAN
+                },
+                samples: s.rows,
+                resting: s.resting,
+            }
+        };
+        let joints: Vec<JointError> = all.iter().enumerate().map(joint).collect();
         let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
         // squared error and torque over all joints, then those of rest
         let mut pooled = [0.0; 4];
         let (mut moving, mut resting) = (0, 0);
-        for s in &self.sums {
+        for s in &all {
             for (sum, x) in pooled
                 .iter_mut()
                 .zip([s.error, s.torque, s.rest[0], s.rest[1]])
@@ -453,7 +509,7 @@ impl<'a> Reconstruction<'a> {
             .iter()
             .map(|e| e.relative_error * e.relative_error)
             .sum::<f64>();
-        Validation {
+        TorqueErrors {
             overall: Overall {
                 relative_error: one_unit.then(|| (error / torque).sqrt()),
                 relative_error_moving: part(error - at_rest, torque - torque_at_rest, moving),
@@ -461,8 +517,6 @@ impl<'a> Reconstruction<'a> {
                 mean_relative_error: (mean / n as f64).sqrt(),
             },
             joints,
-            summary,
-            traces: self.traces,
         }
     }
 }

@@ -10,6 +10,7 @@ use cft_ident::identify::{
     lsq, refined, validate,
 };
 use cft_ident::log::LogSpec;
+use cft_ident::validate::TorqueErrors;
 use nalgebra::DMatrix;
 
 /// A carriage on a screw: 3 kg, viscous 5 N s/m, Coulomb 2 N.
@@ -90,8 +91,48 @@ fn a_model_that_was_fitted_is_validated_without_a_file() {
         rows += 1
     })
     .unwrap();
-    assert!(validated.validation.joints[0].relative_error < 0.01);
+    assert!(validated.validation.errors.joints[0].relative_error < 0.01);
     assert!(rows > 3000, "{rows}");
+}
+
+#[test]
+fn fitted_logs_do_not_lend_their_error_to_unseen_ones() {
+    let [t, q, tau] = motion();
+    // the unseen log has a load that the model does not know
+    let loaded: Vec<f64> = tau.iter().map(|tau| tau + 0.5).collect();
+    let seen = Log::of_rows("seen", &t, &q, &tau).unwrap();
+    let unseen = Log::of_rows("unseen", &t, &q, &loaded).unwrap();
+    let (robot, control) = (robot(), Control::default());
+    let settings = LsqSettings::default();
+    let found = lsq(&robot, std::slice::from_ref(&seen), &settings, &control).unwrap();
+    let file = found.model(&robot, None);
+    let model = refined(&file, "model").unwrap();
+    let on = |logs: &[Log]| {
+        let of = (&model, Some(&file));
+        validate(&robot, of, logs, &control, &mut |_, _| {}).unwrap()
+    };
+    let alone = [
+        on(std::slice::from_ref(&seen)),
+        on(std::slice::from_ref(&unseen)),
+    ];
+    assert!(alone.iter().all(|found| found.by_use.is_none()));
+    let error = |of: &TorqueErrors| of.joints[0].relative_error;
+    let [on_seen, on_unseen] = alone.each_ref().map(|found| error(found.judged()));
+    assert!(on_unseen > 3.0 * on_seen, "{on_unseen} {on_seen}");
+    for logs in [[seen.clone(), unseen.clone()], [unseen, seen]] {
+        let both = on(&logs);
+        let by_use = both.by_use.as_ref().unwrap();
+        assert_eq!(by_use.unseen.logs, ["unseen"]);
+        assert_eq!(by_use.used.logs, ["seen"]);
+        assert_eq!(error(both.judged()), on_unseen);
+        assert_eq!(error(&by_use.used.errors), on_seen);
+        let joints = [&by_use.used.errors, &both.validation.errors].map(|of| of.joints[0].clone());
+        let alone = alone[0].judged().joints[0].clone();
+        assert_eq!(joints[0].r2, alone.r2);
+        // all rows together lie between
+        assert_eq!(joints[1].samples, 2 * alone.samples);
+        assert!(joints[1].relative_error > on_seen && joints[1].relative_error < on_unseen);
+    }
 }
 
 #[test]

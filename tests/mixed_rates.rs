@@ -100,11 +100,11 @@ fn logs_of_three_rates_are_fitted_diagnosed_validated_and_compared_together() {
     let apart = |log: &Log| {
         let one = std::slice::from_ref(log);
         let found = validate(&robot, (&model, None), one, &control, &mut |_, _| {}).unwrap();
-        found.validation.joints[0].clone()
+        found.validation.errors.joints[0].clone()
     };
     let each: Vec<_> = all.iter().map(apart).collect();
     let together = validate(&robot, (&model, None), &all, &control, &mut |_, _| {}).unwrap();
-    let together = &together.validation.joints[0];
+    let together = &together.validation.errors.joints[0];
     assert_eq!(
         together.samples,
         each.iter().map(|e| e.samples).sum::<u64>()

@@ -220,7 +220,7 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
         validate(&machine, (&augmented, None), logs, &control, &mut |_, _| {}).unwrap()
     };
     let (a, b) = (errors(&parts), errors(&logs));
-    let [a, b] = [&a, &b].map(|v| &v.validation.joints[0]);
+    let [a, b] = [&a, &b].map(|v| &v.validation.errors.joints[0]);
     assert!(a.max_abs.is_nan() && a.r2.is_nan() && a.relative_error_raw.is_nan());
     assert_eq!(a.samples, b.samples);
     assert!(
@@ -371,7 +371,13 @@ fn measured_logs_keep_the_limits_of_size_and_give_the_same_numbers() {
             validate(&machine, (&augmented, None), logs, &control, &mut |_, _| {}).unwrap()
         };
         let (a, b) = (errors(&parts.as_logs()), errors(&logs));
-        for (a, b) in a.validation.joints.iter().zip(&b.validation.joints) {
+        for (a, b) in a
+            .validation
+            .errors
+            .joints
+            .iter()
+            .zip(&b.validation.errors.joints)
+        {
             assert!((a.rmse / b.rmse - 1.0).abs() < 1e-9, "{log} {}", a.joint);
             assert!(
                 (a.relative_error / b.relative_error - 1.0).abs() < 1e-9,

@@ -96,14 +96,14 @@ fn rests_do_not_move_the_friction_and_are_told_apart_in_the_errors() {
     let model = refined(&found.model(&robot, None), "slide.toml").unwrap();
     let unseen = [slide("unseen", 0.6, 8)];
     let all = validate(&robot, (&model, None), &unseen, &control, &mut |_, _| {}).unwrap();
-    let e = &all.validation.joints[0];
+    let e = &all.validation.errors.joints[0];
     assert!(e.relative_error_moving.unwrap() < 0.06, "{e:?}");
     assert!(e.relative_error_rest.unwrap() > 0.5, "{e:?}");
     let share = e.resting as f64 / e.samples as f64;
     // 0.6 s of rest after each move of 1.2 to 2.2 s
     assert!((0.15..0.35).contains(&share), "{share}");
     // squares of both parts make those of the whole
-    let overall = &all.validation.overall;
+    let overall = &all.validation.errors.overall;
     assert_eq!(overall.relative_error_moving, e.relative_error_moving);
     assert_eq!(overall.relative_error_rest, e.relative_error_rest);
     let resting = read_whole(&robot, &unseen, &control).unwrap().rest_speed[0];

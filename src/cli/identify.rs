@@ -195,7 +195,7 @@ fn execute(
             let logs = &role_logs.validation;
             let smoothed = machine.smoothed_for(logs, &found.numbers, control)?;
             let in_memory = pictures::in_memory(&smoothed, logs, context)?;
-            pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers)?
+            pictures::replayed(&smoothed, in_memory.as_ref(), &unseen_names, numbers, &[])?
         }
         _ => None,
     };
@@ -238,7 +238,7 @@ fn execute(
     let missed = found
         .validated
         .as_ref()
-        .map(|found| validate::missed(&found.validation, campaign.settings.max_relative_error));
+        .map(|found| validate::missed(found.judged(), campaign.settings.max_relative_error));
     Ok(Outcome {
         text: report.text_for(context.detail()),
         document,

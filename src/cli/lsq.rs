@@ -150,8 +150,13 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             false => pictures::in_memory(&smoothed, &logs, context)?,
         };
         let numbers = refined(&model, &args.output.to_string_lossy())?;
-        let replayed =
-            pictures::replayed(&smoothed, in_memory.as_ref(), &names, (&model, &numbers))?;
+        let replayed = pictures::replayed(
+            &smoothed,
+            in_memory.as_ref(),
+            &names,
+            (&model, &numbers),
+            &[],
+        )?;
         let files = args.logs.iter().filter(|l| !identify::is_reduced(&l.path));
         let quality = pictures::inspected(files, machine, context)?;
         stages::lsq::pictures(

@@ -38,7 +38,7 @@ pub(super) fn replay<'a>(
     in_memory.map(new).transpose().map_err(CliError::input)
 }
 
-/// A model and its file replayed along these logs.
+/// A model and its file replayed along these logs, of which some were `used` for the model.
 ///
 /// # Errors
 /// Settings that the sampling rate does not carry; logs that are too short for the filter.
@@ -47,9 +47,10 @@ pub(super) fn replayed(
     in_memory: Option<&InMemory>,
     names: &[String],
     (file, model): (&ModelFile, &AugmentedModel),
+    used: &[bool],
 ) -> Result<Option<Replayed>, CliError> {
     let replay = replay(machine, in_memory, names)?;
-    let replayed = replay.map(|replay| Replayed::new(&replay, file, model));
+    let replayed = replay.map(|replay| Replayed::new(&replay, file, model, used));
     replayed.transpose().map_err(CliError::input)
 }
 

@@ -11,7 +11,7 @@ use crate::output::LogWriter;
 use crate::report::json::Document;
 use crate::report::stages;
 use crate::report::table::{Align, Table};
-use crate::validate::{Reconstructed, Validation};
+use crate::validate::{Reconstructed, TorqueErrors};
 
 const EXAMPLE: &str = "\
 Example:
@@ -30,7 +30,8 @@ pub struct Args {
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// End with status 1 when a joint's relative error is above X, a fraction
+    /// End with status 1 when a joint's relative error is above X, a fraction; on unseen logs where some of
+    /// the logs made the model
     #[arg(long, value_name = "X", value_parser = arguments::positive)]
     pub max_relative_error: Option<f64>,
     /// Simulate the motion from the measured torques too, in windows of so many seconds that begin at
@@ -50,11 +51,11 @@ pub struct Args {
 }
 
 /// Joints that miss a limit on the relative error.
-pub fn missed(validation: &Validation, limit: Option<f64>) -> Vec<String> {
+pub fn missed(errors: &TorqueErrors, limit: Option<f64>) -> Vec<String> {
     let Some(limit) = limit else {
         return Vec::new();
     };
-    validation
+    errors
         .joints
         .iter()
         // an error that is not a number is no error within the limit
@@ -215,7 +216,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         // pictures are of the rows that the numbers are of
         let smoothed = machine.smoothed_for(&logs, &model, context.control())?;
         let in_memory = pictures::in_memory(&smoothed, &logs, context)?;
-        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &names, (&file, &model))?;
+        let used = match found.by_use {
+            Some(_) => identify::used_for(&file, &found.inputs),
+            None => Vec::new(),
+        };
+        let mut named = names.clone();
+        for (name, _) in named.iter_mut().zip(&used).filter(|(_, used)| **used) {
+            *name += " (which made the model)";
+        }
+        let of_model = (&file, &model);
+        let replayed = pictures::replayed(&smoothed, in_memory.as_ref(), &named, of_model, &used)?;
         let quality = pictures::inspected(&args.logs, &machine, context)?;
         let mut page = report.page();
         let replayed = replayed.as_ref();
@@ -235,6 +245,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     Ok(Outcome {
         text: report.text_for(context.detail()),
         document,
-        missed: missed(&found.validation, args.max_relative_error),
+        missed: missed(found.judged(), args.max_relative_error),
     })
 }

@@ -78,7 +78,7 @@ pub fn by_motion(
     let file = found.model(machine, None);
     let model = refined(&file, &machine.name)?;
     let errors = validate(machine, (&model, None), logs, control, &mut |_, _| {})?;
-    let errors = errors.validation.joints.into_iter();
+    let errors = errors.validation.errors.joints.into_iter();
     for (j, (joint, error)) in found.joints.iter_mut().zip(errors).enumerate() {
         found.fit.residual_std[j] *= error.rmse / joint.rmse;
         *joint = JointResidual {

@@ -145,7 +145,7 @@ pub struct ComparedErrors<T> {
 
 impl TriedOnLogs {
     fn result(&self) -> ComparedOnLogs {
-        let [a, b] = &self.validations;
+        let [a, b] = self.validations.each_ref().map(|v| &v.errors);
         let joints = a.joints.iter().zip(&b.joints);
         let joint =
             |((a, b), difference): ((&JointError, &JointError), &Difference)| ComparedErrors {
@@ -288,7 +288,7 @@ fn on_logs(
                 .map_err(named)?;
         }
         let mut validation = all.finish(in_memory.summary.clone());
-        machine.name_units(&mut validation);
+        machine.name_units(&mut validation.errors);
         Ok::<_, IdentifyError>(validation)
     };
     let validations = [validation(&sides[0])?, validation(&sides[1])?];

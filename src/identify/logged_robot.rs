@@ -20,7 +20,7 @@ use crate::inspect::{Gate, LogFault};
 use crate::log::{Block, Layout, LogError, Reader, RowFault, escape};
 use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, ZeroOrderHold};
 use crate::robot::{JointKind, Robot};
-use crate::validate::Validation;
+use crate::validate::TorqueErrors;
 
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
@@ -364,8 +364,8 @@ impl LoggedRobot {
     }
 
     /// Names the unit of every joint's torque as its channel has it.
-    pub(super) fn name_units(&self, validation: &mut Validation) {
-        for (j, error) in validation.joints.iter_mut().enumerate() {
+    pub(super) fn name_units(&self, errors: &mut TorqueErrors) {
+        for (j, error) in errors.joints.iter_mut().enumerate() {
             error.unit = self.file.torque_unit(j);
         }
     }

@@ -116,7 +116,7 @@ pub use track::{
 };
 pub use track_error::TrackError;
 pub use unknowns::FittedUnknown;
-pub use validate::{Validated, validate};
+pub use validate::{ErrorsByUse, ErrorsOfLogs, Validated, used_for, validate};
 pub use watch::{
     STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,
 };

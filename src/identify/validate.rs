@@ -21,13 +21,18 @@ use crate::log::{Instant, Provenance};
 use crate::number;
 use crate::open_loop::OpenLoop;
 use crate::robot::model::JointFriction;
-use crate::validate::{HalfWidths, Reconstructed, Reconstruction, SummedRows, Validation};
+use crate::validate::{
+    HalfWidths, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
+};
 
 /// What `validate` found.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Validated {
     #[serde(flatten)]
     pub validation: Validation,
+    /// The same errors apart, where the model was made from some of the logs and not from others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_use: Option<ErrorsByUse>,
     /// Positions that the model makes of the measured torques, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub open_loop: Option<OpenLoop>,
@@ -35,6 +40,47 @@ pub struct Validated {
     pub inputs: Vec<Provenance>,
     #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+/// Errors on logs that had no part in the model, and on those that it was made from.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ErrorsByUse {
+    pub unseen: ErrorsOfLogs,
+    /// Fitted, or a judge of what was added.
+    pub used: ErrorsOfLogs,
+}
+
+/// Errors over some logs.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ErrorsOfLogs {
+    /// Their names, with their spans.
+    pub logs: Vec<String>,
+    #[serde(flatten)]
+    pub errors: TorqueErrors,
+}
+
+impl Validated {
+    /// The errors that judge the model: of unseen logs where there are any, else of all.
+    pub fn judged(&self) -> &TorqueErrors {
+        match &self.by_use {
+            Some(by_use) => &by_use.unseen.errors,
+            None => &self.validation.errors,
+        }
+    }
+
+    /// All errors, and those of parts of the logs.
+    fn every(&mut self) -> impl Iterator<Item = &mut TorqueErrors> {
+        let parts = self.by_use.iter_mut();
+        let parts = parts.flat_map(|by| [&mut by.unseen.errors, &mut by.used.errors]);
+        std::iter::once(&mut self.validation.errors).chain(parts)
+    }
+}
+
+/// Which inputs hold rows that a model was made from.
+pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
+    let made_from = || file.provenance.inputs.iter().filter(|input| input.made());
+    let used = |input: &Provenance| made_from().any(|made| made.shares_rows(input));
+    inputs.iter().map(used).collect()
 }
 
 /// Reconstructs the torque of logs, with a band where the model's `file` holds what it takes; `row` gets every raw
@@ -58,6 +104,7 @@ pub fn validate(
         false => machine.with_position_cutoffs(&whole, &known(&refined.model), control)?,
     };
     smoothed_alike(&machine, logs)?;
+    let of_model = (refined, file);
     // a band is of single rows, which a reduced log has not
     let file = file.filter(|_| whole.len() == logs.len());
     let band = file.and_then(|file| Band::new(file, &refined.model));
@@ -70,14 +117,16 @@ pub fn validate(
         row(r, origin);
     };
     let mut found = match &as_held {
-        None => reconstruct(&machine, refined, band.as_ref(), logs, control, &mut seen)?,
+        None => reconstruct(&machine, of_model, band.as_ref(), logs, control, &mut seen)?,
         Some(as_held) => {
-            let mut found = reconstruct(&machine, refined, None, logs, control, &mut |_, _| {})?;
-            let second = reconstruct(as_held, refined, band.as_ref(), logs, control, &mut seen)?;
-            let joints = found.validation.joints.iter_mut();
-            for (joint, by_band) in joints.zip(second.validation.joints) {
-                joint.coverage_95 = by_band.coverage_95;
-                joint.half_width = by_band.half_width;
+            let mut found = reconstruct(&machine, of_model, None, logs, control, &mut |_, _| {})?;
+            let mut second =
+                reconstruct(as_held, of_model, band.as_ref(), logs, control, &mut seen)?;
+            for (errors, by_band) in found.every().zip(second.every()) {
+                for (joint, by_band) in errors.joints.iter_mut().zip(&by_band.joints) {
+                    joint.coverage_95 = by_band.coverage_95;
+                    joint.half_width = by_band.half_width;
+                }
             }
             found
         }
@@ -132,7 +181,7 @@ fn not_reduced(logs: &[Log]) -> Vec<Log> {
 
 fn reconstruct(
     machine: &LoggedRobot,
-    refined: &AugmentedModel,
+    (refined, file): (&AugmentedModel, Option<&ModelFile>),
     band: Option<&Band>,
     logs: &[Log],
     control: &Control,
@@ -155,6 +204,7 @@ fn reconstruct(
             warnings.extend(part.warnings.iter().cloned());
             inputs.push(part.provenance.clone());
             last = Some(part.summary.clone());
+            all.end_log();
             work.advance(1);
             continue;
         }
@@ -187,6 +237,7 @@ fn reconstruct(
             inputs.extend(whole.inputs);
             last = Some(whole.summary);
         }
+        all.end_log();
         work.advance(1);
     }
     if let Some(part) = logs.iter().find_map(Log::reduced) {
@@ -196,14 +247,27 @@ fn reconstruct(
         ));
     }
     let summary = last.ok_or(IdentifyError::NoLog)?;
-    let mut validation = all.finish(summary);
-    machine.name_units(&mut validation);
-    Ok(Validated {
+    let used = file.map_or(Vec::new(), |file| used_for(file, &inputs));
+    let part = |of_use: bool| ErrorsOfLogs {
+        logs: (logs.iter().zip(&used).filter(|(_, used)| **used == of_use))
+            .map(|(log, _)| log.name())
+            .collect(),
+        errors: all.errors_of(|log| used.get(log) == Some(&of_use)),
+    };
+    let apart = used.contains(&true) && used.contains(&false);
+    let by_use = apart.then(|| ErrorsByUse {
+        unseen: part(false),
+        used: part(true),
+    });
+    let mut found = Validated {
+        by_use,
         open_loop: None,
-        validation,
+        validation: all.finish(summary),
         inputs,
         warnings,
-    })
+    };
+    found.every().for_each(|errors| machine.name_units(errors));
+    Ok(found)
 }
 
 /// Adds the errors of a model that is linear in the columns of a reduced log.

@@ -94,7 +94,8 @@ pub struct Replayed {
 }
 
 impl Replayed {
-    /// Along all logs.
+    /// Along all logs; residual and poses are those of logs that were not `used` for the model, where some were
+    /// and others were not, and the torques of these come first.
     ///
     /// # Errors
     /// Stretches that are too short for the filter.
@@ -102,14 +103,18 @@ impl Replayed {
         replay: &Replay,
         file: &ModelFile,
         model: &AugmentedModel,
+        used: &[bool],
     ) -> Result<Self, MotionError> {
-        let logs = replay.all();
+        let is_used = |log: &usize| used.get(*log) == Some(&true);
+        let (seen, unseen): (Vec<_>, Vec<_>) = replay.all().into_iter().partition(is_used);
+        let judged = if unseen.is_empty() { &seen } else { &unseen };
+        let ordered: Vec<usize> = unseen.iter().chain(&seen).copied().collect();
         Ok(Replayed {
             logs: replay.names.clone(),
             friction: friction::friction(replay, file, model)?,
-            torque: torque::torque(replay, &logs, &[model])?,
-            residual: residual::residual(replay, &logs, model, None)?,
-            poses: poses::poses(replay, &logs),
+            torque: torque::torque(replay, &ordered, &[model])?,
+            residual: residual::residual(replay, judged, model, None)?,
+            poses: poses::poses(replay, judged),
         })
     }
 }

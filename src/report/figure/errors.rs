@@ -17,7 +17,7 @@ pub struct ErrorBar {
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointBars {
     pub joint: String,
-    /// None where there is one model only.
+    /// What the error is compared with, where there is anything.
     pub before: Option<ErrorBar>,
     pub after: ErrorBar,
 }
@@ -27,6 +27,8 @@ pub struct JointBars {
 pub struct ErrorFigure {
     /// Heading: what the errors are of.
     pub title: String,
+    /// Names of the two bars of a joint: of models, or of data.
+    pub names: [&'static str; 2],
     pub joints: Vec<JointBars>,
     /// Largest error that is wanted, as a fraction.
     pub limit: Option<f64>,
@@ -56,8 +58,8 @@ impl ErrorFigure {
         );
         let mut keys = Vec::new();
         if compared {
-            keys.push((Key::Patch(colour::VERMILLION), "before"));
-            keys.push((Key::Patch(colour::BLUE), "after"));
+            keys.push((Key::Patch(colour::VERMILLION), self.names[0]));
+            keys.push((Key::Patch(colour::BLUE), self.names[1]));
         } else {
             keys.push((Key::Patch(colour::BLUE), "error"));
         }
@@ -142,10 +144,12 @@ impl ErrorFigure {
     fn words(&self) -> String {
         let joint = |joint: &JointBars| match joint.before {
             Some(before) => format!(
-                "{} {} before, {} after",
+                "{} {} {}, {} {}",
                 joint.joint,
                 number::percent(before.error),
-                told(joint.after)
+                self.names[0],
+                told(joint.after),
+                self.names[1]
             ),
             None => format!("{} {}", joint.joint, told(joint.after)),
         };
@@ -197,6 +201,7 @@ mod tests {
         };
         ErrorFigure {
             title: "held-out error".into(),
+            names: ["before", "after"],
             joints: vec![JointBars {
                 joint: "q1".into(),
                 before: Some(bar(0.146)),

@@ -172,7 +172,7 @@ fn words(of: &Compared) -> String {
         1 => "A is closer on these logs",
         _ => "these logs do not show which model is closer",
     };
-    let error = |k: usize| number::percent(tried.validations[k].overall.mean_relative_error);
+    let error = |k: usize| number::percent(tried.validations[k].errors.overall.mean_relative_error);
     text += &format!(
         " Over joints A is off by {}, B by {}: {told}.",
         error(0),
@@ -301,7 +301,7 @@ fn error_table(tried: &TriedOnLogs, logs: &str) -> Table {
         1 => "A",
         _ => number::ABSENT,
     };
-    let [a, b] = &tried.validations;
+    let [a, b] = tried.validations.each_ref().map(|v| &v.errors);
     let told = a
         .joints
         .iter()

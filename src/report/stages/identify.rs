@@ -66,8 +66,8 @@ impl Identify<'_> {
         page.verdict(&text, good);
         match &self.found.validated {
             Some(validated) => {
-                let validation = &validated.validation;
-                let (text, good) = validate::words(validation, self.limit, &self.title());
+                let errors = validated.judged();
+                let (text, good) = validate::words(errors, self.limit, &self.title());
                 let declared = match self.found.refined {
                     Some(_) => text.replacen("The model", "The declared model", 1),
                     None => text,
@@ -92,15 +92,15 @@ pub fn identify(of: &Identify) -> Report {
     }
     if let Some(validated) = &found.validated {
         let caption = format!("torque on held-out data ({})", of.unseen.join(", "));
-        let validation = &validated.validation;
+        let errors = validated.judged();
         let mut rest = match of.diagnosed() {
             // the table of the diagnosis has these errors
             Some(_) => report.detail(),
             None => report.terminal(),
         };
         rest.line("");
-        validate::told(&mut rest, validation, &caption);
-        validate::overall(&mut report.detail(), validation);
+        validate::told(&mut rest, errors, &caption);
+        validate::overall(&mut report.detail(), errors);
     }
     let mut detail = report.detail();
     detail.line("");
@@ -117,7 +117,7 @@ pub fn identify(of: &Identify) -> Report {
         }
         (None, Some(validated)) => {
             let caption = "errors of the reconstructed torque on held-out data";
-            validate::errors(&mut page, &validated.validation, caption);
+            validate::errors(&mut page, validated.judged(), caption);
         }
         (None, None) => lsq::residuals(&mut page, &found.dynamics),
     }
@@ -199,7 +199,7 @@ pub fn pictures(page: &mut Writer, of: &Identify, shown: ShownLogs, origin: &Ori
         }
         (ShownLogs::Model(replayed), _) => {
             if let Some(validated) = &found.validated {
-                let errors = validated.validation.joints.iter();
+                let errors = validated.judged().joints.iter();
                 let errors: Vec<f64> = errors.map(|joint| joint.relative_error).collect();
                 sketch::section(page, machine, replayed.poses.as_ref(), &errors);
             }

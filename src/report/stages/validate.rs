@@ -2,8 +2,8 @@
 
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
-use crate::identify::{LoggedRobot, Validated};
-use crate::log::{DataRole, Provenance, escape};
+use crate::identify::{ErrorsByUse, LoggedRobot, Validated, used_for};
+use crate::log::{Provenance, escape};
 use crate::number;
 use crate::replay::Replayed;
 use crate::report::figure::{ErrorBar, ErrorFigure, JointBars, JointTorque, TorqueFigure};
@@ -11,7 +11,7 @@ use crate::report::sections::quality::{self, Inspected};
 use crate::report::sections::{fit, friction, parameters, provenance, residual, sketch, torque};
 use crate::report::table::unbroken;
 use crate::report::{Report, Writer, summary};
-use crate::validate::{JointError, Validation};
+use crate::validate::{JointError, TorqueErrors, Validation};
 
 /// What the report is made from.
 pub struct Validate<'a> {
@@ -29,40 +29,59 @@ pub struct Validate<'a> {
 
 /// The errors, and the verdict on them.
 pub fn validate(of: &Validate) -> Report {
-    let validation = &of.found.validation;
+    let judged = of.found.judged();
     let title = escaped(of.logs);
     let mut report = Report::new(&format!(
         "Validation of {} on {title}",
         escape(&of.given.name)
     ));
-    let logs = of.logs.join(", ");
-    let caption = format!("torque of {logs} by {}", of.machine.name);
-    let (text, good) = words(validation, of.limit, &title);
+    let by_use = of.found.by_use.as_ref();
+    let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
+    let (text, good) = words(judged, of.limit, &escaped(logs));
     report.everywhere().verdict(&text, good);
-    used_before(&mut report.everywhere(), of.file, &of.found.inputs);
+    used_before(&mut report.everywhere(), of);
     report.terminal().line("");
-    told(&mut report.terminal(), validation, &caption);
-    overall(&mut report.detail(), validation);
+    let caption = |logs: &[String]| format!("torque of {} by {}", logs.join(", "), of.machine.name);
+    told(&mut report.terminal(), judged, &caption(logs));
+    if let Some(ErrorsByUse { used, .. }) = by_use {
+        let mut terminal = report.terminal();
+        terminal.line("");
+        let caption = format!("{}, which the model was made from", caption(&used.logs));
+        terminal.table(summary::torque_errors(&caption, &used.errors.joints));
+    }
+    overall(&mut report.detail(), judged);
     let mut page = report.page();
-    page.figure(&bars(validation, of.limit).svg());
-    errors(&mut page, validation, "errors of the reconstructed torque");
+    page.figure(&bars(of).svg());
+    errors(&mut page, judged, "errors of the reconstructed torque");
+    if let Some(ErrorsByUse { used, .. }) = by_use {
+        let logs = escaped(&used.logs);
+        let caption = format!("errors on {logs}, which the model was made from");
+        errors(&mut page, &used.errors, &caption);
+    }
     report
 }
 
 /// Errors joint by joint as bars, with the limit that the user set.
-fn bars(validation: &Validation, limit: Option<f64>) -> ErrorFigure {
-    let joint = |e: &JointError| JointBars {
-        joint: e.joint.clone(),
-        before: None,
-        after: ErrorBar {
-            error: e.relative_error,
-            interval_95: None,
-        },
+fn bars(of: &Validate) -> ErrorFigure {
+    let bar = |e: &JointError| ErrorBar {
+        error: e.relative_error,
+        interval_95: None,
     };
+    let used = |j: usize| {
+        let by_use = of.found.by_use.as_ref()?;
+        by_use.used.errors.joints.get(j).map(bar)
+    };
+    let joints = of.found.judged().joints.iter().enumerate();
+    let joints = joints.map(|(j, e)| JointBars {
+        joint: e.joint.clone(),
+        before: used(j),
+        after: bar(e),
+    });
     ErrorFigure {
         title: "Relative torque error".to_owned(),
-        joints: validation.joints.iter().map(joint).collect(),
-        limit,
+        names: ["on logs that made the model", "on unseen logs"],
+        joints: joints.collect(),
+        limit: of.limit,
     }
 }
 
@@ -83,8 +102,8 @@ pub fn pictures(
     match replayed {
         Some(replayed) => {
             let machine = of.machine;
-            let errors = validation.joints.iter().map(|joint| joint.relative_error);
-            let errors: Vec<f64> = errors.collect();
+            let judged = of.found.judged().joints.iter();
+            let errors: Vec<f64> = judged.map(|joint| joint.relative_error).collect();
             sketch::section(page, machine, replayed.poses.as_ref(), &errors);
             friction::section(page, machine, &replayed.friction, &replayed.logs);
             torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
@@ -117,39 +136,38 @@ fn escaped(names: &[String]) -> String {
 }
 
 /// The errors for a terminal.
-pub fn told(terminal: &mut Writer, validation: &Validation, caption: &str) {
-    let joints = &validation.joints;
-    terminal.table(summary::torque_errors(caption, joints));
-    if let Some(text) = at_rest(validation) {
+pub fn told(terminal: &mut Writer, of: &TorqueErrors, caption: &str) {
+    terminal.table(summary::torque_errors(caption, &of.joints));
+    if let Some(text) = at_rest(of) {
         terminal.line("");
         terminal.paragraph(&text);
     }
 }
 
 /// Errors over all joints and before the parallel filter, for a terminal that shows everything.
-pub fn overall(terminal: &mut Writer, validation: &Validation) {
-    let joints = &validation.joints;
+pub fn overall(terminal: &mut Writer, of: &TorqueErrors) {
+    let joints = &of.joints;
     terminal.line("");
     let raw = joints.iter().map(|e| {
         let error = number::percent(e.relative_error_raw);
         unbroken(&format!("{} {error}", e.joint))
     });
-    let pooled = validation.overall.relative_error;
+    let pooled = of.overall.relative_error;
     let pooled = pooled
         .filter(|_| joints.len() > 1)
         .map(|error| format!(", {} pooled (stacked norms)", number::percent(error)));
     terminal.paragraph(&format!(
         "over joints {}{}; before the parallel filter: {}",
-        number::percent(validation.overall.mean_relative_error),
+        number::percent(of.overall.mean_relative_error),
         pooled.unwrap_or_default(),
         raw.collect::<Vec<_>>().join(", ")
     ));
 }
 
 /// The errors of moving and of resting joints apart, where one rests in a hundredth of its rows.
-fn at_rest(validation: &Validation) -> Option<String> {
+fn at_rest(of: &TorqueErrors) -> Option<String> {
     let rests = |e: &&JointError| 100 * e.resting >= e.samples && e.resting > 0;
-    let joints = validation.joints.iter().filter(rests);
+    let joints = of.joints.iter().filter(rests);
     let each: Vec<String> = joints
         .map(|e| {
             let error = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), number::percent);
@@ -171,14 +189,14 @@ fn at_rest(validation: &Validation) -> Option<String> {
 }
 
 /// The verdict in words, and whether nothing calls for attention.
-pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (String, bool) {
+pub fn words(of: &TorqueErrors, limit: Option<f64>, title: &str) -> (String, bool) {
     let mut text = format!(
         "The model gives the torque of {title} to within {}, as the rms over the joints.",
-        number::percent(validation.overall.mean_relative_error)
+        number::percent(of.overall.mean_relative_error)
     );
-    let joints = validation.joints.iter();
+    let joints = of.joints.iter();
     if let Some(worst) = joints.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))
-        && validation.joints.len() > 1
+        && of.joints.len() > 1
     {
         text += &format!(
             " The worst joint is {} with {}.",
@@ -189,7 +207,7 @@ pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (Strin
     let Some(limit) = limit else {
         return (text, true);
     };
-    let beyond: Vec<&str> = validation
+    let beyond: Vec<&str> = of
         .joints
         .iter()
         .filter(|e| e.relative_error.is_nan() || e.relative_error > limit)
@@ -214,8 +232,8 @@ pub fn words(validation: &Validation, limit: Option<f64>, title: &str) -> (Strin
 }
 
 /// The errors of every joint.
-pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
-    let rows: Vec<Vec<String>> = validation
+pub fn errors(page: &mut Writer, of: &TorqueErrors, caption: &str) {
+    let rows: Vec<Vec<String>> = of
         .joints
         .iter()
         .map(|e| {
@@ -255,33 +273,34 @@ pub fn errors(page: &mut Writer, validation: &Validation, caption: &str) {
 }
 
 /// Logs that the model was made from are no test of it.
-fn used_before(page: &mut Writer, file: &ModelFile, inputs: &[Provenance]) {
-    let made_from = &file.provenance.inputs;
-    // a file of 0.1, or one that is cut off, may not say what a log was used for
-    let used = |m: &&Provenance| m.role != Some(DataRole::HeldOut);
-    let known = |i: &&Provenance| made_from.iter().filter(used).any(|m| m.shares_rows(i));
-    let names: Vec<String> = inputs
-        .iter()
-        .filter(known)
-        .map(|i| escape(&i.name))
+fn used_before(page: &mut Writer, of: &Validate) {
+    let used = used_for(of.file, &of.found.inputs);
+    let names: Vec<String> = (of.found.inputs.iter().zip(&used))
+        .filter(|(_, used)| **used)
+        .map(|(input, _)| escape(&input.name))
         .collect();
-    if !names.is_empty() {
-        page.verdict(
-            &format!(
-                "{} was used to make this model (the checksum is the same): its error is no test \
-                 of the model.",
-                names.join(", ")
-            ),
+    if names.is_empty() {
+        return;
+    }
+    let names = names.join(", ");
+    let made = "used to make this model (the checksum is the same)";
+    match of.found.by_use {
+        Some(_) => page.paragraph(&format!(
+            "{names} was {made}: its error stands apart and is no test of the model."
+        )),
+        None => page.verdict(
+            &format!("{names} was {made}: its error is no test of the model."),
             false,
-        );
+        ),
     }
 }
 
 /// Measured and reconstructed torque over time (Figures 7 and 8 of the report).
 pub fn figure(validation: &Validation, title: &str) -> TorqueFigure {
     let traces = &validation.traces;
-    let n = validation.joints.len();
+    let n = validation.errors.joints.len();
     let joints = validation
+        .errors
         .joints
         .iter()
         .enumerate()
