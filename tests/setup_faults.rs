@@ -81,6 +81,63 @@ fn nothing_is_said_of_right_set_ups_and_of_their_spans() {
     }
 }
 
+const MOTORS: [&str; 8] = ["x_c1", "x_c2", "x_c3", "x_c4", "u_1", "u_2", "u_3", "u_4"];
+
+/// What `inspect` says of a log of the motors behind the pantograph whose channels are altered row by row.
+fn said_of_motors(made: &str, alter: &dyn Fn(&mut [f64])) -> Vec<serde_json::Value> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut lines = made.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().expect("a header");
+    let place = |name: &&str| header.iter().position(|column| column == name);
+    let places: Vec<usize> = MOTORS.iter().filter_map(place).collect();
+    let mut out = format!("t,{}\n", MOTORS.join(","));
+    for line in lines {
+        let number = |at: &usize| line[*at].parse().expect("a number");
+        let mut channels: Vec<f64> = places.iter().map(number).collect();
+        alter(&mut channels);
+        let written: Vec<String> = channels.iter().map(f64::to_string).collect();
+        out += &format!("{},{}\n", line[0], written.join(","));
+    }
+    std::fs::write(folder.path().join("log.csv"), out).expect("the log is written");
+    let done = bench::tool::run(
+        folder.path(),
+        &["inspect", "log.csv", "-r", "configs/cft.toml"],
+    );
+    bench::fit::rows(&done.document["setup"]).to_vec()
+}
+
+#[test]
+fn motors_whose_positions_are_no_poses_or_in_other_units_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let words = "simulate -r configs/cft.toml --seconds 20 --seed 5 -o made.csv";
+    let done = bench::tool::run(folder.path(), &words.split(' ').collect::<Vec<_>>());
+    assert_eq!(done.status, 0, "{}", done.message);
+    let made = std::fs::read_to_string(folder.path().join("made.csv")).expect("it was written");
+    assert!(said_of_motors(&made, &|_| {}).is_empty());
+    let cases: [(&dyn Fn(&mut [f64]), [&str; 4]); 3] = [
+        (
+            &|x| x[1] = -x[1],
+            ["sign", "position", "x_c2", "position_sign = -1"],
+        ),
+        (
+            &|x| x[3] *= 1000.0,
+            ["scale", "position", "x_c4", "position_unit = \"mm\""],
+        ),
+        (
+            &|x| x[7] *= 1000.0,
+            ["scale", "torque", "x_c4", "volts_scale = 0.001"],
+        ),
+    ];
+    for (alter, [kind, channel, joint, remedy]) in cases {
+        let said = said_of_motors(&made, alter);
+        let entry = said.first().expect("something is said");
+        let told = ["kind", "channel", "joint"].map(|key| entry[key].as_str());
+        assert_eq!(told, [kind, channel, joint].map(Some), "{entry}");
+        let told = entry["remedy"].as_str().expect("a line");
+        assert!(told.contains(remedy), "{told}");
+    }
+}
+
 /// What is said of the simulated arm under an altered robot file or log.
 fn said_of_arm(alter: &dyn Fn(&mut Machine)) -> Vec<serde_json::Value> {
     let folder = tempfile::tempdir().expect("a folder");

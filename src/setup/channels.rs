@@ -131,7 +131,7 @@ impl Channels {
         }
     }
 
-    fn position_factor(&self, by: &Correction, j: usize) -> f64 {
+    pub(super) fn position_factor(&self, by: &Correction, j: usize) -> f64 {
         let k = by.position_from[j];
         by.position_factor[j] * self.position_gain[j] / self.position_gain[k]
     }
@@ -272,7 +272,16 @@ mod tests {
                 drive,
                 ..Channels::of_joints(4)
             };
-            let row = ROW.each_ref().map(|x| &x[..]);
+            let mut logged = ROW;
+            if channels.drive == Drive::Motors {
+                let drive = robot.transmission();
+                let [q, v, a, tau] = &ROW;
+                drive.positions(q, &mut logged[0]);
+                drive.velocities(q, v, &mut logged[1]);
+                drive.accelerations(q, v, a, &mut logged[2]);
+                drive.volts(q, tau, &mut logged[3]).unwrap();
+            }
+            let row = logged.each_ref().map(|x| &x[..]);
             let none = Correction::none(4);
             let plain = carried(&channels, &robot, row, &none);
             let found = torques(&channels, &plain, &none);

@@ -6,6 +6,7 @@ use super::finding::ChannelKind;
 use super::fitted;
 use super::normal::Problem;
 use super::physics::{Positive, Quantity, credit, positives};
+use super::sizes::sizes;
 use super::trial::Trial;
 
 /// Blocks of time that are held out in turn.
@@ -28,12 +29,16 @@ const FORBIDDEN: f64 = -4.0;
 const NO_WORSE: f64 = 1.005;
 /// .. and below which it must be where the residual does.
 const BETTER: f64 = 0.99;
+/// Log-probability of sizes that need not be confirmed in every block.
+const SIZES: f64 = 3.0;
 /// A relative error that is more than what real machines leave of a right set-up.
 pub(super) const THIRD: f64 = 0.33;
 /// Deviations by which the mean gain of the blocks is above zero ..
 pub(super) const DEVIATIONS: f64 = 2.5;
 /// .. and where there are few rows.
 pub(super) const MORE_DEVIATIONS: f64 = 4.0;
+/// Share of these deviations at which a reading that gains what is needed is likely.
+const ALMOST: f64 = 0.5;
 /// Independent rows for each unknown that are few.
 pub(super) const FEW: f64 = 3.0;
 /// Strokes of all joints, and of these for each unknown, that show a wrong set-up in all its motions: what fewer
@@ -90,6 +95,9 @@ pub(super) struct Judged {
     pub std: Option<f64>,
     pub trial: Trial,
     pub positives: Vec<Positive>,
+    /// Log-probability of all that physics says, and of the sizes alone.
+    pub credit: f64,
+    sizes: f64,
     /// Log-posterior but for a constant.
     pub worth: f64,
 }
@@ -101,10 +109,13 @@ pub(super) fn judged(
     trial: Trial,
 ) -> Judged {
     let positives = positives(problem, &trial.robot, &trial.by, &trial.normal, &trial.fit);
+    let sizes = sizes(problem, &trial.by);
     Judged {
         change,
         std,
         worth: 0.0,
+        credit: credit(&positives) + sizes,
+        sizes,
         positives,
         trial,
     }
@@ -135,7 +146,7 @@ pub(super) fn decide(
         let fit = &judged.trial.fit;
         let rows = share * judged.trial.normal.rows as f64;
         let unknowns = judged.trial.normal.unknowns + usize::from(judged.std.is_some());
-        share * fit.score + credit(&judged.positives) - 0.5 * unknowns as f64 * rows.max(1.0).ln()
+        share * fit.score + judged.credit - 0.5 * unknowns as f64 * rows.max(1.0).ln()
     };
     for judged in &mut list {
         judged.worth = worth(judged);
@@ -215,7 +226,7 @@ impl Judge<'_> {
             (&a.fit, &a.normal, &a.power),
             self.independent,
         )?;
-        let physics = credit(&chosen.positives) - credit(&declared.positives);
+        let physics = chosen.credit - declared.credit;
         let gain = held_out.all + physics;
         let fitted = self.share * (a.fit.score - b.fit.score);
         let sure = gain >= self.needed;
@@ -234,10 +245,12 @@ impl Judge<'_> {
         let strokes = problem.sample.strokes();
         // what physics says alone needs no residual
         let deviations = if physics > needed { 0.0 } else { deviations };
-        let no_worse = if physics > 0.5 * needed {
-            NO_WORSE
-        } else {
-            BETTER
+        let plausible = chosen.sizes - declared.sizes;
+        let (no_worse, deviations) = match (physics > 0.5 * needed, plausible > SIZES) {
+            (true, false) => (NO_WORSE, deviations),
+            (false, false) => (BETTER, deviations),
+            // a motion or a torque that no robot has, beside ones that it has
+            (_, true) => (NO_WORSE, 0.0),
         };
         if gain < needed {
             return None;
@@ -246,9 +259,10 @@ impl Judge<'_> {
         // forbids by itself outweighs what the fit loses
         let confirmed = held_out.all >= -WORSE
             && fitted >= -0.5 * WORSE
-            && a.fit.error() <= no_worse * b.fit.error()
+            && (a.fit.error() <= no_worse * b.fit.error() || typical(a, b) <= no_worse)
             && held_out.half + 0.5 * physics >= -LOST * held_out.all
-            && held_out.deviations >= deviations;
+            && held_out.deviations >= ALMOST * deviations;
+        let everywhere = held_out.deviations >= deviations;
         // what physics forbids tells a turned or exchanged channel though the rows fit worse; a direction, a zero or a factor
         // that is chosen among many only where they do not
         let turned = matches!(
@@ -256,7 +270,8 @@ impl Judge<'_> {
             Some(Change::Sign(..) | Change::Exchange(..) | Change::Reverse)
         );
         let worse = a.fit.error() > NO_WORSE * b.fit.error();
-        if !confirmed && (physics < FORCED * needed || (worse && !turned)) {
+        if !(confirmed && (sure || everywhere)) && (physics < FORCED * needed || (worse && !turned))
+        {
             return None;
         }
         if (strokes < HARDLY * unknowns && physics < needed)
@@ -299,9 +314,17 @@ impl Judge<'_> {
             needed: self.needed,
             tried: self.tried,
             violated: [violated(&declared.positives), violated(&chosen.positives)],
-            sure: sure && !poor,
+            sure: sure && (everywhere || physics >= FORCED * needed) && !poor,
         })
     }
+}
+
+/// Ratio of the errors of two fits, the geometric mean over the joints: one large error does not hide the others.
+fn typical(after: &Trial, before: &Trial) -> f64 {
+    let pairs = after.fit.left.iter().zip(&before.fit.left);
+    let both = pairs.filter(|(a, b)| **a > 0.0 && **b > 0.0);
+    let count = both.clone().count().max(1) as f64;
+    (both.map(|(a, b)| (a / b).ln()).sum::<f64>() / (2.0 * count)).exp()
 }
 
 /// Readings that explain as much as a chosen one: of other places, else another factor of the same channel.
@@ -365,7 +388,7 @@ fn wins_in_halves(
             let gain = share * (after.fit.score - before.fit.score);
             let before = judged(problem, None, None, before);
             let after = judged(problem, None, None, after);
-            gain + credit(&after.positives) - credit(&before.positives) > needed
+            gain + after.credit - before.credit > needed
         })
 }
 

@@ -18,6 +18,7 @@ use super::fitted::CALIBRATION;
 use super::hypotheses;
 use super::normal::{Normal, Problem, own_column};
 use super::physics::{Positive, credit, positives};
+use super::sizes::sizes;
 use super::trial::Trial;
 use crate::robot::JointKind;
 
@@ -57,6 +58,8 @@ const PROMISING: f64 = -5.0;
 const SLOW: f64 = 3e-3;
 /// Step of differences \[rad\].
 const STEP: f64 = 1e-4;
+/// Log-probability of sizes below which they are looked into.
+const UNUSUAL: f64 = -1.0;
 /// A motion in turns or in thousandths is looked into \[rad\].
 const PLAUSIBLE: [f64; 2] = [0.05, 14.0];
 
@@ -72,6 +75,7 @@ pub(super) fn doubtful(
         || problem.channels.drive == Drive::Motors
         || positives.iter().any(|p| p.told && p.deviations() < BELOW)
         || implausible(problem, moving)
+        || sizes(problem, &declared.by) < UNUSUAL
         || contradicts(declared)
         || torques(problem, declared, credit(positives), rows, moving)
         || {

@@ -16,6 +16,7 @@
 //! | `fit` | their solution, with weights of its own, and its likelihood |
 //! | `physics` | inertia and friction power of a solution with their deviations |
 //! | `poses` | positions that belong to no pose as they are declared |
+//! | `sizes` | how far a joint turns in a log, and how large its torque is beside the others' |
 //! | `confirm` | held-out blocks: gains that did not choose the hypothesis |
 //! | `doubt` | whether there is any reason to try them all |
 //! | `hypotheses` | which corrections are tried |
@@ -40,6 +41,7 @@ mod physics;
 mod poses;
 mod sample;
 mod search;
+mod sizes;
 #[cfg(test)]
 mod tests;
 mod trial;

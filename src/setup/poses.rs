@@ -8,7 +8,6 @@ use super::decide::{BLOCKS, Found, Judged, ODDS, THIRD, choose, judged, tied};
 use super::fitted::Fitted;
 use super::hypotheses;
 use super::normal::Problem;
-use super::physics::credit;
 use super::trial::Trial;
 
 /// Changes that are fitted to all rows.
@@ -81,8 +80,8 @@ pub(super) fn impossible(
         let normal = &judged.trial.normal;
         let rows = (share * normal.rows as f64).max(1.0);
         let unknowns = normal.unknowns + usize::from(judged.std.is_some());
-        judged.worth = share * judged.trial.fit.score + credit(&judged.positives)
-            - 0.5 * unknowns as f64 * rows.ln();
+        judged.worth =
+            share * judged.trial.fit.score + judged.credit - 0.5 * unknowns as f64 * rows.ln();
         judged.std = (judged.std).map(|c| (share * c).max(1e-12).sqrt().recip());
     }
     let most = list

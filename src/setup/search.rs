@@ -17,6 +17,7 @@ use super::hints::{Hint, Small, hint};
 use super::hypotheses;
 use super::normal::Problem;
 use super::poses::impossible;
+use super::sizes::sizes;
 use super::trial::Trial;
 
 /// Rows that hypotheses are chosen by.
@@ -128,12 +129,13 @@ fn round(
     changes.extend(hypotheses::of_zeros(problem));
     changes.extend(hypotheses::of_gravity(problem, base));
     let tried = changes.len();
+    let usual = sizes(problem, base);
     let score = |change: &Change| {
         if stopped() {
             return None;
         }
         let trial = Trial::new(problem, base.with(change), &few, 1, Some(declared))?;
-        Some(trial.fit.score)
+        Some(trial.fit.score + sizes(problem, &trial.by) - usual)
     };
     let mut scores: Vec<Option<f64>> = changes.par_iter().map(score).collect();
     if stopped() {

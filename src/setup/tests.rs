@@ -122,6 +122,29 @@ fn a_right_set_up_is_told_nothing() {
 }
 
 #[test]
+fn a_joint_that_turns_a_thousand_times_is_the_less_likely_for_it() {
+    let here = robot(DOWN);
+    let columns = RegressorColumns {
+        joints: 2,
+        shared: here.parameters().len(),
+        own: vec![vec![Own::Viscous]; 2],
+        known: vec![None, None],
+        rest_speed: Default::default(),
+    };
+    let rows = sample(&quiet(&|_| {}));
+    let problem = Problem::new(&here, None, Channels::of_joints(2), &columns, rows);
+    let none = Correction::none(2);
+    assert_eq!(sizes::sizes(&problem, &none), 0.0);
+    let of = |factor: f64| {
+        let change = Change::Scale(ChannelKind::Position, vec![0], factor);
+        sizes::sizes(&problem, &none.with(&change))
+    };
+    assert!(of(1000.0) < of(57.3) && of(57.3) < 0.0 && of(1e-3) < 0.0);
+    // as many turns as one likes say no more than this
+    assert_eq!(of(1e6), of(1e9));
+}
+
+#[test]
 fn turned_and_exchanged_channels_are_named() {
     use ChannelKind::{Both, Position, Torque};
     let turned = searched(DOWN, &|row| row[9] = -row[9]);
