@@ -223,6 +223,29 @@ fn time_that_runs_backwards_late_in_a_log_is_found() {
 }
 
 #[test]
+fn rows_that_are_missing_for_a_short_part_of_a_period_do_not_part_a_log() {
+    // bursts of ten rows, every half second
+    let mut t = even(20_000, 1e-3);
+    let mut k = 0;
+    t.retain(|_| {
+        k += 1;
+        k % 500 >= 10
+    });
+    let parted = run(&t, &FilterSettings::default()).map(|(_, summary)| summary.segments);
+    let settings = FilterSettings {
+        bridge_s: 0.0125,
+        ..FilterSettings::default()
+    };
+    let (_, whole) = run(&t, &settings).expect("it is one stretch");
+    assert_eq!(whole.segments, 1);
+    assert!(parted.is_err() || parted.is_ok_and(|segments| segments > 1));
+    // a longer one parts it all the same
+    t.retain(|t| !(5.0..5.014).contains(t));
+    let (_, two) = run(&t, &settings).expect("two stretches");
+    assert_eq!(two.segments, 2);
+}
+
+#[test]
 fn settings_out_of_range_are_named() {
     let t = even(5_000, 1e-3);
     let broken = [
@@ -360,5 +383,8 @@ fn a_record_with_a_gap_is_cut_by_the_caller() {
         matches!(error, Err(MotionError::Gap { from, to }) if from < 1.5 && to > 2.4),
         "{error:?}"
     );
-    assert_eq!(motion::segments(&t, 2.5), Ok(vec![0..1_500, 1_500..4_000]));
+    assert_eq!(
+        motion::segments(&t, &FilterSettings::default()),
+        Ok(vec![0..1_500, 1_500..4_000])
+    );
 }

@@ -122,7 +122,7 @@ impl Rows {
         let (arrays, layout) = self.arrays();
         let mut reader = Reader::of_arrays(&arrays, layout).unwrap();
         reader.mend(gate.mending());
-        let mut cutter = gate.cutter(2.5);
+        let mut cutter = gate.cutter(&|dt| 2.5 * dt);
         let (mut all, mut block) = (Block::default(), Block::default());
         while reader.read(&mut block).unwrap() {
             cutter.cut(&mut block);

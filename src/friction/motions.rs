@@ -22,7 +22,7 @@ pub fn motions(
     let n = joints;
     let mut out = Vec::new();
     let mut longest = 0;
-    let stretches = motion::segments(t, settings.gap_factor)?;
+    let stretches = motion::segments(t, settings)?;
     for stretch in &stretches {
         longest = longest.max(stretch.len());
         let rows = stretch.start * n..stretch.end * n;

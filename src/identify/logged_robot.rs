@@ -22,6 +22,9 @@ use crate::motion::{Differences, FilterSettings, ParallelFilter, TorqueTiming, Z
 use crate::robot::{JointKind, Robot};
 use crate::validate::TorqueErrors;
 
+/// Share of a period of the cut-off for which rows may be missing: interpolation is at the noise there.
+const BRIDGED: f64 = 0.125;
+
 /// The same processing with a narrower position filter.
 pub fn narrowed(settings: &FilterSettings, rate_hz: f64) -> FilterSettings {
     let each = settings.joint_q_cutoffs_hz.iter();
@@ -286,7 +289,7 @@ impl LoggedRobot {
             control,
             centre: None,
             name: escape(&log.name()),
-            cutter: look.gate.cutter(self.settings().gap_factor),
+            cutter: look.gate.cutter(&|dt| self.settings().longest_step(dt)),
             look,
         })
     }
@@ -397,6 +400,11 @@ impl LoggedRobot {
             // torques that hold are brought to their rows' time as the log is read
             torque: TorqueTiming::Sampled,
             gap_factor: f.gap_factor.unwrap_or(plain.gap_factor),
+            // a factor that is declared is meant
+            bridge_s: match f.gap_factor {
+                Some(_) => 0.0,
+                None => BRIDGED / f.cutoff_hz.unwrap_or(plain.cutoff_hz),
+            },
             q_trim_s: f.position_trim_s,
             trim_s: f.trim_s,
         }

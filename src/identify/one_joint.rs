@@ -44,6 +44,8 @@ fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
         ),
         differences: Differences::HighOrder,
         q_trim_s: None,
+        // the filter takes rows as they come, and needs none between
+        bridge_s: 0.0,
         ..machine.settings()
     }
 }

@@ -153,10 +153,10 @@ impl Gate {
         self.cuts = joined(self.cuts.drain(..).chain(spans).collect());
     }
 
-    /// Takes rows out of the log so that a step longer than `gap_factor` median ones is left, which
-    /// parts it.
-    pub fn cutter(&self, gap_factor: f64) -> Cutter {
-        let gap = WIDER * gap_factor * self.dt;
+    /// Takes rows out of the log so that a step is left that parts it: one longer than `longest` has it for the
+    /// median step \[s\].
+    pub fn cutter(&self, longest: &dyn Fn(f64) -> f64) -> Cutter {
+        let gap = WIDER * longest(self.dt);
         let widened = self.cuts.iter().map(|[from, to]| {
             let more = (0.5 * (gap - (to - from))).max(0.6 * self.dt);
             [from - more, to + more]
@@ -366,7 +366,7 @@ mod tests {
             dt: 0.1,
             ..Gate::default()
         };
-        let mut cutter = gate.cutter(2.5);
+        let mut cutter = gate.cutter(&|dt| 2.5 * dt);
         let mut kept = Vec::new();
         for (from, to) in [(0, 11), (11, 14), (14, 30)] {
             let mut block = block(from, to);

@@ -250,7 +250,7 @@ fn gap_faults(clock: &ClockFacts, draft: &mut FaultList) {
             String::new()
         };
         format!(
-            "{many}about {} lost: nothing is differentiated across a gap, the log is parted there and the ends of its stretches are given up",
+            "{many}about {} lost: a gap that the filter's band does not see is interpolated, a longer one parts the log and the ends of its stretches are given up",
             rows_text(rows, 1)
         )
     };

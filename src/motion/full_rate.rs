@@ -24,16 +24,16 @@ pub struct Smooth {
     pub settled: Range<usize>,
 }
 
-/// Rows of a record between gaps: steps longer than `gap_factor` times the sampling step.
+/// Rows of a record between gaps: steps longer than [`FilterSettings::longest_step`].
 ///
 /// # Errors
 /// [`MotionError::TooFewSamples`], [`MotionError::Time`].
-pub fn segments(t: &[f64], gap_factor: f64) -> Result<Vec<Range<usize>>, MotionError> {
+pub fn segments(t: &[f64], settings: &FilterSettings) -> Result<Vec<Range<usize>>, MotionError> {
     let clock = SampleClock::of(t)?;
     let mut found = Vec::new();
     let mut start = 0;
     for k in 1..t.len() {
-        if t[k] - t[k - 1] > gap_factor * clock.dt {
+        if t[k] - t[k - 1] > settings.longest_step(clock.dt) {
             found.push(start..k);
             start = k;
         }

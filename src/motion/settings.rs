@@ -33,8 +33,11 @@ pub struct FilterSettings {
     pub differences: Differences,
     /// At which time a logged torque acts.
     pub torque: TorqueTiming,
-    /// A step longer than this many sampling steps splits the log.
+    /// A step longer than this many sampling steps splits the log ..
     pub gap_factor: f64,
+    /// .. where it is longer than this, too (s): what lasts an eighth of a period of the highest frequency that is kept
+    /// is told by its neighbours. 0: only steps count.
+    pub bridge_s: f64,
     /// Dropped at each end of a segment before the parallel filter (s), where the position filter
     /// has nothing to look ahead to; left out, ten of that filter's time constants.
     pub q_trim_s: Option<f64>,
@@ -55,9 +58,17 @@ impl Default for FilterSettings {
             differences: Differences::HighOrder,
             torque: TorqueTiming::Sampled,
             gap_factor: 2.5,
+            bridge_s: 0.0,
             q_trim_s: None,
             trim_s: None,
         }
+    }
+}
+
+impl FilterSettings {
+    /// The longest step of a log of sampling step `dt` that does not split it (s).
+    pub fn longest_step(&self, dt: f64) -> f64 {
+        (self.gap_factor * dt).max(self.bridge_s)
     }
 }
 

@@ -3,7 +3,7 @@
 //! A log whose rows keep their step within 2 % is taken as it is; a row that came early, late or
 //! not at all is replaced by interpolation. Where most steps are uneven, every sample is
 //! interpolated on an even grid (cubic, through the four nearest rows). A step longer than the gap
-//! factor ends a stretch.
+//! factor ends a stretch, unless the rows to be kept are so slow that they do not see it.
 
 use super::MotionError;
 use super::settings::{FilterSettings, TorqueTiming};
@@ -87,7 +87,8 @@ fn checked_step(before: f64, after: f64) -> Result<f64, MotionError> {
 pub(super) struct TimeBase {
     joints: usize,
     clock: Option<SampleClock>,
-    gap_factor: f64,
+    /// Gap factor and shortest gap (s).
+    gap: [f64; 2],
     torque: TorqueTiming,
     /// Rows of the stretch in work; before the clock is known, the log's first rows.
     t: Vec<f64>,
@@ -139,7 +140,7 @@ impl TimeBase {
         Ok(Self {
             joints,
             clock,
-            gap_factor: settings.gap_factor,
+            gap: [settings.gap_factor, settings.bridge_s],
             torque: settings.torque,
             t: Vec::new(),
             q: Vec::new(),
@@ -238,7 +239,8 @@ impl TimeBase {
         while self.checked < self.t.len() {
             if self.checked > 0 {
                 let step = checked_step(self.t[self.checked - 1], self.t[self.checked])?;
-                if step > self.gap_factor * clock.dt {
+                let [factor, shortest] = self.gap;
+                if step > (factor * clock.dt).max(shortest) {
                     return Ok(Some(self.checked));
                 }
             }
