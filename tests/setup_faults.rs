@@ -106,6 +106,9 @@ fn said_of_motors(made: &str, alter: &dyn Fn(&mut [f64])) -> Vec<serde_json::Val
     bench::fit::rows(&done.document["setup"]).to_vec()
 }
 
+/// What is altered, and the kind, channel, joint and line that are told of it.
+type Case = (&'static dyn Fn(&mut [f64]), [&'static str; 4]);
+
 #[test]
 fn motors_whose_positions_are_no_poses_or_in_other_units_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -114,7 +117,7 @@ fn motors_whose_positions_are_no_poses_or_in_other_units_are_named() {
     assert_eq!(done.status, 0, "{}", done.message);
     let made = std::fs::read_to_string(folder.path().join("made.csv")).expect("it was written");
     assert!(said_of_motors(&made, &|_| {}).is_empty());
-    let cases: [(&dyn Fn(&mut [f64]), [&str; 4]); 3] = [
+    let cases: [Case; 3] = [
         (
             &|x| x[1] = -x[1],
             ["sign", "position", "x_c2", "position_sign = -1"],
