@@ -49,7 +49,7 @@ pub use problem::wide_motion::{TIMES as WIDE_TIMES, WideMotion};
 pub use run::diagnose;
 pub use unexplained::dependence::Dependence;
 pub use unexplained::errors::{Errors, JointChange, JointErrors, OverallErrors};
-pub use unexplained::evidence::{JointEvidence, evidence};
+pub use unexplained::evidence::{JointEvidence, evidence, one_after_the_other};
 pub use unexplained::map::ResidualMap;
 pub use unexplained::signal::Signal;
 pub use unexplained::{STRUCTURED, Unexplained};

@@ -149,15 +149,9 @@ pub fn diagnose(
     let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
     let all = [logs.train, logs.veto, logs.holdout].concat();
     let laws = known(&given.model);
-    // each log by the cut-offs that it calls for itself: a slow log must not narrow those of a quick one
-    let each = all.iter().map(|log| {
-        let log = std::slice::from_ref(log);
-        Ok(machine
-            .with_position_cutoffs(log, &laws, control)?
-            .settings())
-    });
-    let each = each.collect::<Result<Vec<_>, IdentifyError>>()?;
-    let machine = &machine.with_position_cutoffs(&all, &laws, control)?;
+    let together = machine.with_position_cutoffs(&all, &laws, control)?;
+    let each = machine.settings_of_each(&all, &laws, &together, control)?;
+    let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(

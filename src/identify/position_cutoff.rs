@@ -59,9 +59,17 @@ fn root_mean_square(numbers: impl Iterator<Item = f64>) -> f64 {
 impl CutoffCosts {
     /// The cut-off of every joint's filter where it is found \[Hz\].
     pub(super) fn found(&self) -> Vec<f64> {
-        let each = self.of_joint.iter();
-        each.map(|cost| cost.as_ref().map_or(self.plain, |cost| cost.at.cutoff_hz))
-            .collect()
+        self.found_or(&[])
+    }
+
+    /// The same, with that of `others` for a joint that these logs do not move, where there is one.
+    fn found_or(&self, others: &[f64]) -> Vec<f64> {
+        let each = self.of_joint.iter().enumerate();
+        each.map(|(j, cost)| match cost {
+            Some(cost) => cost.at.cutoff_hz,
+            None => others.get(j).copied().unwrap_or(self.plain),
+        })
+        .collect()
     }
 
     /// The cut-offs of a fit of logs with these costs, whose friction scales those of joints without a known law, and
@@ -174,6 +182,34 @@ impl LoggedRobot {
     ) -> Result<LoggedRobot, IdentifyError> {
         let speeds = self.rest_speeds(logs, control)?;
         self.with_cutoffs_along(logs, laws, &speeds, &|log| self.open(log, control))
+    }
+
+    /// The processing of each log by the position cut-offs that it calls for itself: a slow log must not narrow those
+    /// of a quick one. A joint that rests in it gets the cut-off of all logs, which are those of `together`: the
+    /// widest would let the rounding of its encoder through.
+    ///
+    /// # Errors
+    /// A log that cannot be used, and interruption.
+    pub(super) fn settings_of_each(
+        &self,
+        logs: &[Log],
+        laws: &[Option<JointFriction>],
+        together: &LoggedRobot,
+        control: &Control,
+    ) -> Result<Vec<FilterSettings>, IdentifyError> {
+        let of_log = |log: &Log| {
+            let log = std::slice::from_ref(log);
+            let mut machine = self.clone();
+            if self.finds_cutoffs() {
+                let speeds = self.rest_speeds(log, control)?;
+                let open = |log: &Log| self.open(log, control);
+                let costs = self.cutoff_costs(log, laws, &speeds, &open)?;
+                machine.position_cutoffs_hz =
+                    Arc::new(costs.found_or(&together.position_cutoffs_hz));
+            }
+            Ok(machine.settings())
+        };
+        logs.iter().map(of_log).collect()
     }
 
     /// The same for logs that `open` opens, in which each joint rests up to its `rest_speed`; nothing is read where

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Replay;
-use crate::diagnose::{JointEvidence, evidence};
+use crate::diagnose::{JointEvidence, evidence, one_after_the_other};
 use crate::effect::{AugmentedModel, Place, Search};
 use crate::motion::{MotionError, Stretch};
 
@@ -22,6 +22,8 @@ pub struct ResidualPair {
 pub struct ResidualEvidence {
     /// Names of the logs.
     pub logs: Vec<String>,
+    /// Where each of several logs begins on the axis of time [s], and its name.
+    pub begins: Vec<(f64, String)>,
     pub joints: Vec<ResidualPair>,
 }
 
@@ -51,6 +53,7 @@ pub(super) fn residual(
     let joints = before.into_iter().zip(waves);
     Ok(ResidualEvidence {
         logs: replay.named(logs),
+        begins: begins(replay, &stretches),
         joints: joints
             .map(|(before, orders)| ResidualPair {
                 before,
@@ -59,6 +62,21 @@ pub(super) fn residual(
             })
             .collect(),
     })
+}
+
+/// Where logs begin on the axis of time; nothing of a single one.
+fn begins(replay: &Replay, stretches: &[&Stretch]) -> Vec<(f64, String)> {
+    let mut found = Vec::new();
+    let mut log = None;
+    for (stretch, late) in stretches.iter().zip(one_after_the_other(stretches)) {
+        if log != Some(stretch.log) {
+            log = Some(stretch.log);
+            let begin = stretch.t.first().copied().unwrap_or_default();
+            let name = replay.names.get(stretch.log).cloned();
+            found.push((begin + late, name.unwrap_or_default()));
+        }
+    }
+    if found.len() < 2 { Vec::new() } else { found }
 }
 
 /// Orders of the waves that a model has at a joint.

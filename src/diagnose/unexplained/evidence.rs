@@ -37,6 +37,8 @@ const MOST_POINTS: usize = 2000;
 const PEAK: f64 = 3.0;
 /// Over the highest order that was found, where its spectrum ends.
 const ABOVE: f64 = 1.25;
+/// Room between two logs on the axis of time, over the time of all.
+const APART: f64 = 0.02;
 /// Rows that a spectrum is made of, about.
 const ROWS: usize = 4000;
 
@@ -64,15 +66,7 @@ pub fn evidence(
     let robot = &model.model.robot;
     let n = robot.joints();
     let mut all: Vec<ResidualRows> = (0..n).map(|_| ResidualRows::default()).collect();
-    // logs stand one after the other, whose clocks may begin alike
-    let (mut log, mut late, mut end) = (None, 0.0, f64::NEG_INFINITY);
-    for stretch in stretches {
-        if log != Some(stretch.log) {
-            log = Some(stretch.log);
-            let begin = stretch.t.first().copied().unwrap_or(0.0);
-            late = if end >= begin { end - begin } else { 0.0 };
-        }
-        end = stretch.t.last().copied().unwrap_or(0.0) + late;
+    for (stretch, late) in stretches.iter().zip(one_after_the_other(stretches)) {
         let parallel = filters.of(stretch);
         let load = model.torques(stretch).load;
         let hat = model.reconstruct(stretch);
@@ -138,6 +132,28 @@ pub fn evidence(
             }
         })
         .collect())
+}
+
+/// What is added to the times of each stretch so that logs, whose clocks may begin alike, stand one after the other
+/// with room between them [s].
+pub fn one_after_the_other(stretches: &[&Stretch]) -> Vec<f64> {
+    let ends = |s: &Stretch| s.t.first().copied().zip(s.t.last().copied());
+    let lasts = |s: &&Stretch| ends(s).map_or(0.0, |(from, to)| to - from);
+    let apart = APART * stretches.iter().map(lasts).sum::<f64>();
+    let (mut log, mut late, mut end) = (None, 0.0, None);
+    let of = |stretch: &&Stretch| {
+        let (from, to) = ends(stretch).unwrap_or_default();
+        if log != Some(stretch.log) {
+            late = match end {
+                Some(end) => end + apart - from,
+                None => 0.0,
+            };
+            log = Some(stretch.log);
+        }
+        end = Some(to + late);
+        late
+    };
+    stretches.iter().map(of).collect()
 }
 
 impl ResidualRows {
@@ -224,6 +240,27 @@ fn spectrum(x: &[f64], e: &[f64], per_unit: f64, (last, units): (f64, f64)) -> L
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn logs_stand_apart_and_the_stretches_of_one_log_keep_their_times() {
+        let stretch = |log, from: f64| Stretch {
+            log,
+            t: vec![from, from + 10.0],
+            ..Stretch::default()
+        };
+        let all = [
+            stretch(0, 0.0),
+            stretch(0, 15.0),
+            stretch(1, 0.0),
+            stretch(2, 90.0),
+        ];
+        let late = one_after_the_other(&all.each_ref());
+        let apart = APART * 40.0;
+        let expected = [0.0, 0.0, 25.0 + apart, 35.0 + 2.0 * apart - 90.0];
+        for (late, expected) in late.iter().zip(expected) {
+            assert!((late - expected).abs() < 1e-9, "{late} {expected}");
+        }
+    }
 
     #[test]
     fn bins_hold_means_and_a_spectrum_peaks_where_the_wave_is() {

@@ -16,11 +16,16 @@ pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
         false => "Residual",
     };
     let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    let begins: Vec<(f64, String)> = (of.begins.iter())
+        .map(|(at, log)| (*at, log.trim_end_matches(".csv").to_owned()))
+        .collect();
     let panels = |(j, (name, of)): (usize, (&String, &ResidualPair))| {
         let mut panels = panels(machine, j, &of.before, of.after.as_ref());
         let marks = of.orders.iter().map(|order| (*order, short(*order)));
         let over_order = panels.iter_mut().filter(|panel| panel.over.0 == ORDER);
         over_order.for_each(|panel| panel.marks = marks.clone().collect());
+        let over_time = panels.iter_mut().filter(|panel| panel.over.0 == TIME);
+        over_time.for_each(|panel| panel.marks = begins.clone());
         (name.clone(), panels)
     };
     ResidualFigure {
@@ -31,6 +36,8 @@ pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
 
 /// Name of the axis of waves over position.
 const ORDER: &str = "order";
+/// Name of the axis of time.
+const TIME: &str = "time";
 
 /// An order as it stands at its mark.
 fn short(order: f64) -> String {
@@ -81,7 +88,7 @@ fn panels(
             one(|e| &e.velocity),
         ),
         panel(load, &torque, "mean residual", two(|e| &e.load)),
-        panel("time", "s", "residual", one(|e| &e.time)),
+        panel(TIME, "s", "residual", one(|e| &e.time)),
         panel(ORDER, wave, "amplitude", one(|e| &e.order)),
         panel("frequency", "Hz", "amplitude", one(|e| &e.frequency)),
     ]
