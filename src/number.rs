@@ -11,6 +11,9 @@ pub const LARGEST: f64 = 1e30;
 /// Smallest of a number that is given and must be above 0: one over it is usable too.
 pub const SMALLEST: f64 = 1e-30;
 
+/// Lengths below so many metres are told in millimetres.
+pub const MILLIMETRES: f64 = 0.01;
+
 /// Whether a number that is given can be worked with: neither inf nor nan, nor beyond [`LARGEST`].
 #[inline]
 pub fn is_usable(value: f64) -> bool {

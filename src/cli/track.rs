@@ -43,7 +43,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let found = identify::track(&robots(args, context)?, context.control())?;
     let document = Document::new("track", &found.inputs, &found.warnings, &found)?;
-    let report = stages::track::track(&found);
+    let mut report = stages::track::track(&found);
+    stages::track::origin(&mut report.page(), &found, context.command());
     context.check()?;
     if let Some(path) = &args.output {
         context.write_text(path, &csv(&found))?;

@@ -41,6 +41,7 @@ pub use error::DiagnoseError;
 pub use faults::channels::Suspicion;
 pub use faults::disturbance::CutDisturbance;
 pub use outcome::{AcceptedEffect, Diagnosis, SplitErrors, StepStatus, Turn};
+pub use placebo::blocks::DRAWS as PLACEBOS;
 pub use problem::case::{Case, SelectionLimits};
 pub use problem::data_split::{LogRole, SetAside};
 pub use problem::prior::ParameterPrior;

@@ -213,6 +213,15 @@ impl Added {
         }
     }
 
+    /// The same with the catalogue's name where that is not among the words: `gear of q1 with play (backlash)`.
+    pub fn said_and_named(&self, robot: &Robot, torque: &str) -> String {
+        let (said, name) = (self.said(robot, torque), self.name());
+        match said.contains(name) || said.contains(&name.replace('-', " ")) {
+            true => said,
+            false => format!("{said} ({name})"),
+        }
+    }
+
     /// Numbers as files and tables have them. `covariance` is that of (shape, linear), row-major;
     /// a shape that these data leave open has infinite variance there. `torque` is the torque's unit.
     pub fn numbers(

@@ -39,11 +39,23 @@ pub(super) fn report(
         joint: machine.robot.joint_names()[negative.joint].clone(),
         power: negative.power,
         std: negative.std,
+        unit: power_unit(machine, negative.joint),
         cause: cause(problem, negative.joint).to_owned(),
     };
     SetupReport {
         findings,
         friction_power: searched.negative.iter().map(power).collect(),
+    }
+}
+
+/// Unit of a torque times a speed: where the torque is a current it is no power.
+fn power_unit(machine: &LoggedRobot, joint: usize) -> String {
+    match machine.file.torque_unit(joint) {
+        "N" | "Nm" => "W".to_owned(),
+        other => format!(
+            "{other} {}/s",
+            machine.robot.joint_kind(joint).position_unit()
+        ),
     }
 }
 

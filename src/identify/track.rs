@@ -89,6 +89,8 @@ pub struct TrackedParameter {
     pub scatter: f64,
     /// Numbers of the logs whose estimate stands alone, from 0.
     pub outliers: Vec<usize>,
+    /// Size from which on a step in the middle of the course is told \[unit\]; null where there are too few logs.
+    pub least_seen: Option<f64>,
 }
 
 /// A change of a parameter.
@@ -488,6 +490,7 @@ fn tracked(key: &Told, course: &Course, estimates: &[Estimate], times: &[f64]) -
         walk: course.walk,
         scatter: course.scatter,
         outliers: course.outliers.clone(),
+        least_seen: course.least_seen,
     }
 }
 

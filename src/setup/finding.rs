@@ -165,9 +165,11 @@ impl Finding {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FrictionPower {
     pub joint: String,
-    /// Mean power of all friction terms over the speeds of the logs \[W; A rad/s of a current\].
+    /// Mean power of all friction terms over the speeds of the logs \[unit\].
     pub power: f64,
     pub std: f64,
+    /// W, or that of a current times a speed.
+    pub unit: String,
     /// Its likeliest cause, as a sentence.
     pub cause: String,
 }
@@ -230,10 +232,11 @@ impl FrictionPower {
             false => format!("{x:.3}"),
         };
         format!(
-            "the friction of {} would drive it: its terms together take {} +- {} W over the speeds of these logs, where friction takes power above zero; {}",
+            "the friction of {} would drive it: its terms together take {} +- {} {} over the speeds of these logs, where friction takes power above zero; {}",
             self.joint,
             watts(self.power),
             watts(self.std),
+            self.unit,
             self.cause
         )
     }

@@ -120,6 +120,28 @@ pub(super) fn seek(about: About, level: f64) -> (Vec<Sizes>, Vec<Found>) {
     (sizes, found)
 }
 
+/// The size from which on a step of each parameter alone, in the middle of the course, is told at `level`; none where
+/// there are too few logs to tell any. That size itself is told in one course of two.
+pub(super) fn least_seen(about: About, sizes: &[Sizes], level: f64) -> Vec<Option<f64>> {
+    let count = about.members.len();
+    let told: Vec<usize> = (0..about.times.len())
+        .filter(|k| about.members.iter().any(|m| m.estimate[*k].is_finite()))
+        .collect();
+    let freedom = about.told().saturating_sub(count * (OTHERS + 1));
+    let law = FisherSnedecor::new(count as f64, freedom.max(1) as f64);
+    let (true, Ok(law)) = (told.len() >= BEFORE + AFTER && freedom > 0, law) else {
+        return vec![None; count];
+    };
+    let tried = 2 * (told.len() - BEFORE - AFTER + 1);
+    let ratio = law.inverse_cdf(1.0 - level / tried as f64);
+    let white = White::new(about, sizes, &rests(about, &[]));
+    let columns = white.columns(&shape(ChangeKind::Step, told[told.len() / 2], about.times));
+    let steps = fitted(&columns, &white.signals(), 1.0);
+    let least = |[_, std]: &[f64; 2]| (ratio * count as f64).sqrt() * std;
+    let finite = |size: f64| size.is_finite().then_some(size);
+    steps.iter().map(|step| finite(least(step))).collect()
+}
+
 /// Sizes of walk and scatter of each parameter with changes taken out, and how unlikely the innovations are.
 fn likeliest(
     about: About,

@@ -1,6 +1,6 @@
 //! One parameter of one robot over its logs.
 
-use super::changes::{ChangeKind, ParameterChange, seek};
+use super::changes::{ChangeKind, ParameterChange, least_seen, seek};
 use super::local_level::{Variances, smooth};
 use super::together::{About, Member};
 use super::walk::{Sizes, median};
@@ -30,6 +30,8 @@ pub struct Course {
     pub scatter: f64,
     /// Logs whose estimate stands alone, far from those before and after.
     pub outliers: Vec<usize>,
+    /// The size from which on a step in the middle of the course is told; none where there are too few logs.
+    pub least_seen: Option<f64>,
 }
 
 /// A step in the variance by which the level is forgotten, over the square of a change.
@@ -75,6 +77,7 @@ pub fn follow_together(
         correlation,
     };
     let (sizes, found) = seek(about, level);
+    let least = least_seen(about, &sizes, level);
     let each = signals.iter().zip(&sizes).enumerate();
     each.map(|(i, (signal, sizes))| {
         let changes = found.iter().map(|change| ParameterChange {
@@ -84,7 +87,10 @@ pub fn follow_together(
             std: change.sizes[i][1],
             p_value: change.p_value,
         });
-        signal.course(sizes, &spacings, changes.collect())
+        Course {
+            least_seen: least[i],
+            ..signal.course(sizes, &spacings, changes.collect())
+        }
     })
     .collect()
 }
@@ -147,6 +153,7 @@ impl Signal {
             walk: sizes.walk.sqrt(),
             scatter: sizes.scatter.sqrt(),
             outliers: self.outliers.clone(),
+            least_seen: None,
         }
     }
 }

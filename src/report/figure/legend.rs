@@ -13,6 +13,8 @@ pub(super) enum Key {
     Dot(&'static str),
     /// A dot of a cloud.
     Spot(&'static str),
+    /// Lines across, as where nothing is known.
+    Hatch,
     /// A tinted patch.
     Patch(&'static str),
 }
@@ -59,6 +61,13 @@ pub(super) fn draw(svg: &mut Svg, [x, y]: [f64; 2], entries: &[(Key, &str)]) {
                 svg.dot([centre, middle], 2.6, fill);
             }
             Key::Spot(fill) => svg.dot([at + 0.5 * SAMPLE, middle], 2.6, fill),
+            Key::Hatch => {
+                let line = Stroke::solid(colour::ZERO, 0.9);
+                for k in 0..4 {
+                    let x = at + 6.0 * f64::from(k);
+                    svg.line([x, middle + 5.0], [x + 8.0, middle - 5.0], line);
+                }
+            }
             Key::Patch(fill) => svg.rect(
                 [at, middle - 5.0, SAMPLE, 10.0],
                 fill,

@@ -31,6 +31,11 @@ const HEIGHT: f64 = 220.0;
 const CURVE: Stroke = Stroke::solid(colour::INK, 1.8);
 /// Half width of the band of 95 % in standard errors.
 const BAND: f64 = 1.96;
+/// Distance of the lines that stand for too few rows \[px\].
+const HATCH: f64 = 7.0;
+/// Room of the bar of shades with its numbers, and its width \[px\].
+const BAR: f64 = 58.0;
+const BAR_WIDTH: f64 = 12.0;
 /// Shades of a mean: so many on each side of none.
 const SHADES: f64 = 8.0;
 
@@ -62,6 +67,7 @@ impl MapFigure {
             key: cell::key(&[
                 (Key::Spot(colour::VERMILLION), &above),
                 (Key::Spot(colour::BLUE), &below),
+                (Key::Hatch, "too few rows"),
                 (Key::Band(CURVE), "mean, 95 %"),
             ]),
             pictures: vec![map, curve],
@@ -76,7 +82,11 @@ impl MapFigure {
             Panel::empty(svg, frame, "no rows");
             return;
         }
+        let bar = [frame[0] + frame[2] - BAR, frame[1], BAR_WIDTH, frame[3]];
+        let frame = [frame[0], frame[1], frame[2] - BAR - 10.0, frame[3]];
         let panel = Panel::new(frame, self.ends[0], self.ends[1], [5, 6]);
+        svg.clip(frame);
+        hatch(svg, frame);
         for (y, line) in self.cells.iter().enumerate() {
             for (x, mean) in line.iter().enumerate() {
                 let Some(mean) = mean else { continue };
@@ -91,14 +101,45 @@ impl MapFigure {
                 };
                 let [left, right] = [x, x + 1].map(|k| panel.x.px(at(0, k, line.len())));
                 let [low, high] = [y, y + 1].map(|k| panel.y.px(at(1, k, self.cells.len())));
-                svg.area(
-                    &[[left, low], [right, low], [right, high], [left, high]],
-                    fill,
-                    shade,
-                );
+                let cell = [[left, low], [right, low], [right, high], [left, high]];
+                svg.rect([left, high, right - left, low - high], colour::PAPER, None);
+                svg.area(&cell, fill, shade);
             }
         }
+        svg.end_clip();
+        self.bar(svg, bar, most);
         self.axes(svg, &panel, &self.over[1]);
+    }
+
+    /// The shades and the means that they stand for.
+    fn bar(&self, svg: &mut Svg, [left, top, width, height]: [f64; 4], most: f64) {
+        let step = 0.5 * height / SHADES;
+        svg.rect([left, top, width, height], colour::PAPER, None);
+        for k in 0..SHADES as usize {
+            let shade = (k + 1) as f64 / SHADES;
+            for (fill, from) in [
+                (
+                    colour::VERMILLION,
+                    top + 0.5 * height - (k + 1) as f64 * step,
+                ),
+                (colour::BLUE, top + 0.5 * height + k as f64 * step),
+            ] {
+                let (right, to) = (left + width, from + step);
+                let patch = [[left, from], [right, from], [right, to], [left, to]];
+                svg.area(&patch, fill, shade);
+            }
+        }
+        let style = Type::new(10.0, Anchor::Start);
+        let end = number::significant(most, 2);
+        for (y, text) in [
+            (top + 7.0, format!("+{end}")),
+            (top + 0.5 * height + 3.5, "0".to_owned()),
+            (top + height, format!("\u{2212}{end}")),
+        ] {
+            svg.text([left + width + 4.0, y], &text, style);
+        }
+        let unit = Type::new(10.0, Anchor::Start).muted();
+        svg.text([left, top - 6.0], &self.unit, unit);
     }
 
     fn line(&self, svg: &mut Svg, frame: [f64; 4]) {
@@ -140,6 +181,19 @@ impl MapFigure {
     }
 }
 
+/// Lines across a frame: where no cell is.
+fn hatch(svg: &mut Svg, [left, top, width, height]: [f64; 4]) {
+    let lines = ((width + height) / HATCH) as usize;
+    for k in 0..=lines {
+        let x = left - height + HATCH * k as f64;
+        svg.line(
+            [x, top + height],
+            [x + height, top],
+            Stroke::solid(colour::ZERO, 0.8),
+        );
+    }
+}
+
 fn name(svg: &mut Svg, frame: [f64; 4], name: &str) {
     let style = Type::new(11.5, Anchor::Start).bold();
     svg.text([frame[0], frame[1] - 8.0], name, style);
@@ -171,10 +225,11 @@ mod tests {
         let full = |colour: &str| count(&format!("fill=\"{colour}\" fill-opacity=\"1\""));
         assert_eq!(
             (full(colour::VERMILLION), full(colour::BLUE)),
-            (1, 1),
+            (2, 2),
             "{map}"
         );
-        assert_eq!(count("fill-opacity"), 3, "{map}");
+        // three cells, and the bar
+        assert_eq!(count("fill-opacity"), 3 + 16, "{map}");
         assert!(map.contains("<desc>mean over position and speed. it depends"));
         assert!(curve.contains("mean residual [Nm]") && !curve.contains("NaN"));
         figure.cells = vec![vec![None]];

@@ -49,12 +49,14 @@ mod colour {
     pub(crate) const BLUE: &str = "#0072b2";
     pub(crate) const SKY: &str = "#56b4e9";
     pub(crate) const VERMILLION: &str = "#d55e00";
+    pub(crate) const YELLOW: &str = "#e69f00";
+    pub(crate) const PURPLE: &str = "#882255";
     pub(crate) const COVERED: &str = "#f0f4e8";
 }
 
 /// All of them, for a page that shows figures in the dark.
 #[cfg(test)]
-pub(crate) const PALETTE: [&str; 10] = [
+pub(crate) const PALETTE: [&str; 12] = [
     colour::INK,
     colour::MUTED,
     colour::FRAME,
@@ -64,5 +66,7 @@ pub(crate) const PALETTE: [&str; 10] = [
     colour::BLUE,
     colour::SKY,
     colour::VERMILLION,
+    colour::YELLOW,
+    colour::PURPLE,
     colour::COVERED,
 ];

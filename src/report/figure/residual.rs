@@ -133,10 +133,10 @@ impl ResidualFigure {
         };
         let alone = !drawn(When::After) && !drawn(When::AfterBackward);
         let names = [
-            (When::Before, ["before", "residual"]),
+            (When::Before, ["as given", "residual"]),
             (
                 When::BeforeBackward,
-                ["before, backward", "residual, backward"],
+                ["as given, backward", "residual, backward"],
             ),
             (When::After, ["after", ""]),
             (When::AfterBackward, ["after, backward", ""]),
@@ -162,7 +162,7 @@ impl ResidualPanel {
         let (what, over) = (&self.of.0, &self.over.0);
         match (before, after) {
             (Some(before), Some(after)) => format!(
-                "greatest {what} of {joint} over {over}: {} before, {} after",
+                "greatest {what} of {joint} over {over}: {} as given, {} after",
                 told(before),
                 told(after)
             ),
@@ -249,7 +249,7 @@ mod tests {
         assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
         let cells = figure.cells();
         assert_eq!(cells[0].pictures.len(), 2);
-        let told = "greatest residual of q&lt;1 over velocity: 2.00 Nm before, 2.00 Nm after";
+        let told = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
         assert!(
             cells[0].pictures[0].contains(told),
             "{}",

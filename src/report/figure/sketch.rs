@@ -40,6 +40,15 @@ const EARLIER: Stroke = Stroke::solid(colour::ZERO, 1.4);
 const WAY: Stroke = Stroke::dashed(colour::MUTED, 0.9, "3 2");
 const LEADER: Stroke = Stroke::solid(colour::FRAME, 0.6);
 
+/// Classes of errors, the same on every page: below which error, colour, and name.
+const CLASSES: [(f64, &str, &str); 5] = [
+    (0.02, colour::SKY, "error below 2 %"),
+    (0.05, colour::BLUE, "2 to 5 %"),
+    (0.10, colour::YELLOW, "5 to 10 %"),
+    (0.30, colour::VERMILLION, "10 to 30 %"),
+    (f64::INFINITY, colour::PURPLE, "above 30 %"),
+];
+
 impl Sketch {
     /// From the side and from above, to one scale.
     pub fn cells(&self) -> Cells {
@@ -54,39 +63,18 @@ impl Sketch {
                 self.draw(svg, frame, axes);
             })
         };
-        let [low, high] = self.classes().map(number::percent);
-        let between = format!("{low} to {high}");
-        let (low, high) = (format!("error below {low}"), format!("above {high}"));
-        let key = [
-            (Key::Spot(colour::SKY), low.as_str()),
-            (Key::Spot(colour::BLUE), between.as_str()),
-            (Key::Spot(colour::VERMILLION), high.as_str()),
+        let classes = CLASSES.map(|(_, fill, name)| (Key::Spot(fill), name));
+        let lines = [
             (Key::Line(EARLIER), "other poses"),
             (Key::Line(WAY), "path of the last joint"),
         ];
+        let key: Vec<(Key, &str)> = classes.into_iter().chain(lines).collect();
         Cells {
             title: self.title.clone(),
             key: cell::key(&key),
             apart: false,
             pictures: views.into_iter().map(picture).collect(),
             words: Vec::new(),
-        }
-    }
-
-    /// Errors that part the colours: thirds of the largest.
-    fn classes(&self) -> [f64; 2] {
-        let errors = self.joints.iter().map(|joint| joint.error);
-        let most = errors.filter(|e| e.is_finite()).fold(0.0, f64::max);
-        [most / 3.0, most * 2.0 / 3.0]
-    }
-
-    fn fill(&self, error: f64) -> &'static str {
-        let [low, high] = self.classes();
-        match error {
-            e if !e.is_finite() => colour::FRAME,
-            e if e > high => colour::VERMILLION,
-            e if e > low => colour::BLUE,
-            _ => colour::SKY,
         }
     }
 
@@ -184,7 +172,7 @@ impl Sketch {
         }
         for (joint, at) in &places {
             let ring = Stroke::solid(colour::PAPER, 1.2);
-            svg.ringed(*at, 5.0, self.fill(joint.error), ring);
+            svg.ringed(*at, 5.0, fill(joint.error), ring);
         }
         for ((joint, _), line) in places.iter().zip(&lines) {
             let text = match joint.error.is_finite() {
@@ -195,6 +183,12 @@ impl Sketch {
             svg.text([left, *line], &text, Type::new(10.5, Anchor::Start));
         }
     }
+}
+
+/// Colour of an error.
+fn fill(error: f64) -> &'static str {
+    let class = CLASSES.iter().find(|(below, _, _)| error < *below);
+    class.map_or(colour::FRAME, |(_, fill, _)| fill)
 }
 
 /// A round length below the picture.
@@ -242,7 +236,7 @@ mod tests {
 
     #[test]
     fn joints_are_coloured_by_their_errors_and_the_worst_is_told() {
-        let cells = sketch([0.01, 0.05, 0.12]).cells();
+        let cells = sketch([0.01, 0.03, 0.12]).cells();
         assert_eq!(cells.pictures.len(), 2);
         for (picture, view) in cells.pictures.iter().zip(["side view", "top view"]) {
             assert!(picture.contains(view));
@@ -252,11 +246,10 @@ mod tests {
             assert!(picture.contains("that of q3, 12.0 %"), "{picture}");
             assert!(picture.contains(">q1 1.00 %<"), "{picture}");
         }
-        assert!(
-            cells.key.concat().contains("above 8.00 %"),
-            "{:?}",
-            cells.key
-        );
+        assert!(cells.key.concat().contains("5 to 10 %"), "{:?}", cells.key);
+        // classes do not depend on the worst joint of the page
+        let small = sketch([0.001, 0.0005, 0.0015]).cells().pictures.concat();
+        assert!(!small.contains(&format!("fill=\"{}\"", colour::VERMILLION)));
     }
 
     #[test]

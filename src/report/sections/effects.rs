@@ -3,7 +3,7 @@
 
 use crate::effect::AugmentedModel;
 use crate::identify::LoggedRobot;
-use crate::number;
+use crate::number::{self, MILLIMETRES};
 use crate::replay::EffectRows;
 use crate::report::Writer;
 use crate::report::figure::EffectFigure;
@@ -28,16 +28,23 @@ pub fn card(
     let told = format!(
         "The residual of {joint} on {data} is {without} rms with this {torque} left out and the rest as it is, and {with} with it."
     );
+    let small = of.over.1 == "m" && of.rows.iter().all(|row| row[0].abs() < MILLIMETRES);
+    let (scale, over) = match small {
+        true => (1e3, (of.over.0.clone(), "mm".to_owned())),
+        false => (1.0, of.over.clone()),
+    };
     let along = match of.along_motion {
         true => ", along the motion",
         false => "",
     };
     let figure = EffectFigure {
-        title: effect.said(robot, own),
+        title: effect.said_and_named(robot, own),
         told: told.clone(),
-        over: of.over.clone(),
+        over,
         of: (format!("{torque}{along}"), unit.to_owned()),
-        rows: of.rows.clone(),
+        rows: (of.rows.iter())
+            .map(|[x, without, added]| [scale * x, *without, *added])
+            .collect(),
     };
     let mut words = vec![told];
     words.push(format!("What to do: {}.", effect.law.entry.remedy));

@@ -1,5 +1,6 @@
 //! Parameters with their standard deviations and what the data say of them.
 
+use super::first_of;
 use crate::config::ModelFile;
 use crate::config::model_file::Parameter;
 use crate::number;
@@ -27,7 +28,22 @@ pub fn tally(model: &ModelFile) -> (String, bool) {
             n => words.push(format!("{n} {word}")),
         }
     }
-    let good = words.len() == 1;
+    let known = |p: &&Parameter| p.verdict != Some(Verdict::NotIdentifiable);
+    let negative: Vec<String> = (rated().filter(known))
+        .filter(|p| p.is_below_zero())
+        .map(|p| match &p.joint {
+            Some(joint) => format!("{} of {joint}", p.name),
+            None => p.name.clone(),
+        })
+        .collect();
+    if !negative.is_empty() {
+        words[0] += &format!(
+            " ({} of the known negative, which no machine has: {})",
+            negative.len(),
+            first_of(&negative)
+        );
+    }
+    let good = words.len() == 1 && negative.is_empty();
     if negligible > 0 {
         words.insert(1, format!("{negligible} negligible"));
     }

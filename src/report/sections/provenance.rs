@@ -36,6 +36,20 @@ fn files(page: &mut Writer, caption: &str, inputs: &[Provenance]) {
     }
 }
 
+/// Files that the run was given.
+pub fn inputs(page: &mut Writer, inputs: &[Provenance]) {
+    files(page, "inputs of this run", inputs);
+}
+
+/// Version and command.
+pub fn called(page: &mut Writer, command: &str) {
+    page.paragraph(&format!(
+        "cft-ident {}, called as:",
+        env!("CARGO_PKG_VERSION")
+    ));
+    page.code(command);
+}
+
 /// The section: inputs, what the model was made from, processing, command and configuration.
 pub fn section(
     page: &mut Writer,
@@ -46,7 +60,7 @@ pub fn section(
     command: &str,
 ) {
     page.heading("Where it came from");
-    files(page, "inputs of this run", inputs);
+    self::inputs(page, inputs);
     files(page, "what the model was made from", model_inputs);
     if let Some(s) = summary {
         page.paragraph(&format!(
@@ -62,11 +76,7 @@ pub fn section(
             )),
         ));
     }
-    page.paragraph(&format!(
-        "cft-ident {}, called as:",
-        env!("CARGO_PKG_VERSION")
-    ));
-    page.code(command);
+    called(page, command);
     if let Ok(text) = toml::to_string(robot) {
         page.details("robot file, with every setting of this run", &text);
     }

@@ -12,7 +12,7 @@ use crate::report::figure::{ResidualFigure, ResidualPanel, When};
 pub fn figure(machine: &LoggedRobot, of: &ResidualEvidence) -> ResidualFigure {
     let after = of.joints.iter().any(|joint| joint.after.is_some());
     let what = match after {
-        true => "Residual before and after",
+        true => "Residual of the model as given, and after",
         false => "Residual",
     };
     let joints = machine.robot.joint_names().iter().zip(&of.joints);

@@ -1,6 +1,6 @@
 //! The report of `diagnose`.
 
-use super::step_words::{in_words, tentative, titled, worsened};
+use super::step_words::{chance, in_words, tentative, titled, worsened};
 use super::{first_screen, found_effects, what_is_left};
 use crate::config::ModelFile;
 use crate::diagnose::{
@@ -140,13 +140,13 @@ fn step_told(
             number::percent(s.cv_gain),
             s.delta_bic,
             s.effective_rows,
-            (step.candidate.placebo_p_value).map_or(String::new(), |p| format!("; p = {p:.3}"))
+            (step.candidate.placebo_p_value).map_or(String::new(), |p| format!("; {}", chance(p)))
         );
         terminal.note(MARGIN, &told, 7);
     }
     if let Some([before, after]) = step.holdout {
         let told = format!(
-            "held-out data: {} before, {} after{}",
+            "held-out data, refitted: {} without it, {} with it{}",
             number::percent(before),
             number::percent(after),
             worsened(step)
@@ -184,7 +184,7 @@ fn before_and_after(machine: &LoggedRobot, d: &Diagnosis) -> Table {
         ("95 % CI", Align::Right),
         ("above noise", Align::Decimal),
     ])
-    .caption("relative torque error [%] on fitted and on held-out data, before and after");
+    .caption("relative torque error [%] on fitted and held-out data, as given and after");
     let hundred = number::hundredths;
     let known = |e: Option<f64>| e.map_or(number::ABSENT.to_owned(), hundred);
     for (j, joint) in machine.robot.joint_names().iter().enumerate() {
@@ -299,6 +299,48 @@ fn tentative_names(d: &Diagnosis) -> String {
     }
 }
 
+/// Joints whose held-out error is larger than that of the model as given, and numbers that stand at a bound of their
+/// search, as sentences.
+fn reservations(machine: &LoggedRobot, found: &Diagnosed) -> String {
+    let d = &found.diagnosis;
+    let mut text = String::new();
+    if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
+        let joints = machine.robot.joint_names().iter().enumerate();
+        let worse = joints.filter_map(|(j, joint)| {
+            let [from, to] = [before, after].map(|e| e.joints[j].relative_error);
+            let told = [from, to].map(number::percent);
+            let [low, high] = after.joints[j].interval_95.map(number::hundredths);
+            (to > from && told[0] != told[1]).then(|| {
+                format!(
+                    "{joint} from {} to {} (95 % CI {low}..{high} %)",
+                    told[0], told[1]
+                )
+            })
+        });
+        let worse: Vec<String> = worse.collect();
+        if !worse.is_empty() {
+            text += &format!(" Held-out data are worse on {}.", worse.join(", "));
+        }
+    }
+    let at_bound = d.steps.iter().flat_map(|step| {
+        let of = d.model.effects[step.effect].title(&machine.robot);
+        let told = found.told(machine, step.effect).into_iter();
+        let bound = told.filter(|number| number.bound);
+        bound.map(move |n| {
+            let value = format!("{} = {} {}", n.key, number::significant(n.value, 3), n.unit);
+            format!("{} of {of}", value.trim_end())
+        })
+    });
+    let at_bound: Vec<String> = at_bound.collect();
+    if !at_bound.is_empty() {
+        text += &format!(
+            " At a bound of the search, so not found by the data: {}.",
+            at_bound.join(", ")
+        );
+    }
+    text
+}
+
 /// The verdict in words, and whether nothing calls for attention.
 pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
     let d = &found.diagnosis;
@@ -312,7 +354,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
             let mut text = format!("The model lacks: {}.", titles.join("; "));
             if let (Some(before), Some(after)) = (&d.before.holdout, &d.after.holdout) {
                 text += &format!(
-                    " {} the held-out error goes from {} to {}, as the rms over \
+                    " {} the held-out error goes from {} as given to {}, as the rms over \
                      the joints.",
                     match titles.as_slice() {
                         [_] => "With it",
@@ -323,6 +365,7 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
                 );
             }
             text += &tentative_names(d);
+            text += &reservations(machine, found);
             (text, true)
         }
         DiagnosisVerdict::NothingMissing => (nothing_missing(d), true),
@@ -341,10 +384,11 @@ pub fn words(machine: &LoggedRobot, found: &Diagnosed) -> (String, bool) {
                     .1
                     .map(|e| number::percent(e.overall.mean_relative_error));
                 text += &format!(
-                    " What comes near to it was added, and takes the {} from {before} to {after}: {}.",
+                    " What comes near to it was added, and takes the {} from {before} as given to {after}: {}.",
                     errors.0,
                     titles.join("; ")
                 );
+                text += &reservations(machine, found);
             }
             (text, false)
         }
@@ -376,7 +420,7 @@ pub fn sections(
         styles: [TraceStyle::Model, TraceStyle::After],
     };
     let before = Drawn {
-        names: ["before", "residual before"],
+        names: ["as given", "residual as given"],
         styles: [TraceStyle::Before, TraceStyle::Before],
     };
     let models = match d.steps.is_empty() {
@@ -462,10 +506,10 @@ pub fn errors(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
         "relative torque error",
         &[
             "joint",
-            "fitted, before",
-            "after",
-            "held-out, before",
-            "after",
+            "fitted, as given",
+            "fitted, after",
+            "held-out, as given",
+            "held-out, after",
             "95 % CI",
             "rms after",
             "residual with a pattern, of torque power",

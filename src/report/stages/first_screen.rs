@@ -30,7 +30,7 @@ fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
     });
     ErrorFigure {
         title: format!("Relative torque error on {data}"),
-        names: ["before", "after"],
+        names: ["as given", "after"],
         joints: joints.collect(),
         limit: None,
     }

@@ -1,6 +1,6 @@
 //! The effects that a diagnosis added, on a page: a table of their numbers, and a card for each.
 
-use super::step_words::{in_words, tentative, worsened};
+use super::step_words::{chance, in_words, tentative, worsened};
 use crate::diagnose::AcceptedEffect;
 use crate::identify::{Diagnosed, LoggedRobot};
 use crate::number;
@@ -66,7 +66,7 @@ fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             effect.title(&machine.robot),
             in_words(machine, found, step.effect),
             score.map_or("-".to_owned(), |s| number::percent(s.cv_gain)),
-            (step.candidate.placebo_p_value).map_or("-".to_owned(), |p| format!("{p:.3}")),
+            (step.candidate.placebo_p_value).map_or("-".to_owned(), chance),
         ]
     };
     page.rows(
@@ -75,7 +75,7 @@ fn table(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
             "effect",
             "parameters",
             "cross-validated gain",
-            "corrected p",
+            "corrected for all candidates",
         ],
         d.steps.iter().map(row).collect(),
     );

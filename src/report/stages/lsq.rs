@@ -33,7 +33,10 @@ pub fn lsq(of: &Lsq) -> Report {
     let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
     let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
     let (text, good) = parameters::tally(of.file);
-    report.everywhere().verdict(&format!("{text}."), good);
+    let apart = far_off(of.found);
+    let good = good && apart.is_none();
+    let text = format!("{text}.{}", apart.unwrap_or_default());
+    report.everywhere().verdict(&text, good);
     report.terminal().line("");
     gains(&mut report.terminal(), &of.found.gains);
     residuals(&mut report.terminal(), of.found);
@@ -110,6 +113,33 @@ fn first_words(found: &IdentifiedDynamics) -> String {
         None => format!("The fit leaves {rms} of the torque."),
     };
     format!("{fit} Next: `cft-ident validate` on a log that was not fitted.")
+}
+
+/// A joint's error is far above the others from so many times their median on, and from so much.
+const FAR: f64 = 3.0;
+const LEAST: f64 = 0.05;
+
+/// Joints whose error is far above those of the others, as a sentence.
+fn far_off(found: &IdentifiedDynamics) -> Option<String> {
+    let error = |j: usize| found.joints[j].relative_error;
+    let median = |without: usize| {
+        let others = (0..found.joints.len()).filter(|k| *k != without);
+        let mut errors: Vec<f64> = others.map(error).collect();
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied()
+    };
+    let far = (0..found.joints.len()).filter_map(|j| {
+        let median = median(j)?;
+        (error(j) > LEAST && error(j) > FAR * median).then(|| {
+            format!(
+                " The error of {}, {}, is far above that of the others, {} in the median.",
+                found.joints[j].joint,
+                number::percent(error(j)),
+                number::percent(median)
+            )
+        })
+    });
+    Some(far.collect::<String>()).filter(|text| !text.is_empty())
 }
 
 /// The residual of the fit, joint by joint.

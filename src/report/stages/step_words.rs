@@ -1,6 +1,6 @@
 //! What is said of one effect that was added.
 
-use crate::diagnose::{AcceptedEffect, Diagnosis, StepStatus};
+use crate::diagnose::{AcceptedEffect, Diagnosis, PLACEBOS, StepStatus};
 use crate::effect::Added;
 use crate::identify::{Diagnosed, LoggedRobot};
 use crate::number;
@@ -54,17 +54,30 @@ pub(super) fn tentative(d: &Diagnosis, step: &AcceptedEffect) -> Option<String> 
 /// What an effect is called where it was found.
 pub(super) fn titled(machine: &LoggedRobot, effect: &Added) -> String {
     let unit = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
-    effect.said(&machine.robot, unit)
+    effect.said_and_named(&machine.robot, unit)
+}
+
+/// A p-value by placebos in words: the least that they can show is an upper bound.
+pub(super) fn chance(p: f64) -> String {
+    let least = 1.0 / (1 + PLACEBOS) as f64;
+    match p <= least * (1.0 + 1e-9) {
+        true => format!("p <= {least:.3}, the least that {PLACEBOS} placebos can show"),
+        false => format!("p = {p:.3}"),
+    }
 }
 
 /// Parameters of an accepted effect in words: `order = 14.0 +- 0.1 1/m, ..`.
 pub(super) fn in_words(machine: &LoggedRobot, found: &Diagnosed, effect: usize) -> String {
     let words = found.told(machine, effect).into_iter().map(|t| {
-        let value = match t.std {
-            Some(std) if std > 0.0 => number::plus_minus(t.value, std),
-            _ => number::significant(t.value, 4),
+        let (scale, unit) = match t.unit == "m" && t.value.abs() < number::MILLIMETRES {
+            true => (1e3, "mm"),
+            false => (1.0, t.unit.as_ref()),
         };
-        let told = format!("{} = {value} {}", t.key, t.unit);
+        let value = match t.std {
+            Some(std) if std > 0.0 => number::plus_minus(scale * t.value, scale * std),
+            _ => number::significant(scale * t.value, 4),
+        };
+        let told = format!("{} = {value} {unit}", t.key);
         match t.bound {
             true => format!("{} (held at a bound)", told.trim_end()),
             false => told.trim_end().to_owned(),

@@ -4,6 +4,7 @@ use crate::identify::{Tracked, TrackedChange, TrackedParameter, TrackedRobot};
 use crate::log::escape;
 use crate::number;
 use crate::report::figure::{CourseFigure, CoursePanel};
+use crate::report::sections::provenance;
 use crate::report::table::{Align, Table};
 use crate::report::{Report, Writer};
 use crate::track::ChangeKind;
@@ -41,6 +42,10 @@ pub fn track(of: &Tracked) -> Report {
         table.table(last(robot));
     }
     let mut page = report.page();
+    page.paragraph(next(of));
+    if let [robot] = of.robots.as_slice() {
+        page.table(last(robot));
+    }
     page.list(&of.warnings);
     let changed = |r: &&TrackedRobot| !r.changes.is_empty();
     let first = of.robots.iter().filter(changed);
@@ -55,6 +60,28 @@ pub fn track(of: &Tracked) -> Report {
         ));
     }
     report
+}
+
+/// What to do next.
+fn next(of: &Tracked) -> &'static str {
+    let changed = of.robots.iter().any(|r| !r.changes.is_empty());
+    match changed || !of.fleet.is_empty() {
+        true => {
+            "Next: look at the joint that changed, and fit a model to the logs since (`cft-ident lsq`), which \
+             `cft-ident compare` sets beside the old one."
+        }
+        false => {
+            "Next: reduce the next logs of the same motion (`cft-ident reduce`) and track them with these: smaller \
+             changes are seen with more logs."
+        }
+    }
+}
+
+/// Where the page came from, so that the run can be repeated.
+pub fn origin(page: &mut Writer, of: &Tracked, command: &str) {
+    page.heading("Where it came from");
+    provenance::inputs(page, &of.inputs);
+    provenance::called(page, command);
 }
 
 /// Name of a parameter with its joint.
@@ -85,6 +112,9 @@ fn words(of: &Tracked) -> String {
         0 => format!("No parameter changed over {logs} logs{of_robots}."),
         n => format!("{n} changes of parameters over {logs} logs{of_robots}, in {changed} robots."),
     };
+    if changes == 0 {
+        text += &unseen(of);
+    }
     if !of.fleet.is_empty() {
         text += &format!(
             " {} parameters differ from those of the other robots.",
@@ -92,6 +122,29 @@ fn words(of: &Tracked) -> String {
         );
     }
     text
+}
+
+/// How small a change the logs could not have shown, as a sentence.
+fn unseen(of: &Tracked) -> String {
+    let all = || of.robots.iter().flat_map(|r| &r.parameters);
+    let mut least: Vec<f64> = all().filter_map(relative_least).collect();
+    if all().all(|p| p.least_seen.is_none()) {
+        return " There are too few logs to show one: a change needs six logs before it and six from it on.".to_owned();
+    }
+    least.sort_by(f64::total_cmp);
+    match least.get(least.len() / 2) {
+        Some(median) => format!(
+            " Changes smaller than {} of the value, in the median over the parameters, could not be seen.",
+            number::percent(*median)
+        ),
+        None => String::new(),
+    }
+}
+
+/// The least change that could be seen, over the parameter.
+fn relative_least(p: &TrackedParameter) -> Option<f64> {
+    let last = p.values.iter().rev().flatten().next()?;
+    (*last != 0.0).then(|| p.least_seen.map(|least| least / last.abs()))?
 }
 
 fn changes(of: &Tracked) -> Option<Table> {
@@ -163,8 +216,12 @@ fn last(robot: &TrackedRobot) -> Table {
         ("unit", Align::Left),
         ("walk", Align::Decimal),
         ("scatter", Align::Decimal),
+        ("least seen", Align::Decimal),
     ];
-    let caption = format!("parameters after {} logs", robot.logs.len());
+    let caption = format!(
+        "parameters after {} logs; a step is seen from the least size on",
+        robot.logs.len()
+    );
     let mut table = Table::new(&columns).caption(&caption);
     for p in &robot.parameters {
         let last = |x: &[Option<f64>]| x.last().copied().flatten().unwrap_or(f64::NAN);
@@ -176,6 +233,7 @@ fn last(robot: &TrackedRobot) -> Table {
             p.unit.clone(),
             number::significant(p.walk, 2),
             number::significant(p.scatter, 2),
+            number::significant(p.least_seen.unwrap_or(f64::NAN), 2),
         ]);
     }
     table

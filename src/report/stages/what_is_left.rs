@@ -1,8 +1,9 @@
 //! What of the residual no effect explains: on which signals it depends, in sentences and as pictures.
 
+use super::step_words::chance;
 use crate::diagnose::{ResidualMap, Signal};
 use crate::identify::{Diagnosed, LoggedRobot, signal_words};
-use crate::number;
+use crate::number::{self, MILLIMETRES};
 use crate::report::Writer;
 use crate::report::figure::MapFigure;
 
@@ -15,10 +16,10 @@ pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String>
             let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
             let signals: Vec<String> = signals.collect();
             format!(
-                "{} ({} of its square, p = {:.3})",
+                "{} ({} of its square, {})",
                 signals.join(" with "),
                 number::percent(d.share),
-                d.p_value
+                chance(d.p_value)
             )
         });
         let told: Vec<String> = told.collect();
@@ -66,6 +67,13 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
         };
         (signal_words(names, joint, signal), unit)
     });
+    let small = [0, 1]
+        .map(|s: usize| over[s].1 == "m" && map.ends[s].iter().all(|end| end.abs() < MILLIMETRES));
+    let scale = small.map(|small| if small { 1e3 } else { 1.0 });
+    let over = [0, 1].map(|s: usize| {
+        let (name, unit) = over[s].clone();
+        (name, if small[s] { "mm".to_owned() } else { unit })
+    });
     let means = map.curve.iter().map(|[_, mean, _]| *mean);
     let [low, high] =
         [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| means.clone().fold(0.0, of));
@@ -79,8 +87,10 @@ fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
         ),
         unit: torque.to_owned(),
         over,
-        ends: map.ends,
+        ends: [0, 1].map(|s: usize| map.ends[s].map(|end| scale[s] * end)),
         cells: map.cells.clone(),
-        curve: map.curve.clone(),
+        curve: (map.curve.iter())
+            .map(|[x, mean, std]| [scale[0] * x, *mean, *std])
+            .collect(),
     }
 }
