@@ -21,6 +21,7 @@ use cft_ident::simulate::{
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use statrs::distribution::{Beta, ContinuousCDF};
 
 pub const JOINTS: [&str; 4] = ["q1", "q2", "q4", "q5"];
 
@@ -200,6 +201,19 @@ pub fn estimated(
 pub fn quantile(mut x: Vec<f64>, share: f64) -> f64 {
     x.sort_by(f64::total_cmp);
     x[((x.len() - 1) as f64 * share).round() as usize]
+}
+
+/// The 95 % interval of a share, of which so many of a total were hits (Clopper and Pearson 1934).
+#[allow(dead_code)] // each study uses its share
+pub fn interval(hits: usize, total: usize) -> String {
+    let bound = |a: f64, b: f64, p: f64, end: f64| match Beta::new(a, b) {
+        Ok(beta) => beta.inverse_cdf(p),
+        Err(_) => end,
+    };
+    let (k, n) = (hits as f64, total as f64);
+    let low = bound(k, n - k + 1.0, 0.025, 0.0);
+    let high = bound(k + 1.0, n - k, 0.975, 1.0);
+    format!("{:.1} % to {:.1} %", 100.0 * low, 100.0 * high)
 }
 
 pub fn percent(x: f64) -> String {

@@ -1,161 +1,162 @@
 //! Monte Carlo study of the diagnosis where nothing is missing: plants of several kinds on several motions, logs of
-//! 20 s with encoder quantisation and 1 % torque noise, identified as a laboratory would, and diagnosed. A step that
-//! is found is false.
+//! some 20 s with encoder quantisation and 1 % torque noise, identified and diagnosed by the commands that a
+//! laboratory would type. An effect that is found is false.
 //!
-//! What the largest chance value of each campaign is told by the placebos is to be even between 0 and 1: shares of
-//! campaigns below a few values show it.
+//! Beside it, what the placebos say of the best candidate of each campaign by chance alone, with every other test
+//! switched off: that is to be even between 0 and 1.
 //!
-//! `cargo run --release --example study_clean -- [SEEDS] [FOLDER]` writes one line per seed to
-//! target/study_clean.jsonl as it goes, and goes on from there when it is begun again; at the end it writes into
-//! FOLDER the summary that docs/closing-the-loop.md is generated from.
+//! `cargo build --release && cargo run --release --example study_clean -- [SEEDS] [FOLDER]` writes one line per
+//! campaign to target/study_clean.jsonl as it goes, first those of single drives, then of the arms seed by seed, and
+//! goes on from there when it is begun again; at the end, or with SEEDS = 0 of what is there, it writes into FOLDER the
+//! summary that docs/closing-the-loop.md is generated from. `-- try KEY` runs the campaigns whose key begins so again,
+//! and leaves their files.
 
-#[path = "../study_diagnosis/campaign.rs"]
-#[allow(dead_code)] // each study uses its share
 mod campaign;
-#[path = "../study_diagnosis/catalogue.rs"]
-#[allow(dead_code)]
-mod catalogue;
-#[path = "../study_diagnosis/drive.rs"]
-#[allow(dead_code)]
-mod drive;
+mod plants;
 #[path = "../study/mod.rs"]
-#[allow(dead_code)]
+#[allow(dead_code)] // each study uses its share
 mod study;
+#[path = "../study_setup/bench/tool.rs"]
+#[allow(dead_code)]
+mod tool;
 
-use campaign::{Campaign, Lab};
-use cft_ident::diagnose::{Diagnosis, SelectionLimits, UNWATCHED, diagnose};
-use cft_ident::motion::Parallel;
-use cft_ident::robot::Robot;
-use cft_ident::robot::cft::{Setup, Structure};
-use cft_ident::simulate::{CftTruth, Reference};
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use campaign::{Campaign, of_seed};
+use plants::Law;
 use serde_json::{Value, json};
-use study::{along, processing, series, study, write_summary};
+use study::{finished, interval};
 
-/// Kinds of campaigns: single drives on ladders of speeds, and the CFT robot on its motion, on it run slowly and on
-/// one designed at 0.4 Hz, each with a ladder of every joint beside it.
-const KINDS: [&str; 5] = [
-    drive::SLIDE,
-    drive::WHEEL,
-    "arm, slow",
-    "arm, 0.2 Hz",
-    "arm, designed at 0.4 Hz",
-];
-const USUAL: u64 = 40;
+const LOG: &str = "target/study_clean.jsonl";
+const USUAL: u64 = 5;
+/// Chance values below which campaigns are counted.
+const CHANCES: [f64; 4] = [0.01, 0.05, 0.1, 0.5];
 
 fn main() {
-    let (rows, folder) = study("study_clean", USUAL, plant);
-    let share = |counted: usize, of: usize| format!("{counted} of {of}");
-    let table = KINDS.iter().map(|kind| {
-        let all: Vec<&Value> = rows.iter().map(|row| &row[*kind]).collect();
-        let ran = || all.iter().filter(|c| c["steps"].is_array());
-        let steps = |c: &&&Value| c["steps"].as_array().is_some_and(|s| !s.is_empty());
-        let found = ran().filter(steps).count();
-        let mut names: Vec<String> = ran()
-            .flat_map(|c| c["steps"].as_array().into_iter().flatten())
-            .filter_map(|s| s.as_str().map(str::to_owned))
-            .collect();
-        names.sort();
-        names.dedup();
-        json!({
-            "campaigns": kind,
-            "with an effect found": share(found, ran().count()),
-            "found": if names.is_empty() { "-".to_owned() } else { names.join(", ") },
-            "refused by placebos alone": share(
-                ran().filter(|c| c["refused"].as_u64().unwrap_or(0) > 0).count(),
-                ran().count()
-            ),
-        })
-    });
-    write_summary(
-        &folder,
-        "study_clean",
-        "effects found where nothing is missing",
-        "cargo run --release --example study_clean",
-        rows.len(),
-        table.collect(),
-    );
-}
-
-/// All kinds of campaigns of one seed.
-fn plant(seed: u64) -> Value {
-    let mut row = json!({ "seed": seed });
-    for kind in KINDS {
-        row[kind] = one(kind, 7000 + seed);
+    let mut arguments = std::env::args().skip(1);
+    let first = arguments.next();
+    if first.as_deref() == Some("try") {
+        return again(&arguments.next().unwrap_or_default());
     }
-    row
+    let seeds = first.and_then(|s| s.parse().ok());
+    let folder = PathBuf::from(arguments.next().unwrap_or_else(|| "docs/results".into()));
+    run(seeds.unwrap_or(USUAL));
+    let rows = finished(Path::new(LOG));
+    let document = summary(&rows);
+    let path = folder.join("study_clean.json");
+    std::fs::write(path, format!("{document:#}\n")).expect("the summary is written");
+    println!("{document:#}");
 }
 
-fn one(kind: &str, seed: u64) -> Value {
-    let (lab, campaign) = match kind {
-        drive::SLIDE | drive::WHEEL => on_drive(kind, seed),
-        _ => on_arm(kind, seed),
-    };
-    let limits = SelectionLimits {
-        deviations: false,
-        ..SelectionLimits::default()
-    };
-    let case = campaign.case(&lab, campaign.declared.clone(), limits, Vec::new());
-    match diagnose(&case, UNWATCHED) {
-        Ok(found) => told(&lab, &found),
-        Err(error) => json!({ "error": error.to_string() }),
+/// Runs the campaign whose key begins so, and leaves its files.
+fn again(key: &str) {
+    let root = Path::new("target/study_clean");
+    let of_key = |campaign: &Campaign| campaign.key().starts_with(key);
+    for campaign in (0..100).flat_map(of_seed).filter(of_key) {
+        let folder = root.join(format!("try {}", campaign.key()));
+        std::fs::create_dir_all(&folder).expect("the folder can be made");
+        println!("{}", campaign.run(&folder, &root.join("designs")));
     }
 }
 
-fn told(lab: &Lab, found: &Diagnosis) -> Value {
-    let steps = found.steps.iter();
-    let steps: Vec<String> = steps
-        .map(|s| found.model.effects[s.effect].title(&lab.robot))
+/// Runs what is not there yet.
+fn run(seeds: u64) {
+    let rows = finished(Path::new(LOG));
+    let done: Vec<&str> = rows.iter().filter_map(|r| r["key"].as_str()).collect();
+    let mut open: Vec<Campaign> = (0..seeds)
+        .flat_map(of_seed)
+        .filter(|campaign| !done.contains(&campaign.key().as_str()))
         .collect();
-    let by_placebos = found
-        .candidates
-        .iter()
-        .filter(|c| c.placebo_p_value.is_some());
-    let lowest = by_placebos.clone().filter_map(|c| c.placebo_p_value);
+    // single drives take seconds
+    open.sort_by_key(|campaign| campaign.machine.joints().len() > 1);
+    let file = OpenOptions::new().create(true).append(true).open(LOG);
+    let file = Mutex::new(file.expect("the log opens"));
+    let next = AtomicUsize::new(0);
+    let worker = |number: usize| {
+        let root = Path::new("target/study_clean");
+        let (folder, designs) = (root.join(number.to_string()), root.join("designs"));
+        while let Some(campaign) = open.get(next.fetch_add(1, Ordering::Relaxed)) {
+            std::fs::create_dir_all(&folder).expect("the folder can be made");
+            let row = campaign.run(&folder, &designs);
+            let mut file = file.lock().expect("no thread panics");
+            writeln!(file, "{row}").expect("the log is written");
+            eprintln!("{row}");
+            drop(file);
+            std::fs::remove_dir_all(&folder).expect("the folder can be removed");
+        }
+    };
+    std::thread::scope(|scope| {
+        let worker = &worker;
+        for number in 0..rayon::current_num_threads() {
+            scope.spawn(move || worker(number));
+        }
+    });
+}
+
+fn summary(rows: &[Value]) -> Value {
+    let mut lines = vec![line("all", rows.iter().collect())];
+    for key in ["motion", "one-joint logs", "machine", "friction law"] {
+        let mut kinds: Vec<&str> = rows.iter().filter_map(|r| r[key].as_str()).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        for kind in kinds {
+            let of_kind = rows.iter().filter(|r| r[key] == kind).collect();
+            lines.push(line(&format!("{key}: {kind}"), of_kind));
+        }
+    }
     json!({
-        "steps": steps,
-        "refused": by_placebos.count(),
-        "lowest": lowest.fold(1.0, f64::min),
-        "structured": found.structured(),
+        "study": format!("effects found where nothing is missing, {} campaigns", rows.len()),
+        "command": "cargo run --release --example study_clean",
+        "false": rows.iter().filter(|r| is_false(r)).collect::<Vec<_>>(),
+        "refused": rows.iter().filter(|r| r["steps"].is_null()).collect::<Vec<_>>(),
+        "rows": lines,
     })
 }
 
-fn on_drive(name: &str, seed: u64) -> (Lab, Campaign) {
-    let truth = drive::truth(name, seed);
-    let processing = drive::settings();
-    let lab = Lab {
-        robot: Robot::single_joint(name, truth.kind),
-        parallel: Parallel::design(&processing, 1e-3).expect("a filter"),
-        processing,
-    };
-    (lab, drive::campaign(&truth, &[], seed))
+/// Whether a step is the plant's own: where a jump is declared the plant has a slope, as steep as its integration
+/// carries.
+fn own(row: &Value, step: &Value) -> bool {
+    let smooth = step
+        .as_str()
+        .is_some_and(|s| s.starts_with("smooth-coulomb"));
+    smooth && row["friction law"] == Law::Jump.words()
 }
 
-fn on_arm(kind: &str, seed: u64) -> (Lab, Campaign) {
-    let lab = Lab {
-        robot: Robot::cft(Setup::Tuedacs, Structure::Printed12),
-        processing: processing(),
-        parallel: Parallel::design(&processing(), 1e-3).expect("a filter"),
-    };
-    let truth = CftTruth::synthetic(Setup::Tuedacs)
-        .varied(0.15, seed)
-        .expect("a plant");
-    let motion = |seed: u64| motion(kind, seed);
-    let campaign = Campaign::made(&lab, &truth, &[], &motion, (seed, false));
-    (lab, campaign)
+/// Whether a campaign has a step that the plant has not.
+fn is_false(row: &Value) -> bool {
+    let mut steps = row["steps"].as_array().into_iter().flatten();
+    steps.any(|step| !own(row, step))
 }
 
-fn motion(kind: &str, seed: u64) -> Reference<4> {
-    let file = match kind {
-        "arm, designed at 0.4 Hz" => "examples/study_rows/designed.toml",
-        _ => "configs/cft-excitation.toml",
-    };
-    let mut of = series(file).at_random_phase(seed);
-    if kind == "arm, slow" {
-        let factor = 0.3;
-        of.fundamental *= factor;
-        for x in of.a.iter_mut().chain(&mut of.b).flatten() {
-            *x *= factor;
-        }
+fn has_own(row: &Value) -> bool {
+    let mut steps = row["steps"].as_array().into_iter().flatten();
+    steps.any(|step| own(row, step))
+}
+
+/// A line of the table.
+fn line(kind: &str, rows: Vec<&Value>) -> Value {
+    let ran: Vec<&&Value> = rows.iter().filter(|r| r["steps"].is_array()).collect();
+    // what is missing has no chance value of nothing
+    let clean: Vec<&&&Value> = ran.iter().filter(|r| !has_own(r)).collect();
+    let found = ran.iter().filter(|r| is_false(r)).count();
+    let mut line = json!({
+        "campaigns": kind,
+        "diagnosed": ran.len(),
+        "with a false effect": found,
+        "95 % interval": interval(found, ran.len()),
+    });
+    for chance in CHANCES {
+        let below = clean
+            .iter()
+            .filter(|r| r["chance"].as_f64().is_some_and(|p| p <= chance));
+        let share = below.count() as f64 / clean.len().max(1) as f64;
+        line[format!("chance at most {chance}")] = format!("{:.1} %", 100.0 * share).into();
     }
-    along(of)
+    line["the plant's own slope found"] = ran.iter().filter(|r| has_own(r)).count().into();
+    line["not diagnosed"] = (rows.len() - ran.len()).into();
+    line
 }

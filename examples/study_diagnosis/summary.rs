@@ -6,10 +6,9 @@ use std::path::Path;
 
 use cft_ident::effect::{Family, Role, entry};
 use serde_json::{Value, json};
-use statrs::distribution::{Beta, ContinuousCDF};
 
 use crate::catalogue::{PLANTED, SIZES};
-use crate::study::{percent, quantile};
+use crate::study::{interval, percent, quantile};
 
 /// Power over the noise's below which nothing is looked for: the declared parameters stand in for it.
 const SHOWS: f64 = 0.25;
@@ -179,25 +178,18 @@ fn by_kind(rows: &[Value]) -> Vec<Value> {
     lines
 }
 
-/// Hits of so many, with the Clopper-Pearson interval.
+/// Hits of so many, with their interval.
 fn rate(what: &str, asked: &str, hits: usize, total: usize) -> Value {
-    let bound = |a: f64, b: f64, p: f64, end: f64| match Beta::new(a, b) {
-        Ok(beta) => beta.inverse_cdf(p),
-        Err(_) => end,
-    };
-    let (k, n) = (hits as f64, total as f64);
-    let low = bound(k, n - k + 1.0, 0.025, 0.0);
-    let high = bound(k + 1.0, n - k, 0.975, 1.0);
     let share = match total {
         0 => "-".to_owned(),
-        _ => format!("{:.1} %", 100.0 * k / n),
+        _ => format!("{:.1} %", 100.0 * hits as f64 / total as f64),
     };
     json!({
         "what": what,
         "campaigns": total,
         "hits": hits,
         "share": share,
-        "95 % interval": format!("{:.1} % to {:.1} %", 100.0 * low, 100.0 * high),
+        "95 % interval": interval(hits, total),
         "asked": asked,
     })
 }
