@@ -1,6 +1,7 @@
 //! Measured machines: their logs fitted and diagnosed once, then made anew with an effect in them.
 
 use cft_ident::config::ModelFile;
+use cft_ident::diagnose::Candidate;
 use cft_ident::effect::{AugmentedModel, Cover, Place, Torques};
 use cft_ident::identify::{
     Control, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, Diagnosed, Log, LoggedRobot, LsqSettings,
@@ -365,6 +366,13 @@ impl Machine {
             if family && better {
                 hit = Some((s, member));
             }
+        }
+        if let (Some(planted), None) = (put, hit) {
+            let own = |c: &&Candidate| {
+                c.effect.name() == planted.kind.name() && c.effect.place == planted.place
+            };
+            let refused = found.candidates.iter().find(own);
+            row["refused because"] = refused.map(|c| c.reason.as_str()).into();
         }
         row["right family"] = hit.is_some().into();
         row["right member"] = hit.is_some_and(|(_, member)| member).into();

@@ -54,11 +54,9 @@ pub fn write(rows: &[Value], draws: u64, asked: usize, folder: &Path) {
         line["said"] = said(&of).into();
         line
     });
-    let fails = |r: &&&Value| r["right member"] == false || r["false"] != 0;
-    let title = format!(
-        "{} of {asked} cases of {draws} draws",
-        rows.len().min(asked)
-    );
+    let missed = |r: &Value| r["effect"].is_string() && r["right member"] == false;
+    let fails = |r: &&&Value| missed(r) || r["false"] != 0;
+    let title = format!("{} of {asked} cases, draws: {draws}", rows.len().min(asked));
     let command = format!("cargo run --release --example study_semi -- --draws={draws}");
     let document = |what: &str, lines: Vec<Value>| json!({ "study": format!("{what}, {title}"), "command": command, "rows": lines });
     let mut of_rates = document("one effect put into measured logs", rates);
