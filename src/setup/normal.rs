@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::channels::{Carried, Channels, Drive};
 use super::correction::Correction;
-use super::physics::tells_friction;
 use super::sample::Sample;
 use crate::inertia::columns::{Own, RegressorColumns};
 use crate::robot::{JointKind, Robot};
@@ -139,7 +138,7 @@ impl<'a> Problem<'a> {
 
     /// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
     pub fn tells_friction(&self, joint: usize) -> bool {
-        tells_friction(self.of_joints(), joint)
+        self.of_joints().tells_friction(joint)
     }
 
     /// Channels whose motion or torque the joints that move feel.

@@ -13,11 +13,6 @@ use crate::robot::Robot;
 
 /// What the model lacks may look like a quantity to this correlation: a share of the residual that has any sign.
 const ALIKE: f64 = 0.25;
-/// A joint that goes the other way in a smaller share of its rows does not tell friction from a constant
-/// torque.
-const OTHER_WAY: f64 = 0.1;
-/// A speed below this share of the largest one is rest.
-const REST: f64 = 0.05;
 /// Rows whose poses stand for all of them.
 const POSES: usize = 60;
 
@@ -153,7 +148,7 @@ pub(super) fn positives(
         if problem.columns.known[j].is_some() || !problem.columns.own[j].is_empty() {
             let f = &power[j] / all;
             let friction = fit.targets[j][n];
-            let told = tells_friction(joints, j);
+            let told = joints.tells_friction(j);
             out.push(Positive {
                 joint: j,
                 quantity: Quantity::FrictionPower,
@@ -166,16 +161,6 @@ pub(super) fn positives(
         }
     }
     out
-}
-
-/// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
-pub(super) fn tells_friction(sample: &Sample, joint: usize) -> bool {
-    let of_joint = sample.v.iter().skip(joint);
-    let speeds = || of_joint.clone().step_by(sample.joints.max(1)).copied();
-    let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
-    let forward = speeds().filter(|v| *v > REST * most).count() as f64;
-    let backward = speeds().filter(|v| *v < -REST * most).count() as f64;
-    forward.min(backward) > OTHER_WAY * (forward + backward)
 }
 
 /// Root mean square of each joint's torque.

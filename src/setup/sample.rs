@@ -3,6 +3,12 @@
 /// Most rows that are kept.
 pub const MOST_ROWS: usize = 2000;
 
+/// A joint that goes the other way in a smaller share of its rows does not tell friction from a constant
+/// torque.
+const OTHER_WAY: f64 = 0.1;
+/// A speed below this share of the largest one is rest.
+const REST: f64 = 0.05;
+
 /// A joint rests below this share of its rms speed.
 const RESTING: f64 = 0.01;
 
@@ -105,6 +111,16 @@ impl Sample {
             }
         }
         count as f64
+    }
+
+    /// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
+    pub(super) fn tells_friction(&self, joint: usize) -> bool {
+        let of_joint = self.v.iter().skip(joint);
+        let speeds = || of_joint.clone().step_by(self.joints.max(1)).copied();
+        let most = speeds().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let forward = speeds().filter(|v| *v > REST * most).count() as f64;
+        let backward = speeds().filter(|v| *v < -REST * most).count() as f64;
+        forward.min(backward) > OTHER_WAY * (forward + backward)
     }
 
     /// Leaves out the rows in which nothing moves: static friction takes any torque there.
