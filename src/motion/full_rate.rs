@@ -24,7 +24,7 @@ pub struct Smooth {
     pub settled: Range<usize>,
 }
 
-/// Rows of a record between gaps: steps longer than [`FilterSettings::longest_step`].
+/// Rows of a record between gaps, as these settings have them.
 ///
 /// # Errors
 /// [`MotionError::TooFewSamples`], [`MotionError::Time`].
@@ -33,7 +33,7 @@ pub fn segments(t: &[f64], settings: &FilterSettings) -> Result<Vec<Range<usize>
     let mut found = Vec::new();
     let mut start = 0;
     for k in 1..t.len() {
-        if t[k] - t[k - 1] > settings.longest_step(clock.dt) {
+        if clock.splits(t[k] - t[k - 1], settings) {
             found.push(start..k);
             start = k;
         }

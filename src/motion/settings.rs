@@ -35,8 +35,8 @@ pub struct FilterSettings {
     pub torque: TorqueTiming,
     /// A step longer than this many sampling steps splits the log ..
     pub gap_factor: f64,
-    /// .. where it is longer than this, too (s): what lasts an eighth of a period of the highest frequency that is kept
-    /// is told by its neighbours. 0: only steps count.
+    /// .. unless rows of an even clock are missing for no longer than this (s): what lasts an eighth of a period of the
+    /// highest frequency that is kept is told by its neighbours. 0: only steps count.
     pub bridge_s: f64,
     /// Dropped at each end of a segment before the parallel filter (s), where the position filter
     /// has nothing to look ahead to; left out, ten of that filter's time constants.
@@ -66,7 +66,7 @@ impl Default for FilterSettings {
 }
 
 impl FilterSettings {
-    /// The longest step of a log of sampling step `dt` that does not split it (s).
+    /// The longest step of a log of sampling step `dt` that may not split it (s).
     pub fn longest_step(&self, dt: f64) -> f64 {
         (self.gap_factor * dt).max(self.bridge_s)
     }

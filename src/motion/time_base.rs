@@ -74,6 +74,16 @@ impl SampleClock {
     }
 }
 
+impl SampleClock {
+    /// Whether a step (s) splits a log: it is longer than the gap factor, and no number of rows of an even clock that are
+    /// missing for so short a time that the rows to be kept do not see it.
+    pub fn splits(&self, step: f64, settings: &FilterSettings) -> bool {
+        let steps = step / self.dt;
+        let missing = self.even && (steps - steps.round()).abs() <= EVEN * steps;
+        steps > settings.gap_factor && !(missing && step <= settings.bridge_s)
+    }
+}
+
 fn checked_step(before: f64, after: f64) -> Result<f64, MotionError> {
     let step = after - before;
     if step > 0.0 && step.is_finite() {
@@ -87,9 +97,7 @@ fn checked_step(before: f64, after: f64) -> Result<f64, MotionError> {
 pub(super) struct TimeBase {
     joints: usize,
     clock: Option<SampleClock>,
-    /// Gap factor and shortest gap (s).
-    gap: [f64; 2],
-    torque: TorqueTiming,
+    settings: FilterSettings,
     /// Rows of the stretch in work; before the clock is known, the log's first rows.
     t: Vec<f64>,
     q: Vec<f64>,
@@ -140,8 +148,7 @@ impl TimeBase {
         Ok(Self {
             joints,
             clock,
-            gap: [settings.gap_factor, settings.bridge_s],
-            torque: settings.torque,
+            settings: settings.clone(),
             t: Vec::new(),
             q: Vec::new(),
             tau: Vec::new(),
@@ -239,8 +246,7 @@ impl TimeBase {
         while self.checked < self.t.len() {
             if self.checked > 0 {
                 let step = checked_step(self.t[self.checked - 1], self.t[self.checked])?;
-                let [factor, shortest] = self.gap;
-                if step > (factor * clock.dt).max(shortest) {
+                if clock.splits(step, &self.settings) {
                     return Ok(Some(self.checked));
                 }
             }
@@ -308,7 +314,7 @@ impl TimeBase {
     fn bring_torques(&mut self, clock: SampleClock, end: usize, closed: bool) {
         let n = self.joints;
         let from = self.acting.len() / n;
-        match self.torque {
+        match self.settings.torque {
             TorqueTiming::Sampled => {
                 self.acting.extend_from_slice(&self.tau[from * n..end * n]);
             }
