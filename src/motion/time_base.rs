@@ -13,6 +13,8 @@ use crate::log::Block;
 const PREFIX: usize = 8192;
 /// Share of a step by which rows may be off and still count as even.
 const EVEN: f64 = 0.02;
+/// Share of the steps of a steady clock that are even.
+const STEADY: f64 = 0.9;
 /// Rows that an interpolated value is formed from.
 const NODES: usize = 4;
 /// Rows kept behind the one in work: interpolation reaches that far back.
@@ -42,6 +44,8 @@ pub(super) struct SampleClock {
     pub dt: f64,
     /// Whether most steps are even, so that rows are taken as they are.
     pub even: bool,
+    /// Whether nearly all are: what is missing then are rows, and not the clock's steadiness.
+    pub steady: bool,
 }
 
 impl SampleClock {
@@ -70,16 +74,17 @@ impl SampleClock {
         }
         let even = 2 * count >= steps.len();
         let dt = if even { sum / count as f64 } else { median };
-        Ok(Self { dt, even })
+        let steady = count as f64 >= STEADY * steps.len() as f64;
+        Ok(Self { dt, even, steady })
     }
 }
 
 impl SampleClock {
-    /// Whether a step (s) splits a log: it is longer than the gap factor, and no number of rows of an even clock that are
+    /// Whether a step (s) splits a log: it is longer than the gap factor, and no number of rows of a steady clock that are
     /// missing for so short a time that the rows to be kept do not see it.
     pub fn splits(&self, step: f64, settings: &FilterSettings) -> bool {
         let steps = step / self.dt;
-        let missing = self.even && (steps - steps.round()).abs() <= EVEN * steps;
+        let missing = self.steady && (steps - steps.round()).abs() <= EVEN * steps;
         steps > settings.gap_factor && !(missing && step <= settings.bridge_s)
     }
 }
@@ -136,6 +141,7 @@ impl TimeBase {
             Some(rate) if rate > 0.0 && rate.is_finite() => Some(SampleClock {
                 dt: 1.0 / rate,
                 even: true,
+                steady: true,
             }),
             Some(value) => {
                 return Err(MotionError::Setting {
