@@ -442,8 +442,8 @@ pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> Robo
         true => COORDINATES.map(str::to_owned).to_vec(),
         false => file.joint_names(),
     };
-    let robot = file.robot();
-    let drive = robot.transmission();
+    let robot = motors.then(|| file.robot());
+    let coordinate = |j: usize| robot.as_ref()?.transmission().coordinate_kind(j);
     for (j, name) in names.iter().enumerate() {
         let (p, t) = (by.position_from[j], by.torque_from[j]);
         let (pf, tf) = (by.position_factor[j], by.torque_factor[j]);
@@ -470,7 +470,7 @@ pub(super) fn corrected(file: &RobotFile, by: &Correction, motors: bool) -> Robo
                 c.position_sign = Some(-declared.position_sign);
             }
             if pf.abs() != 1.0 {
-                let kind = drive.coordinate_kind(j).unwrap_or(JointKind::Prismatic);
+                let kind = coordinate(j).unwrap_or(JointKind::Prismatic);
                 match other_unit(c.position_unit, kind, pf.abs()) {
                     Some(unit) => c.position_unit = Some(unit),
                     None => c.position_scale = Some(declared.position_scale * pf.abs()),

@@ -17,7 +17,7 @@ use crate::band::{Band, NO_BAND, Reach};
 use crate::config::ModelFile;
 use crate::effect::AugmentedModel;
 use crate::inertia::columns::Own;
-use crate::log::{Instant, Provenance};
+use crate::log::{DataRole, Instant, Provenance};
 use crate::number;
 use crate::open_loop::OpenLoop;
 use crate::robot::model::JointFriction;
@@ -77,8 +77,12 @@ impl Validated {
 }
 
 /// Which inputs hold rows that a model was made from.
+///
+/// Told by checksum and role alone: a file that lost the number of rows of its last input must not turn a log that the
+/// model was fitted to into an unseen one.
 pub fn used_for(file: &ModelFile, inputs: &[Provenance]) -> Vec<bool> {
-    let made_from = || file.provenance.inputs.iter().filter(|input| input.made());
+    let held_out = |made: &Provenance| made.role == Some(DataRole::HeldOut);
+    let made_from = || (file.provenance.inputs.iter()).filter(|input| !held_out(input));
     let used = |input: &Provenance| made_from().any(|made| made.shares_rows(input));
     inputs.iter().map(used).collect()
 }

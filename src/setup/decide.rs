@@ -1,9 +1,9 @@
 //! The best of the hypotheses that were fitted to all rows, and whether the evidence for it is enough.
 
 use super::confirm;
-use super::correction::Change;
+use super::correction::{Change, Correction};
 use super::finding::ChannelKind;
-use super::fitted;
+use super::fitted::{self, Fitted};
 use super::normal::Problem;
 use super::physics::{Positive, Quantity, credit, positives};
 use super::sizes::sizes;
@@ -121,6 +121,53 @@ pub(super) fn judged(
     }
 }
 
+/// A change of the base as it is fitted to all rows; where its number was `fitted`, with the one that does best there.
+/// `declared` is the set-up as it is on these rows, where they are poses by it.
+pub(super) fn on_all_rows(
+    problem: &Problem,
+    (base, change): (&Correction, &Change),
+    fitted: bool,
+    rows: &[usize],
+    declared: Option<&Trial>,
+) -> Option<Judged> {
+    let trial = |change: &Change| Trial::new(problem, base.with(change), rows, BLOCKS, declared);
+    let (mut change, mut std) = (change.clone(), None);
+    if fitted {
+        let own = match declared {
+            Some(_) => None,
+            None => Some(trial(&change)?),
+        };
+        let fitted = Fitted {
+            problem,
+            base,
+            rows,
+            blocks: BLOCKS,
+            declared: declared.or(own.as_ref())?,
+        };
+        let (better, curvature) = fitted.polished(&change);
+        (change, std) = (better, Some(curvature));
+    }
+    let trial = trial(&change)?;
+    Some(judged(problem, Some(change), std, trial))
+}
+
+impl Judged {
+    /// Log-posterior but for a constant, where this share of the rows is independent.
+    fn worth_at(&self, share: f64) -> f64 {
+        let normal = &self.trial.normal;
+        let rows = (share * normal.rows as f64).max(1.0);
+        let unknowns = normal.unknowns + usize::from(self.std.is_some());
+        share * self.trial.fit.score + self.credit - 0.5 * unknowns as f64 * rows.ln()
+    }
+
+    /// Takes this share of the rows as independent: the curvature becomes a deviation.
+    pub fn weigh(&mut self, share: f64) {
+        self.worth = self.worth_at(share);
+        let deviation = |curvature: f64| (share * curvature).max(1e-12).sqrt().recip();
+        self.std = self.std.map(deviation);
+    }
+}
+
 /// The best of the list, where it is better than the set-up as it is.
 pub(super) fn decide(
     problem: &Problem,
@@ -142,18 +189,7 @@ pub(super) fn decide(
         .filter(|(_, m)| **m)
         .map(|(x, _)| *x);
     let share = of_moving.clone().sum::<f64>() / of_moving.count().max(1) as f64;
-    let worth = |judged: &Judged| {
-        let fit = &judged.trial.fit;
-        let rows = share * judged.trial.normal.rows as f64;
-        let unknowns = judged.trial.normal.unknowns + usize::from(judged.std.is_some());
-        share * fit.score + judged.credit - 0.5 * unknowns as f64 * rows.max(1.0).ln()
-    };
-    for judged in &mut list {
-        judged.worth = worth(judged);
-        judged.std = judged
-            .std
-            .map(|curvature| (share * curvature).max(1e-12).sqrt().recip());
-    }
+    list.iter_mut().for_each(|judged| judged.weigh(share));
     drop_flat(&mut list);
     let judge = Judge {
         problem,
@@ -163,7 +199,7 @@ pub(super) fn decide(
         needed: ODDS + (tried.max(1) as f64).ln(),
         tried,
     };
-    let from = worth(declared);
+    let from = declared.worth_at(share);
     let best = list.iter().map(|j| j.worth).fold(from, f64::max);
     let mut likely = None;
     while let Some(at) = choose(&list, from) {

@@ -91,14 +91,10 @@ fn implausible(problem: &Problem, moving: &[usize]) -> bool {
     let fastest = speeds.iter().copied().fold(0.0, f64::max);
     moving.len() > 1
         && moving.iter().any(|&j| {
-            let sample = &problem.sample;
-            let q = sample.q.iter().skip(j).step_by(sample.joints);
-            let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
-            let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
             let turns = problem.robot.joint_kind(j) == JointKind::Revolute;
             turns
                 && speeds[j] > SLOW * fastest
-                && !(PLAUSIBLE[0]..PLAUSIBLE[1]).contains(&(high - low))
+                && !(PLAUSIBLE[0]..PLAUSIBLE[1]).contains(&problem.sample.travel(j))
         })
 }
 

@@ -218,13 +218,8 @@ impl Fitted<'_> {
     /// A factor of any size on a joint's position, where it goes round many times or hardly at all: what is
     /// logged is before a gear then, or in an unknown unit.
     fn geared(&self, j: usize, declared: f64) -> Option<(Change, f64)> {
-        let n = self.problem.sample.joints;
-        let q = self.problem.sample.q.iter().skip(j).step_by(n);
-        let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
-            (l.min(*q), h.max(*q))
-        });
         let turns = self.problem.robot.joint_kind(j) == JointKind::Revolute;
-        let sign = match high - low {
+        let sign = match self.problem.sample.travel(j) {
             range if turns && range > MANY_TURNS => -1.0,
             range if turns && range < HARDLY => 1.0,
             _ => return None,

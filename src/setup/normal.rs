@@ -88,14 +88,11 @@ impl<'a> Problem<'a> {
         let n = self.sample.joints;
         let joints = self.of_joints();
         let travels = |j: usize| {
-            let q = joints.q.iter().skip(j).step_by(n.max(1));
-            let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
-            let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
             let least = match self.robot.joint_kind(j) {
                 JointKind::Revolute => STILL[0],
                 JointKind::Prismatic => STILL[1],
             };
-            high - low > least
+            joints.travel(j) > least
         };
         let moved: Vec<bool> = (0..n).map(travels).collect();
         let alone = n > 1 && moved.iter().filter(|m| **m).count() == 1;

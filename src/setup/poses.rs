@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::confirm;
 use super::correction::{Change, Correction};
-use super::decide::{BLOCKS, Found, Judged, ODDS, THIRD, choose, judged, tied};
+use super::decide::{Found, Judged, ODDS, THIRD, choose, on_all_rows, tied};
 use super::fitted::Fitted;
 use super::hypotheses;
 use super::normal::Problem;
@@ -51,24 +51,7 @@ pub(super) fn impossible(
     });
     order.truncate(SHORT_LIST);
     order.sort_unstable();
-    let whole = |i: &usize| {
-        let mut change = changes[*i].clone();
-        let mut std = None;
-        if *i >= fixed {
-            let declared = Trial::new(problem, base.with(&change), all, BLOCKS, None)?;
-            let fitted = Fitted {
-                problem,
-                base,
-                rows: all,
-                blocks: BLOCKS,
-                declared: &declared,
-            };
-            let (better, curvature) = fitted.polished(&change);
-            (change, std) = (better, Some(curvature));
-        }
-        let trial = Trial::new(problem, base.with(&change), all, BLOCKS, None)?;
-        Some(judged(problem, Some(change), std, trial))
-    };
+    let whole = |i: &usize| on_all_rows(problem, (base, &changes[*i]), *i >= fixed, all, None);
     let mut list: Vec<Judged> = order.par_iter().filter_map(whole).collect();
     let likeliest = list
         .iter()
@@ -76,14 +59,7 @@ pub(super) fn impossible(
     let t = &likeliest.trial;
     let independent = confirm::independent(problem, &t.robot, &t.by, &t.fit);
     let share = independent.iter().sum::<f64>() / independent.len().max(1) as f64;
-    for judged in &mut list {
-        let normal = &judged.trial.normal;
-        let rows = (share * normal.rows as f64).max(1.0);
-        let unknowns = normal.unknowns + usize::from(judged.std.is_some());
-        judged.worth =
-            share * judged.trial.fit.score + judged.credit - 0.5 * unknowns as f64 * rows.ln();
-        judged.std = (judged.std).map(|c| (share * c).max(1e-12).sqrt().recip());
-    }
+    list.iter_mut().for_each(|judged| judged.weigh(share));
     let most = list
         .iter()
         .map(|j| j.worth)

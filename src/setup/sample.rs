@@ -113,6 +113,14 @@ impl Sample {
         count as f64
     }
 
+    /// How far a joint travels \[m or rad\].
+    pub(super) fn travel(&self, joint: usize) -> f64 {
+        let q = self.q.iter().skip(joint).step_by(self.joints.max(1));
+        let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
+        let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+        high - low
+    }
+
     /// Whether the motion of a joint tells its friction from a constant torque: it goes both ways.
     pub(super) fn tells_friction(&self, joint: usize) -> bool {
         let of_joint = self.v.iter().skip(joint);

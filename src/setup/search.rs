@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::channels::Drive;
 use super::correction::{Change, Correction};
 use super::decide::{
-    BLOCKS, Found, Judged, NEGATIVE, Negative, decide, joints_below, judged, negative,
+    BLOCKS, Found, Judged, NEGATIVE, Negative, decide, joints_below, judged, negative, on_all_rows,
 };
 use super::doubt::doubtful;
 use super::fitted::{Fitted, TILT};
@@ -192,22 +192,10 @@ fn round(
         .collect();
     short.extend(rest);
     short.sort_unstable();
+    let declared = Some(&whole.trial);
     let judge = |i: &usize| {
-        let (mut change, mut std) = (changes[*i].clone(), None);
-        if *i >= fixed {
-            let all_rows = Fitted {
-                problem,
-                base,
-                rows: &all,
-                blocks: BLOCKS,
-                declared: &whole.trial,
-            };
-            let (better, curvature) = all_rows.polished(&change);
-            (change, std) = (better, Some(curvature));
-        }
-        let by = base.with(&change);
-        let trial = Trial::new(problem, by, &all, BLOCKS, Some(&whole.trial))?;
-        Some(judged(problem, Some(change), std, trial))
+        let change = (base, &changes[*i]);
+        on_all_rows(problem, change, *i >= fixed, &all, declared)
     };
     let list: Vec<Judged> = short.par_iter().filter_map(judge).collect();
     let found = decide(problem, &whole, list, tried);

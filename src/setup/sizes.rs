@@ -28,10 +28,8 @@ pub(super) fn sizes(problem: &Problem, by: &Correction) -> f64 {
         return 0.0;
     }
     let travel = |j: usize| {
-        let q = sample.q.iter().skip(by.position_from[j]).step_by(n);
-        let ends = |(l, h): (f64, f64), q: &f64| (l.min(*q), h.max(*q));
-        let (low, high) = q.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-        problem.channels.position_factor(by, j).abs() * (high - low)
+        let factor = problem.channels.position_factor(by, j).abs();
+        factor * sample.travel(by.position_from[j])
     };
     let rms = sample.rms(&sample.tau);
     let mix = problem.channels.mix(by);
@@ -40,15 +38,13 @@ pub(super) fn sizes(problem: &Problem, by: &Correction) -> f64 {
         parts.map(|(m, x)| (m * x).powi(2)).sum::<f64>().sqrt()
     };
     let mut torques: Vec<f64> = joints.iter().map(|j| torque(*j).max(1e-300).ln()).collect();
-    let of_torques = |torques: &mut Vec<f64>| {
-        torques.sort_by(f64::total_cmp);
-        let middle = torques[torques.len() / 2];
-        let away = torques.iter().map(|x| beyond((x - middle).abs() - TORQUE));
-        away.map(|x| x.max(-MOST)).sum::<f64>()
-    };
-    // of two nobody knows which is right
+    torques.sort_by(f64::total_cmp);
+    let middle = torques[torques.len() / 2];
     let of_torques = match joints.len() > 2 {
-        true => of_torques(&mut torques),
+        true => (torques.iter())
+            .map(|x| beyond((x - middle).abs() - TORQUE).max(-MOST))
+            .sum::<f64>(),
+        // of two nobody knows which is right
         false => 0.0,
     };
     let of_travel = |j: &usize| {

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::channels::Carried;
-use super::channels::Drive;
+use super::channels::{Carried, Drive};
 use super::correction::Correction;
 use super::fit::{Fit, Power};
 use super::normal::{Normal, Problem};
@@ -101,17 +100,25 @@ pub(super) fn power(
         // channels share joints: their sizes count together
         _ => {
             let scale = (2.0 * by.torque_size() / n as f64).exp();
-            let mut sums = vec![0.0; n];
-            for &k in rows {
-                for (sum, tau) in sums.iter_mut().zip(problem.sample.row(k).tau) {
-                    *sum += scale * tau * tau;
-                }
-            }
-            let moving = problem.moving();
-            let felt = sums.iter().zip(moving);
-            alone(felt.map(|(s, m)| if *m { *s } else { 0.0 }).collect())
+            let sums = squares(problem, rows);
+            let felt = sums.iter().zip(problem.moving());
+            alone(
+                felt.map(|(s, m)| if *m { scale * s } else { 0.0 })
+                    .collect(),
+            )
         }
     }
+}
+
+/// Squares of the torques of each channel in these rows.
+fn squares(problem: &Problem, rows: &[usize]) -> Vec<f64> {
+    let mut sums = vec![0.0; problem.sample.joints];
+    for &k in rows {
+        for (sum, tau) in sums.iter_mut().zip(problem.sample.row(k).tau) {
+            *sum += tau * tau;
+        }
+    }
+    sums
 }
 
 /// Logarithm of the product of the joints' mean squares over that of the motors', by the volume that the linkage and the
@@ -124,12 +131,6 @@ fn through_linkage(
     rows: &[usize],
 ) -> f64 {
     let n = joints.len();
-    let mut squares = vec![0.0; n];
-    for &k in rows {
-        for (sum, tau) in squares.iter_mut().zip(problem.sample.row(k).tau) {
-            *sum += tau * tau;
-        }
-    }
     let mean = |sums: &[f64], rows: usize| -> f64 {
         let all = sums.iter().filter(|s| **s > 0.0);
         all.map(|s| (s / rows.max(1) as f64).ln()).sum()
@@ -157,5 +158,5 @@ fn through_linkage(
         }
     }
     let volume = volume / f64::max(count, 1.0) + by.torque_size();
-    mean(joints, good) - mean(&squares, rows.len()) - 2.0 * volume
+    mean(joints, good) - mean(&squares(problem, rows), rows.len()) - 2.0 * volume
 }
