@@ -178,6 +178,40 @@ fn ladders_of_a_single_joint_need_its_friction_and_nothing_else_of_a_model() {
     assert!(message.contains("no friction in the model"), "{message}");
 }
 
+#[test]
+fn a_ladder_for_a_law_that_bends_at_once_stays_within_the_travel() {
+    let folder = robots();
+    let path = folder.path();
+    let robot = format!("{SLIDE}acceleration = 4.0\n\n[friction]\nlaw = \"double-tanh\"\n");
+    let mut sharp = robot.clone();
+    parameter(&mut sharp, "inertia", "", 95.0);
+    // such slopes are told best by slow reversals, which fast strokes have no room for
+    for (name, value) in LAW.iter().zip([200.0, 14.0, 6.0, 2400.0, 800.0]) {
+        parameter(&mut sharp, name, "slide", value);
+    }
+    fs::write(path.join("slide.toml"), robot).unwrap();
+    fs::write(path.join("sharp.toml"), sharp).unwrap();
+    for seed in 1..=5 {
+        let made = format!(
+            "excite -r slide.toml -m sharp.toml --joint slide --seed {seed} -o sharp-{seed}.toml"
+        );
+        let (status, message, design) = run(path, &made);
+        assert_eq!(status, 0, "{message}");
+        for used in design["limits_used"].as_array().unwrap() {
+            assert!(used["position"].as_f64().unwrap() <= 1.0, "{used}");
+        }
+    }
+    fs::write(
+        path.join("slow-turns.toml"),
+        "kind = \"single-joint\"\njoint = \"slide\"\nspeeds = [0.02, 0.2]\nturn_s = 2.0\n",
+    )
+    .unwrap();
+    let check = "excite -r slide.toml -m sharp.toml --check slow-turns.toml";
+    let (status, message, _) = run(path, check);
+    assert_eq!(status, 3, "{message}");
+    assert!(message.contains("give a shorter turn"), "{message}");
+}
+
 fn points(rows: &[(f64, &str)]) -> String {
     let mut text = "kind = \"points\"\ncoordinates = \"joint\"\n".to_owned();
     for (t, position) in rows {

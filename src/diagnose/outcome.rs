@@ -46,16 +46,22 @@ pub enum StepStatus {
 
 impl AcceptedEffect {
     /// Whether held-out data confirm the step: the 95 % CI of the change of the error lies below zero
-    /// on a joint, and above it on none.
+    /// on a joint, and no joint is noticeably worse.
     pub fn confirmed(&self) -> bool {
-        self.joints.iter().any(JointChange::improved) && !self.worsens()
+        self.joints.iter().any(JointChange::improved)
+            && !self.worse_over_joints()
+            && !self.joints.iter().any(JointChange::noticeably_worse)
+    }
+
+    /// Whether it makes held-out data worse as the rms over the joints.
+    pub fn worse_over_joints(&self) -> bool {
+        self.holdout.is_some_and(|[before, after]| after > before)
     }
 
     /// Whether it makes held-out data worse: as the rms over the joints, or on one of them by its
     /// whole interval.
     pub fn worsens(&self) -> bool {
-        self.holdout.is_some_and(|[before, after]| after > before)
-            || self.joints.iter().any(|j| j.worsened)
+        self.worse_over_joints() || self.joints.iter().any(|j| j.worsened)
     }
 }
 

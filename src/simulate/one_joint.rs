@@ -225,7 +225,8 @@ impl OneJointMove {
                 turn: self.turn.unwrap_or(TURN),
                 seconds: self.seconds,
             };
-            return plan.build_seeded(self.seed);
+            // any turn may be given
+            return plan.within_range(plan.build_seeded(self.seed)?);
         }
         let ends = match of_practice {
             Some([lowest, _]) => (lowest, SPEED_SHARE * room.top_speed),

@@ -68,6 +68,12 @@ impl JointChange {
     pub fn improved(&self) -> bool {
         self.interval_95[1] < 0.0
     }
+
+    /// Whether it worsened by an amount that shows in the digits of a report: with rows enough the interval of a
+    /// change of no consequence is above zero too.
+    pub fn noticeably_worse(&self) -> bool {
+        self.worsened && self.after - self.before > NOTICEABLE * self.before
+    }
 }
 
 /// Errors of every joint over pieces, `[piece][joint]`.
@@ -86,6 +92,9 @@ pub struct PieceErrors {
     /// Squared error and torque, and number, of the rows in which the joint rests.
     rest: [f64; 3],
 }
+
+/// Share of an error below which a change of it is none to speak of.
+const NOTICEABLE: f64 = 0.01;
 
 /// Seed of the bootstrap.
 const SEED: u64 = 20_020_520;
@@ -289,4 +298,36 @@ pub fn summed(
         },
         joints,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Many pieces of one joint with the same torque, whose errors scatter a little.
+    fn pieces(error: f64) -> Pieces {
+        let piece = |k: usize| PieceErrors {
+            error: (error * (1.0 + 0.001 * (k % 3) as f64)).powi(2),
+            torque: 1.0,
+            mean: 0.0,
+            rows: 1.0,
+            largest: 0.0,
+            raw_error: 0.0,
+            raw_torque: 1.0,
+            rest: [0.0; 3],
+        };
+        (0..60).map(|k| vec![piece(k)]).collect()
+    }
+
+    #[test]
+    fn a_change_that_is_surely_above_zero_and_far_too_small_to_matter_is_told_apart() {
+        let joints = ["q4".to_owned()];
+        let of = |after: f64| changes(&joints, &pieces(0.00146), &pieces(after)).remove(0);
+        let tiny = of(0.001461);
+        assert!(tiny.worsened && tiny.interval_95[0] > 0.0, "{tiny:?}");
+        assert!(!tiny.noticeably_worse(), "{tiny:?}");
+        assert!(of(0.0016).noticeably_worse());
+        let better = of(0.0013);
+        assert!(better.improved() && !better.worsened && !better.noticeably_worse());
+    }
 }

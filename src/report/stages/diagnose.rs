@@ -299,8 +299,11 @@ fn tentative_names(d: &Diagnosis) -> String {
     }
 }
 
-/// Joints whose held-out error is larger than that of the model as given, and numbers that stand at a bound of their
-/// search, as sentences.
+/// Share of an error by which a joint must be worse to be named where chance makes as much.
+const TENTH: f64 = 0.1;
+
+/// Joints whose held-out error is larger than that of the model as given by a tenth or beyond its interval, and numbers
+/// that stand at a bound of their search, as sentences.
 fn reservations(machine: &LoggedRobot, found: &Diagnosed) -> String {
     let d = &found.diagnosis;
     let mut text = String::new();
@@ -308,13 +311,11 @@ fn reservations(machine: &LoggedRobot, found: &Diagnosed) -> String {
         let joints = machine.robot.joint_names().iter().enumerate();
         let worse = joints.filter_map(|(j, joint)| {
             let [from, to] = [before, after].map(|e| e.joints[j].relative_error);
-            let told = [from, to].map(number::percent);
-            let [low, high] = after.joints[j].interval_95.map(number::hundredths);
-            (to > from && told[0] != told[1]).then(|| {
-                format!(
-                    "{joint} from {} to {} (95 % CI {low}..{high} %)",
-                    told[0], told[1]
-                )
+            let interval = after.joints[j].interval_95;
+            let [low, high] = interval.map(number::hundredths);
+            (to > (1.0 + TENTH) * from || from < interval[0]).then(|| {
+                let [from, to] = [from, to].map(number::percent);
+                format!("{joint} from {from} to {to} (95 % CI {low}..{high} %)")
             })
         });
         let worse: Vec<String> = worse.collect();

@@ -5,27 +5,22 @@ use crate::effect::Added;
 use crate::identify::{Diagnosed, LoggedRobot};
 use crate::number;
 
-/// The joints that a step makes worse on held-out data, with the change of their errors; nothing where there is none.
+/// The joints that a step makes noticeably worse on held-out data, with the change of their errors; nothing where there
+/// is none.
 pub(super) fn worsened(step: &AcceptedEffect) -> String {
-    let joints = step.joints.iter().filter(|j| j.worsened).map(|j| {
-        let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
-        let digits = |x: f64| number::significant(100.0 * x, 4);
-        // a change too small for the usual digits is told with one more
-        let (before, after) = match number::percent(j.before) == number::percent(j.after) {
-            true => (
-                format!("{} %", digits(j.before)),
-                format!("{} %", digits(j.after)),
-            ),
-            false => (number::percent(j.before), number::percent(j.after)),
-        };
-        format!(
-            "{} from {before} to {after} (95 % CI of the change {low}..{high} points)",
-            j.joint,
-        )
-    });
+    let joints = (step.joints.iter())
+        .filter(|j| j.noticeably_worse())
+        .map(|j| {
+            let [low, high] = j.interval_95.map(|x| format!("{:+.2}", 100.0 * x));
+            let [before, after] = [j.before, j.after].map(number::percent);
+            format!(
+                "{} from {before} to {after} (95 % CI of the change {low}..{high} points)",
+                j.joint,
+            )
+        });
     let joints: Vec<String> = joints.collect();
     match joints.is_empty() {
-        true if step.worsens() => ": worse".to_owned(),
+        true if step.worse_over_joints() => ": worse".to_owned(),
         true => String::new(),
         false => format!("; worse on {}", joints.join(", ")),
     }

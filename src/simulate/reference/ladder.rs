@@ -39,6 +39,8 @@ pub struct LadderReference {
 
 /// A sweep must have at least this share of the range at its plateau speed.
 const PLATEAU_SHARE: f64 = 0.25;
+/// Share of the range by which a motion may pass its ends: half of what usual ranges leave to the limits.
+const BEYOND: f64 = 0.02;
 /// Speeds of the usual ladder.
 const SPEEDS: usize = 10;
 /// Time from zero speed to a slow plateau of the usual ladder \[s\].
@@ -164,6 +166,35 @@ impl LadderPlan {
             }
         }
         Ok(self.lay_out(&order, low, mirrored))
+    }
+
+    /// Refuses a motion whose reversals are so slow that they take it out of the range.
+    ///
+    /// # Errors
+    /// [`SimulateError::Reference`].
+    pub(crate) fn within_range(
+        &self,
+        ladder: LadderReference,
+    ) -> Result<LadderReference, SimulateError> {
+        let (low, high) = self.range;
+        // pairs of slow strokes between sweeps of two speeds do not end just where they began
+        let hardly = BEYOND * (high - low);
+        let leaves = |stroke: &&Stroke| {
+            let to = stroke.from + stroke.direction * stroke.length();
+            !(low - hardly..=high + hardly).contains(&to)
+        };
+        let Some(stroke) = ladder.strokes.iter().find(leaves) else {
+            return Ok(ladder);
+        };
+        Err(SimulateError::Reference {
+            what: format!(
+                "reversals at {} with a turn of {} s take {:.4} of the range [{low}, {high}], which is shorter; \
+                 give a shorter turn, a lower speed or a wider range",
+                stroke.speed,
+                self.turn,
+                stroke.length()
+            ),
+        })
     }
 
     fn check(&self) -> Result<(), SimulateError> {
@@ -440,7 +471,7 @@ mod tests {
         let refuse = |change: fn(&mut LadderPlan)| {
             let mut plan = plan();
             change(&mut plan);
-            match plan.build(None) {
+            match plan.build(None).and_then(|built| plan.within_range(built)) {
                 Err(SimulateError::Reference { what }) => what,
                 other => panic!("{other:?}"),
             }
@@ -449,5 +480,8 @@ mod tests {
         assert!(refuse(|p| p.speeds = vec![2.0]).contains("does not fit"));
         assert!(refuse(|p| p.range = (0.7, 0.2)).contains("empty"));
         assert!(refuse(|p| p.speeds.clear()).contains("at least one"));
+        // 0.6 m/s that is reached within 1.5 s alone takes about a metre
+        let slow = |p: &mut LadderPlan| (p.turn, p.speeds) = (1.5, vec![0.3, 0.6]);
+        assert!(refuse(slow).contains("a shorter turn"));
     }
 }
