@@ -188,8 +188,8 @@ impl LadderPlan {
         };
         Err(SimulateError::Reference {
             what: format!(
-                "reversals at {} with a turn of {} s take {:.4} of the range [{low}, {high}], which is shorter; \
-                 give a shorter turn, a lower speed or a wider range",
+                "the stroke at {} with a turn of {} s is {:.4} long and leaves the range [{low}, {high}]; give a \
+                 shorter turn, a lower speed or a wider range",
                 stroke.speed,
                 self.turn,
                 stroke.length()
@@ -482,6 +482,6 @@ mod tests {
         assert!(refuse(|p| p.speeds.clear()).contains("at least one"));
         // 0.6 m/s that is reached within 1.5 s alone takes about a metre
         let slow = |p: &mut LadderPlan| (p.turn, p.speeds) = (1.5, vec![0.3, 0.6]);
-        assert!(refuse(slow).contains("a shorter turn"));
+        assert!(refuse(slow).contains("shorter turn"));
     }
 }
