@@ -7,7 +7,7 @@ mod measured_support;
 use measured_support::{run, shared};
 use serde_json::Value;
 
-/// A measured set: robot file, logs that are fitted, logs that decide nothing; paths below
+/// A measured set: robot file, logs that are fitted, held-out logs; paths below
 /// ../shared/data, with their spans.
 struct Set {
     robot: &'static str,

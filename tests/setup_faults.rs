@@ -106,7 +106,7 @@ fn said_of_motors(made: &str, alter: &dyn Fn(&mut [f64])) -> Vec<serde_json::Val
     bench::fit::rows(&done.document["setup"]).to_vec()
 }
 
-/// What is altered, and the kind, channel, joint and line that are told of it.
+/// What is altered, and the kind, channel, joint and line that are reported.
 type Case = (&'static dyn Fn(&mut [f64]), [&'static str; 4]);
 
 #[test]

@@ -11,7 +11,7 @@ pub struct HeldOut {
     pub joint: String,
     /// Samples, each in the block that its model did not see.
     pub samples: u64,
-    /// Independent ones that they are worth: two a period of the model's cut-off.
+    /// Effective sample size: two a period of the model's cut-off.
     pub effective_samples: f64,
     /// Cut-off of the filter that its positions came through \[Hz\].
     pub position_cutoff_hz: f64,

@@ -9,7 +9,7 @@
 //! Every candidate is tested beside everything that is declared, with its columns projected off it:
 //! a share of its own, an F test that correlated residuals do not break, a criterion with the
 //! effective sample size, cross-validation over blocks with gaps, and data set aside that may
-//! veto. All must agree. The holdout decides nothing.
+//! veto. All must agree. Held-out data are evaluated once, at the end.
 //!
 //! | room | what |
 //! |---|---|

@@ -130,9 +130,8 @@ impl Diagnosis {
             .map(|(j, _)| j)
     }
 
-    /// Candidates of the last round that the data tell from chance, and that were not added, for they are too
-    /// small to matter or came after the last that is looked for: what was added is then not all that is there,
-    /// or not quite what is there.
+    /// Candidates of the last round that are significant and were not added, for they are too small or came after
+    /// the last that is looked for: treat the effects that were added as approximations then.
     pub fn remainder(&self) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().filter(|c| c.significant)
     }

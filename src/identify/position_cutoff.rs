@@ -356,7 +356,7 @@ impl LoggedRobot {
             0 => Vec::new(),
             _ => candidates(&settings, rate),
         };
-        // Viscous friction is linear in the velocity and chooses nothing: a model finds the cut-offs of its own fit, where
+        // Viscous friction is linear in the velocity and prefers no cut-off: a model finds the cut-offs of its own fit, where
         // the Coulomb level was not known yet.
         let friction = |j: usize, v: f64| match laws.get(j) {
             Some(Some(JointFriction::ViscousCoulomb(law))) if law.coulomb != 0.0 => {

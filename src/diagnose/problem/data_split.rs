@@ -61,7 +61,7 @@ pub struct DataSplit {
     pub folds: usize,
     pub set_aside: Vec<SetAside>,
     /// Whether the rows of each joint count for nothing along each stretch, `[stretch][joint]`: of a stationary
-    /// joint, which say nothing of its friction, and of all where the log decides nothing.
+    /// joint, which do not determine its friction, and of all where the log is held out.
     pub ignored: Vec<Vec<bool>>,
     /// Whether each joint is stationary along each stretch, whatever the stretch is for: it has no error that a
     /// law of motion answers for.

@@ -62,7 +62,7 @@ impl<'a> FitProblem<'a> {
         })
     }
 
-    /// Torques of a model along every stretch; none along those that decide nothing.
+    /// Torques of a model along every stretch; none along those of held-out data.
     pub fn torques(&self, model: &AugmentedModel) -> Vec<Torques> {
         let stretches = self.stretches.par_iter().enumerate();
         let of = |(i, stretch): (usize, &Stretch)| match self.split.idle(i) {

@@ -93,7 +93,7 @@ pub struct PieceErrors {
     rest: [f64; 3],
 }
 
-/// Share of an error below which a change of it is none to speak of.
+/// Relative change of an error below which it is not reported as worse.
 const NOTICEABLE: f64 = 0.01;
 
 /// Seed of the bootstrap.
