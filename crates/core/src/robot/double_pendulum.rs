@@ -1,10 +1,10 @@
-//! A robot that unit tests share.
+//! The smallest robot with every term of the dynamics, for tests and examples.
 
 use super::tree::{Coordinate, Link, Tree, space};
 use super::{JointKind, Robot};
 
 /// Two links, both about z, 0.4 m between the axes, in a gravity \[m/s^2\].
-pub(crate) fn double_pendulum(gravity: [f64; 3], drive_inertia: bool) -> Robot {
+pub fn double_pendulum(gravity: [f64; 3], drive_inertia: bool) -> Robot {
     let link = |name: &str, parent, origin, joint| Link {
         name: name.to_owned(),
         parent,

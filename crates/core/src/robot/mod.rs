@@ -20,8 +20,7 @@
 
 pub mod bodies;
 pub mod cft;
-#[cfg(test)]
-pub(crate) mod double_pendulum;
+pub mod double_pendulum;
 pub mod drive;
 pub mod dynamics;
 pub mod error;
