@@ -58,7 +58,6 @@ pub static LAW: Law = Law {
     fits: |robot, _, place| place.kind(robot) == JointKind::Revolute,
     starts: |cover, place| {
         let joint = cover.at(place);
-        joint.is_wide()?;
         if joint.reversals < 4 {
             return Err("fewer than four sweeps over the travel".into());
         }

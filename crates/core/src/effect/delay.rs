@@ -28,6 +28,7 @@ pub static ENTRY: Entry = Entry {
         format!("torque {ms} ms {way} position on {}", f.at)
     },
     remedy: "log torques and positions with one clock and no filter between them, or shift the torque by this time",
+    measurable: true,
     ..Entry::USUAL
 };
 

@@ -25,6 +25,7 @@ pub static ENTRY: Entry = Entry {
         )
     },
     remedy: "check torque constant and gear ratio, and correct `torque_scale` in [log]",
+    measurable: true,
     ..Entry::USUAL
 };
 

@@ -28,6 +28,7 @@ pub static ENTRY: Entry = Entry {
         format!("base that leans by {} deg", number::significant(lean, 2))
     },
     remedy: "level the base, or give `gravity` in the robot file as it is in the frame of the base",
+    measurable: true,
     ..Entry::USUAL
 };
 

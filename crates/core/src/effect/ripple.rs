@@ -32,6 +32,7 @@ pub static ENTRY: Entry = Entry {
     at_rest: true,
     said: |f| format!("ripple of {}, {}, {}", f.at, f.wave(), f.amplitude()),
     remedy: "compare its period with the parts of the drive that repeat, such as motor poles, gear teeth and bearings; compensate it over position with the refined model",
+    measurable: true,
     ..Entry::USUAL
 };
 
