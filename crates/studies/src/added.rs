@@ -11,21 +11,35 @@ pub enum Shape {
     Offset,
     /// Coulomb friction that is larger in the positive direction.
     Asymmetric,
-    Stribeck { vs: f64 },
+    Stribeck {
+        vs: f64,
+    },
     Quadratic,
     /// A torque that is periodic in the position, so many times a radian or metre.
-    Ripple { order: f64, phase: f64 },
-    Spring { zero: f64 },
+    Ripple {
+        order: f64,
+        phase: f64,
+    },
+    Spring {
+        zero: f64,
+    },
     /// Friction that is periodic in the position.
-    PositionFriction { order: f64, phase: f64 },
+    PositionFriction {
+        order: f64,
+        phase: f64,
+    },
     /// Friction by the load.
     LoadFriction,
     /// Loss in the gear where the drive pushes the load.
     Efficiency,
     /// Viscous friction of another joint's speed.
-    Coupling { other: usize },
+    Coupling {
+        other: usize,
+    },
     /// Friction that starts higher and settles [s].
-    WarmUp { time_s: f64 },
+    WarmUp {
+        time_s: f64,
+    },
     Drift,
     /// Outside every catalogue: a torque that follows the square of the position's swing and the speed's sign.
     Stray,

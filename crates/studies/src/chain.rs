@@ -80,10 +80,7 @@ impl Chain {
         let (mut force, mut moment) = ([[0.0; 3]; JOINTS], [[0.0; 3]; JOINTS]);
         for i in 0..n {
             let (link, place) = (&self.links[i], self.place(i, q[i]));
-            let at_joint = add(
-                acc,
-                add(cross(dw, place.at), cross(w, cross(w, place.at))),
-            );
+            let at_joint = add(acc, add(cross(dw, place.at), cross(w, cross(w, place.at))));
             acc = back(&place.turn, at_joint);
             w = back(&place.turn, w);
             dw = back(&place.turn, dw);
@@ -193,9 +190,8 @@ impl Body {
         );
         let p = place.at;
         let both = 2.0 * dot(h, p);
-        let shift = |i: usize, j: usize| {
-            (if i == j { both } else { 0.0 }) - h[i] * p[j] - p[i] * h[j]
-        };
+        let shift =
+            |i: usize, j: usize| (if i == j { both } else { 0.0 }) - h[i] * p[j] - p[i] * h[j];
         let mixed = [0, 1, 2].map(|i| [0, 1, 2].map(|j| shift(i, j)));
         Self {
             mass: self.mass,
@@ -271,15 +267,17 @@ mod tests {
             for (q, v, a) in poses() {
                 let h = 1e-5;
                 let moved = |s: f64| {
-                    let q: Joints =
-                        std::array::from_fn(|i| q[i] + s * v[i] + 0.5 * s * s * a[i]);
+                    let q: Joints = std::array::from_fn(|i| q[i] + s * v[i] + 0.5 * s * s * a[i]);
                     let v: Joints = std::array::from_fn(|i| v[i] + s * a[i]);
                     chain.energy(&q, &v)
                 };
                 let slope = (moved(h) - moved(-h)) / (2.0 * h);
                 let tau = chain.torque(&q, &v, &a);
                 let power: f64 = (0..chain.links.len()).map(|i| tau[i] * v[i]).sum();
-                assert!((slope - power).abs() < 1e-6 * (1.0 + power.abs()), "{slope} {power}");
+                assert!(
+                    (slope - power).abs() < 1e-6 * (1.0 + power.abs()),
+                    "{slope} {power}"
+                );
             }
         }
     }

@@ -28,7 +28,11 @@ impl Chance {
     }
 
     pub fn sign(&mut self) -> f64 {
-        if self.0.random::<f64>() < 0.5 { -1.0 } else { 1.0 }
+        if self.0.random::<f64>() < 0.5 {
+            -1.0
+        } else {
+            1.0
+        }
     }
 
     pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {

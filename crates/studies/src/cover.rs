@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 /// Cells as levels by factor, for factors with so many levels; `may` says which cells there can be.
 pub fn pairwise(levels: &[usize], may: impl Fn(&[usize]) -> bool) -> Vec<Vec<usize>> {
     let all: Vec<Vec<usize>> = every(levels).into_iter().filter(|cell| may(cell)).collect();
-    let mut open: BTreeSet<(usize, usize, usize, usize)> = all.iter().flat_map(|c| pairs(c)).collect();
+    let mut open: BTreeSet<(usize, usize, usize, usize)> =
+        all.iter().flat_map(|c| pairs(c)).collect();
     let mut cells: Vec<Vec<usize>> = Vec::new();
     let mut used: Vec<Vec<usize>> = levels.iter().map(|&n| vec![0; n]).collect();
     while !open.is_empty() {
@@ -55,7 +56,15 @@ mod tests {
         let cells = pairwise(&levels, may);
         let covered: BTreeSet<_> = cells.iter().flat_map(|c| pairs(c)).collect();
         let can: BTreeSet<_> = every(&levels).into_iter().filter(|c| may(c)).collect();
-        assert!(can.iter().flat_map(|c| pairs(c)).all(|p| covered.contains(&p)));
-        assert!(cells.iter().all(|c| may(c)) && cells.len() < 28, "{}", cells.len());
+        assert!(
+            can.iter()
+                .flat_map(|c| pairs(c))
+                .all(|p| covered.contains(&p))
+        );
+        assert!(
+            cells.iter().all(|c| may(c)) && cells.len() < 28,
+            "{}",
+            cells.len()
+        );
     }
 }

@@ -10,12 +10,13 @@ use serde_json::{Value, json};
 use crate::chain::JOINTS;
 use crate::chance::Chance;
 use crate::cover::pairwise;
-use crate::drive::{CONTROLLERS, Controller, Course, Run, Sensing};
+use crate::drive::{CONTROLLERS, Controller, Run};
 use crate::files;
 use crate::judge::{LIMITS, Share};
+use crate::lab::Lab;
 use crate::machine::{DRIVES, Drive, KINDS, Kind, LAWS, LawKind, Machine};
 use crate::model::Model;
-use crate::path::{MOTIONS, Motion, Path};
+use crate::path::{MOTIONS, Motion};
 use crate::study::{Rows, StudyError};
 use crate::tool::Tool;
 
@@ -38,7 +39,14 @@ pub struct Cell {
 }
 
 pub fn cells() -> Vec<Cell> {
-    let levels = [KINDS.len(), MOTIONS.len(), DRIVES.len(), LAWS.len(), CONTROLLERS.len(), 2];
+    let levels = [
+        KINDS.len(),
+        MOTIONS.len(),
+        DRIVES.len(),
+        LAWS.len(),
+        CONTROLLERS.len(),
+        2,
+    ];
     let of = |c: &[usize]| Cell {
         kind: KINDS[c[0]],
         motion: MOTIONS[c[1]],
@@ -47,12 +55,11 @@ pub fn cells() -> Vec<Cell> {
         controller: CONTROLLERS[c[4]],
         fine: c[5] == 0,
     };
-    // no arm of six joints is built with screws
-    let may = |c: &[usize]| !(KINDS[c[0]] == Kind::Arm6 && DRIVES[c[2]] == Drive::BallScrew);
+    let may = |c: &[usize]| KINDS[c[0]].may_have(DRIVES[c[2]]);
     pairwise(&levels, may).iter().map(|c| of(c)).collect()
 }
 
-fn word(value: impl serde::Serialize) -> String {
+pub fn word(value: impl serde::Serialize) -> String {
     serde_json::to_value(value)
         .ok()
         .and_then(|v| v.as_str().map(str::to_owned))
@@ -77,60 +84,45 @@ impl Cell {
         if self.kind == Kind::Single { 200 } else { 50 }
     }
 
-    fn sensing(&self, chance: &mut Chance) -> Sensing {
-        let fine = self.fine;
-        Sensing {
-            rate_hz: chance.pick(if fine { &[500.0, 1000.0] } else { &[200.0, 250.0] }),
-            noise: if fine { 0.01 } else { 0.025 },
-            memory_s: (!fine).then_some(0.03),
-            counts: if fine { 65_536.0 } else { 8192.0 },
-            delay_s: 0.0,
-        }
-    }
-
     /// Draws a machine, drives it, and asks the binary.
     pub fn run(&self, tool: &Tool, folder: &File, number: u64) -> Result<Value, StudyError> {
         let mut chance = Chance::of(&self.name(), number);
         let machine = Machine::draw(self.kind, self.drive, self.law, GEAR_ERROR, &mut chance);
-        let seconds = if self.motion == Motion::Ladder { 40.0 } else { 20.0 };
-        let path = Path::new(self.motion, &machine.ranges, seconds, &mut chance);
-        let sensing = self.sensing(&mut chance);
-        let course = Course::of(&machine, &path, self.controller, sensing.counts);
-        let run = course.logged(&machine, &sensing, &mut chance);
-        lay_out(folder, &machine, &sensing)?;
-        files::write(&folder.join("log.csv"), &files::log_text(&machine, &run))?;
+        let lab = Lab::new(machine, self.controller, self.fine, &mut chance);
+        lab.lay_out(folder)?;
+        let run = lab.record(folder, "log.csv", self.motion, &mut chance)?;
+        let machine = &lab.machine;
 
-        let lsq = tool.run(folder, &["lsq", "log.csv", "-r", "robot.toml", "-o", "model.toml"])?;
+        let lsq = tool.run(
+            folder,
+            &["lsq", "log.csv", "-r", "robot.toml", "-o", "model.toml"],
+        )?;
         let mut row = json!({
             "exit": lsq.exit,
             "still": run.still.iter().map(|s| (s * 1000.0).round() / 1000.0).collect::<Vec<_>>(),
-            "parameters": judged(&machine, lsq.list("parameters")),
+            "parameters": judged(machine, lsq.list("parameters")),
         });
         if lsq.exit == 0 {
             let model = Model::read(&folder.join("model.toml"))?;
-            row["curve"] = json!(model_curve(&machine, &run, &model));
+            row["curve"] = json!(model_curve(machine, &run, &model));
         } else {
             row["said"] = json!(lsq.last_words());
         }
         if self.kind == Kind::Single {
-            let words = ["friction", "log.csv", "-r", "robot.toml", "-o", "friction.toml"];
+            let words = [
+                "friction",
+                "log.csv",
+                "-r",
+                "robot.toml",
+                "-o",
+                "friction.toml",
+            ];
             let answer = tool.run(folder, &words)?;
             row["friction_exit"] = json!(answer.exit);
-            row["friction_curve"] = json!(filter_curve(&machine, answer.list("joints")));
+            row["friction_curve"] = json!(filter_curve(machine, answer.list("joints")));
         }
         Ok(row)
     }
-}
-
-/// Writes robot file, URDF and truth into a folder.
-pub fn lay_out(folder: &File, machine: &Machine, sensing: &Sensing) -> Result<(), StudyError> {
-    let robot = files::robot_text(machine, sensing.rate_hz, "arm.urdf", "");
-    files::write(&folder.join("robot.toml"), &robot)?;
-    if let Some(urdf) = files::urdf_text(machine) {
-        files::write(&folder.join("arm.urdf"), &urdf)?;
-    }
-    let truth = files::truth(machine);
-    files::write(&folder.join("truth.json"), &format!("{truth:#}\n"))
 }
 
 /// Class, name, error in deviations, whether its interval holds the truth, and whether it is "identified".
@@ -140,13 +132,21 @@ fn judged(machine: &Machine, parameters: &[Value]) -> Vec<Value> {
         let (value, std) = (p["value"].as_f64()?, p["std"].as_f64()?);
         let z = (value - truth.1) / std;
         let holds = match p["interval_95"].as_array() {
-            Some(bounds) => bounds.first()?.as_f64()? <= truth.1 && truth.1 <= bounds.get(1)?.as_f64()?,
+            Some(bounds) => {
+                bounds.first()?.as_f64()? <= truth.1 && truth.1 <= bounds.get(1)?.as_f64()?
+            }
             None => z.abs() <= TWO_SIDED_95,
         };
         let name = p["key"].as_str().or(p["name"].as_str())?;
         let joint = p["joint"].as_str().unwrap_or("");
         let z = (100.0 * z).round() / 100.0;
-        Some(json!([truth.0, format!("{name} {joint}").trim(), z, holds, p["verdict"] == "identified"]))
+        Some(json!([
+            truth.0,
+            format!("{name} {joint}").trim(),
+            z,
+            holds,
+            p["verdict"] == "identified"
+        ]))
     };
     parameters.iter().filter_map(one).collect()
 }
@@ -169,7 +169,12 @@ fn truth_of(machine: &Machine, parameter: &Value) -> Option<(&'static str, f64)>
 fn model_curve(machine: &Machine, run: &Run, model: &Model) -> Vec<(usize, usize)> {
     let n = machine.plant.joints.min(JOINTS);
     let of_joint = |i: usize| {
-        let mut speeds: Vec<f64> = run.speed.iter().map(|v| v[i].abs()).filter(|v| *v > 0.0).collect();
+        let mut speeds: Vec<f64> = run
+            .speed
+            .iter()
+            .map(|v| v[i].abs())
+            .filter(|v| *v > 0.0)
+            .collect();
         speeds.sort_by(f64::total_cmp);
         let at = |part: f64| speeds.get((part * speeds.len() as f64) as usize).copied();
         let (low, high) = (at(0.1)?, at(0.95)?);
@@ -201,7 +206,14 @@ fn filter_curve(machine: &Machine, joints: &[Value]) -> Option<(usize, usize)> {
     Some((curve.iter().filter(holds).count(), curve.len()))
 }
 
-const CLASSES: [&str; 6] = ["inertial", "viscous", "coulomb", "offset", "curve", "friction_curve"];
+const CLASSES: [&str; 6] = [
+    "inertial",
+    "viscous",
+    "coulomb",
+    "offset",
+    "curve",
+    "friction_curve",
+];
 
 /// Hits and trials of a class in one run.
 fn counted(row: &Value, class: &str) -> (usize, usize) {
@@ -212,12 +224,17 @@ fn counted(row: &Value, class: &str) -> (usize, usize) {
     match class {
         "curve" => {
             let all = row["curve"].as_array().map_or(&[][..], Vec::as_slice);
-            all.iter().map(pair).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+            all.iter()
+                .map(pair)
+                .fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
         }
         "friction_curve" => pair(&row["friction_curve"]),
         _ => {
             let all = row["parameters"].as_array().map_or(&[][..], Vec::as_slice);
-            let own: Vec<_> = all.iter().filter(|p| p[0] == class && p[4] == true).collect();
+            let own: Vec<_> = all
+                .iter()
+                .filter(|p| p[0] == class && p[4] == true)
+                .collect();
             (own.iter().filter(|p| p[3] == true).count(), own.len())
         }
     }
@@ -253,7 +270,10 @@ pub fn table(rows: &Rows) -> String {
             text += &format!("| {name} | {tool} | {} |{shown} {verdict} |\n", own.len());
         }
     }
-    let sums = tools.iter().zip(&failed).map(|(tool, (bad, all))| format!("{tool}: {bad} of {all} cells fail"));
+    let sums = tools
+        .iter()
+        .zip(&failed)
+        .map(|(tool, (bad, all))| format!("{tool}: {bad} of {all} cells fail"));
     format!("{}.\n\n{text}", sums.collect::<Vec<_>>().join("; "))
 }
 

@@ -137,7 +137,10 @@ impl Course {
         let mut run = Run {
             t: picked.iter().map(|&k| k as f64 / CONTROL_HZ).collect(),
             q: picked.iter().map(|&k| self.rows[k].q).collect(),
-            tau: picked.iter().map(|&k| self.late(k, sensing.delay_s)).collect(),
+            tau: picked
+                .iter()
+                .map(|&k| self.late(k, sensing.delay_s))
+                .collect(),
             clean: Vec::new(),
             planted: picked.iter().map(|&k| self.rows[k].planted).collect(),
             speed: picked.iter().map(|&k| self.rows[k].v).collect(),
@@ -211,7 +214,8 @@ impl<'a> Loops<'a> {
             if self.controller == Controller::FeedForward {
                 let friction = &self.machine.plant.friction[i];
                 let corner = 0.02 * self.machine.ranges[i].speed;
-                u[i] += 0.9 * (friction.viscous * vr[i] + friction.coulomb * (vr[i] / corner).tanh());
+                u[i] +=
+                    0.9 * (friction.viscous * vr[i] + friction.coulomb * (vr[i] / corner).tanh());
             }
         }
         u

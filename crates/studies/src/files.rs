@@ -49,9 +49,16 @@ pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> St
             let _ = write!(text, "model = \"serial\"\nurdf = \"{urdf}\"\n");
         }
         None => {
-            let kind = if machine.slides(0) { "prismatic" } else { "revolute" };
+            let kind = if machine.slides(0) {
+                "prismatic"
+            } else {
+                "revolute"
+            };
             let name = &machine.names[0];
-            let _ = write!(text, "model = \"single-joint\"\njoint = \"{name}\"\nkind = \"{kind}\"\n");
+            let _ = write!(
+                text,
+                "model = \"single-joint\"\njoint = \"{name}\"\nkind = \"{kind}\"\n"
+            );
         }
     }
     text.push_str(more);
@@ -60,7 +67,10 @@ pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> St
          [log]\ntime = \"time\"\ntorque_is = \"joint\"\ntorque_held = false\n\n[log.joint]\n",
     );
     for name in &machine.names {
-        let _ = writeln!(text, "{name} = {{ position = \"q_{name}\", torque = \"tau_{name}\" }}");
+        let _ = writeln!(
+            text,
+            "{name} = {{ position = \"q_{name}\", torque = \"tau_{name}\" }}"
+        );
     }
     let cutoff = (rate_hz / 12.5).min(20.0);
     let _ = write!(text, "\n[filter]\ncutoff_hz = {cutoff:?}\n");
@@ -102,11 +112,18 @@ pub fn urdf_text(machine: &Machine) -> Option<String> {
         );
     }
     for (i, (link, range)) in chain.links.iter().zip(&machine.ranges).enumerate() {
-        let parent = if i == 0 { "base".to_owned() } else { format!("l{i}") };
+        let parent = if i == 0 {
+            "base".to_owned()
+        } else {
+            format!("l{i}")
+        };
         let kind = if link.slides { "prismatic" } else { "revolute" };
         let [x, y, z] = link.xyz;
         let [r, p, w] = link.rpy;
-        let (low, high) = (range.centre - 1.6 * range.half, range.centre + 1.6 * range.half);
+        let (low, high) = (
+            range.centre - 1.6 * range.half,
+            range.centre + 1.6 * range.half,
+        );
         let _ = writeln!(
             text,
             "<joint name=\"{}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"l{}\"/><origin \
@@ -167,7 +184,9 @@ pub fn grouped(chain: &Chain, grouping: &str) -> Option<f64> {
 }
 
 fn named(chain: &Chain, word: &str) -> Option<f64> {
-    let (sign, word) = word.strip_prefix('-').map_or((1.0, word), |rest| (-1.0, rest));
+    let (sign, word) = word
+        .strip_prefix('-')
+        .map_or((1.0, word), |rest| (-1.0, rest));
     let digits = word.find(|c: char| c.is_ascii_digit())?;
     let link: usize = word[digits..].parse().ok()?;
     let all = standard(chain.links.get(link.checked_sub(1)?)?);
@@ -189,7 +208,10 @@ mod tests {
     fn groupings_are_read_with_signs_and_factors() {
         let chain = arms::arm3();
         let of = |link: usize, name: &str| {
-            standard(&chain.links[link]).iter().find(|p| p.0 == name).map_or(0.0, |p| p.1)
+            standard(&chain.links[link])
+                .iter()
+                .find(|p| p.0 == name)
+                .map_or(0.0, |p| p.1)
         };
         let expected = of(0, "Izz") + of(1, "Iyy") - 0.09 * of(2, "m");
         assert_eq!(grouped(&chain, "Izz1 + Iyy2 - 0.09 m3"), Some(expected));

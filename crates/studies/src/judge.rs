@@ -91,7 +91,8 @@ impl Share {
     pub fn interval(&self, confidence: f64) -> (f64, f64) {
         let tail = 0.5 * (1.0 - confidence);
         let misses = self.trials - self.hits;
-        let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
+        let quantile =
+            |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
         let low = if self.hits <= 0.0 {
             0.0
         } else {

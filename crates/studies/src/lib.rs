@@ -8,9 +8,9 @@
 //! | study | asks |
 //! |---|---|
 //! | [`coverage`] | do 95 % intervals hold the truth, where the verdict is "identified"? |
-//! | `clean` | is an effect written where nothing is missing? |
-//! | `planted` | is what was planted named, and does the model predict as well as the truth? |
-//! | `setup` | is a right robot file left in peace, and a mistake named? |
+//! | [`clean`] | is an effect written where nothing is missing? |
+//! | [`planted`] | is what was planted named, and does the model predict as well as the truth? |
+//! | [`setup`] | is a right robot file left in peace, and a mistake named? |
 
 #![forbid(unsafe_code)]
 
@@ -18,16 +18,21 @@ pub mod added;
 pub mod arms;
 pub mod chain;
 pub mod chance;
+pub mod clean;
 pub mod cover;
 pub mod coverage;
 pub mod drive;
 pub mod files;
 pub mod friction;
 pub mod judge;
+pub mod lab;
 pub mod machine;
 pub mod model;
 pub mod path;
 pub mod plant;
+pub mod planted;
+pub mod setup;
+pub mod signal;
 pub mod space;
 pub mod study;
 pub mod tool;

@@ -14,6 +14,8 @@ use crate::plant::{Bodies, Elastic, Plant};
 pub enum Kind {
     Single,
     Arm3,
+    /// Two joints that turn and one that slides along gravity.
+    Scara,
     Arm6,
 }
 
@@ -23,7 +25,7 @@ pub enum Drive {
     Direct,
     /// Elastic, with a periodic error twice a turn of its motor.
     Harmonic,
-    /// A slide on a screw; of the three-joint arms that is a SCARA's last joint.
+    /// A slide on a screw; a SCARA's last joint is one.
     BallScrew,
 }
 
@@ -36,7 +38,7 @@ pub enum LawKind {
     Presliding,
 }
 
-pub const KINDS: [Kind; 3] = [Kind::Single, Kind::Arm3, Kind::Arm6];
+pub const KINDS: [Kind; 4] = [Kind::Single, Kind::Arm3, Kind::Scara, Kind::Arm6];
 pub const DRIVES: [Drive; 3] = [Drive::Direct, Drive::Harmonic, Drive::BallScrew];
 pub const LAWS: [LawKind; 4] = [
     LawKind::Coulomb,
@@ -66,13 +68,24 @@ const SWING_HZ: f64 = 45.0;
 /// Damping of that swing.
 const SWING_DAMPING: f64 = 0.08;
 
+impl Kind {
+    /// Only slides have screws, and a SCARA has no other drive here.
+    pub fn may_have(self, drive: Drive) -> bool {
+        match self {
+            Self::Single => true,
+            Self::Scara => drive == Drive::BallScrew,
+            Self::Arm3 | Self::Arm6 => drive != Drive::BallScrew,
+        }
+    }
+}
+
 impl Machine {
     /// Draws a machine; `error` is the periodic error of harmonic gears [rad].
     pub fn draw(kind: Kind, drive: Drive, law: LawKind, error: f64, chance: &mut Chance) -> Self {
         let mut machine = match kind {
             Kind::Single => single(drive, law, chance),
-            Kind::Arm3 if drive == Drive::BallScrew => arm(arms::scara(), law, chance),
             Kind::Arm3 => arm(arms::arm3(), law, chance),
+            Kind::Scara => arm(arms::scara(), law, chance),
             Kind::Arm6 => arm(arms::arm6(), law, chance),
         };
         machine.kind = kind;
@@ -92,7 +105,9 @@ impl Machine {
 
     /// One count of a joint's encoder with so many over the joint's range.
     pub fn step(&self, joint: usize, counts: f64) -> f64 {
-        self.ranges.get(joint).map_or(0.0, |range| 2.0 * range.half / counts)
+        self.ranges
+            .get(joint)
+            .map_or(0.0, |range| 2.0 * range.half / counts)
     }
 
     /// Whether the robot file's law of friction is the plant's.
@@ -129,7 +144,9 @@ impl Machine {
 fn law_of(kind: LawKind, coulomb: f64, speed: f64, inertia: f64) -> Law {
     match kind {
         LawKind::Coulomb => Law::Coulomb,
-        LawKind::Smooth => Law::Smooth { width: 0.02 * speed },
+        LawKind::Smooth => Law::Smooth {
+            width: 0.02 * speed,
+        },
         LawKind::Stribeck => Law::Stribeck {
             more: 0.3 * coulomb,
             vs: 0.04 * speed,
@@ -148,21 +165,41 @@ fn law_of(kind: LawKind, coulomb: f64, speed: f64, inertia: f64) -> Law {
 fn single(drive: Drive, law: LawKind, chance: &mut Chance) -> Machine {
     let screw = drive == Drive::BallScrew;
     let (inertia, viscous, coulomb) = if screw {
-        (chance.ratio(40.0, 120.0), chance.ratio(100.0, 300.0), chance.ratio(12.0, 30.0))
+        (
+            chance.ratio(40.0, 120.0),
+            chance.ratio(100.0, 300.0),
+            chance.ratio(12.0, 30.0),
+        )
     } else {
-        (chance.ratio(0.012, 0.06), chance.ratio(0.25, 0.6), chance.ratio(0.35, 0.7))
+        (
+            chance.ratio(0.012, 0.06),
+            chance.ratio(0.25, 0.6),
+            chance.ratio(0.35, 0.7),
+        )
     };
     let range = if screw {
-        Range { centre: 0.15, half: 0.12, speed: 0.3 }
+        Range {
+            centre: 0.15,
+            half: 0.12,
+            speed: 0.3,
+        }
     } else {
-        Range { centre: 0.0, half: 0.8, speed: 2.2 }
+        Range {
+            centre: 0.0,
+            half: 0.8,
+            speed: 2.2,
+        }
     };
     let friction = Friction {
         viscous,
         coulomb,
         law: law_of(law, coulomb, range.speed, inertia),
     };
-    let bodies = Bodies::Single { inertia, weight: 0.0, phase: 0.0 };
+    let bodies = Bodies::Single {
+        inertia,
+        weight: 0.0,
+        phase: 0.0,
+    };
     let mut offset = [0.0; JOINTS];
     offset[0] = chance.between(-0.1, 0.1) * coulomb;
     let mut inertias = [0.0; JOINTS];
@@ -199,10 +236,18 @@ fn arm(drawing: Chain, law: LawKind, chance: &mut Chance) -> Machine {
     let n = chain.links.len();
     let range = |i: usize| {
         if chain.links[i].slides {
-            return Range { centre: 0.1, half: 0.09, speed: 0.35 };
+            return Range {
+                centre: 0.1,
+                half: 0.09,
+                speed: 0.35,
+            };
         }
         let centre = [0.0, -0.4, 0.6, 0.0, 0.5, 0.0][i];
-        Range { centre, half: 0.9, speed: 2.0 }
+        Range {
+            centre,
+            half: 0.9,
+            speed: 2.0,
+        }
     };
     let ranges: Vec<Range> = (0..n).map(range).collect();
     let centre: Joints = std::array::from_fn(|i| ranges.get(i).map_or(0.0, |r| r.centre));
@@ -214,7 +259,10 @@ fn arm(drawing: Chain, law: LawKind, chance: &mut Chance) -> Machine {
         let (viscous, coulomb) = if chain.links[i].slides {
             (30.0, 8.0)
         } else {
-            ([3.0, 3.0, 1.5, 0.8, 0.6, 0.4][i], [2.4, 2.6, 1.4, 0.7, 0.5, 0.3][i])
+            (
+                [3.0, 3.0, 1.5, 0.8, 0.6, 0.4][i],
+                [2.4, 2.6, 1.4, 0.7, 0.5, 0.3][i],
+            )
         };
         let coulomb = coulomb * chance.between(0.8, 1.2);
         friction.push(Friction {

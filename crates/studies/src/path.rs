@@ -40,7 +40,11 @@ pub struct Range {
 pub type Point = (f64, f64, f64);
 
 enum OfJoint {
-    Sines { base: f64, centre: f64, parts: Vec<(f64, f64)> },
+    Sines {
+        base: f64,
+        centre: f64,
+        parts: Vec<(f64, f64)>,
+    },
     Pieces(Vec<Piece>),
 }
 
@@ -55,6 +59,8 @@ struct Piece {
 pub struct Path {
     joints: Vec<OfJoint>,
     pub seconds: f64,
+    /// A joint that goes with another, and by which factor.
+    pub tied: Option<(usize, usize, f64)>,
 }
 
 impl Path {
@@ -69,6 +75,7 @@ impl Path {
         Self {
             joints: ranges.iter().map(one).collect(),
             seconds,
+            tied: None,
         }
     }
 
@@ -77,6 +84,11 @@ impl Path {
         for (i, joint) in self.joints.iter().enumerate() {
             (q[i], v[i], a[i]) = joint.at(t);
         }
+        if let Some((joint, with, factor)) = self.tied {
+            for values in [&mut q, &mut v, &mut a] {
+                values[joint] = factor * values[with];
+            }
+        }
         (q, v, a)
     }
 }
@@ -84,7 +96,11 @@ impl Path {
 impl OfJoint {
     fn at(&self, t: f64) -> Point {
         match self {
-            Self::Sines { base, centre, parts } => {
+            Self::Sines {
+                base,
+                centre,
+                parts,
+            } => {
                 let mut out = (*centre, 0.0, 0.0);
                 for (k, (a, b)) in parts.iter().enumerate() {
                     let w = base * (k + 1) as f64;
@@ -145,7 +161,9 @@ fn sines(range: &Range, base_hz: f64, harmonics: usize, chance: &mut Chance) -> 
     };
     let trial = shape(parts.clone());
     let period = 1.0 / base_hz;
-    let points: Vec<Point> = (0..400).map(|k| trial.at(period * f64::from(k) / 400.0)).collect();
+    let points: Vec<Point> = (0..400)
+        .map(|k| trial.at(period * f64::from(k) / 400.0))
+        .collect();
     let most = |of: fn(&Point) -> f64| points.iter().map(|p| of(p).abs()).fold(0.0, f64::max);
     let scale = (range.half / most(|p| p.0)).min(range.speed / most(|p| p.1));
     for part in &mut parts {
@@ -193,7 +211,12 @@ fn ladder(range: &Range, seconds: f64, chance: &mut Chance) -> Vec<Piece> {
         // as long as the joint has room, and a second and a half at most
         let room = range.half - way * (at - range.centre);
         let length = (0.95 * room / size).clamp(0.05, 1.15);
-        pieces.push(Piece::between(t, length, (at, speed), (at + length * speed, speed)));
+        pieces.push(Piece::between(
+            t,
+            length,
+            (at, speed),
+            (at + length * speed, speed),
+        ));
         (t, at) = (t + length, at + length * speed);
         way = -way;
         k += 1.0;
@@ -234,7 +257,11 @@ mod tests {
 
     #[test]
     fn every_motion_is_smooth_and_stays_near_its_range() {
-        let range = Range { centre: 0.2, half: 0.8, speed: 2.0 };
+        let range = Range {
+            centre: 0.2,
+            half: 0.8,
+            speed: 2.0,
+        };
         for motion in MOTIONS {
             for seed in 0..10 {
                 let path = Path::new(motion, &[range], 20.0, &mut Chance::of("path", seed));
@@ -245,10 +272,17 @@ mod tests {
                     let (before, now, after) = (path.at(t - h), path.at(t), path.at(t + h));
                     let slope = (after.0[0] - before.0[0]) / (2.0 * h);
                     assert!((slope - now.1[0]).abs() < 0.01, "{motion:?} at {t}");
-                    assert!((now.0[0] - range.centre).abs() < 1.3 * range.half, "{motion:?} {}", now.0[0]);
+                    assert!(
+                        (now.0[0] - range.centre).abs() < 1.3 * range.half,
+                        "{motion:?} {}",
+                        now.0[0]
+                    );
                     fastest = fastest.max(now.1[0].abs());
                 }
-                assert!(fastest > 0.3 * range.speed && fastest < 1.6 * range.speed, "{motion:?} {fastest}");
+                assert!(
+                    fastest > 0.3 * range.speed && fastest < 1.6 * range.speed,
+                    "{motion:?} {fastest}"
+                );
             }
         }
     }

@@ -206,7 +206,11 @@ impl Plant {
         }
         let stiff = self.drives[..n].iter().all(Option::is_none);
         let (mut v, mut link_v) = ([0.0; JOINTS], [0.0; JOINTS]);
-        let (q_body, v_body) = if stiff { (&s.q, &s.v) } else { (&s.link_q, &s.link_v) };
+        let (q_body, v_body) = if stiff {
+            (&s.q, &s.v)
+        } else {
+            (&s.link_q, &s.link_v)
+        };
         let (mass, bias) = self.bodies.dynamics(q_body, v_body, n);
         let (load, holds);
         if stiff {
@@ -255,14 +259,18 @@ impl Elastic {
     fn pull(&self, s: &State, i: usize) -> f64 {
         let swing = self.error * (self.order * s.q[i]).sin();
         let twist = s.q[i] + swing - s.link_q[i];
-        let slip = s.v[i] * (1.0 + self.error * self.order * (self.order * s.q[i]).cos())
-            - s.link_v[i];
+        let slip =
+            s.v[i] * (1.0 + self.error * self.order * (self.order * s.q[i]).cos()) - s.link_v[i];
         let half = 0.5 * self.gap;
         if twist.abs() < half {
             return 0.0;
         }
         let pull = self.stiffness * (twist - half * twist.signum()) + self.damping * slip;
-        if self.gap > 0.0 && pull * twist < 0.0 { 0.0 } else { pull }
+        if self.gap > 0.0 && pull * twist < 0.0 {
+            0.0
+        } else {
+            pull
+        }
     }
 }
 
@@ -335,11 +343,15 @@ fn accelerations(m: &Square, free: &Joints, held: &[bool; JOINTS], n: usize) -> 
         y[r] = (free[i] - dot(&l[r], &y, r)) / l[r][r];
     }
     for r in (0..moving.len()).rev() {
-        let above: f64 = (r + 1..moving.len())
-            .map(|k| l[k][r] * a[moving[k]])
-            .sum();
+        let above: f64 = (r + 1..moving.len()).map(|k| l[k][r] * a[moving[k]]).sum();
         a[moving[r]] = (y[r] - above) / l[r][r];
     }
-    let holds = std::array::from_fn(|i| if i < n { free[i] - dot(&m[i], &a, n) } else { 0.0 });
+    let holds = std::array::from_fn(|i| {
+        if i < n {
+            free[i] - dot(&m[i], &a, n)
+        } else {
+            0.0
+        }
+    });
     (a, holds)
 }

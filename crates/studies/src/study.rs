@@ -40,7 +40,11 @@ pub struct Rows {
 
 fn key(row: &Value) -> (String, String, u64) {
     let text = |key: &str| row[key].as_str().unwrap_or_default().to_owned();
-    (text("tool"), text("cell"), row["run"].as_u64().unwrap_or(u64::MAX))
+    (
+        text("tool"),
+        text("cell"),
+        row["run"].as_u64().unwrap_or(u64::MAX),
+    )
 }
 
 impl Rows {
@@ -77,7 +81,10 @@ impl Rows {
         run: u64,
         one: impl FnOnce(&Path) -> Result<Value, StudyError>,
     ) -> Result<(), StudyError> {
-        if self.done.contains(&(tool.label.clone(), cell.to_owned(), run)) {
+        if self
+            .done
+            .contains(&(tool.label.clone(), cell.to_owned(), run))
+        {
             return Ok(());
         }
         let of_file = |path: &Path, source| StudyError::File {
@@ -136,7 +143,15 @@ pub fn into_page(page: &Path, name: &str, text: &str) -> Result<(), StudyError> 
         mark: mark.clone(),
     };
     let begin = whole.find(&mark).ok_or_else(missing)? + mark.len();
-    let end = begin + whole[begin..].find("<!-- end of study -->").ok_or_else(missing)?;
-    let new = format!("{}\n\n{}\n\n{}", &whole[..begin], text.trim(), &whole[end..]);
+    let end = begin
+        + whole[begin..]
+            .find("<!-- end of study -->")
+            .ok_or_else(missing)?;
+    let new = format!(
+        "{}\n\n{}\n\n{}",
+        &whole[..begin],
+        text.trim(),
+        &whole[end..]
+    );
     crate::files::write(page, &new)
 }

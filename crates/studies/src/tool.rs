@@ -59,7 +59,11 @@ impl Answer {
 
     /// The last line of what it said, to find the cause of an exit in the results.
     pub fn last_words(&self) -> String {
-        let line = self.message.lines().rev().find(|line| !line.trim().is_empty());
+        let line = self
+            .message
+            .lines()
+            .rev()
+            .find(|line| !line.trim().is_empty());
         line.unwrap_or_default().chars().take(300).collect()
     }
 }

@@ -7,10 +7,18 @@ use cft_ident_studies::plant::{Bodies, Contact, Elastic, Plant, State};
 
 fn one(inertia: f64, viscous: f64, coulomb: f64, law: Law) -> Plant {
     Plant {
-        bodies: Bodies::Single { inertia, weight: 0.0, phase: 0.0 },
+        bodies: Bodies::Single {
+            inertia,
+            weight: 0.0,
+            phase: 0.0,
+        },
         joints: 1,
         drives: [None; JOINTS],
-        friction: vec![Friction { viscous, coulomb, law }],
+        friction: vec![Friction {
+            viscous,
+            coulomb,
+            law,
+        }],
         offset: [0.0; JOINTS],
         added: Vec::new(),
     }
@@ -60,7 +68,15 @@ fn a_joint_breaks_loose_at_the_level_that_holds_it() {
     let speed = (t - tau + tau * (-t / tau).exp()) / b;
     assert!((state.v[0] - speed).abs() < 1e-6, "{} {speed}", state.v[0]);
     // Stribeck's holds longer, and is overtaken by nothing below it
-    let plant = one(j, b, c, Law::Stribeck { more: 0.3, vs: 0.05 });
+    let plant = one(
+        j,
+        b,
+        c,
+        Law::Stribeck {
+            more: 0.3,
+            vs: 0.05,
+        },
+    );
     let mut state = plant.at_rest(joint(0.0));
     run(&plant, &mut state, |_| 0.89, 0.5, 5e-5);
     assert_eq!(state.q[0], 0.0);
@@ -145,19 +161,28 @@ fn arm(law: Law) -> Plant {
 #[test]
 fn work_is_energy_and_heat_on_a_stiff_arm() {
     let plant = arm(Law::Coulomb);
-    let Bodies::Chain(chain) = &plant.bodies else { unreachable!() };
+    let Bodies::Chain(chain) = &plant.bodies else {
+        unreachable!()
+    };
     let energy = |s: &State| {
-        let drives: f64 = (0..6).map(|i| 0.5 * chain.links[i].drive_inertia * s.v[i] * s.v[i]).sum();
+        let drives: f64 = (0..6)
+            .map(|i| 0.5 * chain.links[i].drive_inertia * s.v[i] * s.v[i])
+            .sum();
         chain.energy(&s.q, &s.v) + drives
     };
     let (spent, gained) = balance(&plant, energy, 5e-5);
-    assert!((spent - gained).abs() < 1e-3 * (1.0 + spent.abs()), "{spent} {gained}");
+    assert!(
+        (spent - gained).abs() < 1e-3 * (1.0 + spent.abs()),
+        "{spent} {gained}"
+    );
 }
 
 #[test]
 fn work_is_energy_and_heat_on_an_elastic_arm() {
     let mut plant = arm(Law::Smooth { width: 0.02 });
-    let Bodies::Chain(chain) = &mut plant.bodies else { unreachable!() };
+    let Bodies::Chain(chain) = &mut plant.bodies else {
+        unreachable!()
+    };
     for i in 0..6 {
         let motor = std::mem::take(&mut chain.links[i].drive_inertia);
         plant.drives[i] = Some(Elastic {
@@ -180,7 +205,10 @@ fn work_is_energy_and_heat_on_an_elastic_arm() {
         chain.energy(&s.link_q, &s.link_v) + (0..6).map(of).sum::<f64>()
     };
     let (spent, gained) = balance(&plant, energy, 5e-5);
-    assert!((spent - gained).abs() < 1e-3 * (1.0 + spent.abs()), "{spent} {gained}");
+    assert!(
+        (spent - gained).abs() < 1e-3 * (1.0 + spent.abs()),
+        "{spent} {gained}"
+    );
 }
 
 #[test]
@@ -195,7 +223,11 @@ fn a_held_joint_does_not_move_while_another_pulls_at_it() {
     let mut state = plant.at_rest([0.0; JOINTS]);
     for k in 0..20_000 {
         let swing = (8.0 * f64::from(k) * 5e-5).sin();
-        plant.step(&mut state, &[0.0, 20.0 * swing, 5.0 * swing, 1.0, -1.0, 0.5], 5e-5);
+        plant.step(
+            &mut state,
+            &[0.0, 20.0 * swing, 5.0 * swing, 1.0, -1.0, 0.5],
+            5e-5,
+        );
     }
     assert_eq!(state.q[0], 0.0);
     assert!(state.q[1].abs() > 0.01);
@@ -204,13 +236,31 @@ fn a_held_joint_does_not_move_while_another_pulls_at_it() {
 #[test]
 fn a_bristle_yields_in_proportion_and_then_slides_at_the_level() {
     let stiffness = 500.0;
-    let plant = one(0.02, 0.0, 0.5, Law::Presliding { stiffness, damping: 2.0 });
+    let plant = one(
+        0.02,
+        0.0,
+        0.5,
+        Law::Presliding {
+            stiffness,
+            damping: 2.0,
+        },
+    );
     let mut state = plant.at_rest(joint(0.0));
     // Dahl's way under a load that grows slowly
     run(&plant, &mut state, |t| 0.05 * t, 5.0, 5e-5);
     let way = -0.5 / stiffness * (1.0_f64 - 0.25 / 0.5).ln();
-    assert!((state.q[0] - way).abs() < 0.02 * way, "{} {way}", state.q[0]);
-    let mut state = plant.at_rest(joint(0.0));
+    assert!(
+        (state.q[0] - way).abs() < 0.02 * way,
+        "{} {way}",
+        state.q[0]
+    );
+    // 0.02 Nm beyond the level
     run(&plant, &mut state, |_| 0.52, 1.0, 5e-5);
-    assert!((state.v[0] - 1.0).abs() < 0.05, "{}", state.v[0]);
+    let before = state.v[0];
+    run(&plant, &mut state, |_| 0.52, 1.0, 5e-5);
+    assert!(
+        (state.v[0] - before - 1.0).abs() < 1e-3,
+        "{}",
+        state.v[0] - before
+    );
 }
