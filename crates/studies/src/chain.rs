@@ -154,12 +154,12 @@ impl Chain {
             .sum();
         let (mut turn, mut at) = ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z], [0.0; 3]);
         let mut potential = 0.0;
-        for i in 0..n {
-            let place = self.place(i, q[i]);
+        for (i, (link, &position)) in self.links.iter().zip(q).enumerate() {
+            let place = self.place(i, position);
             at = add(at, times(&turn, place.at));
             turn = product(&turn, &place.turn);
-            let centre = add(at, times(&turn, self.links[i].centre));
-            potential -= self.links[i].mass * dot(self.gravity, centre);
+            let centre = add(at, times(&turn, link.centre));
+            potential -= link.mass * dot(self.gravity, centre);
         }
         kinetic + potential
     }

@@ -48,7 +48,25 @@ pub fn cells() -> Vec<Cell> {
         law: LAWS[c[2]],
         controller: CONTROLLERS[c[3]],
     };
-    pairwise(&levels, |_| true).iter().map(of).collect()
+    let of_cft = |motion, law, controller| Cell {
+        kind: Kind::Cft,
+        drive: Drive::Direct,
+        motion,
+        law,
+        controller,
+    };
+    let mut cells: Vec<Cell> = pairwise(&levels, |_| true).iter().map(of).collect();
+    cells.extend([
+        of_cft(Motion::SlowSines, LawKind::Coulomb, Controller::Pd),
+        of_cft(Motion::FastSines, LawKind::Smooth, Controller::Pd),
+        of_cft(
+            Motion::PointToPoint,
+            LawKind::Coulomb,
+            Controller::FeedForward,
+        ),
+        of_cft(Motion::HandLed, LawKind::Smooth, Controller::FeedForward),
+    ]);
+    cells
 }
 
 impl Cell {

@@ -56,7 +56,22 @@ pub fn cells() -> Vec<Cell> {
         fine: c[5] == 0,
     };
     let may = |c: &[usize]| KINDS[c[0]].may_have(DRIVES[c[2]]);
-    pairwise(&levels, may).iter().map(|c| of(c)).collect()
+    let mut cells: Vec<Cell> = pairwise(&levels, may).iter().map(|c| of(c)).collect();
+    cells.extend(of_cft());
+    cells
+}
+
+/// The CFT robot, once with each law of friction.
+fn of_cft() -> [Cell; 4] {
+    let of = |k: usize| Cell {
+        kind: Kind::Cft,
+        motion: MOTIONS[k],
+        drive: Drive::Direct,
+        law: LAWS[k],
+        controller: CONTROLLERS[(k + 2) % 4],
+        fine: k.is_multiple_of(2),
+    };
+    [0, 1, 2, 3].map(of)
 }
 
 pub fn word(value: impl serde::Serialize) -> String {
@@ -160,6 +175,13 @@ fn truth_of(machine: &Machine, parameter: &Value) -> Option<(&'static str, f64)>
         ("viscous", Some(i)) => declared.then(|| ("viscous", machine.plant.friction[i].viscous)),
         ("coulomb", Some(i)) => declared.then(|| ("coulomb", machine.plant.friction[i].coulomb)),
         ("offset", Some(i)) => Some(("offset", machine.plant.offset[i])),
+        (theta, _) if theta.starts_with("theta_") => {
+            let number: usize = theta["theta_".len()..].parse().ok()?;
+            let value = files::theta(machine)?
+                .get(number.checked_sub(1)?)
+                .copied()?;
+            Some(("inertial", value))
+        }
         ("inertia" | "mass", _) => Some(("inertial", machine.inertia[0])),
         _ => Some(("inertial", files::grouped(machine.chain.as_ref()?, name)?)),
     }

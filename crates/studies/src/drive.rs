@@ -80,9 +80,9 @@ impl Course {
         let mut state = plant.at_rest(q);
         state.v = v;
         state.link_v = v;
-        for i in 0..n {
-            if v[i] != 0.0 {
-                state.contact[i] = Contact::Slides(v[i].signum());
+        for (contact, v) in state.contact.iter_mut().zip(&v[..n]) {
+            if *v != 0.0 {
+                *contact = Contact::Slides(v.signum());
             }
         }
         let substeps = (machine.step_hz / CONTROL_HZ).round() as usize;

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use crate::chain::{Chain, standard};
 use crate::drive::Run;
-use crate::machine::{Drive, Machine};
+use crate::machine::{Drive, Kind, Machine};
 use crate::plant::Bodies;
-use crate::space::{Matrix, of_rpy, transposed};
+use crate::space::Matrix;
 use crate::study::StudyError;
 
 pub fn write(path: &Path, text: &str) -> Result<(), StudyError> {
@@ -47,6 +47,9 @@ pub fn robot_text(machine: &Machine, rate_hz: f64, urdf: &str, more: &str) -> St
     match &machine.chain {
         Some(_) => {
             let _ = write!(text, "model = \"serial\"\nurdf = \"{urdf}\"\n");
+        }
+        None if machine.kind == Kind::Cft => {
+            text.push_str("model = \"cft\"\nsetup = \"tuedacs\"\nparameters = 12\n");
         }
         None => {
             let kind = if machine.slides(0) {
@@ -155,12 +158,25 @@ pub fn truth(machine: &Machine) -> Value {
     json!({
         "kind": machine.kind,
         "drive": machine.drive,
-        "inertia": if links.is_none() { json!(machine.inertia[0]) } else { Value::Null },
+        "inertia": single(machine),
+        "theta": theta(machine),
         "links": links,
         "friction": machine.plant.friction,
         "offset": machine.plant.offset[..n],
         "added": machine.plant.added,
     })
+}
+
+fn single(machine: &Machine) -> Option<f64> {
+    (machine.kind == Kind::Single).then_some(machine.inertia[0])
+}
+
+/// The CFT robot's inertial parameters.
+pub fn theta(machine: &Machine) -> Option<[f64; 12]> {
+    match &machine.plant.bodies {
+        Bodies::Cft(cft) => Some(cft.theta),
+        _ => None,
+    }
 }
 
 /// Value of a base parameter from its grouping, `Izz1 + Iyy2 - 0.09 m3`, with the true links; None where a name is
@@ -192,11 +208,6 @@ fn named(chain: &Chain, word: &str) -> Option<f64> {
     let all = standard(chain.links.get(link.checked_sub(1)?)?);
     let found = all.iter().find(|(name, _)| *name == &word[..digits])?;
     Some(sign * found.1)
-}
-
-/// Gravity in the base frame of a robot that stands as `rpy` says, for robot files of wall mounts.
-pub fn turned_gravity(rpy: [f64; 3]) -> [f64; 3] {
-    crate::space::times(&transposed(&of_rpy(rpy)), [0.0, 0.0, -9.81])
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@
 
 pub mod added;
 pub mod arms;
+pub mod cft;
 pub mod chain;
 pub mod chance;
 pub mod clean;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::arms;
+use crate::cft::Cft;
 use crate::chain::{Chain, JOINTS, Joints};
 use crate::chance::Chance;
 use crate::friction::{Friction, Law};
@@ -17,6 +18,8 @@ pub enum Kind {
     /// Two joints that turn and one that slides along gravity.
     Scara,
     Arm6,
+    /// The robot with a pantograph that the tool was first built for.
+    Cft,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -74,6 +77,7 @@ impl Kind {
         match self {
             Self::Single => true,
             Self::Scara => drive == Drive::BallScrew,
+            Self::Cft => drive == Drive::Direct,
             Self::Arm3 | Self::Arm6 => drive != Drive::BallScrew,
         }
     }
@@ -87,6 +91,7 @@ impl Machine {
             Kind::Arm3 => arm(arms::arm3(), law, chance),
             Kind::Scara => arm(arms::scara(), law, chance),
             Kind::Arm6 => arm(arms::arm6(), law, chance),
+            Kind::Cft => cft(law, chance),
         };
         machine.kind = kind;
         machine.drive = drive;
@@ -99,6 +104,7 @@ impl Machine {
     pub fn slides(&self, joint: usize) -> bool {
         match &self.chain {
             Some(chain) => chain.links[joint].slides,
+            None if self.kind == Kind::Cft => joint == 0,
             None => self.drive == Drive::BallScrew,
         }
     }
@@ -125,6 +131,7 @@ impl Machine {
                     motor
                 }
                 Bodies::Chain(chain) => std::mem::take(&mut chain.links[i].drive_inertia),
+                Bodies::Cft(_) => return,
             };
             let link = self.inertia[i] - motor;
             let both = motor * link / (motor + link);
@@ -254,9 +261,9 @@ fn arm(drawing: Chain, law: LawKind, chance: &mut Chance) -> Machine {
     let mass = chain.mass_matrix(&centre);
     let mut inertia = [0.0; JOINTS];
     let (mut friction, mut offset) = (Vec::new(), [0.0; JOINTS]);
-    for i in 0..n {
-        inertia[i] = mass[i][i] + chain.links[i].drive_inertia;
-        let (viscous, coulomb) = if chain.links[i].slides {
+    for (i, link) in chain.links.iter().enumerate() {
+        inertia[i] = mass[i][i] + link.drive_inertia;
+        let (viscous, coulomb) = if link.slides {
             (30.0, 8.0)
         } else {
             (
@@ -268,7 +275,7 @@ fn arm(drawing: Chain, law: LawKind, chance: &mut Chance) -> Machine {
         friction.push(Friction {
             viscous: viscous * chance.between(0.8, 1.2),
             coulomb,
-            law: law_of(law, coulomb, ranges[i].speed, chain.links[i].drive_inertia),
+            law: law_of(law, coulomb, ranges[i].speed, link.drive_inertia),
         });
         offset[i] = chance.between(-0.1, 0.1) * coulomb;
     }
@@ -289,5 +296,60 @@ fn arm(drawing: Chain, law: LawKind, chance: &mut Chance) -> Machine {
         ranges,
         inertia,
         step_hz: if n > 3 { 10_000.0 } else { 20_000.0 },
+    }
+}
+
+/// Inertial parameters of the CFT robot; all but the first three are made up.
+const THETA: [f64; 12] = [
+    121.3049, 0.3107, 4.1955, 0.95, -0.07, 0.0012, 0.08, 0.0128, -0.94, -0.02, 4.67, 2.83,
+];
+
+fn cft(law: LawKind, chance: &mut Chance) -> Machine {
+    // masses move together, so that the mass matrix stays that of bodies
+    let scale = chance.between(0.9, 1.1);
+    let own = Cft {
+        theta: THETA.map(|t| scale * t),
+    };
+    let range = |centre, half, speed| Range {
+        centre,
+        half,
+        speed,
+    };
+    let ranges = vec![
+        range(0.42, 0.2, 0.4),
+        range(0.4, 1.0, 1.5),
+        range(-0.9, 0.3, 0.8),
+        range(1.7, 0.3, 0.8),
+    ];
+    let centre: Joints = std::array::from_fn(|i| ranges.get(i).map_or(0.0, |r| r.centre));
+    let mass = own.mass_matrix(&centre);
+    let inertia: Joints = std::array::from_fn(|i| mass[i][i]);
+    let (mut friction, mut offset) = (Vec::new(), [0.0; JOINTS]);
+    for (i, range) in ranges.iter().enumerate() {
+        let coulomb = [35.0, 6.0, 4.5, 3.2][i] * chance.between(0.85, 1.15);
+        friction.push(Friction {
+            viscous: [120.0, 9.0, 5.0, 4.0][i] * chance.between(0.85, 1.15),
+            coulomb,
+            law: law_of(law, coulomb, range.speed, inertia[i]),
+        });
+        offset[i] = chance.between(-0.1, 0.1) * coulomb;
+    }
+    Machine {
+        kind: Kind::Cft,
+        drive: Drive::Direct,
+        nominal: Bodies::Cft(Cft { theta: THETA }),
+        plant: Plant {
+            bodies: Bodies::Cft(own),
+            joints: 4,
+            drives: [None; JOINTS],
+            friction,
+            offset,
+            added: Vec::new(),
+        },
+        chain: None,
+        names: ["q1", "q2", "q4", "q5"].map(str::to_owned).to_vec(),
+        ranges,
+        inertia,
+        step_hz: 20_000.0,
     }
 }

@@ -163,19 +163,17 @@ fn all<'a, C: 'a>(
 
 fn tables(results: &Path) -> Result<(), StudyError> {
     let page = results.join("../independent.md");
-    let written: [(&str, fn(&Rows) -> String); 4] = [
-        ("coverage", coverage::table),
-        ("clean", clean::table),
-        ("planted", planted::table),
-        ("setup", setup::table),
-    ];
-    for (name, table) in written {
+    let one = |name: &str, table: fn(&Rows) -> String| {
         let rows = Rows::open(results, &format!("independent_{name}"))?;
-        if !rows.rows.is_empty() {
-            into_page(&page, name, &table(&rows))?;
+        if rows.rows.is_empty() {
+            return Ok(());
         }
-    }
-    Ok(())
+        into_page(&page, name, &table(&rows))
+    };
+    one("coverage", coverage::table)?;
+    one("clean", clean::table)?;
+    one("planted", planted::table)?;
+    one("setup", setup::table)
 }
 
 /// How long the plants take for 20 s of motion.

@@ -5,6 +5,7 @@
 //! again at each step. No speed is called zero because it is small.
 
 use crate::added::{Added, Share};
+use crate::cft::Cft;
 use crate::chain::{Chain, JOINTS, Joints, Square};
 use crate::friction::Friction;
 
@@ -18,6 +19,7 @@ pub enum Bodies {
         phase: f64,
     },
     Chain(Chain),
+    Cft(Cft),
 }
 
 /// Between motor and link; positions and torques are reckoned at the joint.
@@ -211,15 +213,13 @@ impl Plant {
         } else {
             (&s.link_q, &s.link_v)
         };
-        let (mass, bias) = self.bodies.dynamics(q_body, v_body, n);
         let (load, holds);
         if stiff {
-            let free: Joints = std::array::from_fn(|i| on_motor[i] - bias[i]);
-            (v, holds) = accelerations(&mass, &free, &held, n);
-            load = std::array::from_fn(|i| bias[i] + dot(&mass[i], &v, n));
+            (v, holds, load) = self.bodies.answer(q_body, v_body, &on_motor, &held, n);
         } else {
-            let free: Joints = std::array::from_fn(|i| on_link[i] - bias[i]);
-            (link_v, _) = accelerations(&mass, &free, &[false; JOINTS], n);
+            (link_v, _, _) = self
+                .bodies
+                .answer(q_body, v_body, &on_link, &[false; JOINTS], n);
             for i in 0..n {
                 let motor = self.drives[i].map_or(f64::INFINITY, |drive| drive.motor);
                 v[i] = if held[i] { 0.0 } else { on_motor[i] / motor };
@@ -275,28 +275,57 @@ impl Elastic {
 }
 
 impl Bodies {
-    /// Mass matrix with the drives' inertias, and what remains at no acceleration.
-    fn dynamics(&self, q: &Joints, v: &Joints, n: usize) -> (Square, Joints) {
+    /// Accelerations under torques, what holds the joints that stand, and the torque that the bodies ask for.
+    fn answer(
+        &self,
+        q: &Joints,
+        v: &Joints,
+        tau: &Joints,
+        held: &[bool; JOINTS],
+        n: usize,
+    ) -> (Joints, Joints, Joints) {
+        if let Self::Single { inertia, .. } = self {
+            let (mut a, mut free) = ([0.0; JOINTS], *tau);
+            free[0] -= self.weight(q[0]);
+            a[0] = if held[0] { 0.0 } else { free[0] / inertia };
+            let mut load = [0.0; JOINTS];
+            load[0] = self.weight(q[0]) + inertia * a[0];
+            return (a, free, load);
+        }
+        let (mass, bias) = self.dynamics(q, v);
+        let free: Joints = std::array::from_fn(|i| tau[i] - bias[i]);
+        let (a, holds) = accelerations(&mass, &free, held, n);
+        (
+            a,
+            holds,
+            std::array::from_fn(|i| bias[i] + dot(&mass[i], &a, n)),
+        )
+    }
+
+    /// Torque of gravity on one joint.
+    fn weight(&self, q: f64) -> f64 {
         match self {
-            Self::Single {
-                inertia,
-                weight,
-                phase,
-            } => {
+            Self::Single { weight, phase, .. } if *weight != 0.0 => weight * (q + phase).cos(),
+            _ => 0.0,
+        }
+    }
+
+    /// Mass matrix with the drives' inertias, and what remains at no acceleration.
+    fn dynamics(&self, q: &Joints, v: &Joints) -> (Square, Joints) {
+        match self {
+            Self::Single { inertia, .. } => {
                 let (mut mass, mut bias) = ([[0.0; JOINTS]; JOINTS], [0.0; JOINTS]);
-                mass[0][0] = *inertia;
-                if *weight != 0.0 {
-                    bias[0] = weight * (q[0] + phase).cos();
-                }
+                (mass[0][0], bias[0]) = (*inertia, self.weight(q[0]));
                 (mass, bias)
             }
             Self::Chain(chain) => {
                 let mut mass = chain.mass_matrix(q);
-                for i in 0..n {
-                    mass[i][i] += chain.links[i].drive_inertia;
+                for (i, link) in chain.links.iter().enumerate() {
+                    mass[i][i] += link.drive_inertia;
                 }
                 (mass, chain.torque(q, v, &[0.0; JOINTS]))
             }
+            Self::Cft(cft) => (cft.mass_matrix(q), cft.bias(q, v)),
         }
     }
 
@@ -304,7 +333,7 @@ impl Bodies {
     pub fn inverse(&self, q: &Joints, v: &Joints, a: &Joints) -> Joints {
         match self {
             Self::Single { inertia, .. } => {
-                let mut tau = self.dynamics(q, v, 1).1;
+                let mut tau = self.dynamics(q, v).1;
                 tau[0] += inertia * a[0];
                 tau
             }
@@ -314,6 +343,10 @@ impl Bodies {
                     tau[i] += link.drive_inertia * a[i];
                 }
                 tau
+            }
+            Self::Cft(cft) => {
+                let (mass, bias) = (cft.mass_matrix(q), cft.bias(q, v));
+                std::array::from_fn(|i| bias[i] + dot(&mass[i], a, JOINTS))
             }
         }
     }
@@ -326,12 +359,6 @@ fn dot(a: &Joints, b: &Joints, n: usize) -> f64 {
 /// Accelerations of the joints that do not hold (Cholesky), and the torque that holds the others.
 fn accelerations(m: &Square, free: &Joints, held: &[bool; JOINTS], n: usize) -> (Joints, Joints) {
     let mut a = [0.0; JOINTS];
-    if n == 1 {
-        if !held[0] {
-            a[0] = free[0] / m[0][0];
-        }
-        return (a, *free);
-    }
     let moving: Vec<usize> = (0..n).filter(|&i| !held[i]).collect();
     let mut l = [[0.0; JOINTS]; JOINTS];
     let mut y = [0.0; JOINTS];

@@ -1,11 +1,16 @@
 //! The binary that is judged: it is run as a laboratory would run it, and only its documents are read.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::study::StudyError;
+
+/// No command on a minute of log should take longer than this, on a machine that others use too.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// The binary, and what its column is called in tables.
 #[derive(Debug, Clone)]
@@ -22,18 +27,34 @@ pub struct Answer {
 }
 
 impl Tool {
-    /// Runs it in a folder with `--json`, on one thread; the document is read and removed.
+    /// Runs it in a folder with `--json`, on one thread; the document is read and removed. A run that goes on for
+    /// longer than [`PATIENCE`] is ended, and has exit status -1.
     pub fn run(&self, folder: &Path, words: &[&str]) -> Result<Answer, StudyError> {
+        let failed = |source| StudyError::Tool {
+            path: self.path.clone(),
+            source,
+        };
         let json = folder.join("answer.json");
-        let output = Command::new(&self.path)
+        let said = folder.join("said.txt");
+        let mut child = Command::new(&self.path)
             .current_dir(folder)
             .args(words)
             .args(["--json", "answer.json", "--threads", "1", "-q"])
-            .output()
-            .map_err(|source| StudyError::Tool {
-                path: self.path.clone(),
-                source,
-            })?;
+            .stdout(Stdio::null())
+            .stderr(File::create(&said).map_err(failed)?)
+            .spawn()
+            .map_err(failed)?;
+        let begin = Instant::now();
+        let exit = loop {
+            if let Some(status) = child.try_wait().map_err(failed)? {
+                break status.code().unwrap_or(-1);
+            }
+            if begin.elapsed() > PATIENCE {
+                child.kill().and_then(|()| child.wait()).map_err(failed)?;
+                break -1;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
         let document = match std::fs::read_to_string(&json) {
             Ok(text) => {
                 let _ = std::fs::remove_file(&json);
@@ -42,9 +63,9 @@ impl Tool {
             Err(_) => None,
         };
         Ok(Answer {
-            exit: output.status.code().unwrap_or(-1),
+            exit,
             document,
-            message: String::from_utf8_lossy(&output.stderr).into_owned(),
+            message: std::fs::read_to_string(&said).unwrap_or_default(),
         })
     }
 }

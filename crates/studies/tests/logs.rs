@@ -1,12 +1,13 @@
 //! The logs say what the machine did: their torque is what bodies and friction ask for along the motion, without a lag,
 //! and noise and steps are as large as they are said to be.
 
-use cft_ident_studies::chain::{JOINTS, Joints};
+use cft_ident_studies::chain::Joints;
 use cft_ident_studies::chance::Chance;
 use cft_ident_studies::drive::{CONTROLLERS, Controller, Run, Sensing};
 use cft_ident_studies::lab::Lab;
 use cft_ident_studies::machine::{DRIVES, Drive, Kind, LawKind, Machine};
 use cft_ident_studies::path::{MOTIONS, Motion};
+use cft_ident_studies::plant::Bodies;
 use cft_ident_studies::signal::rms;
 
 fn log(
@@ -37,7 +38,7 @@ const IDEAL: Sensing = Sensing {
 /// Share of each joint's torque that the true model, along the logged positions, does not give; rows near a
 /// reversal of any joint are left out.
 fn unexplained(machine: &Machine, run: &Run) -> Vec<f64> {
-    let n = machine.plant.joints;
+    let (n, kind) = (machine.plant.joints, machine.kind);
     let h = run.t[1] - run.t[0];
     let moving = |k: usize, i: usize| {
         let fast = 0.03 * machine.ranges[i].speed;
@@ -52,17 +53,16 @@ fn unexplained(machine: &Machine, run: &Run) -> Vec<f64> {
             (run.q[k + 1][i] - 2.0 * run.q[k][i] + run.q[k - 1][i]) / (h * h)
         });
         let bodies = match &machine.chain {
-            Some(chain) => {
-                let mut tau = chain.torque(&run.q[k], &v, &a);
-                (0..n).for_each(|i| tau[i] += chain.links[i].drive_inertia * a[i]);
-                tau
-            }
-            None => {
-                let mut tau = [0.0; JOINTS];
-                tau[0] = machine.inertia[0] * a[0];
-                tau
-            }
+            // an elastic drive's inertia is the motor's, which the plant's own chain does not have
+            Some(chain) => Bodies::Chain(chain.clone()),
+            None if kind == Kind::Single => Bodies::Single {
+                inertia: machine.inertia[0],
+                weight: 0.0,
+                phase: 0.0,
+            },
+            None => machine.plant.bodies.clone(),
         };
+        let bodies = bodies.inverse(&run.q[k], &v, &a);
         for i in 0..n {
             let friction = machine.plant.friction[i].lasting(v[i]);
             left[i].push(run.tau[k][i] - bodies[i] - friction - machine.plant.offset[i]);
@@ -81,6 +81,7 @@ fn the_logged_torque_is_what_the_motion_asks_for() {
         (Kind::Arm3, Drive::Direct),
         (Kind::Scara, Drive::BallScrew),
         (Kind::Arm6, Drive::Direct),
+        (Kind::Cft, Drive::Direct),
     ] {
         let all = if kind == Kind::Single {
             &CONTROLLERS[..]

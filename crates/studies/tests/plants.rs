@@ -127,10 +127,10 @@ fn balance(plant: &Plant, energy: impl Fn(&State) -> f64, h: f64) -> (f64, f64) 
         });
         let before = state.clone();
         plant.step(&mut state, &u, h);
-        for i in 0..n {
+        for (i, torque) in u.iter().enumerate().take(n) {
             let v = 0.5 * (before.v[i] + state.v[i]);
             let z = 0.5 * (before.bristle[i] + state.bristle[i]);
-            work += u[i] * (state.q[i] - before.q[i]);
+            work += torque * (state.q[i] - before.q[i]);
             heat += h * v * plant.friction[i].torque(v, v.signum(), z, 0.0).0;
             if let Some(drive) = &plant.drives[i] {
                 let slip = v - 0.5 * (before.link_v[i] + state.link_v[i]);
