@@ -25,6 +25,7 @@ mod source;
 mod spec;
 mod stale;
 mod stream;
+mod tape;
 mod temperatures;
 mod text;
 mod time;
