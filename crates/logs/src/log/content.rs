@@ -1,11 +1,10 @@
 //! Files opened for what they hold: decompressed on the way, and known by their first bytes.
 
-use std::fs::File;
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::source::Checksum;
+use super::source::{Checksum, OpenFile};
 use super::stream::{Stream, Watch};
 use super::{LogError, source};
 
@@ -41,10 +40,10 @@ pub(super) struct Content {
 
 /// The bytes of an open file, hashed as they are read.
 #[derive(Clone)]
-pub(super) struct RawBytes(Arc<Mutex<(File, Checksum)>>);
+pub(super) struct RawBytes(Arc<Mutex<(OpenFile, Checksum)>>);
 
 impl RawBytes {
-    fn new(file: File) -> Self {
+    fn new(file: OpenFile) -> Self {
         Self(Arc::new(Mutex::new((file, Checksum::default()))))
     }
 

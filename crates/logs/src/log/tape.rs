@@ -15,7 +15,7 @@ use super::content::RawBytes;
 use super::layout::Layout;
 use super::pass::{Opened, open};
 use super::rows::{LogRows, Strictness};
-use super::source;
+use super::source::{self, OpenFile};
 use super::time::{Instant, Stamped};
 use super::{Block, LogError};
 
@@ -27,6 +27,8 @@ const IN_MEMORY: usize = 16 << 20;
 /// What is kept of a log while somebody holds its [`super::LogSpec`].
 #[derive(Default)]
 pub(super) struct Kept {
+    path: PathBuf,
+    files: Mutex<Vec<(PathBuf, Arc<File>)>>,
     tapes: Mutex<Vec<(Layout, Arc<Tape>)>>,
 }
 
@@ -36,21 +38,65 @@ impl fmt::Debug for Kept {
     }
 }
 
-/// What is kept of logs that somebody holds now, by their paths.
-static HELD: Mutex<Vec<(PathBuf, Weak<Kept>)>> = Mutex::new(Vec::new());
+/// What is kept of logs that somebody holds now.
+static HELD: Mutex<Vec<Weak<Kept>>> = Mutex::new(Vec::new());
+
+/// Files of one log that are kept open.
+const OPEN: usize = 16;
+
+/// A file, opened anew unless it is one of a log that somebody holds.
+///
+/// # Errors
+/// What the system says; a folder.
+pub(super) fn opened(path: &Path) -> io::Result<OpenFile> {
+    let held: Vec<Arc<Kept>> = lock(&HELD).iter().filter_map(Weak::upgrade).collect();
+    let kept = held.iter().find(|kept| kept.has(path));
+    let mut files = kept.map(|kept| lock(&kept.files));
+    let now = path.metadata()?;
+    let same = |file: &File| {
+        let then = file.metadata()?;
+        Ok::<bool, io::Error>(then.len() == now.len() && then.modified()? == now.modified()?)
+    };
+    if let Some(files) = &mut files {
+        files.retain(|(of, file)| of != path || same(file).unwrap_or(false));
+        if let Some((_, file)) = files.iter().find(|(of, _)| of == path) {
+            return Ok(OpenFile::new(Arc::clone(file), true));
+        }
+    }
+    if now.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    let file = Arc::new(File::open(path)?);
+    let regular = now.is_file();
+    if let Some(files) = files.as_mut().filter(|files| regular && files.len() < OPEN) {
+        files.push((path.to_owned(), Arc::clone(&file)));
+    }
+    Ok(OpenFile::new(file, regular))
+}
 
 impl Kept {
     /// What is kept of the log of this path: all who hold it share its rows, whatever their spans.
     pub(super) fn of(path: &Path) -> Arc<Self> {
         let mut held = lock(&HELD);
-        held.retain(|(_, kept)| kept.strong_count() > 0);
-        let found = held.iter().find(|(of, _)| of == path);
-        if let Some(kept) = found.and_then(|(_, kept)| kept.upgrade()) {
+        held.retain(|kept| kept.strong_count() > 0);
+        let mut alive = held.iter().filter_map(Weak::upgrade);
+        if let Some(kept) = alive.find(|kept| kept.path == path) {
             return kept;
         }
-        let kept = Arc::new(Self::default());
-        held.push((path.to_owned(), Arc::downgrade(&kept)));
+        let kept = Arc::new(Self {
+            path: path.to_owned(),
+            ..Self::default()
+        });
+        held.push(Arc::downgrade(&kept));
         kept
+    }
+
+    /// Whether a file is one of the log: itself, in its folder, or one of those that `+` joins.
+    fn has(&self, path: &Path) -> bool {
+        let joined = || self.path.to_str().zip(path.to_str());
+        self.path == path
+            || path.parent() == Some(&self.path)
+            || joined().is_some_and(|(all, one)| all.split('+').any(|part| part == one))
     }
 
     /// The tape of these files by this layout, its conversion aside; what the log turned out to be.
