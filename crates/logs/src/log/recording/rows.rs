@@ -1,0 +1,387 @@
+//! Messages of a recording as rows of channels in SI units.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::encoding::reader_of;
+use super::fields::{RobotFields, TimeSource};
+use super::message::{OpenedReader, Schema, Wanted};
+use super::pairing::{Pairing, Sample};
+use super::partial::Parts;
+use super::parts::{Message, MessageFiles};
+use super::sources::{Publisher, Publishers};
+use super::survey::{self, Choice};
+use super::value::Value;
+use crate::log::layout::{Channel, Layout};
+use crate::log::rows::LogRows;
+use crate::log::time::Stamped;
+use crate::log::{Block, LogError, escape, source};
+use cft_ident_core::number::{beyond, is_usable};
+
+/// The rows of a recording.
+pub(in crate::log) struct MessageRows {
+    recording: MessageFiles,
+    reading: SampleReader,
+    pairing: Option<Pairing>,
+    row: Sample,
+    previous: Sample,
+    messages: u64,
+    /// Names of the columns: of the time, and of what the samples hold.
+    names: Vec<String>,
+}
+
+/// How messages become samples.
+struct SampleReader {
+    layout: Layout,
+    fields: RobotFields,
+    choice: Choice,
+    readers: Vec<(Arc<Schema>, OpenedReader)>,
+    values: Vec<Value>,
+    /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
+    incomplete: LeftOut,
+    unreadable: LeftOut,
+    /// Messages that were stamped 0 before the clock was known.
+    unstamped: u64,
+    /// Files of the recording, and who publishes on the topics of positions and of torques.
+    paths: Vec<PathBuf>,
+    publishers: [Publishers; 2],
+    parts: [Parts; 2],
+}
+
+#[derive(Default)]
+struct LeftOut {
+    count: u64,
+    first: String,
+}
+
+impl LeftOut {
+    fn add(&mut self, reason: impl FnOnce() -> String) {
+        if self.count == 0 {
+            self.first = reason();
+        }
+        self.count += 1;
+    }
+}
+
+impl fmt::Debug for MessageRows {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MessageRows")
+            .field("choice", &self.reading.choice)
+            .finish_non_exhaustive()
+    }
+}
+
+/// What a message holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Whole,
+    Positions,
+    Torques,
+}
+
+impl MessageRows {
+    /// Opens a recording and finds the channels in it; the layout that it turns out to have.
+    pub(in crate::log) fn open(
+        paths: &[PathBuf],
+        layout: &Layout,
+    ) -> Result<(Self, Layout), LogError> {
+        let (choice, layout) = survey::choose(paths, layout)?;
+        let mut names = vec![choice.topic.clone()];
+        names.extend(choice.torque_topic.clone());
+        let fields = RobotFields::new(&layout);
+        let pairing = choice.torque_topic.is_some().then(|| Pairing::new(&layout));
+        let velocities = match choice.velocities {
+            true => &layout.velocities[..],
+            false => &[],
+        };
+        let channels = (layout.positions.iter())
+            .chain(&layout.torques)
+            .chain(velocities);
+        let channels = channels.map(|channel| channel.column.clone());
+        let rows = Self {
+            names: std::iter::once("t".to_owned()).chain(channels).collect(),
+            recording: MessageFiles::open(paths, Wanted { names })?,
+            pairing,
+            row: Sample::default(),
+            previous: Sample::default(),
+            messages: 0,
+            reading: SampleReader {
+                values: vec![Value::Absent; fields.paths.len()],
+                layout: layout.clone(),
+                fields,
+                choice,
+                readers: Vec::new(),
+                incomplete: LeftOut::default(),
+                unreadable: LeftOut::default(),
+                unstamped: 0,
+                paths: paths.to_vec(),
+                publishers: Default::default(),
+                parts: Default::default(),
+            },
+        };
+        Ok((rows, layout))
+    }
+
+    fn append_part(
+        &self,
+        channels: &[Channel],
+        numbers: &[f64],
+        to: &mut Vec<f64>,
+    ) -> Result<(), LogError> {
+        for (channel, number) in channels.iter().zip(numbers) {
+            let value = number * channel.factor + channel.offset;
+            if !is_usable(value) {
+                return Err(LogError::NotFinite {
+                    at: self.place(),
+                    column: escape(&channel.column),
+                    text: format!("{number:?}{}", beyond(value)),
+                    remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
+                });
+            }
+            to.push(value);
+        }
+        Ok(())
+    }
+}
+
+impl LogRows for MessageRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        std::mem::swap(&mut self.row, &mut self.previous);
+        loop {
+            if let Some(pairing) = &mut self.pairing
+                && pairing.take(&mut self.row)
+            {
+                return Ok(Some(self.row.stamp));
+            }
+            let Some(message) = self.recording.next()? else {
+                return Ok(None);
+            };
+            self.messages += 1;
+            let Some(part) = self.reading.read(&message, &mut self.row)? else {
+                continue;
+            };
+            match (&mut self.pairing, part) {
+                (None, _) | (_, Holds::Whole) => return Ok(Some(self.row.stamp)),
+                (Some(pairing), Holds::Positions) => pairing.add_positions(&mut self.row),
+                (Some(pairing), Holds::Torques) => pairing.add_torques(&mut self.row),
+            }
+        }
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let layout = &self.reading.layout;
+        self.append_part(&layout.positions, &self.row.q, &mut block.q)?;
+        self.append_part(&layout.torques, &self.row.tau, &mut block.tau)?;
+        if self.has_velocities() {
+            // nothing is fitted to velocities: what was not measured is no reason to refuse a row
+            let scaled = layout.velocities.iter().zip(&self.row.dq);
+            let scaled = scaled.map(|(channel, x)| x * channel.factor + channel.offset);
+            block
+                .dq
+                .extend(scaled.map(|x| if is_usable(x) { x } else { f64::NAN }));
+        }
+        Ok(())
+    }
+
+    fn has_velocities(&self) -> bool {
+        self.reading.choice.velocities
+    }
+
+    fn repeats(&self) -> bool {
+        let (a, b) = (&self.row, &self.previous);
+        a.stamp == b.stamp && a.q == b.q && a.tau == b.tau && a.dq == b.dq
+    }
+
+    #[cold]
+    fn place(&self) -> String {
+        format!(
+            "{}: message {} ({})",
+            self.row.file,
+            self.row.number,
+            escape(&self.reading.choice.topic)
+        )
+    }
+
+    #[cold]
+    fn clock_remedy(&self, t: f64) -> Option<String> {
+        let part = format!("use the part before it: FILE@0..{t}s");
+        Some(match self.reading.choice.time {
+            TimeSource::Log => format!(
+                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`, or {part}"
+            ),
+            _ => format!(
+                "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
+            ),
+        })
+    }
+
+    fn number(&self) -> u64 {
+        self.row.number
+    }
+
+    fn logged(&self, column: usize) -> Option<f64> {
+        let mut numbers = (self.row.q.iter()).chain(&self.row.tau).chain(&self.row.dq);
+        numbers.nth(column.checked_sub(1)?).copied()
+    }
+
+    fn breaks(&self) -> Vec<String> {
+        let messages = self.messages;
+        self.recording
+            .breaks(&format!(", {messages} messages of the robot's topics"))
+    }
+
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        let choice = &self.reading.choice;
+        let topics = [Some(&choice.topic), choice.torque_topic.as_ref()];
+        let each = self.reading.publishers.iter().zip(topics);
+        each.filter_map(|(publishers, topic)| publishers.left_out(&escape(topic?)))
+            .collect()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.reading.choice.notes.clone();
+        let reading = &self.reading;
+        out.extend(self.breaks());
+        let topic = escape(&reading.choice.topic);
+        if reading.incomplete.count > 0 {
+            out.push(format!(
+                "{} of {} messages are left out: they lack a channel of the robot (the first: {})",
+                reading.incomplete.count, self.messages, reading.incomplete.first
+            ));
+        }
+        if reading.unreadable.count > 0 {
+            out.push(format!(
+                "{} of {} messages are left out: they cannot be decoded (the first: {})",
+                reading.unreadable.count, self.messages, reading.unreadable.first
+            ));
+        }
+        if reading.unstamped > 0 {
+            out.push(format!(
+                "{} messages of {topic} are stamped 0, before their clock was set, and are left out",
+                reading.unstamped
+            ));
+        }
+        out.extend(self.contradictions().into_iter().map(|(_, text)| text));
+        if let (Some(pairing), Some(torques)) = (&self.pairing, &reading.choice.torque_topic) {
+            out.extend(pairing.warnings(&topic, &escape(torques)));
+        }
+        out
+    }
+}
+
+impl SampleReader {
+    /// Reads one message into a sample; `None` where it is left out.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    fn read(
+        &mut self,
+        message: &Message<'_>,
+        sample: &mut Sample,
+    ) -> Result<Option<Holds>, LogError> {
+        let Message {
+            path,
+            topic,
+            head,
+            data,
+        } = message;
+        let (schema, topic) = (&topic.schema, &topic.name);
+        let place = || format!("message {} of {}", head.number, escape(topic));
+        let known = self.readers.iter().position(|(s, _)| s == schema);
+        let reader_at = known.unwrap_or_else(|| {
+            let reader = reader_of(schema, &self.fields.paths);
+            self.readers.push((schema.clone(), reader));
+            self.readers.len() - 1
+        });
+        let read = match &mut self.readers[reader_at].1 {
+            Ok(reader) => reader.read(data, &mut self.values),
+            Err(reason) => Err(reason.clone()),
+        };
+        if let Err(reason) = read {
+            self.unreadable
+                .add(|| format!("{}: {}", place(), escape(&reason)));
+            return Ok(None);
+        }
+        let unset = self.choice.time == TimeSource::Header && !self.choice.zero_is_time;
+        if unset && self.fields.header_ns(&self.values) == Some(0) {
+            self.unstamped += 1;
+            return Ok(None);
+        }
+        let part = match &self.choice.torque_topic {
+            None => Holds::Whole,
+            Some(torques) if torques == topic => Holds::Torques,
+            Some(_) => Holds::Positions,
+        };
+        let of = usize::from(part == Holds::Torques);
+        let needed = match part {
+            Holds::Whole => self.fields.positions.start..self.fields.torques.end,
+            Holds::Positions => self.fields.positions.clone(),
+            Holds::Torques => self.fields.torques.clone(),
+        };
+        if let Ok(reader) = &self.readers[reader_at].1 {
+            let publisher = Publisher::of(head, &**reader);
+            let paths = &self.fields.paths[needed.clone()];
+            let numbers = &self.values[needed.clone()];
+            let at = (&*self.paths, &**topic);
+            if !self.publishers[of].take(publisher, at, paths, numbers)? {
+                return Ok(None);
+            }
+        }
+        if self.values[needed].contains(&Value::Absent) {
+            self.parts[of].join(&self.fields, head, &mut self.values);
+        }
+        let (fields, values) = (&self.fields, &self.values);
+        let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
+            self.incomplete.add(|| format!("{}: no time", place()));
+            return Ok(None);
+        };
+        let none = || 0..0;
+        let (q, tau, dq): (Range<usize>, Range<usize>, Range<usize>) = match part {
+            Holds::Whole => (
+                fields.positions.clone(),
+                fields.torques.clone(),
+                fields.velocities.clone(),
+            ),
+            Holds::Positions => (fields.positions.clone(), none(), fields.velocities.clone()),
+            Holds::Torques => (none(), fields.torques.clone(), none()),
+        };
+        let dq = if self.choice.velocities { dq } else { none() };
+        let parts = [
+            (q, &mut sample.q),
+            (tau, &mut sample.tau),
+            (dq, &mut sample.dq),
+        ];
+        for (range, to) in parts {
+            to.clear();
+            for index in range {
+                let Some(number) = values[index].number() else {
+                    let reader = self.readers[reader_at].1.as_ref().ok();
+                    let uneven = reader.and_then(|reader| reader.uneven());
+                    self.incomplete.add(|| {
+                        let path = fields.paths[index].last();
+                        let path = path.map_or("", |path| path.text());
+                        match uneven {
+                            Some(uneven) => format!("in {} {uneven}", place()),
+                            None => format!("{} has no `{}`", place(), escape(path)),
+                        }
+                    });
+                    return Ok(None);
+                };
+                to.push(number);
+            }
+        }
+        sample.stamp = stamp;
+        sample.number = head.number;
+        if sample.path != *path {
+            sample.path = (*path).to_owned();
+            sample.file = source::shown(path);
+        }
+        Ok(Some(part))
+    }
+}
