@@ -20,6 +20,7 @@ mod directions;
 mod folds;
 mod quantiles;
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 
 pub use directions::{Direction, Directions};
@@ -36,12 +37,14 @@ use crate::robot::model::Model;
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Deviations of a model's torque that come from its parameters.
+#[derive(Debug, Clone)]
 pub struct Deviation<'a> {
-    model: &'a Model,
+    model: Cow<'a, Model>,
     joints: Vec<OfJoint>,
 }
 
 /// What the torque of a joint holds.
+#[derive(Debug, Clone)]
 struct OfJoint {
     /// Inertial parameters.
     theta: Vec<usize>,
@@ -56,7 +59,16 @@ thread_local! {
 
 impl<'a> Deviation<'a> {
     pub fn new(file: &ModelFile, model: &'a Model) -> Self {
-        let (covariance, u) = (file.model_covariance(model), model.parameters());
+        Self::of(file, Cow::Borrowed(model))
+    }
+
+    /// The same with a model of its own.
+    pub fn owned(file: &ModelFile, model: Model) -> Deviation<'static> {
+        Deviation::of(file, Cow::Owned(model))
+    }
+
+    fn of(file: &ModelFile, model: Cow<'a, Model>) -> Self {
+        let (covariance, u) = (file.model_covariance(&model), model.parameters());
         let (mut friction, offset) = (model.theta.len(), u - model.offset.len());
         let mut joints = Vec::new();
         for (j, theta) in model.robot.parameters_by_joint().into_iter().enumerate() {
