@@ -72,43 +72,15 @@
 
 #![forbid(unsafe_code)]
 
-pub mod math;
-pub mod number;
-pub mod robot;
-pub mod verdict;
-
-pub mod log;
-
-pub mod motion;
-
-pub mod band;
-pub mod effect;
-pub mod inspect;
-pub mod mapping;
-pub mod observe;
-pub mod open_loop;
-
-pub mod friction;
-pub mod inertia;
-
-pub mod diagnose;
-pub mod validate;
-
-pub mod setup;
-pub mod simulate;
-
-pub mod excite;
-
-pub mod replay;
-pub mod report;
-
-pub mod config;
-pub mod export;
-pub mod output;
-
-pub mod compare;
-pub mod track;
-
-pub mod identify;
+pub use cft_ident_core::{
+    block, diagnose, effect, friction, inertia, math, motion, number, robot, validate, verdict,
+};
+pub use cft_ident_export::export;
+pub use cft_ident_files::config;
+pub use cft_ident_fleet::track;
+pub use cft_ident_logs::{inspect, log, mapping, output};
+pub use cft_ident_plant::{excite, simulate};
+pub use cft_ident_report::report;
+pub use cft_ident_stages::{band, compare, identify, observe, open_loop, replay, setup};
 
 pub mod cli;

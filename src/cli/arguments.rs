@@ -4,12 +4,11 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use crate::config::campaign::EstimatorKind;
-use crate::number::{LARGEST, SMALLEST, is_usable};
-use crate::output::LogForm;
+use cft_ident_core::number::{LARGEST, SMALLEST, is_usable};
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_logs::output::LogForm;
 
 /// Where a document goes: `-` is standard output.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -151,26 +150,34 @@ fn with_ending(text: &str, ending: &str) -> Result<PathBuf, String> {
     }
 }
 
-impl ValueEnum for EstimatorKind {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Wls, Self::Ols, Self::Irls, Self::Iv, Self::Oe]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Wls => "Rows weighted by each joint's noise, in two steps",
-            Self::Ols => "All rows alike",
-            Self::Irls => {
-                "Rows with large residuals count less: Huber's loss, then Tukey's bisquare"
-            }
-            Self::Iv => {
-                "Instrumental variables: the regressor along simulated positions, blind to their noise"
-            }
-            Self::Oe => "All parameters at once, the slopes of the friction law among them",
-        };
-        Some(PossibleValue::new(self.name()).help(help))
-    }
+/// The estimators by name, each with a line of help.
+pub(super) fn estimator() -> impl TypedValueParser<Value = EstimatorKind> {
+    let helped = ESTIMATORS.map(|(kind, help)| PossibleValue::new(kind.name()).help(help));
+    PossibleValuesParser::new(helped).try_map(|name| {
+        let found = ESTIMATORS.iter().find(|(kind, _)| kind.name() == name);
+        found.map(|(kind, _)| *kind).ok_or("no such estimator")
+    })
 }
+
+const ESTIMATORS: [(EstimatorKind, &str); 5] = [
+    (
+        EstimatorKind::Wls,
+        "Rows weighted by each joint's noise, in two steps",
+    ),
+    (EstimatorKind::Ols, "All rows alike"),
+    (
+        EstimatorKind::Irls,
+        "Rows with large residuals count less: Huber's loss, then Tukey's bisquare",
+    ),
+    (
+        EstimatorKind::Iv,
+        "Instrumental variables: the regressor along simulated positions, blind to their noise",
+    ),
+    (
+        EstimatorKind::Oe,
+        "All parameters at once, the slopes of the friction law among them",
+    ),
+];
 
 #[cfg(test)]
 mod tests {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::simulate::{simulate_to, truth_beside, warnings};
 use super::{CliError, Context};
-use crate::config::campaign::{CampaignLogs, CampaignSettings};
-use crate::config::{self, Campaign, RobotFile, Trajectory, Wanted};
-use crate::simulate::{EffectSpec, Experiment, Order};
+use cft_ident_files::config::campaign::{CampaignLogs, CampaignSettings};
+use cft_ident_files::config::{self, Campaign, RobotFile, Trajectory, Wanted};
+use cft_ident_plant::simulate::{EffectSpec, Experiment, Order};
 
 /// Robot file and motions of the campaign, as they come with the tool.
 pub(super) const ROBOT: &str = "configs/cft.toml";

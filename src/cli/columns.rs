@@ -1,12 +1,12 @@
 //! Which columns of a log are which channels: by the robot file, or by their names.
 
 use super::CliError;
-use crate::identify::LoggedRobot;
-use crate::inspect::{
+use cft_ident_logs::inspect::{
     ChannelColumn, ChannelRole, ColumnPlan, FaultKind, InspectedChannel, LogFault, Severity,
     is_time,
 };
-use crate::log::{self, DeclaredChannels, Layout, RawReader};
+use cft_ident_logs::log::{self, DeclaredChannels, Layout, RawReader};
+use cft_ident_stages::identify::LoggedRobot;
 
 /// Channels by their names alone.
 ///

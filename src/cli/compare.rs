@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures};
-use crate::identify::{self, GivenModel};
-use crate::log::{LogSpec, escape};
-use crate::replay::ReplayedPair;
-use crate::report::json::Document;
-use crate::report::stages;
+use cft_ident_logs::log::{LogSpec, escape};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{self, GivenModel};
+use cft_ident_stages::replay::ReplayedPair;
 
 const EXAMPLE: &str = "\
 Example:

@@ -14,9 +14,9 @@ use indicatif::{
 
 use super::error::{CliError, indented, tell};
 use super::{outputs, typed};
-use crate::identify::{self, Control};
-use crate::output::Together;
-use crate::report::{Detail, figure};
+use cft_ident_logs::output::Together;
+use cft_ident_report::report::{Detail, figure};
+use cft_ident_stages::identify::{self, Control};
 
 /// The circumstances of a run.
 #[derive(Debug, Clone)]

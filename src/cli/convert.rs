@@ -6,13 +6,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, columns, logs_of, names_of};
-use crate::identify::{LoggedRobot, repeated_rows};
-use crate::log::{
+use cft_ident_core::number;
+use cft_ident_logs::log::{
     Block, Instant, LogSection, LogSpec, Provenance, RawBlock, RawReader, Reader, escape,
 };
-use crate::number;
-use crate::output::{LogForm, LogWriter};
-use crate::report::json::Document;
+use cft_ident_logs::output::{LogForm, LogWriter};
+use cft_ident_report::report::json::Document;
+use cft_ident_stages::identify::{LoggedRobot, repeated_rows};
 
 const EXAMPLE: &str = "\
 Example:

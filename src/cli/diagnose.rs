@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files, logs_of, outputs, pictures, setup};
-use crate::identify::{
+use cft_ident_logs::log::LogSpec;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::{provenance, quality, residual};
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{
     self, DataFault, DiagnoseEnd, DiagnoseLogs, DiagnoseSettings, DiagnosisResult, LoggedRobot,
 };
-use crate::log::LogSpec;
-use crate::replay::ReplayedDiagnosis;
-use crate::report::json::Document;
-use crate::report::sections::{provenance, quality, residual};
-use crate::report::stages;
+use cft_ident_stages::replay::ReplayedDiagnosis;
 
 const EXAMPLE: &str = "\
 Example:

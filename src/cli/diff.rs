@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::{CliError, Context, Exit, Outcome};
-use crate::compare::runs;
-use crate::config;
-use crate::log::{Provenance, escape};
-use crate::report::json::Document;
-use crate::report::stages;
+use cft_ident_files::config;
+use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::compare::runs;
 
 const EXAMPLE: &str = "\
 Example:

@@ -9,14 +9,14 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 
 use super::exit::Exit;
-use crate::config::ConfigError;
-use crate::identify::{ErrorKind, IdentifyError};
-use crate::log::{LogError, is_hidden};
-use crate::mapping::MappingError;
-use crate::output::OutputError;
-use crate::report::json::JsonError;
-use crate::report::table::folded;
-use crate::simulate::SimulateError;
+use cft_ident_files::config::ConfigError;
+use cft_ident_logs::log::{LogError, is_hidden};
+use cft_ident_logs::mapping::MappingError;
+use cft_ident_logs::output::OutputError;
+use cft_ident_plant::simulate::SimulateError;
+use cft_ident_report::report::json::JsonError;
+use cft_ident_report::report::table::folded;
+use cft_ident_stages::identify::{ErrorKind, IdentifyError};
 
 /// An error ready to be shown: `error: ...`, then the places, then `hint: ...`.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -7,10 +7,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, campaign};
-use crate::config;
-use crate::log::unpacked;
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
+use cft_ident_files::config;
+use cft_ident_logs::log::unpacked;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:

@@ -8,19 +8,19 @@ use serde::Serialize;
 
 use super::files::ReadFile;
 use super::{CliError, Context, Outcome, arguments, files};
-use crate::config::{self, ModelFile, RobotFile, UrdfReplacement, replaced_in_urdf};
-use crate::effect::AugmentedModel;
-use crate::effect::as_code::no_torque;
-use crate::export::arm::{Arm, Says};
-use crate::export::dissipative::below_zero;
-use crate::export::left_out::{self, Elsewhere};
-use crate::export::{self, ExportError, Note, Program, urdf_source};
-use crate::identify::{self, Log, LoggedRobot};
-use crate::log::{LogSpec, Provenance, escape};
-use crate::motion::Stretch;
-use crate::number;
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::effect::as_code::no_torque;
+use cft_ident_core::motion::Stretch;
+use cft_ident_core::number;
+use cft_ident_export::export::arm::{Arm, Says};
+use cft_ident_export::export::dissipative::below_zero;
+use cft_ident_export::export::left_out::{self, Elsewhere};
+use cft_ident_export::export::{self, ExportError, Note, Program, urdf_source};
+use cft_ident_files::config::{self, ModelFile, RobotFile, UrdfReplacement, replaced_in_urdf};
+use cft_ident_logs::log::{LogSpec, Provenance, escape};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::{self, Log, LoggedRobot};
 
 const EXAMPLE: &str = "\
 Example:
@@ -131,7 +131,7 @@ fn name(path: &Path) -> String {
 
 /// The effects of a model, as a person names them.
 fn effects(file: &ModelFile) -> Vec<String> {
-    let of = |e: &crate::config::model_file::EffectSection| match &e.joint {
+    let of = |e: &cft_ident_files::config::model_file::EffectSection| match &e.joint {
         Some(joint) => format!("{} of {}", escape(&e.name), escape(joint)),
         None => escape(&e.name),
     };

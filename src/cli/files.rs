@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::Context;
 use super::error::CliError;
-use crate::config::candidates::{self, CandidateSection};
-use crate::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
-use crate::log::{Provenance, escape};
+use cft_ident_files::config::candidates::{self, CandidateSection};
+use cft_ident_files::config::{self, ConfigError, ModelFile, RobotFile, Trajectory, Wanted};
+use cft_ident_logs::log::{Provenance, escape};
 
 /// A configuration file that was read.
 #[derive(Debug, Clone)]

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use super::{
     CliError, Context, Outcome, arguments, files, logs_of, names_of, outputs, pictures, setup,
 };
-use crate::identify::{self, FrictionSettings, LoggedRobot};
-use crate::log::LogSpec;
-use crate::report::json::Document;
-use crate::report::stages;
+use cft_ident_logs::log::LogSpec;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{self, FrictionSettings, LoggedRobot};
 
 const EXAMPLE: &str = "\
 Example:

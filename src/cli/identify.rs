@@ -7,21 +7,21 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, campaign, logs_of, names_of, pictures, setup, validate};
-use crate::config::model_file::Parameter;
-use crate::config::{self, Campaign, ModelFile};
-use crate::identify::{
+use cft_ident_files::config::model_file::Parameter;
+use cft_ident_files::config::{self, Campaign, ModelFile};
+use cft_ident_logs::log::LogSpec;
+use cft_ident_plant::simulate::TruthFile;
+use cft_ident_plant::simulate::effects::EffectValue;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::residual;
+use cft_ident_report::report::stages;
+use cft_ident_report::report::stages::identify::ShownLogs;
+use cft_ident_stages::identify::{
     self, DiagnoseEnd, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, IdentifySettings,
     LoggedRobot, RoleLogs, StageEnd, Validated,
 };
-use crate::log::LogSpec;
-use crate::replay::ReplayedDiagnosis;
-use crate::report::json::Document;
-use crate::report::sections::residual;
-use crate::report::stages;
-use crate::report::stages::identify::ShownLogs;
-use crate::setup::Finding;
-use crate::simulate::TruthFile;
-use crate::simulate::effects::EffectValue;
+use cft_ident_stages::replay::ReplayedDiagnosis;
+use cft_ident_stages::setup::Finding;
 
 const EXAMPLE: &str = "\
 Example:

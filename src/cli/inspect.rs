@@ -6,17 +6,17 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
-use crate::config::ModelFile;
-use crate::identify::{IdentifyError, LoggedRobot, repeated_rows};
-use crate::inspect::{
+use cft_ident_core::motion;
+use cft_ident_core::robot::model::Model;
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::inspect::{
     FaultKind, Findings, Inspection, LogFault, OrderComparison, look, look_again,
 };
-use crate::log::{LogSection, LogSpec, Provenance, RawReader, escape};
-use crate::motion;
-use crate::report::json::Document;
-use crate::report::stages;
-use crate::robot::model::Model;
-use crate::setup::{Finding, SetupReport};
+use cft_ident_logs::log::{LogSection, LogSpec, Provenance, RawReader, escape};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{IdentifyError, LoggedRobot, repeated_rows};
+use cft_ident_stages::setup::{Finding, SetupReport};
 
 const EXAMPLE: &str = "\
 Example:
@@ -239,7 +239,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         // What several machines recorded is no one log: each is looked at on its own.
         let machines = match &known {
             Some(_) => Vec::new(),
-            None => crate::log::topics(spec)?,
+            None => cft_ident_logs::log::topics(spec)?,
         };
         let topics: Vec<Option<String>> = match machines.len() {
             0 | 1 => vec![None],

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use crate::identify::{Log, PayloadLog};
-use crate::log::{LogSpec, escape};
+use cft_ident_logs::log::{LogSpec, escape};
+use cft_ident_stages::identify::{Log, PayloadLog};
 
 /// A log with a payload whose mass is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,9 @@ impl FromStr for KnownPayload {
             std,
             log: log
                 .parse()
-                .map_err(|error: crate::log::LogError| PayloadError::Log(error.to_string()))?,
+                .map_err(|error: cft_ident_logs::log::LogError| {
+                    PayloadError::Log(error.to_string())
+                })?,
         })
     }
 }

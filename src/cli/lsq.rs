@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::known_payload::KnownPayload;
 use super::{CliError, Context, Outcome, arguments, files, logs, names_of, pictures, setup};
-use crate::config::campaign::EstimatorKind;
-use crate::identify::{self, LoggedRobot, LsqSettings, refined};
-use crate::log::LogSpec;
-use crate::report::json::Document;
-use crate::report::stages;
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_logs::log::LogSpec;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{self, LoggedRobot, LsqSettings, refined};
 
 const EXAMPLE: &str = "\
 Example:
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FRICTION.toml")]
     pub model: Option<PathBuf>,
     /// How parameters are estimated from the rows
-    #[arg(long, value_enum, default_value_t = EstimatorKind::Wls)]
+    #[arg(long, value_parser = arguments::estimator(), default_value = "wls")]
     pub estimator: EstimatorKind,
     /// Fit the gain of every torque channel too, from a log in which the last link carries a known mass
     /// [kg] besides those without it; with no log given, ratios of gains alone

@@ -7,7 +7,7 @@ use clap_mangen::Man;
 use serde_json::json;
 
 use super::{Cli, CliError, Context, Outcome};
-use crate::report::json::Document;
+use cft_ident_report::report::json::Document;
 
 const EXAMPLE: &str = "\
 Example:

@@ -50,11 +50,11 @@ use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 
-use crate::identify::{Log, ReducedLogs, is_reduced};
-use crate::log::LogSpec;
-use crate::output;
-use crate::report::Detail;
-use crate::report::table::{WIDTH, folded};
+use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::output;
+use cft_ident_report::report::Detail;
+use cft_ident_report::report::table::{WIDTH, folded};
+use cft_ident_stages::identify::{Log, ReducedLogs, is_reduced};
 
 pub use arguments::Destination;
 pub use context::{Context, RunningBar};
@@ -334,7 +334,10 @@ mod tests {
         assert_eq!(args.joint.as_deref(), Some("q4"));
         let args: super::lsq::Args =
             parse("id.csv@0..70% -r cft.toml -m f.toml --estimator ols -o m.toml").unwrap();
-        assert_eq!(args.estimator, crate::config::campaign::EstimatorKind::Ols);
+        assert_eq!(
+            args.estimator,
+            cft_ident_files::config::campaign::EstimatorKind::Ols
+        );
         assert_eq!(args.logs[0].span.label().as_deref(), Some("0..70%"));
         let args: super::validate::Args =
             parse("v.csv -m m.toml --max-relative-error 0.02 -o r.csv --plot a.svg --plot b.svg")

@@ -7,10 +7,10 @@ use std::io::{self, Write};
 use super::error::{CliError, indented, tell};
 use super::exit::Exit;
 use super::{Destination, colour};
-use crate::log::is_hidden;
-use crate::output::Together;
-use crate::report::Detail;
-use crate::report::json::Document;
+use cft_ident_logs::log::is_hidden;
+use cft_ident_logs::output::Together;
+use cft_ident_report::report::Detail;
+use cft_ident_report::report::json::Document;
 
 /// What a command hands back.
 #[derive(Debug)]

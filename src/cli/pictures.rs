@@ -1,12 +1,12 @@
 //! What the page of a command needs besides its result: the logs in memory, and what is wrong with them.
 
 use super::{CliError, Context, Exit, inspect};
-use crate::config::ModelFile;
-use crate::effect::AugmentedModel;
-use crate::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
-use crate::log::LogSpec;
-use crate::replay::{Replay, Replayed};
-use crate::report::sections::quality::Inspected;
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::LogSpec;
+use cft_ident_report::report::sections::quality::Inspected;
+use cft_ident_stages::identify::{self, IdentifyError, InMemory, Log, LoggedRobot};
+use cft_ident_stages::replay::{Replay, Replayed};
 
 /// Reads logs whole for the pictures of a report; `None` where they are too long for that, which
 /// is no reason to lose the report.

@@ -6,12 +6,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, arguments, files, logs, setup};
-use crate::identify::{self, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
-use crate::log::{LogSpec, Provenance, escape};
-use crate::report::Report;
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
-use crate::setup::Finding;
+use cft_ident_logs::log::{LogSpec, Provenance, escape};
+use cft_ident_report::report::Report;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::{self, FORMAT, LoggedRobot, MadeWith, ReducedLogs};
+use cft_ident_stages::setup::Finding;
 
 const EXAMPLE: &str = "\
 Example:

@@ -5,15 +5,15 @@ use serde_json::Value;
 
 use super::{CliError, Context, Outcome};
 use crate::cli::{convert, example, export, identify, inspect, new, reduce, simulate};
-use crate::compare::RunDifference;
-use crate::config::schema::{campaign, model, robot, trajectory};
-use crate::excite::Judgements;
-use crate::identify::{
+use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
+use cft_ident_plant::excite::Judgements;
+use cft_ident_plant::simulate::truth::TruthFile;
+use cft_ident_report::report::json::{self, Document};
+use cft_ident_stages::compare::RunDifference;
+use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong,
     Tracked, Validated, Watched,
 };
-use crate::report::json::{self, Document};
-use crate::simulate::truth::TruthFile;
 
 const EXAMPLE: &str = "\
 Example:

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context};
-use crate::config::correction::{Edit, edited};
-use crate::config::{self, ModelFile, RobotFile};
-use crate::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
-use crate::setup::{Finding, FindingSeverity, SetupReport};
+use cft_ident_files::config::correction::{Edit, edited};
+use cft_ident_files::config::{self, ModelFile, RobotFile};
+use cft_ident_stages::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
+use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
 /// What to do with a set-up that the torques contradict.
 #[derive(Debug, Clone, Default, clap::Args)]

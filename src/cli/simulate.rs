@@ -10,17 +10,17 @@ use super::context::Context;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::{arguments, files};
-use crate::config::RobotFile;
-use crate::config::model_file::Parameter;
-use crate::log::{Block, LogSpec, Provenance, Reader};
-use crate::number;
-use crate::output::LogWriter;
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
-use crate::simulate::effects::EffectValue;
-use crate::simulate::{
+use cft_ident_core::number;
+use cft_ident_files::config::RobotFile;
+use cft_ident_files::config::model_file::Parameter;
+use cft_ident_logs::log::{Block, LogSpec, Provenance, Reader};
+use cft_ident_logs::output::LogWriter;
+use cft_ident_plant::simulate::effects::EffectValue;
+use cft_ident_plant::simulate::{
     self, EffectSpec, Experiment, InitialConditions, LimitEvent, Order, RunEnding,
 };
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
 
 const EXAMPLE: &str = "\
 Example:

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files};
-use crate::identify::{self, Log, LoggedRobot, refined};
-use crate::log::LogSpec;
-use crate::number;
-use crate::output::LogWriter;
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
+use cft_ident_core::number;
+use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::output::LogWriter;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::{self, Log, LoggedRobot, refined};
 
 const EXAMPLE: &str = "\
 Example:

@@ -4,9 +4,11 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files};
-use crate::identify::{self, ReducedLogs, RobotSources, TrackSource, Tracked, is_reduced};
-use crate::report::json::Document;
-use crate::report::stages;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{
+    self, ReducedLogs, RobotSources, TrackSource, Tracked, is_reduced,
+};
 
 const EXAMPLE: &str = "\
 Example:

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::{CliError, Context, Outcome, arguments, files, logs, names_of, outputs, pictures};
-use crate::identify::{self, Log, LoggedRobot, refined};
-use crate::log::{LogSpec, escape};
-use crate::number;
-use crate::open_loop::OpenLoop;
-use crate::output::LogWriter;
-use crate::report::json::Document;
-use crate::report::stages;
-use crate::report::table::{Align, Table};
-use crate::validate::{Reconstructed, TorqueErrors};
+use cft_ident_core::number;
+use cft_ident_core::validate::{Reconstructed, TorqueErrors};
+use cft_ident_logs::log::{LogSpec, escape};
+use cft_ident_logs::output::LogWriter;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::stages;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::{self, Log, LoggedRobot, refined};
+use cft_ident_stages::open_loop::OpenLoop;
 
 const EXAMPLE: &str = "\
 Example:

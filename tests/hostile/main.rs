@@ -7,7 +7,7 @@ mod causes;
 mod every_command;
 mod extremes;
 mod lost_parts;
-#[path = "../measured_support/mod.rs"]
+#[path = "../program/measured_support/mod.rs"]
 mod measured_support;
 mod metamorphic;
 mod numbers;

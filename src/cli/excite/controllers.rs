@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::{Bench, Names, samples};
 use crate::cli::error::CliError;
-use crate::excite::{ExciteError, Judgement, Motion};
-use crate::log::escape;
-use crate::number;
-use crate::output::JointTrajectory;
-use crate::robot::JointKind;
+use cft_ident_core::number;
+use cft_ident_core::robot::JointKind;
+use cft_ident_logs::log::escape;
+use cft_ident_logs::output::JointTrajectory;
+use cft_ident_plant::excite::{ExciteError, Judgement, Motion};
 
 /// Most points of a message or lines of a program: controllers hold them in memory.
 const MOST_POINTS: f64 = 1e6;

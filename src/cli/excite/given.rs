@@ -5,12 +5,12 @@ use std::path::Path;
 use super::Bench;
 use crate::cli::error::CliError;
 use crate::cli::files;
-use crate::config::RobotFile;
-use crate::excite::machine::ForeseenRobot;
-use crate::excite::{GivenInformation, Motion, foresee};
-use crate::identify::{IdentifyError, Log, LoggedRobot};
-use crate::inertia::accumulate;
-use crate::log::LogSpec;
+use cft_ident_core::inertia::accumulate;
+use cft_ident_files::config::RobotFile;
+use cft_ident_logs::log::LogSpec;
+use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::{GivenInformation, Motion, foresee};
+use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
 
 /// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
 const NOISE_SHARE: f64 = 0.01;

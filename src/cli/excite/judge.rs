@@ -2,9 +2,9 @@
 
 use super::Bench;
 use crate::cli::error::CliError;
-use crate::excite::limits::BoundedQuantity;
-use crate::excite::{GivenInformation, Judgement, LawForeseen, Motion, Terms, judge};
-use crate::number;
+use cft_ident_core::number;
+use cft_ident_plant::excite::limits::BoundedQuantity;
+use cft_ident_plant::excite::{GivenInformation, Judgement, LawForeseen, Motion, Terms, judge};
 
 /// Judges a motion by the limits given.
 pub(super) fn judged(

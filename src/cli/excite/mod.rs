@@ -14,22 +14,22 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::outcome::Outcome;
 use super::{arguments, files, keep_what_there_is};
-use crate::config::trajectory::FourierSection;
-use crate::config::{RobotFile, Trajectory};
-use crate::excite::blend::Blend;
-use crate::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
-use crate::excite::machine::ForeseenRobot;
-use crate::excite::search::{FoundMotion, Task, design};
-use crate::excite::series::Series;
-use crate::excite::usage::check_pose;
-use crate::excite::{
+use cft_ident_files::config::trajectory::FourierSection;
+use cft_ident_files::config::{RobotFile, Trajectory};
+use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_plant::excite::blend::Blend;
+use cft_ident_plant::excite::ladder::{LadderTask, design_ladder, foresee_ladder};
+use cft_ident_plant::excite::machine::ForeseenRobot;
+use cft_ident_plant::excite::search::{FoundMotion, Task, design};
+use cft_ident_plant::excite::series::Series;
+use cft_ident_plant::excite::usage::check_pose;
+use cft_ident_plant::excite::{
     Criterion, ExciteError, GivenInformation, Judgement, Judgements, LawForeseen, Motion,
     PriorInformation, foresee, machine, series_of, trajectory, usual_torque,
 };
-use crate::log::{Provenance, escape};
-use crate::report::json::Document;
-use crate::report::sections::provenance;
-use crate::report::{Report, stages};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::provenance;
+use cft_ident_report::report::{Report, stages};
 
 use judge::{head, judged, refuse_broken};
 use names::Names;

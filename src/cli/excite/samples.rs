@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::Bench;
 use crate::cli::error::CliError;
-use crate::config::trajectory::Coordinates;
-use crate::excite::{ExciteError, Motion};
-use crate::number;
-use crate::output::LogWriter;
+use cft_ident_core::number;
+use cft_ident_files::config::trajectory::Coordinates;
+use cft_ident_logs::output::LogWriter;
+use cft_ident_plant::excite::{ExciteError, Motion};
 
 /// Most samples that a file may have.
 const MOST_ROWS: f64 = 1e8;

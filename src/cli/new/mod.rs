@@ -8,15 +8,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Outcome, inspect};
-use crate::config::{Capsules, RobotFile, UrdfChain};
-use crate::excite::space::always_touching;
-use crate::identify::LoggedRobot;
-use crate::inspect::{LogFault, Severity};
-use crate::log::{LogSpec, Provenance, Reader, escape};
-use crate::mapping::{Asked, JointColumns, Known, Mapping, look};
-use crate::report::json::Document;
-use crate::report::table::{Align, Table};
-use crate::robot::JointKind;
+use cft_ident_core::robot::JointKind;
+use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
+use cft_ident_logs::inspect::{LogFault, Severity};
+use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
+use cft_ident_logs::mapping::{Asked, JointColumns, Known, Mapping, look};
+use cft_ident_plant::excite::space::always_touching;
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::table::{Align, Table};
+use cft_ident_stages::identify::LoggedRobot;
 use text::Draft;
 
 const EXAMPLE: &str = "\
@@ -179,7 +179,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         warnings.push(format!(
             "topic {} is read, for it holds positions and torques and is no leader's and no command's; the others are {}",
             escape(topic),
-            crate::log::list(seen.other_topics.iter().map(String::as_str))
+            cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
         ));
     }
     let (mut unread, mut faults) = (false, None);
@@ -324,7 +324,7 @@ fn inspected(faults: Option<&[LogFault]>) -> String {
 
 /// The independent joints of a URDF, their kinds and their largest torques.
 fn joints_of(chain: &UrdfChain) -> Vec<Known> {
-    let of = |link: &crate::config::serial_section::LinkSection| {
+    let of = |link: &cft_ident_files::config::serial_section::LinkSection| {
         let name = link.joint.clone()?;
         let limits = chain.limits.iter().find(|(joint, _)| *joint == name);
         Some(Known {

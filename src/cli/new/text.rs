@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use super::Shape;
-use crate::config::{Capsules, UrdfChain};
-use crate::log::{escape, list};
-use crate::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
-use crate::number;
-use crate::robot::JointKind;
+use cft_ident_core::number;
+use cft_ident_core::robot::JointKind;
+use cft_ident_files::config::{Capsules, UrdfChain};
+use cft_ident_logs::log::{escape, list};
+use cft_ident_logs::mapping::{ClockSource, JointColumns, Mapping, SeenColumns};
 
 /// What the text is made from.
 pub(super) struct Draft<'a> {

@@ -1,0 +1,288 @@
+//! An effect with its numbers, as it stands in a model.
+
+use super::entry::{Family, Role};
+use super::facts::Facts;
+use super::law::{KeyValue, Law};
+use super::physics::{Rule, Seen};
+use super::place::Place;
+use super::scene::Scene;
+use super::unit::Unit;
+use super::values::{EffectError, Values};
+use crate::robot::Robot;
+
+/// One number of an effect as results and files have it: key, value, standard deviation, unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectNumber {
+    pub key: String,
+    pub value: f64,
+    pub std: Option<f64>,
+    pub unit: String,
+    /// Held at a bound, for these data do not tell it.
+    pub bound: bool,
+}
+
+/// An effect in a model.
+#[derive(Debug, Clone)]
+pub struct Added {
+    pub law: &'static Law,
+    pub place: Place,
+    pub shape: Vec<f64>,
+    pub linear: Vec<f64>,
+    /// Which of (shape, linear) a fit leaves where they are: what the data do not tell, at a bound.
+    pub held: Vec<bool>,
+}
+
+impl PartialEq for Added {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+            && self.place == other.place
+            && self.shape == other.shape
+            && self.linear == other.linear
+    }
+}
+
+impl Added {
+    /// An effect with its numbers, all of them open to a fit.
+    pub fn new(law: &'static Law, place: Place, shape: Vec<f64>, linear: Vec<f64>) -> Self {
+        Added {
+            held: vec![false; shape.len() + linear.len()],
+            law,
+            place,
+            shape,
+            linear,
+        }
+    }
+
+    /// The effect at the place and with the numbers that a file gives.
+    ///
+    /// # Errors
+    /// [`EffectError`] for a joint or key that does not fit.
+    pub(crate) fn of_values(
+        law: &'static Law,
+        robot: &Robot,
+        joint: Option<&str>,
+        values: &Values,
+    ) -> Result<Self, EffectError> {
+        let place = law.entry.places.named(robot, joint, values)?;
+        let [shape, linear] = law.of_keys(values)?;
+        Ok(Added::new(law, place, shape, linear))
+    }
+
+    /// Holds the numbers whose keys are at a bound, as a file says; none of an effect whose keys are not its shape and
+    /// coefficients.
+    pub fn hold(&mut self, bound: &dyn Fn(&str) -> bool) {
+        if self.law.reparametrised.is_none() {
+            let keys = self.law.key_names();
+            for (held, key) in self.held.iter_mut().zip(keys) {
+                *held = bound(key);
+            }
+        }
+    }
+
+    /// Whether its torque is the same while its joint rests.
+    pub(crate) fn at_rest(&self) -> bool {
+        match self.law.varied {
+            Some(of) => of(&self.shape).1,
+            None => self.law.entry.at_rest,
+        }
+    }
+
+    /// Joints whose temperature it takes.
+    pub fn temperatures(&self) -> Vec<usize> {
+        let formula = self.law.formula.zip(self.place.joint());
+        formula.map_or(Vec::new(), |(formula, j)| formula.temperatures(j))
+    }
+
+    /// As results and files name it.
+    pub fn name(&self) -> &'static str {
+        self.law.entry.name
+    }
+
+    /// Family.
+    pub fn family(&self) -> Family {
+        match self.law.varied {
+            Some(of) => of(&self.shape).0,
+            None => self.law.entry.family(),
+        }
+    }
+
+    /// The first rule of its entry, but for those to `skip`, that its numbers break, with the reason in words.
+    pub fn broken(
+        &self,
+        seen: &Seen,
+        skip: &dyn Fn(&Rule) -> bool,
+    ) -> Option<(&'static Rule, String)> {
+        let keys = self.law.keys(&self.shape, &self.linear);
+        let value = |key: &str| keys.iter().find(|k| k.key == key).map(|k| k.value);
+        let mut rules = self.law.entry.must.iter().filter(|rule| !skip(rule));
+        rules.find_map(|rule| Some((rule, rule.broken(&value, seen)?)))
+    }
+
+    /// Values and covariance of its sizes, where `covariance` is that of (shape, linear), row-major. A size that
+    /// has none, or an infinite one, is left out.
+    pub fn sizes(&self, covariance: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let size = |k: &KeyValue| self.law.entry.key(k.key).is_some_and(|key| key.size);
+        let told = |k: &KeyValue| {
+            let variance = spread(&k.slopes, &k.slopes, covariance);
+            variance > 0.0 && variance.is_finite()
+        };
+        let mut keys = self.law.keys(&self.shape, &self.linear);
+        keys.retain(|k| size(k) && told(k));
+        let of = |a: &KeyValue| {
+            let row = keys
+                .iter()
+                .map(|b| spread(&a.slopes, &b.slopes, covariance));
+            row.collect()
+        };
+        (
+            keys.iter().map(|k| k.value).collect(),
+            keys.iter().map(of).collect(),
+        )
+    }
+
+    /// What the effect adds to joint `joint` along a scene, into `out` (zeroed before); nothing for
+    /// effects that shift the torque.
+    pub fn torque(&self, scene: &Scene, joint: usize, out: &mut [f64]) {
+        out.fill(0.0);
+        if self.law.entry.role == Role::Shift || !self.place.touches(joint) {
+            return;
+        }
+        let columns = self.columns(scene, joint);
+        for (column, c) in columns.iter().zip(&self.linear) {
+            for (x, y) in out.iter_mut().zip(column) {
+                *x += c * y;
+            }
+        }
+    }
+
+    /// Its columns in the rows of joint `joint`.
+    pub fn columns(&self, scene: &Scene, joint: usize) -> Vec<Vec<f64>> {
+        let mut out = vec![vec![0.0; scene.len()]; self.law.linear.len()];
+        if self.place.touches(joint) {
+            self.law
+                .fill(scene, self.place, (&self.shape, joint), &mut out);
+        }
+        out
+    }
+
+    /// Time by which it shifts the torque of joint `joint` \[s\].
+    pub fn shift(&self, joint: usize) -> f64 {
+        if self.law.entry.role == Role::Shift && self.place.touches(joint) {
+            self.linear[0]
+        } else {
+            0.0
+        }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.shape.len() + self.linear.len()
+    }
+
+    /// Name, or name and place: `ripple of q4`.
+    pub fn title(&self, robot: &Robot) -> String {
+        let name = self.name();
+        match (self.place, self.place.name(robot)) {
+            (Place::Pair { of, .. }, Some(on)) => {
+                format!("{name} of {on} with {}", robot.joint_names()[of])
+            }
+            (Place::Geared { other, .. }, Some(motor)) => {
+                format!("{name} of {motor} and {}", robot.joint_names()[other])
+            }
+            (_, Some(place)) => format!("{name} of {place}"),
+            (_, None) => name.to_owned(),
+        }
+    }
+
+    /// What it is called where it was found: `ripple of q1, 2.5 mm pitch, 1.2 N`. `torque` is the torque's unit.
+    pub fn said(&self, robot: &Robot, torque: &str) -> String {
+        let numbers = self.numbers(robot, torque, None).into_iter();
+        let at = self.place.name(robot);
+        let words = (self.law.entry.said)(&Facts {
+            at: at.unwrap_or_else(|| "all joints".to_owned()),
+            with: (self.place.from()).map_or(String::new(), |j| robot.joint_names()[j].clone()),
+            kind: self.place.kind(robot),
+            numbers: numbers.map(|n| (n.key, n.value, n.unit)).collect(),
+            curve: self.curve(),
+            torque: torque.to_owned(),
+        });
+        match words.is_empty() {
+            // an effect of the user's own has its name alone
+            true => self.title(robot),
+            false => words,
+        }
+    }
+
+    /// The same with the catalogue's name where that is not among the words: `gear of q1 with play (backlash)`.
+    pub fn said_and_named(&self, robot: &Robot, torque: &str) -> String {
+        let (said, name) = (self.said(robot, torque), self.name());
+        match said.contains(name) || said.contains(&name.replace('-', " ")) {
+            true => said,
+            false => format!("{said} ({name})"),
+        }
+    }
+
+    /// Numbers as files and tables have them. `covariance` is that of (shape, linear), row-major;
+    /// a shape that these data leave open has infinite variance there. `torque` is the torque's unit.
+    pub fn numbers(
+        &self,
+        robot: &Robot,
+        torque: &str,
+        covariance: Option<&[f64]>,
+    ) -> Vec<EffectNumber> {
+        let kind = self.place.kind(robot);
+        let from = self.place.from().map_or(kind, |j| robot.joint_kind(j));
+        let own = self.law.keys(&self.shape, &self.linear).into_iter();
+        let own = own.map(|number| {
+            let unit = self.law.entry.key(number.key);
+            let unit = match unit.map_or(Unit::One, |key| key.unit) {
+                Unit::Signal => self.curve().map_or(Unit::One, |(signal, _)| signal.unit()),
+                unit => unit,
+            };
+            // a number of held ones alone
+            let open = |(slope, held): (&f64, &bool)| *slope != 0.0 && !held;
+            let bound =
+                self.held.contains(&true) && !number.slopes.iter().zip(&self.held).any(open);
+            let std = covariance.and_then(|c| deviation(&number.slopes, c));
+            EffectNumber {
+                key: number.key.to_owned(),
+                value: number.value,
+                std: std.filter(|_| !bound),
+                unit: unit.in_files(kind, from, torque),
+                bound,
+            }
+        });
+        let place = self.place.keys().into_iter();
+        let place = place.map(|(key, value)| EffectNumber {
+            key: key.to_owned(),
+            value,
+            std: None,
+            unit: String::new(),
+            bound: false,
+        });
+        own.chain(place).collect()
+    }
+}
+
+/// Covariance of two numbers with these slopes.
+fn spread(one: &[f64], other: &[f64], covariance: &[f64]) -> f64 {
+    let k = one.len();
+    let mut sum = 0.0;
+    for a in 0..k {
+        for b in 0..k {
+            // a variance may be infinite
+            if one[a] != 0.0 && other[b] != 0.0 {
+                sum += one[a] * other[b] * covariance[a * k + b];
+            }
+        }
+    }
+    sum
+}
+
+/// Standard deviation of a number with these slopes, where it is one.
+fn deviation(slopes: &[f64], covariance: &[f64]) -> Option<f64> {
+    let variance = spread(slopes, slopes, covariance);
+    // rounding may leave nothing below nothing; what is not a number is no deviation
+    let std = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+    std.is_finite().then_some(std)
+}

@@ -1,0 +1,216 @@
+//! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
+//! gradient of its known friction, and the target.
+
+use crate::motion::rest;
+use crate::robot::Robot;
+use crate::robot::friction::{DoubleTanh, sign};
+
+/// A linear term that belongs to one joint and is fitted with the inertias.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Own {
+    /// Fv v.
+    Viscous,
+    /// Fc sgn(v).
+    Coulomb,
+    /// A constant torque.
+    Offset,
+    /// Fc tanh(w v) with w known [s/m or s/rad]: one of several by which a law (18) is begun.
+    Saturating(f64),
+    /// Change of the parameter of this index of a friction law (order of [`DoubleTanh::NAMES`]);
+    /// the law's gradient is its column.
+    Law(usize),
+}
+
+impl Own {
+    /// Name in results and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Own::Viscous => "viscous",
+            Own::Coulomb => "coulomb",
+            Own::Offset => "offset",
+            Own::Saturating(_) => "coulomb",
+            Own::Law(k) => DoubleTanh::NAMES[k],
+        }
+    }
+
+    /// Its column at velocity v; 0 for a law's, which [`RegressorColumns::fill`] writes by its gradient.
+    #[inline]
+    pub fn column(self, v: f64) -> f64 {
+        match self {
+            Own::Viscous => v,
+            Own::Coulomb => sign(v),
+            Own::Offset => 1.0,
+            Own::Saturating(slope) => (slope * v).tanh(),
+            Own::Law(_) => 0.0,
+        }
+    }
+}
+
+/// What is known of a joint's friction before the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownFriction {
+    pub law: DoubleTanh,
+    /// Covariance of (Bv, Bf1, Bf2, w1, w2), row-major 5 x 5; zero where it is taken as exact.
+    pub covariance: [[f64; 5]; 5],
+    /// Which of them a refinement leaves where they are.
+    pub held: [bool; GRADIENT],
+}
+
+impl KnownFriction {
+    /// Whether a refinement moves any of its parameters.
+    pub fn moves(&self) -> bool {
+        self.held.contains(&false)
+    }
+}
+
+/// Columns of the rows of every joint.
+#[derive(Debug, Clone)]
+pub struct RegressorColumns {
+    /// Number of joints n.
+    pub joints: usize,
+    /// Number of shared inertial parameters p.
+    pub shared: usize,
+    /// Own linear terms per joint.
+    pub own: Vec<Vec<Own>>,
+    /// Known friction per joint; its gradient takes five columns.
+    pub known: Vec<Option<KnownFriction>>,
+    /// Speed up to which each joint rests [m/s or rad/s]: static friction takes any torque there, and its
+    /// rows inform no parameter. Below 0 of a joint whose rows always count; empty where all do.
+    pub rest_speed: Vec<f64>,
+}
+
+/// Columns that the gradient of a known friction law takes.
+pub const GRADIENT: usize = 5;
+
+impl RegressorColumns {
+    /// Rows in which a joint with friction rests, by the speed up to which it does [m/s or rad/s], inform no
+    /// parameter; joints without friction never rest.
+    pub fn rest_at(&mut self, speeds: Vec<f64>) {
+        let friction = |j: usize| {
+            let of_friction = |own: &Own| !matches!(own, Own::Offset);
+            self.known[j].is_some() || self.own[j].iter().any(of_friction)
+        };
+        let speeds = speeds.into_iter().enumerate();
+        let speeds = speeds.map(|(j, speed)| if friction(j) { speed } else { -1.0 });
+        self.rest_speed = speeds.collect();
+    }
+
+    /// Number of unknowns: shared ones first, then each joint's own in turn.
+    pub fn unknowns(&self) -> usize {
+        self.shared + self.own.iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Index of the first own unknown of joint j.
+    pub fn first_own(&self, j: usize) -> usize {
+        self.shared + self.own[..j].iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Number of unknowns in the rows of joint j.
+    pub fn unknowns_of(&self, j: usize) -> usize {
+        self.shared + self.own[j].len()
+    }
+
+    /// Width of one row of joint j: unknowns, gradient, target b = tau - F(v).
+    pub fn row_width(&self, j: usize) -> usize {
+        self.unknowns_of(j) + self.gradient(j) + 1
+    }
+
+    /// Gradient columns of joint j.
+    pub fn gradient(&self, j: usize) -> usize {
+        if self.known[j].is_some() { GRADIENT } else { 0 }
+    }
+
+    /// Index of the global unknown that column c of joint j's unknowns stands for.
+    pub fn unknown(&self, j: usize, c: usize) -> usize {
+        if c < self.shared {
+            c
+        } else {
+            self.first_own(j) + c - self.shared
+        }
+    }
+
+    /// Where joint j's columns begin in a row of all channels; after all joints' columns stand the
+    /// n measured torques.
+    pub fn offset(&self, j: usize) -> usize {
+        (0..j).map(|i| self.row_width(i)).sum()
+    }
+
+    /// Channels per sample over all joints: their rows, measured torques, and for each joint 1 where it
+    /// moves and 0 where it rests, where rests are told.
+    pub fn channels(&self) -> usize {
+        self.offset(self.joints) + self.joints + self.rest_speed.len()
+    }
+
+    /// Whether joint j rests in a row of filtered channels.
+    #[inline]
+    pub(crate) fn rests(&self, channels: &[f64], j: usize) -> bool {
+        let moving = self.offset(self.joints) + self.joints + j;
+        !self.rest_speed.is_empty() && rest::rests(channels[moving])
+    }
+
+    /// The same columns with the parameters of the known friction among the unknowns, but for those that are
+    /// held: their gradient, which stands after the own terms, becomes own terms.
+    pub fn with_free_friction(&self) -> RegressorColumns {
+        let mut own = self.own.clone();
+        for (own, known) in own.iter_mut().zip(&self.known) {
+            if let Some(known) = known {
+                let free = (0..GRADIENT).filter(|k| !known.held[*k]);
+                own.extend(free.map(Own::Law));
+            }
+        }
+        RegressorColumns {
+            joints: self.joints,
+            shared: self.shared,
+            own,
+            known: vec![None; self.joints],
+            rest_speed: self.rest_speed.clone(),
+        }
+    }
+
+    /// Unknowns of joint j that are changes of its law, each with its place in the law.
+    pub fn law_unknowns(&self, j: usize) -> impl Iterator<Item = (usize, usize)> {
+        let first = self.first_own(j);
+        let own = self.own[j].iter().enumerate();
+        own.filter_map(move |(c, own)| match own {
+            Own::Law(k) => Some((first + c, *k)),
+            _ => None,
+        })
+    }
+
+    /// Fills the channels of one sample.
+    pub fn fill(
+        &self,
+        robot: &Robot,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        tau: &[f64],
+        out: &mut [f64],
+    ) {
+        let (n, p) = (self.joints, self.shared);
+        robot.regressor(q, v, a, &mut out[..n * p]);
+        let mut end = self.offset(n);
+        out[end..end + n].copy_from_slice(tau);
+        for (j, speed) in self.rest_speed.iter().enumerate() {
+            out[end + n + j] = rest::movement(v[j], *speed);
+        }
+        // from the last joint to the first: rows only move up
+        for j in (0..n).rev() {
+            let first = end - self.row_width(j);
+            out.copy_within(j * p..(j + 1) * p, first);
+            let mut at = first + p;
+            for own in &self.own[j] {
+                out[at] = own.column(v[j]);
+                at += 1;
+            }
+            let mut b = tau[j];
+            if let Some(known) = &self.known[j] {
+                b -= known.law.torque(v[j]);
+                out[at..at + GRADIENT].copy_from_slice(&known.law.gradient(v[j]));
+                at += GRADIENT;
+            }
+            out[at] = b;
+            end = first;
+        }
+    }
+}

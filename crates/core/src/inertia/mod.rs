@@ -1,0 +1,88 @@
+//! Inertial parameters by least squares on the inverse-dynamics regressor, eq. (39)-(42).
+//!
+//! Rows come filtered and decimated from `motion`; `columns` says what stands in them,
+//! `accumulate` folds them into R factors, `solve` fits by a `solution`, `covariance` says how sure it is. `robust`,
+//! `refine` (from a `law_start`) and `instruments` (along motions of `closed_loop`) are estimators that read the logs
+//! several times; `condense` makes of a log what a file of reduced logs holds, one R factor and `scores`; `essential`
+//! and `feasible` work on the R factor of a fit, `gains` finds what one unit of each torque channel is at its joint.
+
+pub mod accumulate;
+pub mod closed_loop;
+pub mod columns;
+mod condense;
+mod covariance;
+pub mod encoder;
+pub mod essential;
+pub mod feasible;
+pub mod gains;
+pub mod instruments;
+pub mod law_start;
+pub mod refine;
+pub mod robust;
+pub mod scores;
+pub mod solution;
+pub mod solve;
+mod two_pass;
+pub mod verdict;
+
+use crate::block::Block;
+use crate::motion::{self, FilterSettings, RunError, Summary};
+use crate::robot::Robot;
+
+use accumulate::{Accumulator, BlockFactors};
+use columns::RegressorColumns;
+use robust::Weigher;
+
+/// Length of the blocks whose scores make the covariance, to begin with [s]: so short beside the time over which
+/// residuals are correlated that it does not matter where they begin.
+const BLOCK_SECONDS: f64 = 0.05;
+
+/// Reads one log and reduces its filtered, decimated rows to block factors. Those of several logs merge.
+///
+/// # Errors
+/// Those of the source and of [`motion::run`].
+pub fn accumulate<E>(
+    robot: &Robot,
+    columns: &RegressorColumns,
+    settings: &FilterSettings,
+    source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+) -> Result<(BlockFactors, Summary), RunError<E>> {
+    accumulate_weighted(robot, columns, None, settings, source)
+}
+
+/// The same with each row weighted by its residual, where a weigher is given.
+///
+/// # Errors
+/// Those of the source and of [`motion::run`].
+pub fn accumulate_weighted<E>(
+    robot: &Robot,
+    columns: &RegressorColumns,
+    mut weigher: Option<&mut Weigher>,
+    settings: &FilterSettings,
+    source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+) -> Result<(BlockFactors, Summary), RunError<E>> {
+    let mut factors = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+    let summary = motion::run(
+        source,
+        columns.joints,
+        settings,
+        None,
+        columns.channels(),
+        &|s, out| columns.fill(robot, s.q, s.v, s.a, s.tau, out),
+        &mut |row| {
+            let channels = match &mut weigher {
+                Some(weigher) => weigher.weigh(columns, row.filtered),
+                None => row.filtered,
+            };
+            factors.add(row.segment, row.step, channels);
+        },
+    )?;
+    Ok((factors.finish(), summary))
+}
+
+/// Adds to a fit's covariance what another processing of the same logs changes in its parameters.
+/// Smoothing errs in the same way at every reversal of a periodic motion, which no residual shows.
+pub fn add_processing(fit: &mut solve::Fit, other: &solve::Fit) {
+    let change = &other.theta - &fit.theta;
+    fit.covariance.ger(1.0, &change, &change, 1.0);
+}

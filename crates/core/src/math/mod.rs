@@ -1,0 +1,115 @@
+//! Small general mathematics: the mergeable R factor, rank and singular values, recursive filters,
+//! minimisation.
+//!
+//! | file | what | outside crate behind it |
+//! |---|---|---|
+//! | [`rfactor`] | triangular factor of a stacked matrix that never exists as a whole | none |
+//! | [`rank`] | singular values, rank, condition number | `faer` |
+//! | `rank_revealing` | inverse of a normal matrix with redundant columns | none |
+//! | `jacobi` | one-sided Jacobi singular values: fallback and test oracle | none |
+//! | `bootstrap` | 95 % intervals of statistics of pieces of data | none |
+//! | `lanes` | loops compiled for the widest vectors of the processor | `pulp` |
+//! | [`descent`] | step control of the Gauss-Newton loops | none |
+//! | [`minimise`] | lowest value of a function, with or without gradient | `argmin` |
+//! | [`formula`] | formulas of users, evaluated or as text of a program | `exmex` |
+//! | [`sos`] | Butterworth and Chebyshev filters as second-order sections | none |
+//! | [`zero_phase`] | a section cascade run forward and backward over interleaved channels | none |
+
+pub mod bootstrap;
+pub mod causal;
+pub mod descent;
+pub mod formula;
+pub mod jacobi;
+pub mod lanes;
+pub mod long_run;
+pub mod minimise;
+pub mod rank;
+pub mod rank_revealing;
+pub mod rfactor;
+pub mod sos;
+pub mod zero_phase;
+
+#[cfg(test)]
+mod properties;
+
+use thiserror::Error;
+
+/// What the room `math` cannot compute, with the numbers that offend.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum MathError {
+    /// An entry is NaN or infinite.
+    #[error(
+        "matrix entry ({row}, {column}) is {value}: find the row of data that is not finite and leave it out"
+    )]
+    NotFinite {
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+        /// The entry.
+        value: f64,
+    },
+
+    /// Neither method found singular values that reproduce the norm of the matrix.
+    #[error(
+        "singular values of a {rows} x {columns} matrix have square sum {found:e}, its entries {expected:e}: scale the columns to norm 1 first"
+    )]
+    NoConvergence {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        columns: usize,
+        /// Sum of the squared singular values.
+        found: f64,
+        /// Sum of the squared entries.
+        expected: f64,
+    },
+
+    /// Two R factors of different width cannot be merged.
+    #[error(
+        "an R factor of {found} columns cannot be merged into one of {expected}: both must come from the same model"
+    )]
+    ColumnMismatch {
+        /// Columns of the factor that is extended.
+        expected: usize,
+        /// Columns of what is added.
+        found: usize,
+    },
+
+    /// A cut-off frequency that the sampling rate does not carry.
+    #[error(
+        "a cut-off of {cutoff_hz} Hz needs a sampling rate of more than {} Hz, found {rate_hz} Hz: lower the cut-off",
+        2.0 * cutoff_hz
+    )]
+    Cutoff {
+        /// Cut-off frequency (Hz).
+        cutoff_hz: f64,
+        /// Sampling rate (Hz).
+        rate_hz: f64,
+    },
+
+    /// A filter order outside 1..=16.
+    #[error("a filter of order {order} is not offered: choose 1 to 16")]
+    FilterOrder {
+        /// The order asked for.
+        order: usize,
+    },
+
+    /// A pass-band ripple that is not a positive number of decibels.
+    #[error("a pass-band ripple of {ripple_db} dB is not possible: choose more than 0, 0.05 say")]
+    Ripple {
+        /// Ripple (dB).
+        ripple_db: f64,
+    },
+
+    /// A signal shorter than the extension at its ends.
+    #[error(
+        "{samples} samples are too few for a zero-phase filter that extends each end by {needed}: give a longer record or a filter of lower order"
+    )]
+    TooShort {
+        /// Samples of the signal.
+        samples: usize,
+        /// Samples of the extension; the signal needs one more.
+        needed: usize,
+    },
+}

@@ -1,0 +1,571 @@
+//! Torque reconstruction on a log that was not used (Figures 7 and 8 of the report).
+//!
+//! Measured and reconstructed torque run through the model's declared parallel filter alike; the
+//! errors of every filtered, decimated row and of every raw sample are summed as they pass.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::block::Block;
+use crate::motion::{self, FilterSettings, Parallel, Stretch, Summary, rest};
+use crate::robot::model::{JointFriction, Model};
+
+/// Errors of one joint.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct JointError {
+    pub joint: String,
+    /// "N" or "Nm".
+    pub unit: &'static str,
+    /// Root mean square of measured less reconstructed torque, filtered.
+    pub rmse: f64,
+    /// norm(tau - tau_hat) / norm(tau), filtered and decimated.
+    pub relative_error: f64,
+    /// The same of the rows in which the joint moves; null where there are none.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which it rests.
+    pub relative_error_rest: Option<f64>,
+    /// The same of every raw sample.
+    pub relative_error_raw: f64,
+    /// Largest filtered error.
+    pub max_abs: f64,
+    /// 1 - residual variance / variance of the measured torque, filtered.
+    pub r2: f64,
+    /// Share of the raw samples that the 95 % band holds; absent without a band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage_95: Option<f64>,
+    /// Mean half width of the band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_width: Option<f64>,
+    /// Filtered, decimated rows.
+    pub samples: u64,
+    /// Those in which it rests.
+    #[serde(skip)]
+    pub resting: u64,
+}
+
+/// Errors over all joints.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Overall {
+    /// Stacked norms over all joints; none where their units differ.
+    pub relative_error: Option<f64>,
+    /// The same of the rows in which each joint moves.
+    pub relative_error_moving: Option<f64>,
+    /// The same of the rows in which each joint rests.
+    pub relative_error_rest: Option<f64>,
+    /// Root mean square over joints of their relative errors.
+    pub mean_relative_error: f64,
+}
+
+/// Errors joint by joint, and over the joints.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TorqueErrors {
+    pub joints: Vec<JointError>,
+    pub overall: Overall,
+}
+
+/// Reconstructed logs.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Validation {
+    /// Over all logs.
+    #[serde(flatten)]
+    pub errors: TorqueErrors,
+    #[serde(rename = "processing")]
+    pub summary: Summary,
+    #[serde(skip)]
+    pub traces: TorqueTraces,
+}
+
+/// Filtered torques over time for the figure, thinned to a bounded number of points so that every
+/// extreme survives.
+#[derive(Debug, Clone, Default)]
+pub struct TorqueTraces {
+    /// Time of each point [s].
+    pub t: Vec<f64>,
+    /// First point of each uninterrupted stretch.
+    pub breaks: Vec<usize>,
+    /// Measured and reconstructed torque, points x joints, row-major.
+    pub measured: Vec<f64>,
+    pub reconstructed: Vec<f64>,
+}
+
+/// ErrorSums of one joint.
+#[derive(Debug, Clone, Copy, Default)]
+struct ErrorSums {
+    error: f64,
+    torque: f64,
+    mean: f64,
+    scatter: f64,
+    largest: f64,
+    rows: u64,
+    raw_error: f64,
+    raw_torque: f64,
+    /// Raw samples, those inside the band, and the sum of its half widths.
+    raw_rows: u64,
+    inside: u64,
+    widths: f64,
+    /// Squared error and torque of the rows in which the joint rests, and their number.
+    rest: [f64; 2],
+    resting: u64,
+}
+
+impl ErrorSums {
+    fn add(&mut self, measured: f64, reconstructed: f64, rests: bool) {
+        let e = measured - reconstructed;
+        if rests {
+            self.rest[0] += e * e;
+            self.rest[1] += measured * measured;
+            self.resting += 1;
+        }
+        self.error += e * e;
+        self.torque += measured * measured;
+        self.largest = self.largest.max(e.abs());
+        self.rows += 1;
+        // Welford 1962: the scatter about the running mean
+        let d = measured - self.mean;
+        self.mean += d / self.rows as f64;
+        self.scatter += d * (measured - self.mean);
+    }
+
+    /// Adds the rows of another log.
+    fn merge(&mut self, other: &Self) {
+        // Chan, Golub and LeVeque 1983: the scatter about the mean of both
+        let rows = (self.rows + other.rows).max(1) as f64;
+        let apart = other.mean - self.mean;
+        self.scatter += other.scatter + apart * apart * self.rows as f64 * other.rows as f64 / rows;
+        self.mean += apart * other.rows as f64 / rows;
+        self.error += other.error;
+        self.torque += other.torque;
+        self.largest = self.largest.max(other.largest);
+        self.rows += other.rows;
+        self.raw_error += other.raw_error;
+        self.raw_torque += other.raw_torque;
+        self.raw_rows += other.raw_rows;
+        self.inside += other.inside;
+        self.widths += other.widths;
+        self.rest[0] += other.rest[0];
+        self.rest[1] += other.rest[1];
+        self.resting += other.resting;
+    }
+
+    fn add_raw(&mut self, measured: f64, reconstructed: f64, half_width: f64) {
+        let e = measured - reconstructed;
+        self.raw_rows += 1;
+        self.inside += u64::from(e.abs() <= half_width);
+        self.widths += half_width;
+        self.raw_error += e * e;
+        self.raw_torque += measured * measured;
+    }
+}
+
+/// norm(tau - tau_hat) / norm(tau) from the squares of both, where there are rows.
+fn ratio(error: f64, torque: f64, rows: u64) -> Option<f64> {
+    let relative = match torque > 0.0 {
+        true => (error / torque).sqrt(),
+        false => f64::NAN,
+    };
+    (rows > 0).then_some(relative)
+}
+
+/// One row of raw torques, handed to the caller for a residual file.
+#[derive(Debug, Clone, Copy)]
+pub struct Reconstructed<'a> {
+    pub t: f64,
+    /// Positions [m or rad] and velocities [m/s or rad/s].
+    pub q: &'a [f64],
+    pub v: &'a [f64],
+    /// Unfiltered torque as logged and as reconstructed, n numbers each.
+    pub measured: &'a [f64],
+    pub reconstructed: &'a [f64],
+    /// Half the width of the 95 % band; 0 without one.
+    pub half_width: &'a [f64],
+}
+
+/// Half the widths of a band from q, v, a, and the model's torque.
+pub type HalfWidths<'a> = &'a (dyn Fn([&[f64]; 3], &[f64], &mut [f64]) + Sync);
+
+/// Where the thinning of a log's rows stands.
+struct Taken<'a> {
+    settings: &'a FilterSettings,
+    stretch: Option<usize>,
+    count: usize,
+    began: f64,
+    every: usize,
+}
+
+impl<'a> Taken<'a> {
+    fn new(settings: &'a FilterSettings) -> Self {
+        Taken {
+            settings,
+            stretch: None,
+            count: 0,
+            began: 0.0,
+            every: 1,
+        }
+    }
+
+    /// Whether the next row, at `t` of `stretch`, is kept; and whether a stretch begins with it.
+    fn keeps(&mut self, stretch: usize, t: f64) -> (bool, bool) {
+        let begins = self.stretch != Some(stretch);
+        if begins {
+            (self.stretch, self.count, self.began) = (Some(stretch), 0, t);
+        } else if self.count == 1 {
+            // rows come at full rate: two of them tell the step
+            self.every = self.settings.decimation_at(t - self.began);
+        }
+        let keeps = self.count.is_multiple_of(self.every) || begins;
+        self.count += 1;
+        (keeps, begins)
+    }
+}
+
+/// Errors of several logs and joints, summed log after log.
+pub struct Reconstruction<'a> {
+    model: &'a Model,
+    /// Speed up to which each joint rests [m/s or rad/s]; below 0 where its rows always count.
+    rest_speed: Vec<f64>,
+    band: Option<HalfWidths<'a>>,
+    /// Of the present log, joint by joint, and of those before it.
+    sums: Vec<ErrorSums>,
+    before: Vec<Vec<ErrorSums>>,
+    traces: TorqueTraces,
+    /// Time of the log's own clock where the times of its rows are 0 [s].
+    zero: f64,
+    /// Rows of which sums alone are known: nothing is told then of single ones.
+    summed: bool,
+}
+
+/// Squares of one joint over filtered, decimated rows.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SummedRows {
+    /// Squared error [N^2 or N^2 m^2], of the rows in which the joint moves and of those in which it rests.
+    pub error: [f64; 2],
+    /// Squared measured torque of both.
+    pub torque: [f64; 2],
+    /// Number of both.
+    pub rows: [u64; 2],
+}
+
+impl<'a> Reconstruction<'a> {
+    /// Nothing yet. `rest_speed`: the speed up to which each joint rests [m/s or rad/s], none where rests are
+    /// not told; joints without friction never rest. `band` is that of the model, where it has one.
+    pub fn new(model: &'a Model, rest_speed: &[f64], band: Option<HalfWidths<'a>>) -> Self {
+        let speed = |(j, law): (usize, &JointFriction)| match (law, rest_speed.get(j)) {
+            (JointFriction::None, _) | (_, None) => -1.0,
+            (_, Some(speed)) => *speed,
+        };
+        Reconstruction {
+            model,
+            rest_speed: model.friction.iter().enumerate().map(speed).collect(),
+            band,
+            sums: vec![ErrorSums::default(); model.robot.joints()],
+            before: Vec::new(),
+            traces: TorqueTraces::default(),
+            zero: 0.0,
+            summed: false,
+        }
+    }
+
+    /// Says from where the times of the log are counted, by its own clock [s]: traces have that clock's times.
+    pub fn count_from(&mut self, zero: f64) {
+        self.zero = zero;
+    }
+
+    /// Ends a log: what is added from here on is of another one.
+    pub fn end_log(&mut self) {
+        let next = vec![ErrorSums::default(); self.sums.len()];
+        self.before.push(std::mem::replace(&mut self.sums, next));
+    }
+
+    /// Errors over those of the logs that were ended, in their order, of which `wanted` is true.
+    pub fn errors_of(&self, wanted: impl Fn(usize) -> bool) -> TorqueErrors {
+        let logs = self.before.iter().enumerate();
+        self.errors(logs.filter(|(log, _)| wanted(*log)).map(|(_, sums)| sums))
+    }
+
+    /// Runs one log through with the processing that the model declares. `row` gets every raw
+    /// sample.
+    ///
+    /// # Errors
+    /// Those of the source and of [`motion::run`].
+    pub fn add<E>(
+        &mut self,
+        settings: &FilterSettings,
+        source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
+        row: &mut dyn FnMut(&Reconstructed),
+    ) -> Result<Summary, motion::RunError<E>> {
+        let n = self.model.robot.joints();
+        let (model, rest_speed, band) = (self.model, self.rest_speed.clone(), self.band);
+        let mut full = settings.clone();
+        // every raw sample counts, so rows are thinned here and not by the pipeline
+        full.decimation = Some(1);
+        let mut taken = Taken::new(settings);
+        let summary = motion::run(
+            source,
+            n,
+            &full,
+            None,
+            4 * n,
+            &|sample, out| {
+                out[..n].copy_from_slice(sample.tau);
+                model.torque(sample.q, sample.v, sample.a, &mut out[n..2 * n]);
+                for (j, speed) in rest_speed.iter().enumerate() {
+                    out[2 * n + j] = rest::movement(sample.v[j], *speed);
+                }
+                if let Some(band) = band {
+                    let (tau, widths) = out[n..].split_at_mut(2 * n);
+                    band([sample.q, sample.v, sample.a], &tau[..n], widths);
+                }
+            },
+            &mut |r| {
+                let channels = [r.raw, r.filtered];
+                self.take(&mut taken, (r.segment, r.t), [r.q, r.v], channels, row);
+            },
+        )?;
+        Ok(Summary {
+            decimation: settings.decimation_at(summary.dt),
+            ..summary
+        })
+    }
+
+    /// Adds one stretch of a log in memory with its reconstructed torque, `[joint][sample]`: for
+    /// models whose effects remember. `segment` counts the stretches of all logs.
+    ///
+    /// # Errors
+    /// [`MotionError`](motion::MotionError) of the filter.
+    pub fn add_stretch(
+        &mut self,
+        settings: &FilterSettings,
+        segment: usize,
+        stretch: &Stretch,
+        reconstructed: &[Vec<f64>],
+        row: &mut dyn FnMut(&Reconstructed),
+    ) -> Result<(), motion::MotionError> {
+        let n = self.model.robot.joints();
+        let mut full = settings.clone();
+        full.decimation = Some(1);
+        let parallel = Parallel::design(&full, stretch.dt)?;
+        let movement = |(v, speed): (&Vec<f64>, &f64)| -> Vec<f64> {
+            v.iter().map(|v| rest::movement(*v, *speed)).collect()
+        };
+        let moving: Vec<Vec<f64>> = stretch
+            .v
+            .iter()
+            .zip(&self.rest_speed)
+            .map(movement)
+            .collect();
+        let mut widths = vec![vec![0.0; stretch.len()]; n];
+        if let Some(band) = self.band {
+            let [mut q, mut v, mut a, mut tau, mut width] = [(); 5].map(|()| vec![0.0; n]);
+            for k in 0..stretch.len() {
+                stretch.at(k, &mut q, &mut v, &mut a);
+                for (tau, hat) in tau.iter_mut().zip(reconstructed) {
+                    *tau = hat[k];
+                }
+                band([&q, &v, &a], &tau, &mut width);
+                for (channel, width) in widths.iter_mut().zip(&width) {
+                    channel[k] = *width;
+                }
+            }
+        }
+        let channels = stretch.tau.iter().chain(reconstructed);
+        let channels = channels.chain(&moving).chain(&widths);
+        let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
+        let rows = parallel.run(&channels)?;
+        let mut taken = Taken::new(settings);
+        let (mut raw, mut filtered) = (vec![0.0; 4 * n], vec![0.0; 4 * n]);
+        let count = parallel.rows(stretch.len());
+        let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
+        for (i, k) in (0..count).map(|i| (i, parallel.sample_of(i))) {
+            stretch.at(k, &mut q, &mut v, &mut a);
+            for c in 0..4 * n {
+                raw[c] = channels[c][k];
+                filtered[c] = rows[c][i];
+            }
+            let at = (segment, stretch.t[k]);
+            self.take(&mut taken, at, [&q, &v], [&raw, &filtered], row);
+        }
+        Ok(())
+    }
+
+    /// Adds rows of one joint of which the sums are known, and nothing else: of the errors of single rows and of the
+    /// raw samples nothing is told any more.
+    pub fn add_sums(&mut self, joint: usize, rows: &SummedRows) {
+        self.summed = true;
+        let sums = &mut self.sums[joint];
+        sums.error += rows.error[0] + rows.error[1];
+        sums.torque += rows.torque[0] + rows.torque[1];
+        sums.rest[0] += rows.error[1];
+        sums.rest[1] += rows.torque[1];
+        sums.rows += rows.rows[0] + rows.rows[1];
+        sums.resting += rows.rows[1];
+    }
+
+    /// Takes one row at full rate.
+    fn take(
+        &mut self,
+        taken: &mut Taken,
+        (segment, t): (usize, f64),
+        [q, v]: [&[f64]; 2],
+        [raw, filtered]: [&[f64]; 2],
+        row: &mut dyn FnMut(&Reconstructed),
+    ) {
+        let n = self.sums.len();
+        let (keep, begins) = taken.keeps(segment, t);
+        if begins {
+            self.traces.breaks.push(self.traces.t.len());
+        }
+        for (j, s) in self.sums.iter_mut().enumerate() {
+            let width = match self.band {
+                Some(_) => raw[3 * n + j],
+                None => f64::NAN,
+            };
+            s.add_raw(raw[j], raw[n + j], width);
+        }
+        row(&Reconstructed {
+            t,
+            q,
+            v,
+            measured: &raw[..n],
+            reconstructed: &raw[n..2 * n],
+            half_width: &raw[3 * n..],
+        });
+        if keep {
+            for (j, s) in self.sums.iter_mut().enumerate() {
+                s.add(
+                    filtered[j],
+                    filtered[n + j],
+                    rest::rests(filtered[2 * n + j]),
+                );
+            }
+            append(&mut self.traces, self.zero + t, &filtered[..2 * n], n);
+        }
+    }
+
+    /// Errors over all logs that were added, with the last log's summary.
+    pub fn finish(self, summary: Summary) -> Validation {
+        let all = self.before.iter().chain([&self.sums]);
+        Validation {
+            errors: self.errors(all),
+            summary,
+            traces: self.traces,
+        }
+    }
+
+    fn errors<'s>(&self, logs: impl Iterator<Item = &'s Vec<ErrorSums>>) -> TorqueErrors {
+        let mut all = vec![ErrorSums::default(); self.sums.len()];
+        for log in logs {
+            for (sum, of_log) in all.iter_mut().zip(log) {
+                sum.merge(of_log);
+            }
+        }
+        let robot = &self.model.robot;
+        let n = robot.joints();
+        let has_band = self.band.is_some();
+        let known = |x: Option<f64>| x.filter(|_| !self.summed).unwrap_or(f64::NAN);
+        let joint = |(j, s): (usize, &ErrorSums)| {
+            let [error, torque] = [s.error - s.rest[0], s.torque - s.rest[1]];
+            JointError {
+                joint: robot.joint_names()[j].clone(),
+                unit: robot.joint_unit(j),
+                rmse: (s.error / s.rows.max(1) as f64).sqrt(),
+                relative_error: ratio(s.error, s.torque, 1).unwrap_or(f64::NAN),
+                relative_error_moving: ratio(error.max(0.0), torque, s.rows - s.resting),
+                relative_error_rest: ratio(s.rest[0], s.rest[1], s.resting),
+                relative_error_raw: known(ratio(s.raw_error, s.raw_torque, 1)),
+                coverage_95: has_band.then(|| s.inside as f64 / s.raw_rows.max(1) as f64),
+                half_width: has_band.then(|| s.widths / s.raw_rows.max(1) as f64),
+                max_abs: known(Some(s.largest)),
+                r2: if s.scatter > 0.0 && !self.summed {
+                    1.0 - s.error / s.scatter
+                } else {
+                    f64::NAN
+                },
+                samples: s.rows,
+                resting: s.resting,
+            }
+        };
+        let joints: Vec<JointError> = all.iter().enumerate().map(joint).collect();
+        let one_unit = joints.iter().all(|e| e.unit == joints[0].unit);
+        // squared error and torque over all joints, then those of rest
+        let mut pooled = [0.0; 4];
+        let (mut moving, mut resting) = (0, 0);
+        for s in &all {
+            for (sum, x) in pooled
+                .iter_mut()
+                .zip([s.error, s.torque, s.rest[0], s.rest[1]])
+            {
+                *sum += x;
+            }
+            moving += s.rows - s.resting;
+            resting += s.resting;
+        }
+        let [error, torque, at_rest, torque_at_rest] = pooled;
+        let part = |error: f64, torque: f64, rows: u64| {
+            one_unit
+                .then(|| ratio(error.max(0.0), torque, rows))
+                .flatten()
+        };
+        let mean = joints
+            .iter()
+            .map(|e| e.relative_error * e.relative_error)
+            .sum::<f64>();
+        TorqueErrors {
+            overall: Overall {
+                relative_error: one_unit.then(|| (error / torque).sqrt()),
+                relative_error_moving: part(error - at_rest, torque - torque_at_rest, moving),
+                relative_error_rest: part(at_rest, torque_at_rest, resting),
+                mean_relative_error: (mean / n as f64).sqrt(),
+            },
+            joints,
+        }
+    }
+}
+
+/// Most points of a trace; beyond it neighbouring pairs of extremes merge.
+const MOST_POINTS: usize = 16_384;
+
+/// Appends a row to the traces; thins them by two where they are too many.
+fn append(traces: &mut TorqueTraces, t: f64, filtered: &[f64], n: usize) {
+    traces.t.push(t);
+    traces.measured.extend_from_slice(&filtered[..n]);
+    traces.reconstructed.extend_from_slice(&filtered[n..]);
+    if traces.t.len() >= MOST_POINTS {
+        halve(traces, n);
+    }
+}
+
+/// Of every four points keeps the two whose first-joint error is smallest and largest, in order
+/// of time; stretches keep their borders.
+fn halve(traces: &mut TorqueTraces, n: usize) {
+    let mut out = TorqueTraces::default();
+    let mut bounds = traces.breaks.clone();
+    bounds.push(traces.t.len());
+    for pair in bounds.windows(2) {
+        out.breaks.push(out.t.len());
+        let mut k = pair[0];
+        while k < pair[1] {
+            let end = (k + 4).min(pair[1]);
+            let size = |i: &usize| -> f64 {
+                (0..n)
+                    .map(|j| traces.measured[i * n + j] - traces.reconstructed[i * n + j])
+                    .sum()
+            };
+            let lo = (k..end).min_by(|a, b| size(a).total_cmp(&size(b)));
+            let hi = (k..end).max_by(|a, b| size(a).total_cmp(&size(b)));
+            let (Some(lo), Some(hi)) = (lo, hi) else {
+                break;
+            };
+            let mut kept = [lo.min(hi), lo.max(hi)].to_vec();
+            kept.dedup();
+            for i in kept {
+                out.t.push(traces.t[i]);
+                out.measured
+                    .extend_from_slice(&traces.measured[i * n..(i + 1) * n]);
+                out.reconstructed
+                    .extend_from_slice(&traces.reconstructed[i * n..(i + 1) * n]);
+            }
+            k = end;
+        }
+    }
+    *traces = out;
+}

@@ -1,0 +1,13 @@
+//! Tests of physics, motion and estimators.
+
+mod motion_accuracy;
+mod motion_measured;
+mod motion_time_base;
+mod motion_windows;
+mod robot_actuation;
+mod robot_excitation;
+mod robot_kinematics;
+mod robot_lagrange;
+mod robot_oracle;
+mod robot_properties;
+mod robot_reference;

@@ -1,0 +1,295 @@
+//! A model as simulators take it: bodies on joints with damping, friction and armature.
+
+use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
+
+use super::dissipative::{damping_and_friction, dissipative};
+use super::error::ExportError;
+use super::prepared::{Drive, Prepared, drive, joint_name, root};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::effect::as_code::Property;
+use cft_ident_core::robot::JointKind;
+use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
+use cft_ident_core::robot::tree::Coupling;
+use cft_ident_core::robot::tree::space::{
+    Rotation, Vector, about, add, cross, product, times, turn,
+};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::robot_file::CoordinateLimits;
+use cft_ident_files::config::serial_section::FrameSection;
+
+/// What a format can say beside bodies, joints, damping and friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Says {
+    /// Inertia of a drive at its joint.
+    pub armature: bool,
+    /// Inertia and friction that two joints share.
+    pub couplings: bool,
+}
+
+/// A model as bodies on joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm {
+    /// Name of the link that stands still.
+    pub root: String,
+    /// Acceleration of free fall in its frame \[m/s^2\].
+    pub gravity: Vector,
+    pub links: Vec<ArmLink>,
+    pub frames: Vec<FrameSection>,
+    /// Gear trains that two joints turn, with inertia, damping and friction.
+    pub couplings: Vec<(Coupling, [f64; 3])>,
+    /// Where the inertials come from.
+    pub of_inertials: &'static [&'static str],
+    /// Effects that are in bodies, gravity and armatures, by their place in the model.
+    pub held: Vec<(usize, Property)>,
+}
+
+/// A link and the joint before it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmLink {
+    pub name: String,
+    pub parent: Option<usize>,
+    /// The joint's frame in that of the link before.
+    pub rotation: Rotation,
+    /// Its origin \[m\].
+    pub origin: Vector,
+    pub axis: Vector,
+    pub kind: JointKind,
+    pub joint: ArmJoint,
+    pub body: Body,
+}
+
+/// What moves a link.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ArmJoint {
+    /// A joint of its own.
+    Own(Box<OwnJoint>),
+    /// It follows joint `of` by `factor` and `offset`.
+    Mimic {
+        name: String,
+        of: String,
+        factor: f64,
+        offset: f64,
+    },
+    /// Nothing.
+    Fixed,
+}
+
+/// An independent joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnJoint {
+    pub name: String,
+    /// Its place in vectors.
+    pub index: usize,
+    /// \[N s/m or Nm s/rad\]
+    pub damping: f64,
+    /// \[N or Nm\]
+    pub friction: f64,
+    /// Inertia of its drive \[kg or kg m^2\].
+    pub armature: f64,
+    pub limits: CoordinateLimits,
+}
+
+impl Arm {
+    /// The bodies and joints of a model, `refined` being what its `file` stands for. Payload, tilt and rotor
+    /// inertia go into bodies, gravity and armatures.
+    ///
+    /// # Errors
+    /// [`ExportError::NoLinks`] for robots that are no such tree; [`ExportError::Impossible`] for a link that
+    /// no body can be.
+    pub fn of(file: &ModelFile, refined: &AugmentedModel) -> Result<Self, ExportError> {
+        let prepared = Prepared::of(file, &refined.model)?;
+        let (file, robot) = (&prepared.file, &prepared.model.robot);
+        let links = robot.tree().links();
+        let (bodies, drives) = prepared.standard.values.split_at(links.len() * STANDARD);
+        let (mut bodies, mut drives) = (bodies.to_vec(), drives.to_vec());
+        drives.resize(robot.joints(), 0.0);
+        let (mut gravity, mut held) = (robot.tree().gravity(), Vec::new());
+        for (i, effect) in refined.effects.iter().enumerate() {
+            if let Some(property) = effect.property() {
+                fold(property, &mut bodies, &mut drives, &mut gravity);
+                held.push((i, property));
+            }
+        }
+        let couplings = robot.transmission().couplings().iter().copied();
+        let couplings = couplings.zip(robot.coupling_parameters(&prepared.model.theta));
+        let mut out = Vec::new();
+        for (i, link) in links.iter().enumerate() {
+            let body: [f64; STANDARD] = std::array::from_fn(|k| bodies[i * STANDARD + k]);
+            let least = SymmetricEigen::new(pseudo_inertia(&body)).eigenvalues.min();
+            if least.is_nan() || least < 0.0 || body[9] <= 0.0 {
+                return Err(ExportError::Impossible {
+                    link: link.name.clone(),
+                    eigenvalue: least,
+                });
+            }
+            let moved = drive(robot, link)?;
+            let name = joint_name(robot, link, &moved);
+            let (mut rotation, mut origin) = (link.rotation, link.origin);
+            let joint = match moved {
+                Drive::Joint(j) => {
+                    let [damping, friction] =
+                        dissipative(&prepared.model, j).unwrap_or_else(|| {
+                            damping_and_friction(&prepared.model.friction[j]).map(|x| x.max(0.0))
+                        });
+                    ArmJoint::Own(Box::new(OwnJoint {
+                        limits: file.robot.limits.get(&name).cloned().unwrap_or_default(),
+                        index: j,
+                        damping,
+                        friction,
+                        armature: drives[j].max(0.0),
+                        name,
+                    }))
+                }
+                Drive::Mimic(of, factor, offset) => ArmJoint::Mimic {
+                    name,
+                    of,
+                    factor,
+                    offset,
+                },
+                Drive::Rest(at) => {
+                    match link.kind {
+                        JointKind::Revolute => {
+                            rotation = product(&rotation, &about(&link.axis, at))
+                        }
+                        JointKind::Prismatic => {
+                            origin = add(&origin, &turn(&rotation, &times(at, &link.axis)));
+                        }
+                    }
+                    ArmJoint::Fixed
+                }
+            };
+            out.push(ArmLink {
+                name: link.name.clone(),
+                parent: link.parent,
+                rotation,
+                origin,
+                axis: link.axis,
+                kind: link.kind,
+                joint,
+                body: Body::of(&body),
+            });
+        }
+        Ok(Self {
+            root: root(robot, file),
+            gravity,
+            links: out,
+            frames: file.robot.robot.frame.clone(),
+            couplings: couplings.collect(),
+            of_inertials: prepared.of_inertials,
+            held,
+        })
+    }
+
+    /// The independent joints in the order of vectors.
+    pub fn joints(&self) -> Vec<&OwnJoint> {
+        let own = self.links.iter().filter_map(|link| match &link.joint {
+            ArmJoint::Own(joint) => Some(&**joint),
+            _ => None,
+        });
+        let mut own: Vec<&OwnJoint> = own.collect();
+        own.sort_by_key(|joint| joint.index);
+        own
+    }
+
+    /// Gear trains that a format with shared inertias can say, as inertia, damping and friction of
+    /// v_motor + ratio v_other, and what they leave of each joint's armature and damping.
+    pub(super) fn trains(&self) -> Option<Vec<[f64; 2]>> {
+        let joints = self.joints();
+        let mut own: Vec<[f64; 2]> = joints.iter().map(|j| [j.armature, j.damping]).collect();
+        for (c, [inertia, damping, friction]) in &self.couplings {
+            if [inertia, damping, friction].into_iter().any(|x| *x < 0.0) {
+                return None;
+            }
+            for (k, share) in [(0, inertia), (1, damping)] {
+                own[c.motor][k] -= share;
+                own[c.other][k] -= share * c.ratio * c.ratio;
+            }
+        }
+        own.iter().flatten().all(|x| *x >= 0.0).then_some(own)
+    }
+}
+
+/// Takes an effect into bodies, drives or gravity, where it is one of these.
+fn fold(property: Property, bodies: &mut [f64], drives: &mut [f64], gravity: &mut Vector) {
+    match property {
+        Property::Drive { joint, inertia } => drives[joint] += inertia,
+        Property::Gravity([gx, gy]) => {
+            gravity[0] += gx;
+            gravity[1] += gy;
+        }
+        Property::Body(body) => {
+            let first = bodies.len() - STANDARD;
+            for (sum, x) in bodies[first..].iter_mut().zip(body.standard()) {
+                *sum += x;
+            }
+        }
+    }
+}
+
+/// A rotation as quaternion w, x, y, z.
+pub(super) fn quaternion(r: &Rotation) -> [f64; 4] {
+    let matrix = Matrix3::from_fn(|i, j| r[i][j]);
+    let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    [q.w, q.i, q.j, q.k]
+}
+
+/// Principal moments of a body and the rotation of its principal axes.
+pub(super) fn principal(body: &Body) -> ([f64; 3], Rotation) {
+    let [xx, xy, xz, yy, yz, zz] = body.inertia;
+    let eigen = SymmetricEigen::new(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
+    let mut axes = eigen.eigenvectors;
+    if axes.determinant() < 0.0 {
+        axes.column_mut(2).neg_mut();
+    }
+    let moments = eigen.eigenvalues;
+    (
+        [moments[0], moments[1], moments[2]],
+        std::array::from_fn(|i| std::array::from_fn(|j| axes[(i, j)])),
+    )
+}
+
+/// A rotation that takes the z axis to this one.
+pub(super) fn z_to(axis: &Vector) -> Rotation {
+    // the shorter of two helpers is far enough from the axis
+    let least = (0..3).min_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()));
+    let mut helper = [0.0; 3];
+    helper[least.unwrap_or(0)] = 1.0;
+    let x = cross(&helper, axis);
+    let size = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let x = times(1.0 / size, &x);
+    let y = cross(axis, &x);
+    std::array::from_fn(|i| [x[i], y[i], axis[i]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_z_axis_is_turned_to_any_axis_by_a_rotation() {
+        for axis in [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.6, 0.0, -0.8]] {
+            let r = z_to(&axis);
+            assert_eq!(turn(&r, &[0.0, 0.0, 1.0]), axis);
+            let det = Matrix3::from_fn(|i, j| r[i][j]).determinant();
+            assert!((det - 1.0).abs() < 1e-15, "{det}");
+        }
+    }
+
+    #[test]
+    fn principal_axes_give_the_inertia_back() {
+        let body = Body {
+            mass: 2.0,
+            centre: [0.0; 3],
+            inertia: [0.03, 0.002, -0.004, 0.05, 0.001, 0.06],
+        };
+        let (moments, axes) = principal(&body);
+        let r = Matrix3::from_fn(|i, j| axes[i][j]);
+        let back = r * Matrix3::from_diagonal(&moments.into()) * r.transpose();
+        for (k, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+            .into_iter()
+            .enumerate()
+        {
+            assert!((back[(i, j)] - body.inertia[k]).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! What a format cannot say of a model, and how much of the torque that is.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::arm::{Arm, Says};
+use super::dissipative::damping_and_friction;
+use super::error::ExportError;
+use cft_ident_core::effect::{AugmentedModel, Scene, shifted};
+use cft_ident_core::motion::Stretch;
+use cft_ident_core::robot::friction::sign;
+
+/// A part of the model's torque that a file does not hold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// What it is.
+    pub what: String,
+    /// Joint where it is largest; absent where no log tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// Its rms over that of the joint's torque, in percent; absent where no log tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub percent_of_torque: Option<f64>,
+}
+
+/// One of them, with the torque of every joint along a stretch.
+struct Part<'a> {
+    what: String,
+    torque: Box<Torque<'a>>,
+}
+
+/// Torque of every joint along a stretch.
+type Torque<'a> = dyn Fn(&Stretch, &[Vec<f64>]) -> Vec<Vec<f64>> + 'a;
+
+/// What a format cannot say, with its size along the stretches given, of which there may be none.
+pub fn left_out(
+    arm: &Arm,
+    refined: &AugmentedModel,
+    says: Says,
+    stretches: &[Stretch],
+) -> Vec<LeftOut> {
+    let parts = parts(arm, refined, says);
+    let n = refined.model.robot.joints();
+    let mut whole = vec![0.0; n];
+    let mut own = vec![vec![0.0; n]; parts.len()];
+    let add = |sums: &mut [f64], channels: &[Vec<f64>]| {
+        for (sum, channel) in sums.iter_mut().zip(channels) {
+            *sum += channel.iter().map(|x| x * x).sum::<f64>();
+        }
+    };
+    for stretch in stretches {
+        let torques = refined.torques(stretch);
+        add(&mut whole, &torques.hat);
+        for (part, own) in parts.iter().zip(&mut own) {
+            add(own, &(part.torque)(stretch, &torques.hat));
+        }
+    }
+    let names = refined.model.robot.joint_names();
+    let told = parts.into_iter().zip(own).map(|(part, own)| {
+        let share = |j: usize| 100.0 * (own[j] / whole[j]).sqrt();
+        let known = (0..n).filter(|j| whole[*j] > 0.0);
+        let worst = known.max_by(|a, b| share(*a).total_cmp(&share(*b)));
+        LeftOut {
+            what: part.what,
+            joint: worst.map(|j| names[j].clone()),
+            // more digits than anybody can use would differ from machine to machine
+            percent_of_torque: worst.map(|j| (1e4 * share(j)).round() / 1e4),
+        }
+    });
+    told.collect()
+}
+
+fn parts<'a>(arm: &'a Arm, refined: &'a AugmentedModel, says: Says) -> Vec<Part<'a>> {
+    let model = &refined.model;
+    let n = model.robot.joints();
+    let names = model.robot.joint_names();
+    let mut out: Vec<Part> = Vec::new();
+    // one joint's torque by its state
+    let mut of_joint = |what: String, j: usize, f: Box<dyn Fn(f64, f64) -> f64 + 'a>| {
+        out.push(Part {
+            what,
+            torque: Box::new(move |s, _| {
+                let mut all = vec![vec![0.0; s.len()]; n];
+                let state = s.v[j].iter().zip(&s.a[j]);
+                all[j] = state.map(|(v, a)| f(*v, *a)).collect();
+                all
+            }),
+        });
+    };
+    for joint in arm.joints() {
+        let (j, name) = (joint.index, &names[joint.index]);
+        let offset = model.offset[j];
+        if offset != 0.0 {
+            of_joint(format!("offset of {name}"), j, Box::new(move |_, _| offset));
+        }
+        if joint.armature != 0.0 && !says.armature {
+            let armature = joint.armature;
+            of_joint(
+                format!("drive inertia of {name}"),
+                j,
+                Box::new(move |_, a| armature * a),
+            );
+        }
+        let law = model.friction[j];
+        let (damping, friction) = (joint.damping, joint.friction);
+        if damping_and_friction(&law) != [damping, friction] || law.parameters() > 2 {
+            of_joint(
+                format!("the friction law of {name} beside damping and friction"),
+                j,
+                Box::new(move |v, _| law.torque(v) - damping * v - friction * sign(v)),
+            );
+        }
+    }
+    if !(says.couplings && arm.trains().is_some()) {
+        for (c, [inertia, viscous, coulomb]) in &arm.couplings {
+            let (m, o, r) = (c.motor, c.other, c.ratio);
+            out.push(Part {
+                what: format!("gear train of {} that {} turns too", names[m], names[o]),
+                torque: Box::new(move |s, _| {
+                    let mut all = vec![vec![0.0; s.len()]; n];
+                    let turning = |k: usize| coulomb * sign(s.v[m][k] + r * s.v[o][k]);
+                    let of = |k: usize, j: usize| inertia * s.a[j][k] + viscous * s.v[j][k];
+                    all[m] = (0..s.len()).map(|k| r * of(k, o) + turning(k)).collect();
+                    all[o] = (0..s.len()).map(|k| r * (of(k, m) + turning(k))).collect();
+                    all
+                }),
+            });
+        }
+    }
+    for (i, effect) in refined.effects.iter().enumerate() {
+        // a drive's inertia is named with that of its joint
+        if arm.held.iter().any(|(held, _)| *held == i) {
+            continue;
+        }
+        let late = (0..n).any(|j| effect.shift(j) != 0.0);
+        out.push(Part {
+            what: effect.title(&model.robot),
+            torque: Box::new(move |s, hat| {
+                if late {
+                    let each = hat.iter().enumerate().map(|(j, hat)| {
+                        let mut moved = hat.clone();
+                        shifted(&mut moved, effect.shift(j) / s.dt);
+                        moved.iter().zip(hat).map(|(x, y)| x - y).collect()
+                    });
+                    return each.collect();
+                }
+                let plain = AugmentedModel::plain(model.clone()).torques(s);
+                let scene = Scene {
+                    robot: &model.robot,
+                    theta: &model.theta,
+                    laws: &model.friction,
+                    stretch: s,
+                    hat: &plain.hat,
+                    load: &plain.load,
+                    direction: &plain.direction,
+                    tilt: Some(&plain.tilt),
+                };
+                let mut all = vec![vec![0.0; s.len()]; n];
+                for (j, out) in all.iter_mut().enumerate() {
+                    effect.torque(&scene, j, out);
+                }
+                all
+            }),
+        });
+    }
+    out
+}
+
+/// Where what a file cannot say is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Elsewhere {
+    /// Nowhere.
+    Nowhere,
+    /// In the model file beside a URDF.
+    Beside,
+}
+
+/// The list as lines for the head of a file; `logs` names the logs of the sizes.
+pub fn lines(left_out: &[LeftOut], logs: &[String], elsewhere: Elsewhere) -> Vec<String> {
+    if left_out.is_empty() {
+        return vec!["Nothing of the model's torque is left out.".to_owned()];
+    }
+    let along = match logs.is_empty() {
+        true => "no log was given, so their sizes are not known".to_owned(),
+        false => format!(
+            "rms over that of the joint's torque along {}, where it is largest",
+            logs.join(", ")
+        ),
+    };
+    let head = match elsewhere {
+        Elsewhere::Nowhere => "NOT in here, though the model has it",
+        Elsewhere::Beside => "Not in the URDF, but in the model file beside it",
+    };
+    let mut out = vec![format!("{head} ({along}):")];
+    for part in left_out {
+        let size = match (part.percent_of_torque, &part.joint) {
+            (Some(percent), Some(joint)) => {
+                format!(
+                    ", {} % at {joint}",
+                    cft_ident_core::number::significant(percent, 3)
+                )
+            }
+            _ => String::new(),
+        };
+        out.push(format!("  {}{size}", part.what));
+    }
+    out
+}
+
+/// The list as a file of its own.
+///
+/// # Errors
+/// [`ExportError::Side`]; none is known: the tables hold words and numbers.
+pub fn side_file(
+    left_out: &[LeftOut],
+    notes: &[String],
+    logs: &[String],
+) -> Result<String, ExportError> {
+    #[derive(Serialize)]
+    struct File<'a> {
+        /// Logs along which sizes were taken.
+        logs: &'a [String],
+        left_out: &'a [LeftOut],
+    }
+    let mut out = String::new();
+    for line in notes {
+        let _ = writeln!(out, "{}", format!("# {line}").trim_end());
+    }
+    out.push('\n');
+    out += &toml::to_string(&File { logs, left_out })?;
+    Ok(out)
+}

@@ -1,0 +1,171 @@
+//! MuJoCo's MJCF: bodies with inertials, joints with armature, damping, friction loss and ranges, gear trains
+//! of two joints as tendons, followers as equalities.
+
+use std::fmt::Write;
+
+use super::arm::{Arm, ArmJoint, ArmLink, Says, quaternion};
+use super::prepared::{quoted, words};
+use cft_ident_core::robot::JointKind;
+use cft_ident_core::robot::tree::space::of_roll_pitch_yaw;
+
+/// What MJCF can say.
+pub const SAYS: Says = Says {
+    armature: true,
+    couplings: true,
+};
+
+/// The text of a model; `notes` stand at its head.
+pub fn mjcf(arm: &Arm, notes: &[String]) -> String {
+    let mut out = String::from("<!--\n");
+    for line in notes {
+        // two hyphens would end the comment early
+        let _ = writeln!(
+            out,
+            "{}",
+            format!("  {}", line.replace("--", "- -")).trim_end()
+        );
+    }
+    let _ = write!(
+        out,
+        "-->\n<mujoco model=\"identified\">\n  <compiler angle=\"radian\" autolimits=\"true\" \
+         inertiafromgeom=\"false\"/>\n  <option gravity=\"{}\"/>\n  <worldbody>\n    <body name=\"{}\">\n",
+        words(&arm.gravity),
+        quoted(&arm.root)
+    );
+    let own = arm.trains();
+    for (i, _) in arm
+        .links
+        .iter()
+        .enumerate()
+        .filter(|(_, l)| l.parent.is_none())
+    {
+        body(&mut out, arm, i, 3, own.as_deref());
+    }
+    out.push_str("    </body>\n  </worldbody>\n");
+    if let (Some(_), false) = (&own, arm.couplings.is_empty()) {
+        tendons(&mut out, arm);
+    }
+    followers(&mut out, arm);
+    out.push_str("  <actuator>\n");
+    for joint in arm.joints() {
+        let range = joint.limits.torque.map_or(String::new(), |top| {
+            format!(" ctrlrange=\"{}\"", words(&[-top, top]))
+        });
+        let name = quoted(&joint.name);
+        let _ = writeln!(out, "    <motor name=\"{name}\" joint=\"{name}\"{range}/>");
+    }
+    out.push_str("  </actuator>\n</mujoco>\n");
+    out
+}
+
+/// A link and all that hang on it; trees are at most as deep as they have links.
+fn body(out: &mut String, arm: &Arm, i: usize, depth: usize, own: Option<&[[f64; 2]]>) {
+    let link = &arm.links[i];
+    let (pad, body) = ("  ".repeat(depth), &link.body);
+    let [xx, xy, xz, yy, yz, zz] = body.inertia;
+    let _ = write!(
+        out,
+        "{pad}<body name=\"{}\" pos=\"{}\" quat=\"{}\">\n{pad}  <inertial pos=\"{}\" mass=\"{:?}\" \
+         fullinertia=\"{}\"/>\n",
+        quoted(&link.name),
+        words(&link.origin),
+        words(&quaternion(&link.rotation)),
+        words(&body.centre),
+        body.mass,
+        words(&[xx, yy, zz, xy, xz, yz])
+    );
+    joint(out, link, &pad, own);
+    for frame in arm.frames.iter().filter(|frame| frame.link == link.name) {
+        let _ = writeln!(
+            out,
+            "{pad}  <site name=\"{}\" pos=\"{}\" quat=\"{}\"/>",
+            quoted(&frame.name),
+            words(&frame.xyz),
+            words(&quaternion(&of_roll_pitch_yaw(&frame.rpy)))
+        );
+    }
+    for (k, _) in arm
+        .links
+        .iter()
+        .enumerate()
+        .filter(|(_, l)| l.parent == Some(i))
+    {
+        self::body(out, arm, k, depth + 1, own);
+    }
+    let _ = writeln!(out, "{pad}</body>");
+}
+
+fn joint(out: &mut String, link: &ArmLink, pad: &str, own: Option<&[[f64; 2]]>) {
+    let kind = match link.kind {
+        JointKind::Revolute => "hinge",
+        JointKind::Prismatic => "slide",
+    };
+    let axis = words(&link.axis);
+    match &link.joint {
+        ArmJoint::Fixed => {}
+        ArmJoint::Mimic { name, .. } => {
+            let name = quoted(name);
+            let _ = writeln!(
+                out,
+                "{pad}  <joint name=\"{name}\" type=\"{kind}\" axis=\"{axis}\"/>"
+            );
+        }
+        ArmJoint::Own(joint) => {
+            let [armature, damping] =
+                own.map_or([joint.armature, joint.damping], |own| own[joint.index]);
+            let range = joint
+                .limits
+                .position
+                .map_or(String::new(), |ends| format!(" range=\"{}\"", words(&ends)));
+            let _ = writeln!(
+                out,
+                "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\" armature=\"{armature:?}\" \
+                 damping=\"{damping:?}\" frictionloss=\"{:?}\"{range}/>",
+                quoted(&joint.name),
+                joint.friction
+            );
+        }
+    }
+}
+
+/// Gear trains of two joints: what turns with v_motor + ratio v_other.
+fn tendons(out: &mut String, arm: &Arm) {
+    let joints = arm.joints();
+    out.push_str("  <tendon>\n");
+    for (c, [inertia, damping, friction]) in &arm.couplings {
+        let (motor, other) = (quoted(&joints[c.motor].name), quoted(&joints[c.other].name));
+        let _ = write!(
+            out,
+            "    <fixed name=\"{motor}_{other}\" armature=\"{inertia:?}\" damping=\"{damping:?}\" \
+             frictionloss=\"{friction:?}\">\n      <joint joint=\"{motor}\" coef=\"1\"/>\n      \
+             <joint joint=\"{other}\" coef=\"{:?}\"/>\n    </fixed>\n",
+            c.ratio
+        );
+    }
+    out.push_str("  </tendon>\n");
+}
+
+/// Links that follow a joint.
+fn followers(out: &mut String, arm: &Arm) {
+    let mut lines = String::new();
+    for link in &arm.links {
+        if let ArmJoint::Mimic {
+            name,
+            of,
+            factor,
+            offset,
+        } = &link.joint
+        {
+            let _ = writeln!(
+                lines,
+                "    <joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{}\"/>",
+                quoted(name),
+                quoted(of),
+                words(&[*offset, *factor, 0.0, 0.0, 0.0])
+            );
+        }
+    }
+    if !lines.is_empty() {
+        let _ = write!(out, "  <equality>\n{lines}  </equality>\n");
+    }
+}

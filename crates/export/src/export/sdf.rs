@@ -1,0 +1,131 @@
+//! SDFormat 1.9, as Gazebo reads it: links with inertials, joints with damping, friction and limits.
+
+use std::fmt::Write;
+
+use super::arm::{Arm, ArmJoint, ArmLink, Says};
+use super::prepared::{quoted, words};
+use cft_ident_core::robot::JointKind;
+use cft_ident_core::robot::tree::space::roll_pitch_yaw;
+
+/// What SDF can say: a drive's inertia has no element, and joints share nothing.
+pub const SAYS: Says = Says {
+    armature: false,
+    couplings: false,
+};
+
+/// Largest number that stands for none.
+const NONE: &str = "1e16";
+
+/// The text of a model in a world of its own, where gravity is the model's; `notes` stand at its head.
+pub fn sdf(arm: &Arm, notes: &[String]) -> String {
+    let mut out = String::from("<?xml version=\"1.0\"?>\n<!--\n");
+    for line in notes {
+        // two hyphens would end the comment early
+        let _ = writeln!(
+            out,
+            "{}",
+            format!("  {}", line.replace("--", "- -")).trim_end()
+        );
+    }
+    let root = quoted(&arm.root);
+    let _ = write!(
+        out,
+        "-->\n<sdf version=\"1.9\">\n  <world name=\"identified\">\n    <gravity>{}</gravity>\n    \
+         <model name=\"identified\">\n      <link name=\"{root}\"/>\n      \
+         <joint name=\"{root}_to_world\" type=\"fixed\">\n        <parent>world</parent>\n        \
+         <child>{root}</child>\n      </joint>\n",
+        words(&arm.gravity)
+    );
+    for link in &arm.links {
+        let parent = link
+            .parent
+            .map_or(&arm.root, |parent| &arm.links[parent].name);
+        let (name, parent) = (quoted(&link.name), quoted(parent));
+        let body = &link.body;
+        let _ = write!(
+            out,
+            "      <link name=\"{name}\">\n        <pose relative_to=\"{parent}\">{} {}</pose>\n        \
+             <inertial>\n          <pose>{} 0 0 0</pose>\n          <mass>{:?}</mass>\n          <inertia>",
+            words(&link.origin),
+            words(&roll_pitch_yaw(&link.rotation)),
+            words(&body.centre),
+            body.mass
+        );
+        for (key, x) in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
+            .iter()
+            .zip(body.inertia)
+        {
+            let _ = write!(out, "<{key}>{x:?}</{key}>");
+        }
+        out.push_str("</inertia>\n        </inertial>\n      </link>\n");
+        joint(&mut out, link, &parent);
+    }
+    for frame in &arm.frames {
+        let _ = writeln!(
+            out,
+            "      <frame name=\"{}\" attached_to=\"{}\">\n        <pose>{} {}</pose>\n      </frame>",
+            quoted(&frame.name),
+            quoted(&frame.link),
+            words(&frame.xyz),
+            words(&frame.rpy)
+        );
+    }
+    out.push_str("    </model>\n  </world>\n</sdf>\n");
+    out
+}
+
+fn joint(out: &mut String, link: &ArmLink, parent: &str) {
+    let child = quoted(&link.name);
+    let (name, limits, loss, mimic) = match &link.joint {
+        ArmJoint::Fixed => {
+            let _ = write!(
+                out,
+                "      <joint name=\"{child}_joint\" type=\"fixed\">\n        <parent>{parent}</parent>\n        \
+                 <child>{child}</child>\n      </joint>\n"
+            );
+            return;
+        }
+        ArmJoint::Own(joint) => (
+            quoted(&joint.name),
+            joint.limits.clone(),
+            [joint.damping, joint.friction],
+            String::new(),
+        ),
+        ArmJoint::Mimic {
+            name,
+            of,
+            factor,
+            offset,
+        } => (
+            quoted(name),
+            Default::default(),
+            [0.0; 2],
+            format!(
+                "          <mimic joint=\"{}\"><multiplier>{factor:?}</multiplier><offset>{offset:?}</offset>\
+                 <reference>0</reference></mimic>\n",
+                quoted(of)
+            ),
+        ),
+    };
+    let kind = match link.kind {
+        JointKind::Revolute => "revolute",
+        JointKind::Prismatic => "prismatic",
+    };
+    let told = |x: Option<f64>| x.map_or(NONE.to_owned(), |x| format!("{x:?}"));
+    let [low, high] = match limits.position {
+        Some(ends) => ends.map(|x| format!("{x:?}")),
+        None => [format!("-{NONE}"), NONE.to_owned()],
+    };
+    let _ = write!(
+        out,
+        "      <joint name=\"{name}\" type=\"{kind}\">\n        <parent>{parent}</parent>\n        \
+         <child>{child}</child>\n        <axis>\n          <xyz>{}</xyz>\n          \
+         <limit><lower>{low}</lower><upper>{high}</upper><effort>{}</effort><velocity>{}</velocity></limit>\n          \
+         <dynamics><damping>{:?}</damping><friction>{:?}</friction></dynamics>\n{mimic}        </axis>\n      </joint>\n",
+        words(&link.axis),
+        told(limits.torque),
+        told(limits.speed),
+        loss[0],
+        loss[1]
+    );
+}

@@ -1,0 +1,280 @@
+//! What the `[log]` section may say.
+
+use std::collections::BTreeMap;
+
+use super::ConfigError;
+use super::channels::gear_matrix;
+use super::document::Document;
+use super::robot_file::{ModelKind, RobotFile};
+use cft_ident_core::robot::JointKind;
+use cft_ident_core::robot::cft::COORDINATES;
+use cft_ident_logs::log::{
+    ActuatorChannels, ColumnName, JointChannels, PositionUnit, TorqueIs, TorqueUnit,
+};
+
+/// Checks the `[log]` section of a robot file.
+pub(super) fn check(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let log = &file.log;
+    document.known_names(&["log", "joint"], &log.joint, &file.joint_names())?;
+    if let Some(rate) = log.rate_hz {
+        document.positive(&["log", "rate_hz"], rate)?;
+        if log.time.is_some() || log.time_unit.is_some() {
+            return Err(document.value(
+                &["log", "rate_hz"],
+                "stands beside a column of times",
+                "keep one of the two: `rate_hz` is for logs that have no times",
+            ));
+        }
+    }
+    gears(file, document)?;
+    foreign_effort(file, document)?;
+    // Which key reads which column: no column may be read twice.
+    let mut columns: BTreeMap<&str, String> = BTreeMap::new();
+    if let Some(time) = &log.time {
+        columns.insert(&time.0, "log.time".to_owned());
+    }
+    let robot = file.robot();
+    for (joint, channels) in &log.joint {
+        let index = robot
+            .joint_names()
+            .iter()
+            .position(|name| name == joint)
+            .unwrap_or(0);
+        joint_channels(
+            document,
+            joint,
+            channels,
+            robot.joint_kind(index),
+            log.torque_is,
+            !log.gears.is_empty(),
+        )?;
+        let named = [
+            ("position", &channels.position),
+            ("velocity", &channels.velocity),
+            ("reference", &channels.reference),
+            ("torque", &channels.torque),
+            ("temperature", &channels.temperature),
+        ];
+        for (key, column) in named {
+            claim(
+                document,
+                &mut columns,
+                column,
+                &["log", "joint", joint, key],
+            )?;
+        }
+    }
+    if file.robot.model != ModelKind::Cft
+        && let Some(name) = log.actuator.keys().next()
+    {
+        return Err(document.value(
+            &["log", "actuator", name],
+            "does not belong to this model",
+            "map the channels of this joint in [log.joint]",
+        ));
+    }
+    let coordinates = COORDINATES.map(str::to_owned);
+    document.known_names(&["log", "actuator"], &log.actuator, &coordinates)?;
+    for (name, channels) in &log.actuator {
+        actuator_channels(document, name, channels)?;
+        for (key, column) in [("position", &channels.position), ("volts", &channels.volts)] {
+            claim(
+                document,
+                &mut columns,
+                column,
+                &["log", "actuator", name, key],
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to take the effort of a foreign recording for a torque at the joint: many drivers publish
+/// motor currents there.
+fn foreign_effort(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let log = &file.log;
+    let mapped = log.joint.values().any(|channels| channels.name.is_some());
+    if log.torque_is.is_none() && (mapped || log.torque_topic.is_some()) {
+        return Err(document.missing(
+            &["log", "torque_is"],
+            "what the messages hold as torque or effort: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses gears that cannot be turned back, or that would be applied to what is no motor's.
+fn gears(file: &RobotFile, document: &Document) -> Result<(), ConfigError> {
+    let log = &file.log;
+    if log.gears.is_empty() {
+        return Ok(());
+    }
+    let at = ["log", "gears"];
+    let joints = file.robot().joints();
+    let matrix = gear_matrix(&log.gears).filter(|matrix| matrix.nrows() == joints);
+    let Some(matrix) = matrix else {
+        return Err(document.value(
+            &at,
+            &format!("is no matrix of {joints} rows and columns"),
+            "give one row for each motor: its turns per unit of each joint",
+        ));
+    };
+    if matrix.try_inverse().is_none() {
+        return Err(document.value(
+            &at,
+            "cannot be inverted: some motion of the joints moves no motor",
+            "correct the ratios",
+        ));
+    }
+    match log.torque_is {
+        Some(TorqueIs::Motor | TorqueIs::Current) => Ok(()),
+        _ => Err(document.value(
+            &at,
+            "takes motor torques to the joints, but the torques are not said to be of the motors",
+            "set `torque_is = \"motor\"` or \"current\", or delete it",
+        )),
+    }
+}
+
+/// Refuses a column that is empty or already read as something else.
+fn claim<'c>(
+    document: &Document,
+    columns: &mut BTreeMap<&'c str, String>,
+    column: &'c Option<ColumnName>,
+    at: &[&str],
+) -> Result<(), ConfigError> {
+    let Some(ColumnName(column)) = column else {
+        return Ok(());
+    };
+    if column.trim().is_empty() {
+        return Err(document.value(at, "is empty", "name a column of the log"));
+    }
+    if let Some(first) = columns.get(column.as_str()) {
+        let problem = format!("reads the column that `{first}` reads already");
+        return Err(document.value(at, &problem, "give each channel its own column"));
+    }
+    columns.insert(column, at.join("."));
+    Ok(())
+}
+
+fn joint_channels(
+    document: &Document,
+    joint: &str,
+    channels: &JointChannels,
+    kind: JointKind,
+    torque_is: Option<TorqueIs>,
+    geared: bool,
+) -> Result<(), ConfigError> {
+    let at = |key| ["log", "joint", joint, key];
+    let position_fits = match channels.position_unit {
+        None => true,
+        Some(PositionUnit::Metre | PositionUnit::Millimetre) => kind == JointKind::Prismatic,
+        Some(PositionUnit::Radian | PositionUnit::Degree) => kind == JointKind::Revolute,
+        Some(PositionUnit::Counts) => channels.position_scale.is_some(),
+    };
+    if !position_fits {
+        let remedy = match kind {
+            _ if channels.position_unit == Some(PositionUnit::Counts) => {
+                "give `position_scale`, metres or radians per count"
+            }
+            JointKind::Prismatic => "a prismatic joint is logged in \"m\" or \"mm\"",
+            JointKind::Revolute => "a revolute joint is logged in \"rad\" or \"deg\"",
+        };
+        return Err(document.value(&at("position_unit"), "does not fit the joint", remedy));
+    }
+    let scaled = channels.torque_scale.is_some();
+    let torque_fits = match channels.torque_unit {
+        Some(TorqueUnit::Newton) => kind == JointKind::Prismatic || scaled,
+        Some(TorqueUnit::NewtonMetre) => kind == JointKind::Revolute || scaled,
+        None
+        | Some(TorqueUnit::Ampere | TorqueUnit::Volt | TorqueUnit::Counts | TorqueUnit::Percent) => {
+            true
+        }
+    };
+    if !torque_fits {
+        return Err(document.value(
+            &at("torque_unit"),
+            "does not fit the joint",
+            "a prismatic joint has N, a revolute one Nm; else give `torque_scale` to get there",
+        ));
+    }
+    sign(document, &at("position_sign"), channels.position_sign)?;
+    sign(document, &at("torque_sign"), channels.torque_sign)?;
+    scale(document, &at("position_scale"), channels.position_scale)?;
+    scale(document, &at("torque_scale"), channels.torque_scale)?;
+    range(document, &at("wrap"), channels.wrap)?;
+    match (torque_is, &channels.torque) {
+        (None, Some(_)) => Err(document.missing(
+            &["log", "torque_is"],
+            "what the torque column is: `torque_is = \"joint\"`, \"motor\", \"current\" or \"commanded\"",
+        )),
+        (Some(TorqueIs::Motor), _) if !scaled && !geared => Err(document.missing(
+            &at("torque_scale"),
+            "the gear ratio that takes motor torque to the joint (1 where there is no gear)",
+        )),
+        (Some(TorqueIs::Current), _)
+            if !scaled && channels.torque_unit.is_none_or(TorqueUnit::is_torque) =>
+        {
+            Err(document.missing(
+                &at("torque_scale"),
+                "torque constant times gear ratio, or `torque_unit = \"A\"` to have the model in A",
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn actuator_channels(
+    document: &Document,
+    name: &str,
+    channels: &ActuatorChannels,
+) -> Result<(), ConfigError> {
+    let at = |key| ["log", "actuator", name, key];
+    let turns = name == COORDINATES[2];
+    let fits = match channels.position_unit {
+        None | Some(PositionUnit::Counts) => true,
+        Some(PositionUnit::Metre | PositionUnit::Millimetre) => !turns,
+        Some(PositionUnit::Radian | PositionUnit::Degree) => turns,
+    };
+    if !fits {
+        let remedy = "x_c3 is logged in \"rad\", \"deg\" or \"counts\", the others in \"m\", \"mm\" or \"counts\"";
+        return Err(document.value(&at("position_unit"), "does not fit the coordinate", remedy));
+    }
+    sign(document, &at("position_sign"), channels.position_sign)?;
+    sign(document, &at("volts_sign"), channels.volts_sign)?;
+    scale(document, &at("position_scale"), channels.position_scale)?;
+    scale(document, &at("volts_scale"), channels.volts_scale)?;
+    range(document, &at("wrap"), channels.wrap)?;
+    Ok(())
+}
+
+fn range(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+    match value {
+        Some(value) if !(value > 0.0 && value.is_finite()) => Err(document.value(
+            at,
+            &format!("is {value}"),
+            "give the range of the encoder in the unit of its column: 360, 6.283185307179586, 4096",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn sign(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+    match value {
+        Some(value) if value.abs() != 1.0 => {
+            Err(document.value(at, &format!("is {value}"), "give 1 or -1"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn scale(document: &Document, at: &[&str], value: Option<f64>) -> Result<(), ConfigError> {
+    match value {
+        Some(value) if value == 0.0 || !value.is_finite() => Err(document.value(
+            at,
+            &format!("is {value}"),
+            "give a finite factor other than 0",
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,317 @@
+//! One TOML text, read with errors that name file, line and the way out.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use toml::de::{DeTable, DeValue};
+
+use super::ConfigError;
+use cft_ident_core::number;
+use cft_ident_logs::log::{escape, escape_whole, list, nearest};
+
+/// A TOML text and the name under which errors speak of it.
+pub(crate) struct Document<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+impl<'a> Document<'a> {
+    pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
+        Self { file, text }
+    }
+
+    /// Deserialises the text, in which no number may be one that cannot be worked with.
+    pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        let root = DeTable::parse(self.text).map_err(|error| self.explain(&error))?;
+        let mut path = Vec::new();
+        for (key, value) in root.get_ref() {
+            path.push(key.get_ref().to_string());
+            self.numbers(value, &mut path)?;
+            path.pop();
+        }
+        T::deserialize(toml::Deserializer::from(root)).map_err(|error| self.explain(&error))
+    }
+
+    /// Refuses inf, nan and numbers beyond [`number::LARGEST`] in the value at `path`.
+    fn numbers(
+        &self,
+        value: &toml::Spanned<DeValue<'_>>,
+        path: &mut Vec<String>,
+    ) -> Result<(), ConfigError> {
+        match value.get_ref() {
+            DeValue::Float(float) => {
+                let number: f64 = float.as_str().parse().unwrap_or(f64::NAN);
+                // a variance has the square of its quantity's range
+                let size = match path.first().is_some_and(|key| key == "covariance") {
+                    true => number.abs().sqrt(),
+                    false => number,
+                };
+                let path: Vec<&str> = path.iter().map(String::as_str).collect();
+                // a row that `new` leaves to be filled in is refused by what it lacks
+                let open = number.is_nan()
+                    && matches!(
+                        path[..],
+                        ["robot", "link", _, "a" | "alpha" | "d" | "theta"]
+                    );
+                if number::is_usable(size) || open {
+                    return Ok(());
+                }
+                let written = match number.is_finite() {
+                    true => float.as_str().to_owned(),
+                    false => number.to_string(),
+                };
+                return Err(ConfigError::Value {
+                    file: self.file.to_owned(),
+                    line: self.line(value.span().start),
+                    key: dotted(&path),
+                    problem: format!("holds {written}{}", number::beyond(number)),
+                    remedy: format!("give finite numbers of at most {:e}", number::LARGEST),
+                });
+            }
+            DeValue::Table(table) => {
+                for (key, value) in table {
+                    path.push(key.get_ref().to_string());
+                    self.numbers(value, path)?;
+                    path.pop();
+                }
+            }
+            DeValue::Array(array) => {
+                for (index, value) in array.iter().enumerate() {
+                    // an array of numbers is named as a whole, its line says the rest
+                    let inner = matches!(value.get_ref(), DeValue::Table(_));
+                    if inner {
+                        path.push(index.to_string());
+                    }
+                    self.numbers(value, path)?;
+                    if inner {
+                        path.pop();
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Turns an error of the TOML reader into ours.
+    fn explain(&self, error: &toml::de::Error) -> ConfigError {
+        let line = error.span().map_or(1, |span| self.line(span.start));
+        let message = one_line(error.message());
+        let listed = between_backticks(error.message());
+        // serde words an unknown name as: unknown field `x`, expected one of `a`, `b`
+        if let Some((name, known)) = listed.split_first() {
+            if message.starts_with("unknown field") {
+                return ConfigError::UnknownKey {
+                    file: self.file.to_owned(),
+                    line,
+                    key: escape(name),
+                    remedy: nearest_or_all(name, known, "known keys here"),
+                };
+            }
+            if message.starts_with("unknown variant") {
+                return ConfigError::Syntax {
+                    file: self.file.to_owned(),
+                    line,
+                    message: format!(
+                        "`{}` is no known value; {}",
+                        escape(name),
+                        nearest_or_all(name, known, "known values")
+                    ),
+                };
+            }
+        }
+        let message = escape_whole(&message);
+        let told = if let Some([name]) = message.strip_prefix("missing field").map(|_| &listed[..])
+        {
+            return ConfigError::MissingKey {
+                file: self.file.to_owned(),
+                line,
+                key: escape(name),
+                remedy: "it; the files in configs/ show how".to_owned(),
+            };
+        } else if message == "duplicate key" {
+            let name = error.span().and_then(|span| self.text.get(span));
+            let name = escape(name.unwrap_or_default().trim());
+            format!("duplicate key `{name}`; keep one of the two")
+        } else if message.starts_with("invalid type") || message.starts_with("wanted") {
+            format!("{message}; give a value of that kind")
+        } else {
+            format!("{message}; correct this line: `key = value`, text in quotes")
+        };
+        ConfigError::Syntax {
+            file: self.file.to_owned(),
+            line,
+            message: told,
+        }
+    }
+
+    /// Line of a byte offset, from 1.
+    fn line(&self, offset: usize) -> usize {
+        let end = offset.min(self.text.len());
+        1 + self.text.as_bytes()[..end]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count()
+    }
+
+    /// Line of the key at `path`, or of the innermost table on the way that exists.
+    /// A number stands for an element of an array.
+    pub(crate) fn line_of(&self, path: &[&str]) -> usize {
+        let mut best = None;
+        self.follow(path, |key, _| best = Some(key));
+        best.map_or(1, |span: Range<usize>| self.line(span.start))
+    }
+
+    /// The number at `path` as it is written; `None` where there is none.
+    pub(crate) fn written(&self, path: &[&str]) -> Option<&'a str> {
+        let mut found = None;
+        let mut steps = 0;
+        self.follow(path, |_, value| {
+            steps += 1;
+            found = Some(value);
+        });
+        let text = self.text.get(found.filter(|_| steps == path.len())?)?;
+        Some(text.trim())
+    }
+
+    /// Goes along `path` as far as it exists; `seen` gets the spans of each key (of the value, in an
+    /// array) and value.
+    fn follow(&self, path: &[&str], mut seen: impl FnMut(Range<usize>, Range<usize>)) {
+        let Ok(root) = DeTable::parse(self.text) else {
+            return;
+        };
+        let mut table = Some(root.get_ref());
+        let mut array: Option<&[toml::Spanned<DeValue<'_>>]> = None;
+        for name in path {
+            let (key, value) = if let Some(inside) = table {
+                let Some((key, value)) = inside.get_key_value(*name) else {
+                    return;
+                };
+                (key.span(), value)
+            } else if let Some(inside) = array {
+                let found = name
+                    .parse::<usize>()
+                    .ok()
+                    .and_then(|index| inside.get(index));
+                let Some(value) = found else { return };
+                (value.span(), value)
+            } else {
+                return;
+            };
+            seen(key, value.span());
+            table = value.get_ref().as_table();
+            array = value.get_ref().as_array().map(|elements| &**elements);
+        }
+    }
+
+    /// The error for a key that must be there; `remedy` reads on after "add".
+    pub(crate) fn missing(&self, path: &[&str], remedy: &str) -> ConfigError {
+        ConfigError::MissingKey {
+            file: self.file.to_owned(),
+            line: self.line_of(path),
+            key: dotted(path),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// The error for a value that cannot be.
+    pub(crate) fn value(&self, path: &[&str], problem: &str, remedy: &str) -> ConfigError {
+        ConfigError::Value {
+            file: self.file.to_owned(),
+            line: self.line_of(path),
+            key: dotted(path),
+            problem: problem.to_owned(),
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// Refuses what is no name for a joint.
+    pub(crate) fn plain_name(&self, path: &[&str], joint: &str) -> Result<(), ConfigError> {
+        if is_plain_name(joint) {
+            return Ok(());
+        }
+        let remedy = "use letters, digits, `_`, `-` and `.`";
+        Err(self.value(path, "is no name for a joint", remedy))
+    }
+
+    /// Refuses a table for a joint or coordinate that the robot does not have.
+    pub(crate) fn known_names<T>(
+        &self,
+        table: &[&str],
+        entries: &BTreeMap<String, T>,
+        known: &[String],
+    ) -> Result<(), ConfigError> {
+        let Some(name) = entries.keys().find(|name| !known.contains(name)) else {
+            return Ok(());
+        };
+        let all = || known.iter().map(String::as_str);
+        let near = nearest(name, all())
+            .map(|near| format!("did you mean `{near}`? "))
+            .unwrap_or_default();
+        let path = [table, &[name.as_str()]].concat();
+        let remedy = format!("{near}this robot has {}", list(all()));
+        Err(self.value(&path, "is nothing that this robot has", &remedy))
+    }
+
+    /// Refuses what is not above 0.
+    pub(crate) fn positive(&self, path: &[&str], value: f64) -> Result<(), ConfigError> {
+        if value >= number::SMALLEST {
+            return Ok(());
+        }
+        let remedy = match value > 0.0 {
+            true => format!("give a number of at least {:e}", number::SMALLEST),
+            false => "give a number above 0".to_owned(),
+        };
+        Err(self.value(path, &format!("is {value:?}"), &remedy))
+    }
+
+    /// Refuses what is below 0, where it is given.
+    pub(crate) fn not_negative(
+        &self,
+        path: &[&str],
+        value: Option<f64>,
+    ) -> Result<(), ConfigError> {
+        match value {
+            Some(value) if value < 0.0 => {
+                Err(self.value(path, &format!("is {value}"), "give 0 or a number above it"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether a text can be the name of a joint.
+pub(super) fn is_plain_name(joint: &str) -> bool {
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    !joint.is_empty() && joint.len() <= 64 && joint.chars().all(plain)
+}
+
+/// Whether a section says nothing: it is not written then.
+pub(super) fn is_default<T: Default + PartialEq>(section: &T) -> bool {
+    *section == T::default()
+}
+
+/// The path of a key as it is written in TOML.
+fn dotted(path: &[&str]) -> String {
+    let shown: Vec<String> = path.iter().map(|part| escape(part)).collect();
+    shown.join(".")
+}
+
+/// The parts of a message that stand between backticks.
+fn between_backticks(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+/// First line of a message: the TOML reader may append more.
+fn one_line(message: &str) -> String {
+    message.lines().collect::<Vec<_>>().join(" ")
+}
+
+/// "did you mean `x`?" where a known name is near, else the list of known names.
+pub(crate) fn nearest_or_all(name: &str, known: &[&str], what: &str) -> String {
+    match nearest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("{what}: {}", known.join(", ")),
+    }
+}

@@ -1,0 +1,283 @@
+//! Reading of configuration files; those that come with the tool are found anywhere.
+
+use std::path::Path;
+
+use super::campaign::Campaign;
+use super::document::Document;
+use super::model_file::ModelFile;
+use super::robot_file::RobotFile;
+use super::text_file::text_of;
+use super::trajectory::Trajectory;
+use super::{ConfigError, check, serial_chain, urdf};
+use cft_ident_logs::log::{did_you_mean, list, named_beside_of, remedy, shown};
+
+/// The files that come with the tool, by the path under which they are asked for.
+pub const EMBEDDED: [(&str, &str); 13] = [
+    (
+        "configs/cft.toml",
+        include_str!("../../../../configs/cft.toml"),
+    ),
+    (
+        "configs/cft-validation.toml",
+        include_str!("../../../../configs/cft-validation.toml"),
+    ),
+    (
+        "configs/cft-excitation.toml",
+        include_str!("../../../../configs/cft-excitation.toml"),
+    ),
+    (
+        "configs/cft-dspace.toml",
+        include_str!("../../../../configs/cft-dspace.toml"),
+    ),
+    (
+        "configs/emps.toml",
+        include_str!("../../../../configs/emps.toml"),
+    ),
+    (
+        "configs/emps-symmetric.toml",
+        include_str!("../../../../configs/emps-symmetric.toml"),
+    ),
+    (
+        "configs/bldc.toml",
+        include_str!("../../../../configs/bldc.toml"),
+    ),
+    (
+        "configs/panda.toml",
+        include_str!("../../../../configs/panda.toml"),
+    ),
+    (
+        "configs/tx40.toml",
+        include_str!("../../../../configs/tx40.toml"),
+    ),
+    (
+        "configs/ur10.toml",
+        include_str!("../../../../configs/ur10.toml"),
+    ),
+    (
+        "configs/kr300.toml",
+        include_str!("../../../../configs/kr300.toml"),
+    ),
+    (
+        "configs/pendulum.toml",
+        include_str!("../../../../configs/pendulum.toml"),
+    ),
+    (
+        "configs/table3.toml",
+        include_str!("../../../../configs/table3.toml"),
+    ),
+];
+
+/// Text of a file that comes with the tool.
+pub fn embedded(path: &Path) -> Option<&'static str> {
+    let path = path.strip_prefix(".").unwrap_or(path);
+    let found = EMBEDDED.iter().find(|(name, _)| Path::new(name) == path);
+    found.map(|(_, text)| *text)
+}
+
+/// What a file is to be, which decides what is suggested where it is not there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wanted {
+    Robot,
+    Trajectory,
+    /// A file of the user's: a model, a campaign, a document.
+    Own,
+    /// Any of them.
+    Any,
+}
+
+impl Wanted {
+    /// Whether a file of the user's may be one: a robot file is no model, and neither is a trajectory.
+    fn may_be(self, path: &Path) -> bool {
+        let Ok(text) = text_of(path) else {
+            return false;
+        };
+        match self {
+            Wanted::Robot | Wanted::Trajectory => self.is(&text) && !text.contains("[contents]"),
+            Wanted::Own | Wanted::Any => true,
+        }
+    }
+
+    /// Whether a file that comes with the tool is one.
+    fn is(self, text: &str) -> bool {
+        match self {
+            Wanted::Robot => text.contains("[robot]"),
+            Wanted::Trajectory => text.contains("kind = ") && !text.contains("[robot]"),
+            Wanted::Own => false,
+            Wanted::Any => true,
+        }
+    }
+}
+
+/// Text of a configuration file: the one on the disk, else the one that comes with the tool.
+///
+/// # Errors
+/// [`ConfigError::Read`] where there is neither.
+pub fn text(path: &Path) -> Result<String, ConfigError> {
+    text_of_kind(path, Wanted::Any)
+}
+
+/// Text of a file of one kind, likewise.
+///
+/// # Errors
+/// [`ConfigError::Read`] where there is neither.
+pub fn text_of_kind(path: &Path, wanted: Wanted) -> Result<String, ConfigError> {
+    let error = match text_of(path) {
+        Ok(text) => return Ok(text),
+        Err(error) => error,
+    };
+    if error.kind() == std::io::ErrorKind::NotFound {
+        if let Some(text) = embedded(path) {
+            return Ok(text.to_owned());
+        }
+        let known = EMBEDDED.iter().filter(|(_, text)| wanted.is(text));
+        let known = list(known.map(|(name, _)| *name));
+        let more = match known.is_empty() {
+            true => String::new(),
+            false => format!(
+                "; {}these come with the tool: {known}",
+                did_you_mean(&shown(path), &known)
+            ),
+        };
+        return Err(ConfigError::Read {
+            file: shown(path),
+            remedy: format!(
+                "{}{}{more}",
+                remedy(&error),
+                named_beside_of(path, &["toml"], &|beside| wanted.may_be(beside))
+            ),
+            source: error,
+        });
+    }
+    if let Some(kind) = other_kind(path, "") {
+        return Err(kind);
+    }
+    Err(ConfigError::Read {
+        file: shown(path),
+        remedy: match error.kind() {
+            std::io::ErrorKind::InvalidData => "name a text file of below 16 MB".to_owned(),
+            _ => remedy(&error).to_owned(),
+        },
+        source: error,
+    })
+}
+
+/// What a file is that is no TOML text: a URDF, or a log.
+pub(super) fn other_kind(path: &Path, text: &str) -> Option<ConfigError> {
+    let file = shown(path);
+    let ends = path
+        .extension()
+        .map(|end| end.to_string_lossy().to_lowercase());
+    let ends = ends.as_deref().unwrap_or_default();
+    let (found, remedy) = match text.trim_start_matches('\u{feff}').trim_start() {
+        text if text.starts_with('<') && (text.contains("<robot") || ends == "urdf") => (
+            "a URDF",
+            format!("make a robot file of it: cft-ident new NAME --urdf {file} --log LOG"),
+        ),
+        text if text.starts_with('<') => (
+            "an XML file",
+            "give a robot file; `cft-ident new` writes one".to_owned(),
+        ),
+        _ if ["csv", "mcap", "db3", "zst", "gz", "bag"].contains(&ends) => (
+            "a log",
+            format!("make a robot file for it: cft-ident new NAME --log {file}"),
+        ),
+        _ => return None,
+    };
+    Some(ConfigError::Kind {
+        file,
+        found,
+        wanted: "a robot or model file",
+        remedy,
+    })
+}
+
+impl RobotFile {
+    /// Reads and checks a robot file from TOML text; `file` names it in errors. A text alone
+    /// cannot name a URDF, which would stand beside it.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_in(file, text, None)
+    }
+
+    /// The same for the text of a file in `folder`, from where the URDF is read that it names: the
+    /// robot file then holds its links and limits.
+    pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
+        if let Some(kind) = other_kind(Path::new(file), text) {
+            return Err(kind);
+        }
+        let document = Document::new(file, text);
+        let mut robot: Self = document.read()?;
+        let taken = serial_chain::take_as_meant(&mut robot.robot, &document, file);
+        robot.notes.0.extend(taken);
+        urdf::resolve(&mut robot, &document, folder)?;
+        check::check(&robot, &document)?;
+        Ok(robot)
+    }
+
+    /// Reads and checks a robot file, or one that comes with the tool.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Self::parse_in(
+            &shown(path),
+            &text_of_kind(path, Wanted::Robot)?,
+            path.parent(),
+        )
+    }
+}
+
+impl ModelFile {
+    /// Reads and checks a model file.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Self::parse_in(
+            &shown(path),
+            &text_of_kind(path, Wanted::Own)?,
+            path.parent(),
+        )
+    }
+}
+
+impl Trajectory {
+    /// Reads and checks a trajectory file, or one that comes with the tool.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Self::parse(&shown(path), &text_of_kind(path, Wanted::Trajectory)?)
+    }
+}
+
+impl Campaign {
+    /// Reads and checks a campaign file.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        Self::parse(&shown(path), &text_of_kind(path, Wanted::Own)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_there_is_answered_with_files_of_its_kind() {
+        let said = |wanted| {
+            text_of_kind(Path::new("none.toml"), wanted)
+                .unwrap_err()
+                .to_string()
+        };
+        let robot = said(Wanted::Robot);
+        assert!(robot.contains("configs/ur10.toml"), "{robot}");
+        assert!(!robot.contains("configs/cft-excitation.toml"), "{robot}");
+        let motion = said(Wanted::Trajectory);
+        assert!(motion.contains("configs/cft-excitation.toml"), "{motion}");
+        assert!(!motion.contains("configs/ur10.toml"), "{motion}");
+        assert!(!said(Wanted::Own).contains("come with the tool"));
+
+        let folder = tempfile::tempdir().unwrap();
+        let write =
+            |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        write("arm_model.toml", "[contents]\n[robot]\n");
+        write("arm_robot.toml", "[robot]\n");
+        let missing = folder.path().join("arm_mobel.toml");
+        let said = text_of_kind(&missing, Wanted::Robot).unwrap_err();
+        let said = said.to_string();
+        assert!(
+            said.contains("arm_robot.toml") && !said.contains("arm_model.toml"),
+            "{said}"
+        );
+    }
+}

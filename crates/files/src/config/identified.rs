@@ -1,0 +1,197 @@
+//! Between a model file and the numbers that formulas work with.
+
+use super::ConfigError;
+use super::model_file::{Covariance, ModelFile, Parameter};
+use cft_ident_core::robot::Robot;
+use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::model::{JointFriction, Model};
+
+/// Unit of a friction parameter of joint `j` by its name.
+pub fn friction_unit(robot: &Robot, j: usize, name: &str, torque_unit: &str) -> String {
+    let position = robot.joint_kind(j).position_unit();
+    match name {
+        "viscous" => format!("{torque_unit} s/{position}"),
+        "slope_1" | "slope_2" => format!("s/{position}"),
+        _ => torque_unit.to_owned(),
+    }
+}
+
+/// Unit of an inertial parameter: the robot's own `si`, or, for a joint whose torque channel is left
+/// in A, current per acceleration.
+pub fn inertia_unit(robot: &Robot, si: &str, torque_unit: &str) -> String {
+    robot.joint_kind(0).inertial_unit(si, torque_unit)
+}
+
+/// Meaning of a friction parameter.
+pub fn friction_meaning(name: &str) -> &'static str {
+    match name {
+        "viscous" => "Bv: viscous friction",
+        "coulomb_1" => "Bf1: height of the steeper saturating part",
+        "coulomb_2" => "Bf2: height of the other saturating part; negative for a Stribeck dip",
+        "slope_1" => "w1: slope of the steeper saturating part",
+        "slope_2" => "w2: slope of the other saturating part",
+        "coulomb" => "Fc: Coulomb friction",
+        "offset" => "constant torque",
+        _ => "",
+    }
+}
+
+impl Covariance {
+    /// Pairs of parameters whose errors correlate by `least` or more, the strongest first.
+    pub fn correlated(&self, least: f64) -> Vec<([&str; 2], f64)> {
+        let at = |i: usize, j: usize| self.matrix.get(i).and_then(|row| row.get(j)).copied();
+        let mut found = Vec::new();
+        for i in 0..self.names.len() {
+            for j in 0..i {
+                let (Some(a), Some(b), Some(both)) = (at(i, i), at(j, j), at(i, j)) else {
+                    continue;
+                };
+                let correlation = both / (a * b).sqrt();
+                if correlation.is_finite() && correlation.abs() >= least {
+                    found.push((correlation, j, i));
+                }
+            }
+        }
+        found.sort_by(|x, y| {
+            let places = (x.1, x.2).cmp(&(y.1, y.2));
+            y.0.abs().total_cmp(&x.0.abs()).then(places)
+        });
+        let named = |(correlation, i, j): (f64, usize, usize)| {
+            ([i, j].map(|k| self.names[k].as_str()), correlation)
+        };
+        found.into_iter().map(named).collect()
+    }
+}
+
+impl ModelFile {
+    /// The model that the file describes; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] for the first inertial or friction parameter it lacks.
+    pub fn model(&self, file: &str) -> Result<Model, ConfigError> {
+        self.model_with(file, self.inertial(file)?)
+    }
+
+    /// The model of a file that may hold friction alone, as `friction` writes it: with inertias of 0 then, for
+    /// what asks for no torque.
+    ///
+    /// # Errors
+    /// [`ConfigError::MissingParameter`] for the first friction parameter that it lacks, or the first inertial
+    /// one where it has some.
+    pub fn model_or_friction(&self, file: &str) -> Result<Model, ConfigError> {
+        let robot = self.robot.robot();
+        let mut inertial = robot.parameters().iter();
+        if inertial.any(|p| self.find(&p.name, None).is_some()) {
+            return self.model(file);
+        }
+        self.model_with(file, vec![0.0; robot.parameters().len()])
+    }
+
+    fn model_with(&self, file: &str, theta: Vec<f64>) -> Result<Model, ConfigError> {
+        let robot = self.robot.robot();
+        let mut friction = Vec::with_capacity(robot.joints());
+        let mut offset = Vec::with_capacity(robot.joints());
+        for joint in robot.joint_names() {
+            friction.push(self.joint_friction(file, joint)?);
+            offset.push(self.offset(joint));
+        }
+        Ok(Model {
+            robot,
+            theta,
+            friction,
+            offset,
+        })
+    }
+
+    /// Friction of one joint by the law whose parameters the file holds.
+    fn joint_friction(&self, file: &str, joint: &str) -> Result<JointFriction, ConfigError> {
+        Ok(if self.find("slope_1", Some(joint)).is_some() {
+            JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
+        } else if self.find("coulomb", Some(joint)).is_some() {
+            JointFriction::ViscousCoulomb(self.viscous_coulomb(file, joint)?)
+        } else if self.find("viscous", Some(joint)).is_some() {
+            // a viscous term alone is half a law: say what is missing
+            JointFriction::DoubleTanh(self.double_tanh(file, joint)?)
+        } else {
+            JointFriction::None
+        })
+    }
+
+    /// Covariance in the order of [`Model::parameters`], row-major; 0 where unknown.
+    pub fn model_covariance(&self, model: &Model) -> Vec<f64> {
+        let mut keys: Vec<String> = model
+            .robot
+            .parameters()
+            .iter()
+            .map(|p| p.name.to_string())
+            .collect();
+        for (joint, friction) in model.robot.joint_names().iter().zip(&model.friction) {
+            let names: &[&str] = match friction {
+                JointFriction::None => &[],
+                JointFriction::DoubleTanh(_) => &DoubleTanh::NAMES,
+                JointFriction::ViscousCoulomb(_) => &ViscousCoulomb::NAMES,
+            };
+            keys.extend(names.iter().map(|n| format!("{n}:{joint}")));
+        }
+        keys.extend(
+            model
+                .robot
+                .joint_names()
+                .iter()
+                .map(|j| format!("offset:{j}")),
+        );
+        self.covariance_of(&keys)
+    }
+
+    /// Puts a joint's friction parameters in place of those that the file has of it, of which the covariance
+    /// then says nothing any more.
+    pub fn replace_joint(&mut self, joint: &str, parameters: Vec<Parameter>) {
+        let kept = |p: &Parameter| p.joint.as_deref() != Some(joint) || p.name == "offset";
+        let dropped: Vec<String> = (self.parameters.iter())
+            .filter(|p| !kept(p))
+            .map(Parameter::key)
+            .collect();
+        self.forget_covariance(&dropped);
+        self.parameters.retain(kept);
+        self.parameters.extend(parameters);
+    }
+
+    /// Takes parameters out of the covariance, of which it says nothing any more.
+    pub fn forget_covariance(&mut self, keys: &[String]) {
+        let Some(old) = self.covariance.take() else {
+            return;
+        };
+        let kept: Vec<usize> = (0..old.names.len())
+            .filter(|i| !keys.contains(&old.names[*i]))
+            .collect();
+        let of = |i: &usize| kept.iter().map(|j| old.matrix[*i][*j]).collect();
+        self.covariance = Some(Covariance {
+            names: kept.iter().map(|i| old.names[*i].clone()).collect(),
+            matrix: kept.iter().map(of).collect(),
+        });
+    }
+
+    /// Puts a block of covariance in place of what the file has between these keys; entries between
+    /// them and other keys are dropped.
+    pub fn replace_covariance(&mut self, keys: &[String], block: &dyn Fn(usize, usize) -> f64) {
+        let old = self.covariance.take().unwrap_or_default();
+        let kept: Vec<usize> = (0..old.names.len())
+            .filter(|i| !keys.contains(&old.names[*i]))
+            .collect();
+        let mut names: Vec<String> = kept.iter().map(|i| old.names[*i].clone()).collect();
+        names.extend_from_slice(keys);
+        let first = kept.len();
+        let matrix = (0..names.len())
+            .map(|i| {
+                (0..names.len())
+                    .map(|j| match (i < first, j < first) {
+                        (true, true) => old.matrix[kept[i]][kept[j]],
+                        (false, false) => block(i - first, j - first),
+                        _ => 0.0,
+                    })
+                    .collect()
+            })
+            .collect();
+        self.covariance = Some(Covariance { names, matrix });
+    }
+}

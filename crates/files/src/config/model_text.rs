@@ -1,0 +1,379 @@
+//! Model files as text: read with checks, written to be read by people.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::candidates::{self, CandidateSection};
+use super::contents::{self, Contents};
+use super::document::Document;
+use super::embedded::other_kind;
+use super::held_out::{Excesses, HeldOut};
+use super::limits::Limits;
+use super::model_file::{
+    Covariance, EffectSection, FrictionPrior, LinkBody, ModelFile, ModelProvenance, Parameter,
+};
+use super::robot_file::{
+    ControlSection, FilterSection, FrictionSection, NoiseSection, RobotFile, RobotSection,
+    SensorsSection,
+};
+use super::robot_file::{ModelKind, Notes};
+use super::{ConfigError, check, urdf};
+use cft_ident_core::robot::drive::JointDrive;
+use cft_ident_logs::log::LogSection;
+
+/// The file as it is written: the sections of a robot file, and what was identified.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ModelToml {
+    contents: Option<Contents>,
+    robot: RobotSection,
+    #[serde(default)]
+    friction: FrictionSection,
+    #[serde(default)]
+    log: LogSection,
+    #[serde(default)]
+    filter: FilterSection,
+    #[serde(default)]
+    noise: NoiseSection,
+    #[serde(default)]
+    limits: Limits,
+    #[serde(default)]
+    drive: BTreeMap<String, JointDrive>,
+    #[serde(default)]
+    control: ControlSection,
+    #[serde(default)]
+    sensors: SensorsSection,
+    #[serde(default)]
+    parameter: Vec<Parameter>,
+    covariance: Option<Covariance>,
+    #[serde(default)]
+    residual_std: BTreeMap<String, f64>,
+    #[serde(default)]
+    friction_prior: Vec<FrictionPrior>,
+    #[serde(default)]
+    held_out: Vec<HeldOut>,
+    excesses: Option<Excesses>,
+    #[serde(default)]
+    candidate: Vec<CandidateSection>,
+    #[serde(default)]
+    effect: Vec<EffectSection>,
+    #[serde(default)]
+    link: Vec<LinkBody>,
+    #[serde(default)]
+    drive_inertia: BTreeMap<String, f64>,
+    provenance: Option<ModelProvenance>,
+}
+
+impl ModelFile {
+    /// Reads a model from TOML text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// Everything that a robot file can have wrong; a parameter twice, or not finite; a covariance
+    /// that is not square or names what is no parameter.
+    pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_in(file, text, None)
+    }
+
+    /// The same for the text of a file in `folder`, from where the URDF is read that it may name:
+    /// base parameters that the file does not give are then those of the URDF's inertials.
+    pub fn parse_in(file: &str, text: &str, folder: Option<&Path>) -> Result<Self, ConfigError> {
+        if let Some(kind) = other_kind(Path::new(file), text) {
+            return Err(kind);
+        }
+        let document = Document::new(file, text);
+        let mut raw: ModelToml = document.read()?;
+        let mut robot = RobotFile {
+            robot: raw.robot,
+            friction: raw.friction,
+            log: raw.log,
+            filter: raw.filter,
+            noise: raw.noise,
+            limits: raw.limits,
+            drive: raw.drive,
+            control: raw.control,
+            sensors: raw.sensors,
+            notes: Notes::default(),
+        };
+        let beside = robot.robot.urdf.is_some();
+        let written: Vec<String> = raw.parameter.iter().map(Parameter::key).collect();
+        urdf::resolve(&mut robot, &document, folder)?;
+        check::check(&robot, &document)?;
+        if beside {
+            urdf::beside::base_parameters(&robot, &mut raw.parameter, &document)?;
+        }
+        if raw.parameter.is_empty() {
+            return Err(document.missing(
+                &["parameter"],
+                "[[parameter]] tables (this looks like a robot file: give it as -r, not as -m)",
+            ));
+        }
+        let mut model = Self {
+            robot,
+            parameters: raw.parameter,
+            covariance: raw.covariance,
+            residual_std: raw.residual_std,
+            friction_prior: raw.friction_prior,
+            held_out: raw.held_out,
+            excesses: raw.excesses,
+            candidates: raw.candidate,
+            effects: raw.effect,
+            links: raw.link,
+            drive_inertia: raw.drive_inertia,
+            provenance: raw.provenance.unwrap_or_default(),
+        };
+        model.check_parameters(&document)?;
+        match &raw.contents {
+            Some(contents) => contents.check(&model, written, &document)?,
+            None => {
+                contents::check_by_robot(&model, file)?;
+                model.robot.notes.0.push(contents::without_list(file));
+            }
+        }
+        model.check_covariance(&document)?;
+        candidates::check(&model.candidates, &document)?;
+        model.check_rest(&document)?;
+        Ok(model)
+    }
+
+    /// The model as TOML text. Numbers are written shortest, so that they are read back bit for bit.
+    ///
+    /// # Errors
+    /// A number that is not finite, or any other content that could not be read back.
+    pub fn to_toml(&self) -> Result<String, ConfigError> {
+        let mut text = String::from(
+            "# A dynamic model identified by cft-ident. SI units and radians. It may be edited by hand.\n\n",
+        );
+        text.push_str(&self.sections()?);
+        // What cannot be read back must not be written.
+        Self::parse("model", &text)?;
+        Ok(text)
+    }
+
+    /// The sections of [`Self::to_toml`], without its head.
+    ///
+    /// # Errors
+    /// A content that TOML cannot hold.
+    pub fn sections(&self) -> Result<String, ConfigError> {
+        let mut text = String::new();
+        let unwritable = |error: toml::ser::Error| ConfigError::Syntax {
+            file: "model".to_owned(),
+            line: 1,
+            message: format!("cannot be written: {error}"),
+        };
+        text.push_str("# What this file must hold, so that a part that is lost is noticed. Values may be edited.\n");
+        let contents = BTreeMap::from([("contents", Contents::of(self))]);
+        text.push_str(&toml::to_string_pretty(&contents).map_err(unwritable)?);
+        text.push('\n');
+        text.push_str(&toml::to_string(&self.robot).map_err(unwritable)?);
+        text.push_str("\n# Parameters: value and standard deviation in `unit`, theta as in the report's Table 4.\n");
+        for parameter in &self.parameters {
+            text.push_str("\n[[parameter]]\n");
+            text.push_str(&toml::to_string(parameter).map_err(unwritable)?);
+        }
+        if let Some(covariance) = &self.covariance {
+            text.push_str("\n# Covariance of the parameters: row and column i belong to names[i].\n[covariance]\nnames = [\n");
+            for name in &covariance.names {
+                let _ = writeln!(text, "  {},", toml::Value::from(name.as_str()));
+            }
+            text.push_str("]\nmatrix = [\n");
+            for row in &covariance.matrix {
+                let row: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
+                let _ = writeln!(text, "  [{}],", row.join(", "));
+            }
+            text.push_str("]\n");
+        }
+        if !self.residual_std.is_empty() {
+            text.push_str(
+                "\n# Standard deviation of the torque residual by joint.\n[residual_std]\n",
+            );
+            text.push_str(&toml::to_string(&self.residual_std).map_err(unwritable)?);
+        }
+        if !self.friction_prior.is_empty() {
+            text.push_str("\n# Friction by one-joint logs: the speeds and logs, and where other logs refined it the values and\n# the covariance of before. A fit of the same logs begins there, so that none counts twice.\n");
+            let priors = BTreeMap::from([("friction_prior", &self.friction_prior)]);
+            text.push_str(&toml::to_string(&priors).map_err(unwritable)?);
+        }
+        if !self.held_out.is_empty() {
+            text.push_str("\n# What the model leaves of torques that it did not see, blocks of its logs set aside one after the other:\n# for prediction bands and alarms.\n");
+            let held = BTreeMap::from([("held_out", &self.held_out)]);
+            text.push_str(&toml::to_string(&held).map_err(unwritable)?);
+        }
+        if let Some(excesses) = &self.excesses {
+            let excesses = BTreeMap::from([("excesses", excesses)]);
+            text.push('\n');
+            text.push_str(&toml::to_string(&excesses).map_err(unwritable)?);
+        }
+        if !self.candidates.is_empty() {
+            text.push_str("\n# Formulas of effects that are the user's own.\n");
+            let own = BTreeMap::from([("candidate", &self.candidates)]);
+            text.push_str(&toml::to_string(&own).map_err(unwritable)?);
+        }
+        if !self.effects.is_empty() {
+            text.push_str("\n# Effects added to the declared model.\n");
+            let effects = BTreeMap::from([("effect", &self.effects)]);
+            text.push_str(&toml::to_string(&effects).map_err(unwritable)?);
+        }
+        if !self.links.is_empty() {
+            text.push_str("\n# Links that can exist and give the parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
+        }
+        for link in &self.links {
+            text.push_str("\n[[link]]\n");
+            text.push_str(&toml::to_string(link).map_err(unwritable)?);
+        }
+        if !self.drive_inertia.is_empty() {
+            text.push_str("\n# Inertias of the drives beside them.\n[drive_inertia]\n");
+            text.push_str(&toml::to_string(&self.drive_inertia).map_err(unwritable)?);
+        }
+        text.push('\n');
+        let provenance = BTreeMap::from([("provenance", &self.provenance)]);
+        text.push_str(&toml::to_string(&provenance).map_err(unwritable)?);
+        Ok(text)
+    }
+
+    fn check_parameters(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        let mut seen = BTreeMap::new();
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            let index_text = index.to_string();
+            let at = |key| ["parameter", index_text.as_str(), key];
+            document.not_negative(&at("std"), parameter.std)?;
+            if let Some(joint) = &parameter.joint
+                && !joints.contains(joint)
+            {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
+            }
+            if seen.insert(parameter.key(), index).is_some() {
+                return Err(document.value(
+                    &at("name"),
+                    "is there twice",
+                    "keep one table for each parameter",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_covariance(&self, document: &Document) -> Result<(), ConfigError> {
+        let Some(covariance) = &self.covariance else {
+            return Ok(());
+        };
+        let size = covariance.names.len();
+        let known: Vec<String> = self.parameters.iter().map(Parameter::key).collect();
+        let at_names = ["covariance", "names"];
+        for (index, name) in covariance.names.iter().enumerate() {
+            if !known.contains(name) || covariance.names[..index].contains(name) {
+                let problem = format!(
+                    "names `{}`, which is no parameter or there twice",
+                    cft_ident_logs::log::escape(name)
+                );
+                return Err(document.value(
+                    &at_names,
+                    &problem,
+                    "use each parameter once, as `name` or `name:joint`",
+                ));
+            }
+        }
+        let square = covariance.matrix.len() == size
+            && covariance.matrix.iter().all(|row| row.len() == size);
+        if !square {
+            let remedy = format!("give {size} rows of {size} numbers, or delete [covariance]");
+            return Err(document.value(
+                &["covariance", "matrix"],
+                "does not have the size of `names`",
+                &remedy,
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_held_out(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        let refit = "fit the model again; what stands here is no number to choose";
+        let mut there = self.held_out.iter().map(|held| &held.joint);
+        if !self.held_out.is_empty() && !joints.iter().all(|joint| there.next() == Some(joint)) {
+            let remedy = format!(
+                "give one table for each of {}, in this order, or none",
+                joints.join(", ")
+            );
+            return Err(document.value(
+                &["held_out", "0", "joint"],
+                "is not in its place",
+                &remedy,
+            ));
+        }
+        for (index, held) in self.held_out.iter().enumerate() {
+            if let Some((key, problem)) = held.fault() {
+                let at = ["held_out", &index.to_string(), key];
+                return Err(document.value(&at, problem, refit));
+            }
+        }
+        match &self.excesses {
+            Some(excesses) if !excesses.is_possible() => {
+                let problem = "has numbers that no excesses have";
+                Err(document.value(&["excesses", "scale"], problem, refit))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_rest(&self, document: &Document) -> Result<(), ConfigError> {
+        let joints = self.robot.joint_names();
+        for (joint, std) in &self.residual_std {
+            if !joints.contains(joint) {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(
+                    &["residual_std", joint],
+                    "is no joint of this robot",
+                    &remedy,
+                ));
+            }
+            document.not_negative(&["residual_std", joint], Some(*std))?;
+        }
+        for (index, prior) in self.friction_prior.iter().enumerate() {
+            let index_text = index.to_string();
+            let at = |key| ["friction_prior", index_text.as_str(), key];
+            if !joints.contains(&prior.joint) {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(&at("joint"), "is no joint of this robot", &remedy));
+            }
+        }
+        self.check_held_out(document)?;
+        for (joint, inertia) in &self.drive_inertia {
+            document.not_negative(&["drive_inertia", joint], Some(*inertia))?;
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            let index_text = index.to_string();
+            if let Some(joint) = &effect.joint
+                && !self.robot.coordinate_names().contains(joint)
+                // the pantograph's references, where the CFT robot's screws are
+                && !(self.robot.robot.model == ModelKind::Cft
+                    && matches!(joint.as_str(), "x_r" | "y_r"))
+            {
+                let remedy = format!("this robot has {}", joints.join(", "));
+                return Err(document.value(
+                    &["effect", &index_text, "joint"],
+                    "is no joint of this robot",
+                    &remedy,
+                ));
+            }
+            for (key, parameter) in &effect.parameters {
+                let at = |what| {
+                    [
+                        "effect",
+                        index_text.as_str(),
+                        "parameters",
+                        key.as_str(),
+                        what,
+                    ]
+                };
+                document.not_negative(&at("std"), parameter.std)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,206 @@
+//! A URDF file read into the `[[robot.link]]` tables of a robot file.
+//!
+//! | file | what |
+//! |---|---|
+//! | `xml` | the text as elements with lines; the door to the XML reader |
+//! | `parts` | elements as links and joints |
+//! | `shapes` | collision shapes |
+//! | [`mesh`] | files of meshes: where they are, and their vertices; COLLADA in `collada` |
+//! | [`capsules`] | capsules that hold the shapes |
+//! | [`source`] | a URDF with other inertials and friction |
+//! | `beside` | model files that leave links and inertials to a URDF |
+//! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
+//!
+//! Only what torques depend on is read: placements, axes, kinds, mimic joints, inertials (as a
+//! prior), limits, and collision shapes for the capsules of `new`. The crate urdf-rs was tried and not taken: its errors
+//! name no line, and a file of some thousand nested elements ends the process. Nor was stl_io: it takes a binary file
+//! whose head begins with `solid` for a text.
+
+pub(super) mod beside;
+pub mod capsules;
+mod collada;
+pub mod mesh;
+mod parts;
+mod shapes;
+pub(super) mod source;
+mod tree;
+mod xml;
+
+use std::path::Path;
+
+use super::ConfigError;
+use super::document::Document;
+use super::robot_file::{CoordinateLimits, ModelKind, RobotFile};
+use super::serial_section::{FrameSection, LinkSection};
+use super::text_file::text_of;
+use cft_ident_core::robot::tree::space::{Rotation, product};
+use cft_ident_logs::log::{named_beside, remedy, shown};
+use shapes::Shape;
+
+/// What a URDF gives to a robot file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UrdfChain {
+    /// Moving links from the base outward.
+    pub links: Vec<LinkSection>,
+    /// Limits of the independent joints that have some, in the order of the links.
+    pub limits: Vec<(String, CoordinateLimits)>,
+    /// Links that fixed joints hang on moving ones, by their placement alone.
+    pub frames: Vec<FrameSection>,
+    /// Collision shapes, for [`capsules`].
+    collisions: Vec<Collision>,
+    /// What was taken otherwise than it is written, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// A collision shape of a link.
+#[derive(Debug, Clone, PartialEq)]
+struct Collision {
+    /// The link of the URDF.
+    of: String,
+    /// The moving link, or the base, that it belongs to.
+    on: String,
+    /// In the frame of that; `None` where it cannot be read.
+    shape: Option<Shape>,
+}
+
+/// How angles and axes are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Angles {
+    /// 1.5708 as pi/2.
+    Meant,
+    /// As they are written.
+    Written,
+}
+
+/// The URDF that errors speak of.
+pub(super) struct Place<'a> {
+    file: &'a str,
+    angles: Angles,
+}
+
+impl Place<'_> {
+    fn wrong(&self, line: usize, what: &str, problem: &str, remedy: &str) -> ConfigError {
+        ConfigError::Value {
+            file: self.file.to_owned(),
+            line,
+            key: what.to_owned(),
+            problem: problem.to_owned(),
+            remedy: remedy.to_owned(),
+        }
+    }
+}
+
+/// R A R'.
+fn turned(r: &Rotation, a: &Rotation) -> Rotation {
+    let transposed = std::array::from_fn(|i| std::array::from_fn(|j| r[j][i]));
+    product(&product(r, a), &transposed)
+}
+
+impl UrdfChain {
+    /// Reads a URDF from text, up to the link `tip` where one is named; `file` names it in errors.
+    /// Angles and axes that are rounded multiples of 15 degrees are taken as those.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] where it is no well-formed XML, [`ConfigError::Value`] with the line
+    /// of the link or joint that cannot be used.
+    pub fn parse(file: &str, text: &str, tip: Option<&str>) -> Result<Self, ConfigError> {
+        Self::parse_with(file, text, tip, Angles::Meant)
+    }
+
+    fn parse_with(
+        file: &str,
+        text: &str,
+        tip: Option<&str>,
+        angles: Angles,
+    ) -> Result<Self, ConfigError> {
+        let text = xml::without_comments(text);
+        let tree = xml::Tree::parse(&text).map_err(|wrong| ConfigError::Syntax {
+            file: file.to_owned(),
+            line: wrong.line,
+            message: wrong.message,
+        })?;
+        let place = Place { file, angles };
+        tree::chain(&parts::parts(tree.root(), &place)?, tip, &place)
+    }
+
+    /// Reads a URDF file.
+    ///
+    /// # Errors
+    /// Those of [`Self::parse`]; [`ConfigError::Read`] where the file cannot be read.
+    pub fn load(path: &Path, tip: Option<&str>) -> Result<Self, ConfigError> {
+        Self::load_with(path, tip, Angles::Meant)
+    }
+
+    fn load_with(path: &Path, tip: Option<&str>, angles: Angles) -> Result<Self, ConfigError> {
+        let file = shown(path);
+        let text = text_of(path).map_err(|source| ConfigError::Read {
+            file: file.clone(),
+            remedy: match source.kind() {
+                std::io::ErrorKind::InvalidData => {
+                    "give a URDF file in UTF-8, below 16 MB".to_owned()
+                }
+                std::io::ErrorKind::NotFound => {
+                    format!("{}{}", remedy(&source), named_beside(path, &["urdf"]))
+                }
+                _ => remedy(&source).to_owned(),
+            },
+            source,
+        })?;
+        Self::parse_with(&file, &text, tip, angles)
+    }
+}
+
+/// Reads the URDF that a robot file names into its links and limits, so that the file stands alone.
+pub(super) fn resolve(
+    file: &mut RobotFile,
+    document: &Document,
+    folder: Option<&Path>,
+) -> Result<(), ConfigError> {
+    let robot = &mut file.robot;
+    if robot.model != ModelKind::Serial {
+        // the check of the file says that these keys do not belong to the model
+        return Ok(());
+    }
+    let Some(urdf) = &robot.urdf else {
+        return match robot.tip {
+            None => Ok(()),
+            Some(_) => Err(document.value(
+                &["robot", "tip"],
+                "stands without a `urdf`",
+                "delete it, or name the URDF file",
+            )),
+        };
+    };
+    if !robot.link.is_empty() {
+        return Err(document.value(
+            &["robot", "urdf"],
+            "stands beside [[robot.link]] tables",
+            "keep one of the two",
+        ));
+    }
+    let Some(folder) = folder else {
+        return Err(document.value(
+            &["robot", "urdf"],
+            "names a file, but this text is not one of a folder",
+            "read the robot file from the disk, the URDF beside it",
+        ));
+    };
+    let angles = match robot.angles_as_written {
+        Some(true) => Angles::Written,
+        _ => Angles::Meant,
+    };
+    let chain = UrdfChain::load_with(&folder.join(urdf), robot.tip.as_deref(), angles)?;
+    file.notes.0.extend(chain.notes);
+    robot.link = chain.links;
+    robot.frame.splice(0..0, chain.frames);
+    robot.urdf = None;
+    robot.tip = None;
+    for (joint, found) in chain.limits {
+        // what the robot file says stands
+        let said = file.limits.entry(joint).or_default();
+        said.position = said.position.or(found.position);
+        said.speed = said.speed.or(found.speed);
+        said.torque = said.torque.or(found.torque);
+    }
+    Ok(())
+}

@@ -1,0 +1,408 @@
+//! What a URDF says: links with their inertials, joints with their placements.
+
+use std::collections::BTreeMap;
+
+use super::shapes::{Shape, of_link};
+use super::xml::{EXPAND, Element, MACRO};
+use super::{Angles, Place};
+use crate::config::ConfigError;
+use crate::config::angles::Changes;
+use crate::config::robot_file::CoordinateLimits;
+use cft_ident_core::number::is_usable;
+use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
+use cft_ident_logs::log::{escape, list, nearest};
+
+/// A mass with its centre and inertia, in the frame of the link that carries it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    /// \[kg\]
+    pub mass: f64,
+    /// \[m\]
+    pub centre: Vector,
+    /// About the centre, along the link's axes [kg m^2].
+    pub inertia: Rotation,
+}
+
+#[derive(Debug)]
+pub(super) struct Link {
+    pub name: String,
+    pub line: usize,
+    pub body: Option<Body>,
+    pub shapes: Vec<Option<Shape>>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Fixed,
+    Revolute,
+    Continuous,
+    Prismatic,
+    Floating,
+    Planar,
+}
+
+/// The names of joint types, in the order of [`Kind`].
+const KINDS: [(&str, Kind); 6] = [
+    ("fixed", Kind::Fixed),
+    ("revolute", Kind::Revolute),
+    ("continuous", Kind::Continuous),
+    ("prismatic", Kind::Prismatic),
+    ("floating", Kind::Floating),
+    ("planar", Kind::Planar),
+];
+
+#[derive(Debug)]
+pub(super) struct Mimic {
+    pub joint: String,
+    pub multiplier: f64,
+    pub offset: f64,
+}
+
+#[derive(Debug)]
+pub(super) struct Joint {
+    pub name: String,
+    pub line: usize,
+    pub kind: Kind,
+    pub parent: String,
+    pub child: String,
+    pub xyz: Vector,
+    pub rpy: Vector,
+    pub axis: Vector,
+    pub limits: CoordinateLimits,
+    pub mimic: Option<Mimic>,
+}
+
+/// A robot as its URDF lists it.
+#[derive(Debug)]
+pub(super) struct Parts {
+    pub links: Vec<Link>,
+    pub joints: Vec<Joint>,
+    /// Angles and axes that were taken for what they stand for.
+    pub changes: Changes,
+}
+
+/// Reads what stands in a `<robot>`.
+pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> {
+    if root.name() != "robot" {
+        return Err(place.wrong(
+            root.line(),
+            &format!("<{}>", escape(root.name())),
+            "is not the <robot> of a URDF",
+            "give a URDF file; an SDF or a xacro file is to be converted first",
+        ));
+    }
+    let mut parts = Parts {
+        links: Vec::new(),
+        joints: Vec::new(),
+        changes: Changes::default(),
+    };
+    let mut links: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
+    for child in root.children() {
+        let known = match child.name() {
+            "link" => &mut links,
+            "joint" => &mut joints,
+            name if name.starts_with("xacro:") => {
+                return Err(place.wrong(
+                    child.line(),
+                    &format!("<{}>", escape(name)),
+                    MACRO,
+                    EXPAND,
+                ));
+            }
+            // materials, transmissions, sensors, gazebo
+            _ => continue,
+        };
+        let name = child.attribute("name").unwrap_or_default();
+        if name.trim().is_empty() {
+            return Err(place.wrong(
+                child.line(),
+                &format!("<{}>", child.name()),
+                "has no name",
+                "give it one: name=\"...\"",
+            ));
+        }
+        if let Some(line) = known.insert(name, child.line()) {
+            return Err(place.wrong(
+                child.line(),
+                &format!("{} {}", child.name(), escape(name)),
+                &format!("has the name of that of line {line}"),
+                "give each its own name",
+            ));
+        }
+        if child.name() == "link" {
+            parts.links.push(link(child, name, place)?);
+        } else {
+            let joint = joint(child, name, place, &mut parts.changes)?;
+            parts.joints.push(joint);
+        }
+    }
+    if parts.links.is_empty() {
+        return Err(place.wrong(
+            root.line(),
+            "<robot>",
+            "has no <link>",
+            "give the URDF of a whole robot",
+        ));
+    }
+    if let Some(root) = undeclared_root(&parts, &links) {
+        parts.links.insert(0, root);
+    }
+    for joint in &parts.joints {
+        for (what, link) in [("parent", &joint.parent), ("child", &joint.child)] {
+            if !parts.links.iter().any(|known| known.name == *link) {
+                return Err(no_link(joint, what, link, &parts.links, place));
+            }
+        }
+    }
+    Ok(parts)
+}
+
+/// The link that the arm hangs on where no `<link>` declares it (`world`): the one undeclared parent,
+/// if every link that is declared hangs on something. Else it is a slip of the pen.
+fn undeclared_root(parts: &Parts, declared: &BTreeMap<&str, usize>) -> Option<Link> {
+    let mut undeclared = (parts.joints.iter()).filter(|j| !declared.contains_key(&*j.parent));
+    let first = undeclared.next()?;
+    let alone = undeclared.all(|other| other.parent == first.parent);
+    let hangs = |link: &Link| parts.joints.iter().any(|j| j.child == link.name);
+    let no_child = parts.joints.iter().all(|j| j.child != first.parent);
+    (alone && no_child && parts.links.iter().all(hangs)).then(|| Link {
+        name: first.parent.clone(),
+        line: first.line,
+        body: None,
+        shapes: Vec::new(),
+    })
+}
+
+/// The error for a joint whose parent or child is no link.
+fn no_link(joint: &Joint, what: &str, link: &str, links: &[Link], place: &Place) -> ConfigError {
+    let all = links.iter().map(|l| l.name.as_str());
+    let remedy = match nearest(link, all.clone()) {
+        Some(near) => format!("did you mean `{}`?", escape(near)),
+        None => format!("the links are {}", list(all.take(20))),
+    };
+    place.wrong(
+        joint.line,
+        &format!("joint {}", escape(&joint.name)),
+        &format!("has the {what} `{}`, which is no link", escape(link)),
+        &remedy,
+    )
+}
+
+fn link(element: Element, name: &str, place: &Place) -> Result<Link, ConfigError> {
+    let at = Reading {
+        place,
+        what: format!("link {}", escape(name)),
+    };
+    let body = match element.child("inertial") {
+        None => None,
+        Some(inertial) => {
+            let (xyz, rpy) = at.origin(inertial)?;
+            let mass = at.number(at.part(inertial, "mass")?, "value", None)?;
+            let tensor = at.part(inertial, "inertia")?;
+            let [xx, xy, xz, yy, yz, zz] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"].map(|key| {
+                at.number(
+                    tensor,
+                    key,
+                    (key.as_bytes()[1] != key.as_bytes()[2]).then_some(0.0),
+                )
+            });
+            let (xy, xz, yz) = (xy?, xz?, yz?);
+            let tensor = [[xx?, xy, xz], [xy, yy?, yz], [xz, yz, zz?]];
+            Some(Body {
+                mass,
+                centre: xyz,
+                inertia: super::turned(&of_roll_pitch_yaw(&rpy), &tensor),
+            })
+        }
+    };
+    Ok(Link {
+        name: name.to_owned(),
+        line: element.line(),
+        body,
+        shapes: of_link(element),
+    })
+}
+
+fn joint(
+    element: Element,
+    name: &str,
+    place: &Place,
+    changes: &mut Changes,
+) -> Result<Joint, ConfigError> {
+    let at = Reading {
+        place,
+        what: format!("joint {}", escape(name)),
+    };
+    let kind = element.attribute("type").unwrap_or_default();
+    let Some((_, kind)) = KINDS.iter().find(|(known, _)| *known == kind) else {
+        return Err(place.wrong(
+            element.line(),
+            &at.what,
+            &format!("has the type `{}`", escape(kind)),
+            "give revolute, continuous, prismatic or fixed",
+        ));
+    };
+    let linked = |what: &str| -> Result<String, ConfigError> {
+        let part = at.part(element, what)?;
+        let link = part.attribute("link");
+        Ok(link.ok_or_else(|| at.lacks(part, "link"))?.to_owned())
+    };
+    let (xyz, mut rpy) = at.origin(element)?;
+    let mut axis = match element.child("axis") {
+        // the default of the format
+        None => [1.0, 0.0, 0.0],
+        Some(axis) => at.vector(axis, "xyz", [1.0, 0.0, 0.0])?,
+    };
+    if place.angles == Angles::Meant {
+        let written = |child: &str, key| words(element.child(child)?.attribute(key)?);
+        if let Some(written) = written("origin", "rpy") {
+            for (angle, written) in rpy.iter_mut().zip(written) {
+                *angle = changes.angle(*angle, written, &format!("rpy of {}", at.what));
+            }
+        }
+        if let Some(written) = written("axis", "xyz") {
+            axis = changes.axis(axis, written, &format!("axis of {}", at.what));
+        }
+    }
+    let moving = !matches!(kind, Kind::Fixed | Kind::Floating);
+    if moving && axis.iter().all(|x| x.abs() < 1e-6) {
+        return Err(place.wrong(
+            element.line(),
+            &at.what,
+            "has an axis without length",
+            "give an axis, e.g. xyz=\"0 0 1\"",
+        ));
+    }
+    let limits = at.limits(element, *kind)?;
+    Ok(Joint {
+        name: name.to_owned(),
+        line: element.line(),
+        kind: *kind,
+        parent: linked("parent")?,
+        child: linked("child")?,
+        xyz,
+        rpy,
+        axis,
+        mimic: at.mimic(element)?,
+        limits,
+    })
+}
+
+/// The three words of a text.
+fn words(text: &str) -> Option<[&str; 3]> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    words.try_into().ok()
+}
+
+/// The reading of one link or joint, which errors name.
+struct Reading<'a> {
+    place: &'a Place<'a>,
+    what: String,
+}
+
+impl Reading<'_> {
+    fn part<'a, 't>(
+        &self,
+        element: Element<'a, 't>,
+        name: &str,
+    ) -> Result<Element<'a, 't>, ConfigError> {
+        element.child(name).ok_or_else(|| {
+            self.place.wrong(
+                element.line(),
+                &self.what,
+                &format!("has no <{name}>"),
+                &format!("add <{name} .../> to it"),
+            )
+        })
+    }
+
+    fn lacks(&self, element: Element, key: &str) -> ConfigError {
+        self.place.wrong(
+            element.line(),
+            &self.what,
+            &format!("has a <{}> without {key}", element.name()),
+            &format!("add {key}=\"...\""),
+        )
+    }
+
+    fn number(&self, element: Element, key: &str, absent: Option<f64>) -> Result<f64, ConfigError> {
+        let Some(text) = element.attribute(key) else {
+            return absent.ok_or_else(|| self.lacks(element, key));
+        };
+        let value = text.trim().parse::<f64>().ok().filter(|x| is_usable(*x));
+        value.ok_or_else(|| {
+            self.place.wrong(
+                element.line(),
+                &self.what,
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
+                "give a finite number with a decimal point",
+            )
+        })
+    }
+
+    fn vector(&self, element: Element, key: &str, absent: Vector) -> Result<Vector, ConfigError> {
+        let Some(text) = element.attribute(key) else {
+            return Ok(absent);
+        };
+        let numbers: Vec<f64> = text
+            .split_whitespace()
+            .map_while(|word| word.parse().ok().filter(|x| is_usable(*x)))
+            .collect();
+        match numbers[..] {
+            [x, y, z] if text.split_whitespace().count() == 3 => Ok([x, y, z]),
+            _ => Err(self.place.wrong(
+                element.line(),
+                &self.what,
+                &format!("has {key}=\"{}\" in <{}>", escape(text), element.name()),
+                "give three finite numbers with spaces between",
+            )),
+        }
+    }
+
+    /// Position [m] and roll, pitch, yaw [rad] of the `<origin>` inside.
+    fn origin(&self, element: Element) -> Result<(Vector, Vector), ConfigError> {
+        let Some(origin) = element.child("origin") else {
+            return Ok(([0.0; 3], [0.0; 3]));
+        };
+        let at = |key| self.vector(origin, key, [0.0; 3]);
+        Ok((at("xyz")?, at("rpy")?))
+    }
+    /// The limits of a joint, where they are given; 0 stands in many files for one that nobody knows.
+    fn limits(&self, joint: Element, kind: Kind) -> Result<CoordinateLimits, ConfigError> {
+        let Some(limit) = joint.child("limit") else {
+            return Ok(CoordinateLimits::default());
+        };
+        let value = |key| self.number(limit, key, Some(0.0));
+        let (speed, effort) = (value("velocity")?, value("effort")?);
+        let (low, high) = (value("lower")?, value("upper")?);
+        if low > high {
+            return Err(self.place.wrong(
+                limit.line(),
+                &self.what,
+                &format!("has the lower limit {low} above the upper {high}"),
+                "exchange the two",
+            ));
+        }
+        Ok(CoordinateLimits {
+            position: (low < high && kind != Kind::Continuous).then_some([low, high]),
+            speed: (speed > 0.0).then_some(speed),
+            torque: (effort > 0.0).then_some(effort),
+            ..CoordinateLimits::default()
+        })
+    }
+
+    fn mimic(&self, joint: Element) -> Result<Option<Mimic>, ConfigError> {
+        let Some(mimic) = joint.child("mimic") else {
+            return Ok(None);
+        };
+        let followed = mimic.attribute("joint");
+        Ok(Some(Mimic {
+            joint: followed
+                .ok_or_else(|| self.lacks(mimic, "joint"))?
+                .to_owned(),
+            multiplier: self.number(mimic, "multiplier", Some(1.0))?,
+            offset: self.number(mimic, "offset", Some(0.0))?,
+        }))
+    }
+}

@@ -1,0 +1,199 @@
+//! Faults of a position that is no longer what it was: leaps that stay, and encoders that begin anew.
+
+use super::detectors::clock::ClockFacts;
+use super::detectors::step::Leap;
+use super::draft::{FaultList, rows_text};
+use super::fault::Severity::Warning;
+use super::fault::{Episodes, FaultKind};
+use super::judge::{LogJudge, Track};
+use super::words::ChannelRole;
+use cft_ident_core::number;
+
+/// Steps of an encoder that a leap has at least: rounding four rows makes two at most.
+const GRAINS: f64 = 4.0;
+/// A drive that accelerates as much as it can may turn its torque round from one row to the next,
+/// and within a row it may reach twice what it has on average over the time in which accelerations
+/// are formed.
+const DRIVE: f64 = 4.0;
+/// Leaps of several joints at one time are one event: within so many steps.
+const TOGETHER: f64 = 1.5;
+
+/// Leap of a position from one row to the next that its drive could make, by the accelerations of
+/// this log in which no event took part [unit of the channel].
+pub(super) fn drive(track: &Track, clock: &ClockFacts) -> f64 {
+    DRIVE * acceleration(track) * clock.dt * clock.dt
+}
+
+/// The largest acceleration in which no leap and no spike took part.
+fn acceleration(track: &Track) -> f64 {
+    let spikes = track.spikes.found().iter().map(|spike| spike.t);
+    let leaps = track.leaps.found().iter().map(|leap| leap.at);
+    let events: Vec<f64> = spikes.chain(leaps).collect();
+    let motion = track.excitation.as_ref();
+    motion.map_or(0.0, |motion| motion.highest_apart(&events))
+}
+
+/// The leaps that are higher than noise, the step of the encoder and the drive account for, and the
+/// least height that is, for one in a step of the clock.
+fn unusual(track: &Track, clock: &ClockFacts) -> (Vec<Leap>, f64) {
+    let grain = track.flat.steps.quantile_not_zero(0.0);
+    let noise = track.leaps.unusual(track.rows).max(GRAINS * grain);
+    let acceleration = acceleration(track);
+    // Rows that were left out leave the drive more time.
+    let least = |step: f64| noise.max(DRIVE * acceleration * step * step);
+    let high = |leap: &&Leap| leap.height.abs() > least(leap.at - leap.before);
+    let found = track.leaps.found().iter().filter(high).copied();
+    (found.collect(), least(clock.dt))
+}
+
+/// Tells the leaps of a position, where it is not `told` of already, and parts the log there; they are
+/// told then, `reach` about each [s].
+pub(super) fn leaps(
+    judge: &LogJudge,
+    place: usize,
+    (clock, reach, told): (&ClockFacts, f64, &mut Vec<[f64; 2]>),
+    draft: &mut FaultList,
+) {
+    let track = &judge.tracks[place];
+    let known = |t: f64| told.iter().any(|[from, to]| *from <= t && t <= *to);
+    let (mut found, least) = unusual(track, clock);
+    found.retain(|leap| !known(leap.at));
+    told.extend(
+        found
+            .iter()
+            .map(|leap| [leap.before - reach, leap.at + reach]),
+    );
+    let mut episodes = Episodes::default();
+    for leap in &found {
+        episodes.add(leap.before, leap.at, 1, -1.0);
+    }
+    let Some(largest) = found
+        .iter()
+        .map(|leap| leap.height)
+        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    else {
+        return;
+    };
+    let others = with_it(judge, place, found[0].at, clock);
+    let cause = match others.as_slice() {
+        [] => "the encoder slipped, its reference was set anew, or logs were joined".to_owned(),
+        others => format!(
+            "with {}: rows are missing there, or logs were joined",
+            others.join(", ")
+        ),
+    };
+    let unit = track.channel.unit.as_deref().unwrap_or("");
+    let effect = |rows: u64, times: usize| {
+        let up_to = if times > 1 { "up to " } else { "" };
+        format!(
+            "leaps by {up_to}{} {unit} from one row to the next, {}, and stays there; noise and drive account for {} at most: {cause}. The log is parted there; before or after it the position is off",
+            number::significant(largest, 3),
+            rows_text(rows, times).replace("rows", "times").replace("1 row", "once"),
+            number::significant(least, 2)
+        )
+        .replace("  ", " ")
+    };
+    let remedy = "where its zero matters (gravity, other joints' inertias), use the part whose zero is right: LOG@0..12s or LOG@12..s";
+    let name = Some(track.channel.name.as_str());
+    let before = draft.faults.len();
+    draft.stretches(
+        FaultKind::PositionStep,
+        Warning,
+        name,
+        &episodes,
+        &effect,
+        remedy,
+    );
+    for fault in &mut draft.faults[before..] {
+        fault.size = Some(largest);
+    }
+    draft.cut(FaultKind::PositionStep, name, &episodes);
+}
+
+/// Where a position leaps: the times before and at it [s].
+pub(super) fn places(track: &Track, clock: &ClockFacts) -> Vec<[f64; 2]> {
+    let (found, _) = unusual(track, clock);
+    found.iter().map(|leap| [leap.before, leap.at]).collect()
+}
+
+/// Names of the other positions that leap at the same time.
+fn with_it(judge: &LogJudge, place: usize, t: f64, clock: &ClockFacts) -> Vec<String> {
+    let others = judge.positions.iter().filter(|other| **other != place);
+    let leaps = |track: &Track| {
+        let (found, _) = unusual(track, clock);
+        found
+            .iter()
+            .any(|leap| (leap.at - t).abs() < TOGETHER * clock.dt)
+    };
+    others
+        .map(|other| &judge.tracks[*other])
+        .filter(|track| leaps(track))
+        .map(|track| format!("`{}`", crate::log::escape(&track.channel.name)))
+        .collect()
+}
+
+/// Tells a position that begins anew, and whether it does.
+pub(super) fn wrapped(judge: &LogJudge, place: usize, draft: &mut FaultList) -> bool {
+    let track = &judge.tracks[place];
+    if track.channel.role != ChannelRole::Position {
+        return false;
+    }
+    // Ranges are usual in the unit of the column.
+    let size = track.channel.factor.abs();
+    let counts = (8..=32).map(|bits| f64::from(bits).exp2());
+    let in_column: Vec<f64> = [std::f64::consts::TAU, 360.0]
+        .into_iter()
+        .chain(counts)
+        .collect();
+    let usual: Vec<f64> = in_column.iter().map(|range| range * size).collect();
+    let step = track.flat.steps.quantile_not_zero(0.5);
+    let Some(found) = track.turns.wrapped(&usual, step) else {
+        return false;
+    };
+    let mut episodes = Episodes::default();
+    episodes.add(found.from, found.to, found.times, 0.0);
+    let logged = found.range / size;
+    let exact = in_column
+        .iter()
+        .find(|range| (*range / logged - 1.0).abs() < 1e-9);
+    let logged = match exact {
+        Some(range) => range.to_string(),
+        None => number::significant(logged, 7),
+    };
+    let unit = track.channel.unit.as_deref().unwrap_or("");
+    let effect = |_: u64, _: usize| {
+        format!(
+            "goes through the end of its range {} time(s), and begins anew there, {} {unit} away: taken as it is, it leaps at an impossible speed. A fit follows it through its turns",
+            found.times,
+            number::significant(found.range, 7)
+        )
+        .replace(" :", ":")
+    };
+    let joint = track
+        .channel
+        .joint
+        .as_deref()
+        .filter(|joint| !joint.is_empty());
+    let remedy = format!(
+        "write `wrap = {logged}` into [log.joint.{}] of the robot file",
+        joint.map_or_else(|| "NAME".to_owned(), crate::log::escape)
+    );
+    let name = Some(track.channel.name.as_str());
+    let before = draft.faults.len();
+    draft.stretches(
+        FaultKind::WrappedEncoder,
+        Warning,
+        name,
+        &episodes,
+        &effect,
+        &remedy,
+    );
+    for fault in &mut draft.faults[before..] {
+        fault.size = Some(found.range);
+    }
+    if !draft.acts(FaultKind::WrappedEncoder, name) {
+        return false;
+    }
+    draft.wraps.push((place, found.range));
+    true
+}

@@ -1,0 +1,259 @@
+//! Finds the channels of a layout among the columns of a header.
+
+use super::LogError;
+use super::layout::{Channel, Layout, column_number};
+use super::names::{escape, list, nearest};
+
+/// Where a channel stands and how its numbers become SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScaledColumn {
+    pub(super) index: usize,
+    pub(super) factor: f64,
+    pub(super) offset: f64,
+}
+
+/// The columns of one log that are read.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ScaledColumns {
+    pub(super) time: Option<ScaledColumn>,
+    pub(super) positions: Vec<ScaledColumn>,
+    pub(super) torques: Vec<ScaledColumn>,
+    /// Empty where the log lacks a velocity.
+    pub(super) velocities: Vec<ScaledColumn>,
+}
+
+/// A header and where it stands.
+pub(super) struct Header<'a> {
+    pub(super) file: String,
+    pub(super) line: u64,
+    pub(super) names: &'a [String],
+}
+
+impl Header<'_> {
+    /// Finds every channel of the layout.
+    pub(super) fn columns(&self, layout: &Layout) -> Result<ScaledColumns, LogError> {
+        let each = |channels: &[Channel], what: &str| -> Result<Vec<ScaledColumn>, LogError> {
+            let named = channels.iter().zip(&layout.joints);
+            named
+                .map(|(channel, joint)| self.find(channel, &format!("{what} of {joint}")))
+                .collect()
+        };
+        let time = match layout.section.rate_hz {
+            Some(_) => None,
+            None => Some(self.find(&layout.time, "time")?),
+        };
+        let positions = each(&layout.positions, layout.what())?;
+        let torques = each(&layout.torques, "torque")?;
+        // A velocity is optional unless the robot file names its column.
+        let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
+        let velocities = if layout.velocities.iter().all(wanted) {
+            each(&layout.velocities, "velocity")?
+        } else {
+            Vec::new()
+        };
+        Ok(ScaledColumns {
+            time,
+            positions,
+            torques,
+            velocities,
+        })
+    }
+
+    fn find(&self, channel: &Channel, purpose: &str) -> Result<ScaledColumn, LogError> {
+        let mut indices = positions_of(self.names, channel);
+        let Some(index) = indices.next() else {
+            return Err(self.missing(channel, purpose));
+        };
+        let more = indices.count();
+        if more > 0 {
+            return Err(LogError::RepeatedColumn {
+                file: self.file.clone(),
+                line: self.line,
+                column: escape(&channel.column),
+                count: more + 1,
+            });
+        }
+        self.check_unit(channel, &self.names[index])?;
+        Ok(ScaledColumn {
+            index,
+            factor: channel.factor,
+            offset: channel.offset,
+        })
+    }
+
+    fn missing(&self, channel: &Channel, purpose: &str) -> LogError {
+        let near = nearest(&channel.column, self.names.iter().map(String::as_str));
+        let near = near.map(|name| format!("the nearest is `{}`; ", escape(name)));
+        let key = match &channel.key {
+            None => "the [log] section of the robot file".to_owned(),
+            Some(key) => format!("`{key}` of the robot file"),
+        };
+        LogError::MissingColumn {
+            file: self.file.clone(),
+            line: self.line,
+            column: escape(&channel.column),
+            purpose: purpose.to_owned(),
+            remedy: format!(
+                "{}name the right column in {key}; the header has {}",
+                near.unwrap_or_default(),
+                list(self.names.iter().map(String::as_str))
+            ),
+        }
+    }
+
+    /// Refuses a header that states another unit than the one that the number is read in.
+    fn check_unit(&self, channel: &Channel, name: &str) -> Result<(), LogError> {
+        let stated = unit_of(name);
+        let (Some(found), Some(declared)) =
+            (stated.and_then(known_unit), known_unit(&channel.unit))
+        else {
+            return Ok(());
+        };
+        if found == declared {
+            return Ok(());
+        }
+        Err(LogError::Unit {
+            file: self.file.clone(),
+            line: self.line,
+            column: escape(name),
+            found,
+            declared,
+            remedy: format!(
+                "set the unit of this column to \"{found}\" in the [log] section of the robot file, or correct the header"
+            ),
+        })
+    }
+}
+
+/// Places of the columns that a channel may be.
+fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<Item = usize> + 'n {
+    let number = column_number(&channel.column);
+    let is = move |(index, name): &(usize, &String)| match number {
+        Some(number) => *index == number,
+        None => **name == channel.column || name_and_unit(name).0 == channel.column,
+    };
+    names.iter().enumerate().filter(is).map(|(index, _)| index)
+}
+
+/// The first column that a channel may be.
+pub(super) fn position_of(names: &[String], channel: &Channel) -> Option<usize> {
+    positions_of(names, channel).next()
+}
+
+/// The layout to use: the other one where the columns have channels of that alone.
+pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
+    let has_any = |layout: &Layout| {
+        let mut channels = layout.positions.iter().chain(&layout.torques);
+        channels.any(|channel| position_of(names, channel).is_some())
+    };
+    match &layout.otherwise {
+        Some(other) if !has_any(layout) && has_any(other) => (**other).clone(),
+        _ => layout.clone(),
+    }
+}
+
+/// `q1 [deg]` and `q1 (deg)` are q1 in deg.
+fn name_and_unit(name: &str) -> (&str, Option<&str>) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((base, unit)) = name
+            .strip_suffix(close)
+            .and_then(|head| head.rsplit_once(open))
+        {
+            return (base.trim_end(), Some(unit.trim()));
+        }
+    }
+    (name, None)
+}
+
+/// The unit that a name states in brackets or as its ending.
+pub fn unit_of(name: &str) -> Option<&str> {
+    name_and_unit(name).1.or_else(|| suffix_unit(name))
+}
+
+/// `q1_deg` says that it is in deg.
+fn suffix_unit(name: &str) -> Option<&str> {
+    let unit = name.rsplit_once('_')?.1;
+    ["deg", "degrees", "mm"].contains(&unit).then_some(unit)
+}
+
+/// One spelling for the units that headers state; a rate is known by its numerator.
+fn known_unit(text: &str) -> Option<&'static str> {
+    let lower = text.to_lowercase();
+    let unit = lower.split('/').next()?.trim();
+    Some(match unit {
+        "deg" | "°" | "degree" | "degrees" => "deg",
+        "rad" | "radian" | "radians" => "rad",
+        "m" | "meter" | "metre" | "meters" | "metres" => "m",
+        "mm" => "mm",
+        "counts" | "count" | "ticks" => "counts",
+        "n" | "newton" => "N",
+        "nm" | "n m" | "n.m" | "n·m" | "n*m" => "Nm",
+        "a" | "ampere" | "amps" => "A",
+        "v" | "volt" | "volts" => "V",
+        "s" | "sec" | "second" | "seconds" => "s",
+        "ms" => "ms",
+        "us" | "µs" | "μs" => "us",
+        "ns" => "ns",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header(names: &[String]) -> Header<'_> {
+        Header {
+            file: "a.csv".to_owned(),
+            line: 1,
+            names,
+        }
+    }
+
+    fn names(text: &str) -> Vec<String> {
+        text.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn columns_are_found_by_name_in_any_order_with_or_without_a_unit() {
+        let names = names("tau_q1 [Nm],extra,q_q1 (rad),t [s]");
+        let columns = header(&names)
+            .columns(&Layout::joint_columns(&["q1"]))
+            .unwrap();
+        assert_eq!(columns.time.unwrap().index, 3);
+        assert_eq!(columns.positions[0].index, 2);
+        assert_eq!(columns.torques[0].index, 0);
+        assert!(columns.velocities.is_empty());
+    }
+
+    #[test]
+    fn a_header_in_degrees_is_refused_where_radians_are_declared_and_taken_where_degrees_are() {
+        let names = names("t,q_q1 [deg],tau_q1");
+        let mut layout = Layout::joint_columns(&["q1"]);
+        layout.positions[0].unit = "rad".to_owned();
+        let message = header(&names).columns(&layout).unwrap_err().to_string();
+        assert!(
+            message.contains("a.csv:1")
+                && message.contains("in deg")
+                && message.contains("\"deg\""),
+            "{message}"
+        );
+        layout.positions[0].unit = "deg".to_owned();
+        assert!(header(&names).columns(&layout).is_ok());
+    }
+
+    #[test]
+    fn velocities_are_read_only_where_all_of_them_are_there() {
+        let layout = Layout::joint_columns(&["a", "b"]);
+        let some = names("t,q_a,q_b,tau_a,tau_b,dq_a");
+        assert!(
+            header(&some)
+                .columns(&layout)
+                .unwrap()
+                .velocities
+                .is_empty()
+        );
+        let all = names("t,q_a,q_b,tau_a,tau_b,dq_a,dq_b");
+        assert_eq!(header(&all).columns(&layout).unwrap().velocities.len(), 2);
+    }
+}

@@ -1,0 +1,191 @@
+//! Files opened for what they hold: decompressed on the way, and known by their first bytes.
+
+use std::fs::File;
+use std::io::{self, BufReader, Chain, Cursor, Read};
+use std::path::Path;
+
+use super::stream::{Stream, Watch};
+use super::{LogError, source};
+
+/// First bytes of a file of reduced logs.
+pub const REDUCED: &[u8] = b"cft-ident reduced\n";
+
+/// Bytes that are looked at.
+pub(super) const HEAD: usize = 1 << 16;
+
+/// How a file is compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    None,
+    Gzip,
+    Zstd,
+}
+
+/// The bytes of a log.
+pub(super) type Bytes = Chain<Cursor<Vec<u8>>, Box<dyn Read + Send>>;
+
+/// An open log of any kind.
+pub(super) struct Content {
+    pub(super) compression: Compression,
+    /// Length of the file as it lies on the disk [bytes].
+    pub(super) size: u64,
+    head: Vec<u8>,
+    rest: Box<dyn Read + Send>,
+    /// What is known of a stream while it arrives; none of a file.
+    pub(super) watch: Option<Watch>,
+}
+
+impl Content {
+    /// Opens a log and looks at its first bytes.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let fail = |error| source::failed(path, error);
+        let mut file = source::open(path)?;
+        let size = file.metadata().map_err(fail)?.len();
+        let mut magic = Vec::new();
+        Read::by_ref(&mut file)
+            .take(4)
+            .read_to_end(&mut magic)
+            .map_err(fail)?;
+        let compression = match magic[..] {
+            [0x1f, 0x8b, ..] => Compression::Gzip,
+            _ if magic == ZSTD => Compression::Zstd,
+            _ => Compression::None,
+        };
+        let mut rest = plain(Cursor::new(magic).chain(file), compression).map_err(fail)?;
+        let mut head = Vec::with_capacity(HEAD);
+        // What comes before the end of a file that is cut off may be used: the error waits there.
+        let read = Read::by_ref(&mut rest)
+            .take(HEAD as u64)
+            .read_to_end(&mut head);
+        if let Err(error) = read {
+            if head.is_empty() {
+                return Err(fail(error));
+            }
+            rest = Box::new(CutOff(error.kind(), error.to_string()));
+        }
+        if head.starts_with(REDUCED) {
+            return Err(LogError::Format {
+                file: source::shown(path),
+                kind: "a file of reduced logs",
+                remedy: "`lsq`, `validate`, `reduce` and `track` take it; give the log itself here",
+            });
+        }
+        Ok(Self {
+            compression,
+            size,
+            head,
+            rest,
+            watch: None,
+        })
+    }
+
+    /// Text that arrives while it is read: no more of it is waited for than its first two lines.
+    ///
+    /// # Errors
+    /// A stream that cannot be read.
+    pub(super) fn of_stream(path: &Path, stream: Box<dyn Read + Send>) -> Result<Self, LogError> {
+        let watch = Watch::default();
+        let mut rest = Stream::new(stream, watch.clone());
+        let mut head = vec![0; HEAD];
+        let mut filled = 0;
+        while filled < HEAD && !has_two_lines(&head[..filled]) {
+            let count = rest.read(&mut head[filled..]);
+            match count.map_err(|error| source::failed(path, error))? {
+                0 => break,
+                count => filled += count,
+            }
+        }
+        head.truncate(filled);
+        Ok(Self {
+            compression: Compression::None,
+            size: 0,
+            head,
+            rest: Box::new(rest),
+            watch: Some(watch),
+        })
+    }
+
+    /// First bytes, decompressed.
+    pub(super) fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    /// All bytes from the beginning, decompressed.
+    pub(super) fn into_bytes(self) -> Bytes {
+        Cursor::new(self.head).chain(self.rest)
+    }
+}
+
+/// Whether two whole lines are there that are neither blank nor comments.
+fn has_two_lines(text: &[u8]) -> bool {
+    let whole = text.split_inclusive(|byte| *byte == b'\n');
+    let whole = whole.filter(|line| line.ends_with(b"\n"));
+    let told = |line: &&[u8]| !matches!(line.trim_ascii().first(), None | Some(b'#' | b'%'));
+    whole.filter(told).count() >= 2
+}
+
+/// First bytes of what zstd compressed.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+/// Bytes that a message may take once it is decompressed, per byte that it takes compressed.
+const LARGEST_RATIO: usize = 1024;
+
+/// Decompresses messages that were compressed one by one; its memory is used again.
+#[derive(Default)]
+pub(super) struct Unpacker {
+    inner: Option<zstd::bulk::Decompressor<'static>>,
+    plain: Vec<u8>,
+}
+
+impl Unpacker {
+    /// Decompresses a message in place; one that is not compressed, or damaged, stays as it is.
+    pub(super) fn unpack(&mut self, data: &mut Vec<u8>) {
+        if !data.starts_with(&ZSTD) {
+            return;
+        }
+        if self.inner.is_none() {
+            self.inner = zstd::bulk::Decompressor::new().ok();
+        }
+        let Some(inner) = &mut self.inner else {
+            return;
+        };
+        let largest = data.len().saturating_mul(LARGEST_RATIO);
+        let stated = zstd::zstd_safe::get_frame_content_size(data).ok().flatten();
+        let stated = stated.and_then(|bytes| usize::try_from(bytes).ok());
+        self.plain.clear();
+        self.plain.reserve(stated.unwrap_or(largest).min(largest));
+        if inner.decompress_to_buffer(data, &mut self.plain).is_ok() {
+            std::mem::swap(data, &mut self.plain);
+        }
+    }
+}
+
+/// All of what zstd compressed in memory.
+///
+/// # Errors
+/// Bytes that are damaged.
+pub fn unpacked(packed: &[u8]) -> io::Result<Vec<u8>> {
+    zstd::stream::decode_all(packed)
+}
+
+/// The end of a file that cannot be read any further.
+struct CutOff(io::ErrorKind, String);
+
+impl Read for CutOff {
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        Err(io::Error::new(self.0, self.1.clone()))
+    }
+}
+
+fn plain(
+    file: Chain<Cursor<Vec<u8>>, File>,
+    compression: Compression,
+) -> io::Result<Box<dyn Read + Send>> {
+    Ok(match compression {
+        Compression::None => Box::new(file),
+        Compression::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))),
+        Compression::Zstd => Box::new(zstd::stream::read::Decoder::new(file)?),
+    })
+}

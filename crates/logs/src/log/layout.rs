@@ -1,0 +1,218 @@
+//! Where the channels of a robot stand in a log, and how a logged number becomes an SI number.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::section::{ColumnName, LogSection};
+
+/// One channel: SI value = `factor` x logged number + `offset`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Name of the column; `#3` is the third one, whatever its name.
+    pub column: String,
+    /// Unit of the logged number, as a header may state it: `rad`, `deg`, `m`, `N`, ...
+    pub unit: String,
+    /// SI per logged unit, sign included.
+    pub factor: f64,
+    /// Offset in SI.
+    pub offset: f64,
+    /// Range after which the logged number begins anew [SI].
+    pub wrap: Option<f64>,
+    /// The key of the robot file that names this column; absent for a name of the contract.
+    pub key: Option<String>,
+}
+
+impl Channel {
+    /// A channel that is logged in `unit`, an SI unit, under its contract name.
+    pub fn si(column: impl Into<String>, unit: &str) -> Self {
+        Self {
+            column: column.into(),
+            unit: unit.to_owned(),
+            factor: 1.0,
+            offset: 0.0,
+            wrap: None,
+            key: None,
+        }
+    }
+}
+
+impl LogSection {
+    /// Which column is the time, and how it becomes seconds.
+    pub fn time_channel(&self) -> Channel {
+        let (unit, factor) = self.time_unit.unwrap_or_default().in_seconds();
+        let time = || "[log] time".to_owned();
+        channel(&self.time, "t".to_owned(), unit, [factor, 0.0], time)
+    }
+}
+
+/// A channel by the column that the file names under `key`, else by the name of the contract; SI value =
+/// `gain[0]` x logged number + `gain[1]`.
+pub fn channel(
+    named: &Option<ColumnName>,
+    contract: String,
+    unit: &str,
+    [factor, offset]: [f64; 2],
+    key: impl Fn() -> String,
+) -> Channel {
+    Channel {
+        column: named.as_ref().map_or(contract, |name| name.0.clone()),
+        unit: unit.to_owned(),
+        factor,
+        offset,
+        wrap: None,
+        key: named.as_ref().map(|_| key()),
+    }
+}
+
+/// What the position and torque channels of a layout are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeclaredChannels {
+    /// Joint positions and joint torques.
+    Joint,
+    /// Actuator positions x_c1..x_c4 and volts u_1..u_4 of the CFT robot.
+    Actuator,
+}
+
+/// Turns the positions, torques and velocities of one row into those of the joints, in place.
+///
+/// Returns false, and leaves both as they are, where the position belongs to no pose of the robot.
+type RowMap = dyn Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync;
+
+/// A conversion that the reader applies to every row, so that its blocks are joint-side.
+#[derive(Clone)]
+pub struct Conversion(Arc<RowMap>);
+
+impl Conversion {
+    /// Wraps a map of one row `(positions, torques, velocities)`; torques and velocities are empty
+    /// where the log has none.
+    pub fn new(
+        map: impl Fn(&mut [f64], &mut [f64], &mut [f64]) -> bool + Send + Sync + 'static,
+    ) -> Self {
+        Self(Arc::new(map))
+    }
+
+    /// Applies it to one row; false where the row has no image.
+    pub fn apply(
+        &self,
+        positions: &mut [f64],
+        torques: &mut [f64],
+        velocities: &mut [f64],
+    ) -> bool {
+        (self.0)(positions, torques, velocities)
+    }
+}
+
+impl fmt::Debug for Conversion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Conversion")
+    }
+}
+
+/// Which columns are read.
+///
+/// In recordings of messages a channel's column is the path of a field (`a.b[2]`, `/a/b/2`). Where a
+/// message has no such field, the channel is looked for as `position`, `velocity` or `effort` of the
+/// joint that the list `name` holds, as in `sensor_msgs/msg/JointState`.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// Names of the joints (or actuator coordinates), for messages.
+    pub joints: Vec<String>,
+    /// Time; its factor gives seconds.
+    pub time: Channel,
+    /// Positions in joint order.
+    pub positions: Vec<Channel>,
+    /// Torques in joint order; empty: the log need not have any and the blocks have none.
+    pub torques: Vec<Channel>,
+    /// Velocities in joint order; read only where the log has all of them.
+    pub velocities: Vec<Channel>,
+    /// What positions and torques are.
+    pub channels: DeclaredChannels,
+    /// Applied to every row.
+    pub conversion: Option<Conversion>,
+    /// A torque holds from its row, or from its message, to the next; else it is interpolated where
+    /// messages of an own topic have it.
+    pub zero_order_hold: bool,
+    /// How the logs are written: delimiter, topics, stamps, names of joints in messages.
+    pub section: LogSection,
+    /// What stands in the places of positions are temperatures.
+    pub temperatures: bool,
+    /// Layout to use instead where the log has none of this layout's positions.
+    pub otherwise: Option<Box<Layout>>,
+}
+
+impl Layout {
+    /// The contract's joint channels: `t`, `q_<joint>`, `tau_<joint>`, optional `dq_<joint>`, all SI.
+    pub fn joint_columns(joints: &[impl AsRef<str>]) -> Self {
+        let each = |prefix: &str| -> Vec<Channel> {
+            joints
+                .iter()
+                .map(|joint| Channel::si(format!("{prefix}{}", joint.as_ref()), ""))
+                .collect()
+        };
+        let joints: Vec<String> = joints.iter().map(|j| j.as_ref().to_owned()).collect();
+        Self {
+            time: Channel::si("t", "s"),
+            positions: each("q_"),
+            torques: each("tau_"),
+            velocities: each("dq_"),
+            joints,
+            channels: DeclaredChannels::Joint,
+            conversion: None,
+            zero_order_hold: false,
+            section: LogSection::default(),
+            temperatures: false,
+            otherwise: None,
+        }
+    }
+
+    /// What its positions are, in words.
+    pub(super) fn what(&self) -> &'static str {
+        match self.temperatures {
+            true => "temperature",
+            false => "position",
+        }
+    }
+
+    /// Name of a joint in messages that list their joints by name.
+    pub(super) fn name_in_messages(&self, joint: usize) -> Option<&str> {
+        let joint = self.joints.get(joint)?;
+        let named = self
+            .section
+            .joint
+            .get(joint)
+            .and_then(|c| c.name.as_deref());
+        Some(named.unwrap_or(joint))
+    }
+
+    /// Whether any column is given by its number (`#1`, `#2`, ...), as a log without a header needs.
+    pub(super) fn by_number(&self) -> bool {
+        let mut channels = (self.positions.iter())
+            .chain(&self.torques)
+            .chain(std::iter::once(&self.time));
+        channels.any(|channel| column_number(&channel.column).is_some())
+    }
+
+    /// The same layout without its conversions: blocks hold what was logged, in SI units.
+    pub fn as_logged(mut self) -> Self {
+        self.conversion = None;
+        self.otherwise = self.otherwise.map(|other| Box::new(other.as_logged()));
+        self
+    }
+
+    /// The same layout for a log that need not hold torques: blocks then have an empty `tau`.
+    ///
+    /// For a trajectory of positions whose torque is asked for.
+    pub fn without_torques(mut self) -> Self {
+        self.torques.clear();
+        self.otherwise = self
+            .otherwise
+            .map(|other| Box::new(other.without_torques()));
+        self
+    }
+}
+
+/// Index of the column that `#1`, `#2`, ... stands for.
+pub(super) fn column_number(column: &str) -> Option<usize> {
+    let number: usize = column.strip_prefix('#')?.parse().ok()?;
+    number.checked_sub(1)
+}

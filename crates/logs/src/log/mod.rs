@@ -1,0 +1,59 @@
+//! The only readers of recordings: from a file to blocks of t, q, tau in SI units.
+//!
+//! A [`LogSpec`] says which part of which file, a [`Layout`] which columns or message fields are which
+//! channels; a [`Reader`] hands out [`Block`]s of at most [`Block::ROWS`] rows, so that memory does not
+//! grow with the log. What comes out is finite, in strictly increasing time, and in SI.
+//!
+//! Text logs, MCAP recordings and rosbag2 databases, each also compressed with gzip or zstd, are told
+//! apart by their first bytes; logs in memory, as [`Arrays`], are read alike.
+
+mod arrays;
+mod columns;
+mod content;
+mod error;
+mod layout;
+mod mend;
+mod names;
+mod pass;
+mod raw;
+mod reader;
+mod recording;
+mod rows;
+mod section;
+mod shared;
+mod source;
+mod spec;
+mod stale;
+mod stream;
+mod temperatures;
+mod text;
+mod time;
+mod time_unit;
+
+pub use arrays::Arrays;
+pub use cft_ident_core::block::Block;
+pub use content::REDUCED;
+pub use error::LogError;
+pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
+pub use mend::{Bridge, Mending, Unwrap};
+pub use names::{escape, escape_whole, nearest};
+pub use raw::{RawBlock, RawReader, topics};
+pub use reader::Reader;
+pub use recording::{
+    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup, Value,
+};
+pub use section::{
+    ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
+    PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
+};
+pub use shared::shares_rows;
+pub use source::{DataRole, Provenance, sha256};
+pub use spec::{LogSpec, Span};
+pub use temperatures::Temperatures;
+pub use time::Instant;
+
+pub use columns::unit_of;
+pub use content::unpacked;
+pub use layout::channel;
+pub use names::{did_you_mean, is_hidden, list};
+pub use source::{bytes, named_beside, named_beside_of, remedy, sha256_of_bytes, shown};

@@ -1,0 +1,160 @@
+//! What is asked of a message: the channels of the robot and the time, and where they may stand.
+
+use std::ops::Range;
+
+use super::message::MessageHead;
+use super::path::FieldPath;
+use super::value::Value;
+use crate::log::layout::{Channel, Layout, column_number};
+use crate::log::section::Stamp;
+use crate::log::time::{FAR_S, Instant, Stamped};
+use cft_ident_core::number::is_usable;
+
+/// The fields of one robot in messages, each with the paths that it may have.
+#[derive(Debug, Clone)]
+pub(super) struct RobotFields {
+    pub(super) paths: Vec<Vec<FieldPath>>,
+    pub(super) positions: Range<usize>,
+    pub(super) torques: Range<usize>,
+    pub(super) velocities: Range<usize>,
+    /// Index of the time that the robot file names.
+    time: usize,
+    /// Indices of the header's seconds and nanoseconds.
+    header: [usize; 2],
+    /// Seconds per unit of the time field.
+    time_factor: f64,
+}
+
+/// Which time of a message counts, once it is decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TimeSource {
+    Field,
+    Header,
+    Log,
+    Publish,
+}
+
+impl RobotFields {
+    pub(super) fn new(layout: &Layout) -> Self {
+        let mut paths: Vec<Vec<FieldPath>> = Vec::new();
+        let mut add = |channels: &[Channel], field: &str| -> Range<usize> {
+            let from = paths.len();
+            for (index, channel) in channels.iter().enumerate() {
+                let mut places = Vec::new();
+                if column_number(&channel.column).is_none() {
+                    places.push(FieldPath::parse(&channel.column));
+                }
+                if let Some(joint) = layout.name_in_messages(index) {
+                    // no list of messages is usually one of temperatures: as an entry of the column's name among
+                    // others, but for a topic that is said to hold them
+                    let among_others = layout.temperatures && layout.section.topic.is_none();
+                    let name = match among_others {
+                        true => &channel.column,
+                        false => joint,
+                    };
+                    places.push(FieldPath::named(field, "name", name));
+                }
+                paths.push(places);
+            }
+            from..paths.len()
+        };
+        let positions = add(&layout.positions, "position");
+        let torques = add(&layout.torques, "effort");
+        let velocities = add(&layout.velocities, "velocity");
+        let time = paths.len();
+        let named = layout.time.key.is_some() && column_number(&layout.time.column).is_none();
+        paths.push(match named {
+            true => vec![FieldPath::parse(&layout.time.column)],
+            false => Vec::new(),
+        });
+        // ROS 2, ROS 1, and the stamps of Foxglove's messages as protobuf and JSON.
+        let parse = |texts: &[&str]| texts.iter().map(|text| FieldPath::parse(text)).collect();
+        paths.push(parse(&[
+            "header.stamp.sec",
+            "header.stamp.secs",
+            "timestamp.seconds",
+            "timestamp.sec",
+        ]));
+        paths.push(parse(&[
+            "header.stamp.nanosec",
+            "header.stamp.nsecs",
+            "timestamp.nanos",
+            "timestamp.nsec",
+        ]));
+        Self {
+            paths,
+            positions,
+            torques,
+            velocities,
+            time,
+            header: [time + 1, time + 2],
+            time_factor: layout.time.factor,
+        }
+    }
+
+    /// Whether a message holds every field of a range, and the range is not empty.
+    pub(super) fn all(values: &[Value], range: &Range<usize>) -> bool {
+        !range.is_empty() && !values[range.clone()].contains(&Value::Absent)
+    }
+
+    /// Whether a message holds the time that the robot file names.
+    pub(super) fn has_time(&self, values: &[Value]) -> bool {
+        values[self.time] != Value::Absent
+    }
+
+    /// Whether a message has a header with a stamp other than 0.
+    pub(super) fn has_header(&self, values: &[Value]) -> bool {
+        let part = |index: usize| values[index].integer();
+        match (part(self.header[0]), part(self.header[1])) {
+            (Some(s), Some(ns)) => (s, ns) != (0, 0),
+            _ => false,
+        }
+    }
+
+    /// Time of a message; `None` where it has none of this kind.
+    pub(super) fn stamp(
+        &self,
+        values: &[Value],
+        head: &MessageHead,
+        source: TimeSource,
+    ) -> Option<Stamped> {
+        match source {
+            TimeSource::Log => Some(Stamped::Exact(Instant::from_ns(head.log_ns))),
+            TimeSource::Publish => Some(Stamped::Exact(Instant::from_ns(head.publish_ns))),
+            TimeSource::Header => {
+                let part = |index: usize| values[index].integer()?.try_into().ok();
+                let (s, ns): (i64, i64) = (part(self.header[0])?, part(self.header[1])?);
+                Some(Stamped::Exact(Instant::from_s_ns(s, ns)))
+            }
+            TimeSource::Field => match values[self.time] {
+                Value::Absent => None,
+                Value::Float(value) => {
+                    let seconds = value * self.time_factor;
+                    if !is_usable(seconds) {
+                        return None;
+                    }
+                    Some(match seconds.abs() < FAR_S {
+                        true => Stamped::Seconds(seconds),
+                        false => Stamped::Exact(Instant::default().plus(seconds)),
+                    })
+                }
+                whole => {
+                    let value = whole.integer()?;
+                    // Units of time are whole numbers of nanoseconds.
+                    let ns = (self.time_factor * 1e9).round() as i128;
+                    Some(Stamped::Exact(Instant::from_ns(value.checked_mul(ns)?)))
+                }
+            },
+        }
+    }
+
+    /// The time source that the robot file asks for; `None` where it is found in the messages.
+    pub(super) fn asked(stamp: Stamp) -> Option<TimeSource> {
+        match stamp {
+            Stamp::Auto => None,
+            Stamp::Header => Some(TimeSource::Header),
+            Stamp::Log => Some(TimeSource::Log),
+            Stamp::Publish => Some(TimeSource::Publish),
+        }
+    }
+}

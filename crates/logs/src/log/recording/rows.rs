@@ -1,0 +1,327 @@
+//! Messages of a recording as rows of channels in SI units.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::encoding::reader_of;
+use super::fields::{RobotFields, TimeSource};
+use super::message::{OpenedReader, Schema, Wanted};
+use super::pairing::{Pairing, Sample};
+use super::parts::{Message, MessageFiles};
+use super::survey::{self, Choice};
+use super::value::Value;
+use crate::log::layout::{Channel, Layout};
+use crate::log::rows::LogRows;
+use crate::log::time::Stamped;
+use crate::log::{Block, LogError, escape, source};
+use cft_ident_core::number::{beyond, is_usable};
+
+/// The rows of a recording.
+pub(in crate::log) struct MessageRows {
+    recording: MessageFiles,
+    reading: SampleReader,
+    pairing: Option<Pairing>,
+    row: Sample,
+    previous: Sample,
+    messages: u64,
+    /// Names of the columns: of the time, and of what the samples hold.
+    names: Vec<String>,
+}
+
+/// How messages become samples.
+struct SampleReader {
+    layout: Layout,
+    fields: RobotFields,
+    choice: Choice,
+    readers: Vec<(Arc<Schema>, OpenedReader)>,
+    values: Vec<Value>,
+    /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
+    incomplete: LeftOut,
+    unreadable: LeftOut,
+}
+
+#[derive(Default)]
+struct LeftOut {
+    count: u64,
+    first: String,
+}
+
+impl LeftOut {
+    fn add(&mut self, reason: impl FnOnce() -> String) {
+        if self.count == 0 {
+            self.first = reason();
+        }
+        self.count += 1;
+    }
+}
+
+impl fmt::Debug for MessageRows {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MessageRows")
+            .field("choice", &self.reading.choice)
+            .finish_non_exhaustive()
+    }
+}
+
+/// What a message holds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Whole,
+    Positions,
+    Torques,
+}
+
+impl MessageRows {
+    /// Opens a recording and finds the channels in it; the layout that it turns out to have.
+    pub(in crate::log) fn open(
+        paths: &[PathBuf],
+        layout: &Layout,
+    ) -> Result<(Self, Layout), LogError> {
+        let (choice, layout) = survey::choose(paths, layout)?;
+        let mut names = vec![choice.topic.clone()];
+        names.extend(choice.torque_topic.clone());
+        let fields = RobotFields::new(&layout);
+        let pairing = choice.torque_topic.is_some().then(|| Pairing::new(&layout));
+        let velocities = match choice.velocities {
+            true => &layout.velocities[..],
+            false => &[],
+        };
+        let channels = (layout.positions.iter())
+            .chain(&layout.torques)
+            .chain(velocities);
+        let channels = channels.map(|channel| channel.column.clone());
+        let rows = Self {
+            names: std::iter::once("t".to_owned()).chain(channels).collect(),
+            recording: MessageFiles::open(paths, Wanted { names })?,
+            pairing,
+            row: Sample::default(),
+            previous: Sample::default(),
+            messages: 0,
+            reading: SampleReader {
+                values: vec![Value::Absent; fields.paths.len()],
+                layout: layout.clone(),
+                fields,
+                choice,
+                readers: Vec::new(),
+                incomplete: LeftOut::default(),
+                unreadable: LeftOut::default(),
+            },
+        };
+        Ok((rows, layout))
+    }
+
+    fn append_part(
+        &self,
+        channels: &[Channel],
+        numbers: &[f64],
+        to: &mut Vec<f64>,
+    ) -> Result<(), LogError> {
+        for (channel, number) in channels.iter().zip(numbers) {
+            let value = number * channel.factor + channel.offset;
+            if !is_usable(value) {
+                return Err(LogError::NotFinite {
+                    at: self.place(),
+                    column: escape(&channel.column),
+                    text: format!("{number:?}{}", beyond(value)),
+                    remedy: "use the parts before and after it as two logs, FILE@0..10s and FILE@10.1..s: a made-up number is worse than a gap",
+                });
+            }
+            to.push(value);
+        }
+        Ok(())
+    }
+}
+
+impl LogRows for MessageRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        std::mem::swap(&mut self.row, &mut self.previous);
+        loop {
+            if let Some(pairing) = &mut self.pairing
+                && pairing.take(&mut self.row)
+            {
+                return Ok(Some(self.row.stamp));
+            }
+            let Some(message) = self.recording.next()? else {
+                return Ok(None);
+            };
+            self.messages += 1;
+            let Some(part) = self.reading.read(&message, &mut self.row) else {
+                continue;
+            };
+            match (&mut self.pairing, part) {
+                (None, _) | (_, Holds::Whole) => return Ok(Some(self.row.stamp)),
+                (Some(pairing), Holds::Positions) => pairing.add_positions(&mut self.row),
+                (Some(pairing), Holds::Torques) => pairing.add_torques(&mut self.row),
+            }
+        }
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let layout = &self.reading.layout;
+        self.append_part(&layout.positions, &self.row.q, &mut block.q)?;
+        self.append_part(&layout.torques, &self.row.tau, &mut block.tau)?;
+        if self.has_velocities() {
+            self.append_part(&layout.velocities, &self.row.dq, &mut block.dq)?;
+        }
+        Ok(())
+    }
+
+    fn has_velocities(&self) -> bool {
+        self.reading.choice.velocities
+    }
+
+    fn repeats(&self) -> bool {
+        let (a, b) = (&self.row, &self.previous);
+        a.stamp == b.stamp && a.q == b.q && a.tau == b.tau && a.dq == b.dq
+    }
+
+    #[cold]
+    fn place(&self) -> String {
+        format!(
+            "{}: message {} ({})",
+            self.row.file,
+            self.row.number,
+            escape(&self.reading.choice.topic)
+        )
+    }
+
+    #[cold]
+    fn clock_remedy(&self, t: f64) -> Option<String> {
+        let part = format!("use the part before it: FILE@0..{t}s");
+        Some(match self.reading.choice.time {
+            TimeSource::Log => part,
+            _ => format!(
+                "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
+            ),
+        })
+    }
+
+    fn number(&self) -> u64 {
+        self.row.number
+    }
+
+    fn logged(&self, column: usize) -> Option<f64> {
+        let mut numbers = (self.row.q.iter()).chain(&self.row.tau).chain(&self.row.dq);
+        numbers.nth(column.checked_sub(1)?).copied()
+    }
+
+    fn breaks(&self) -> Vec<String> {
+        let broken = self.recording.broken.iter();
+        broken
+            .map(|(path, broken)| {
+                format!(
+                    "{} breaks off {} ({}): everything before is used, {} messages of the robot's topics",
+                    escape(&source::file_name(path)),
+                    broken.place,
+                    escape(&broken.reason),
+                    self.messages
+                )
+            })
+            .collect()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.reading.choice.notes.clone();
+        let reading = &self.reading;
+        out.extend(self.breaks());
+        let topic = escape(&reading.choice.topic);
+        if reading.incomplete.count > 0 {
+            out.push(format!(
+                "{} of {} messages are left out: they lack a channel of the robot (the first: {})",
+                reading.incomplete.count, self.messages, reading.incomplete.first
+            ));
+        }
+        if reading.unreadable.count > 0 {
+            out.push(format!(
+                "{} of {} messages are left out: they cannot be decoded (the first: {})",
+                reading.unreadable.count, self.messages, reading.unreadable.first
+            ));
+        }
+        if let (Some(pairing), Some(torques)) = (&self.pairing, &reading.choice.torque_topic) {
+            out.extend(pairing.warnings(&topic, &escape(torques)));
+        }
+        out
+    }
+}
+
+impl SampleReader {
+    /// Reads one message into a sample; `None` where it is left out.
+    fn read(&mut self, message: &Message<'_>, sample: &mut Sample) -> Option<Holds> {
+        let Message {
+            path,
+            topic,
+            head,
+            data,
+        } = message;
+        let (schema, topic) = (&topic.schema, &topic.name);
+        let place = || format!("message {} of {}", head.number, escape(topic));
+        let known = self.readers.iter().position(|(s, _)| s == schema);
+        let index = known.unwrap_or_else(|| {
+            let reader = reader_of(schema, &self.fields.paths);
+            self.readers.push((schema.clone(), reader));
+            self.readers.len() - 1
+        });
+        let read = match &mut self.readers[index].1 {
+            Ok(reader) => reader.read(data, &mut self.values),
+            Err(reason) => Err(reason.clone()),
+        };
+        if let Err(reason) = read {
+            self.unreadable
+                .add(|| format!("{}: {}", place(), escape(&reason)));
+            return None;
+        }
+        let (fields, values) = (&self.fields, &self.values);
+        let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
+            self.incomplete.add(|| format!("{}: no time", place()));
+            return None;
+        };
+        let part = match &self.choice.torque_topic {
+            None => Holds::Whole,
+            Some(torques) if torques == topic => Holds::Torques,
+            Some(_) => Holds::Positions,
+        };
+        let none = || 0..0;
+        let (q, tau, dq): (Range<usize>, Range<usize>, Range<usize>) = match part {
+            Holds::Whole => (
+                fields.positions.clone(),
+                fields.torques.clone(),
+                fields.velocities.clone(),
+            ),
+            Holds::Positions => (fields.positions.clone(), none(), fields.velocities.clone()),
+            Holds::Torques => (none(), fields.torques.clone(), none()),
+        };
+        let dq = if self.choice.velocities { dq } else { none() };
+        let parts = [
+            (q, &mut sample.q),
+            (tau, &mut sample.tau),
+            (dq, &mut sample.dq),
+        ];
+        for (range, to) in parts {
+            to.clear();
+            for index in range {
+                let Some(number) = values[index].number() else {
+                    self.incomplete.add(|| {
+                        let path = fields.paths[index].last();
+                        let path = path.map_or("", |path| path.text());
+                        format!("{} has no `{}`", place(), escape(path))
+                    });
+                    return None;
+                };
+                to.push(number);
+            }
+        }
+        sample.stamp = stamp;
+        sample.number = head.number;
+        if sample.path != *path {
+            sample.path = (*path).to_owned();
+            sample.file = source::shown(path);
+        }
+        Some(part)
+    }
+}

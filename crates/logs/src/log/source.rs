@@ -1,0 +1,282 @@
+//! Files as they lie on the disk: opened with errors that help, and known again by their checksum.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::LogError;
+use super::names::{escape, escape_whole, list, nearest};
+
+/// One input of a result: enough to know the data again, and nothing of the machine it was read on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// File name without folders.
+    pub name: String,
+    /// The part that was used, as written after `@`; absent (null in JSON) for the whole log.
+    #[serde(default)]
+    pub span: Option<String>,
+    /// SHA-256 of the whole file, hexadecimal.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
+    pub sha256: String,
+    /// Rows used; 0 for a file that is no log.
+    #[serde(default)]
+    pub samples: u64,
+    /// Time from the first to the last row used [s].
+    #[serde(default)]
+    pub duration_s: f64,
+    /// What its rows were used for; absent where nothing was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub role: Option<DataRole>,
+}
+
+/// What the rows of a log were used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DataRole {
+    /// Parameters were fitted to them.
+    Fitted,
+    /// They could veto an effect.
+    Vetoed,
+    /// They were evaluated once, after everything was decided.
+    HeldOut,
+}
+
+impl DataRole {
+    /// The word in tables and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            DataRole::Fitted => "fitted",
+            DataRole::Vetoed => "vetoed",
+            DataRole::HeldOut => "held-out",
+        }
+    }
+}
+
+impl Provenance {
+    /// The same, with what it was used for; a file that is no log has no role.
+    pub fn used_as(mut self, role: DataRole) -> Self {
+        self.role = (self.samples > 0).then_some(role);
+        self
+    }
+
+    /// Whether something was made from these rows: from those of a log that was not held out.
+    pub fn made(&self) -> bool {
+        self.samples > 0 && self.role != Some(DataRole::HeldOut)
+    }
+
+    /// An input that is no log: a model, robot, campaign or trajectory file.
+    pub fn of_file(path: &Path) -> Result<Self, LogError> {
+        Ok(Self {
+            name: file_name(path),
+            span: None,
+            sha256: sha256(path)?,
+            samples: 0,
+            duration_s: 0.0,
+            role: None,
+        })
+    }
+
+    /// An input that is no file of the user: a configuration that comes with the tool.
+    pub fn of_text(name: &str, text: &str) -> Self {
+        let mut checksum = Checksum::default();
+        checksum.update(text.as_bytes());
+        Self {
+            name: name.to_owned(),
+            span: None,
+            sha256: checksum.hexadecimal(),
+            samples: 0,
+            duration_s: 0.0,
+            role: None,
+        }
+    }
+}
+
+/// File name without folders: the only form in which a path enters an output.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// A path for a message.
+pub fn shown(path: &Path) -> String {
+    escape_whole(&path.to_string_lossy())
+}
+
+/// What to do when the system refuses to read.
+pub fn remedy(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::NotFound => "check the path; it is looked for from the current folder",
+        io::ErrorKind::PermissionDenied => "allow reading it, or copy it to where you may read",
+        io::ErrorKind::IsADirectory => "name a file inside this folder",
+        io::ErrorKind::InvalidData => "it is no UTF-8 text; name the right file",
+        io::ErrorKind::UnexpectedEof => "it is cut off: copy it again from where it was recorded",
+        _ => "check the disk or the connection, and try again",
+    }
+}
+
+/// Several paths for a message: the first, and how many more.
+pub(super) fn shown_all(paths: &[PathBuf]) -> String {
+    match paths {
+        [] => String::new(),
+        [path] => shown(path),
+        [first, rest @ ..] => format!("{} and {} more files", shown(first), rest.len()),
+    }
+}
+
+/// Opens a file for reading.
+pub(super) fn open(path: &Path) -> Result<File, LogError> {
+    let opened = File::open(path).and_then(|file| {
+        if file.metadata()?.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        Ok(file)
+    });
+    opened.map_err(|error| failed(path, error))
+}
+
+/// "; the nearest is `x`", or "; there are x, y" of the files of these kinds in the folder of one that is
+/// not there; empty where there are none.
+pub fn named_beside(path: &Path, ends: &[&str]) -> String {
+    named_beside_of(path, ends, &|_| true)
+}
+
+/// The same of those files of which `wanted` holds.
+pub fn named_beside_of(path: &Path, ends: &[&str], wanted: &dyn Fn(&Path) -> bool) -> String {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return String::new();
+    };
+    let is = |name: &String| ends.iter().any(|end| name.ends_with(&format!(".{end}")));
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(is).collect();
+    names.retain(|name| wanted(&folder.join(name)));
+    names.sort();
+    let known = || names.iter().map(String::as_str);
+    match nearest(&file_name(path), known()) {
+        Some(near) => format!("; did you mean `{}`?", escape(near)),
+        None if names.is_empty() => String::new(),
+        None => format!("; in that folder are {}", list(known())),
+    }
+}
+
+/// Endings of files that hold logs.
+const LOGS: [&str; 9] = [
+    "csv", "txt", "dat", "tsv", "mcap", "db3", "csv.gz", "csv.zst", "mcap.zst",
+];
+
+/// The error for a read that the system refused.
+pub(super) fn failed(path: &Path, error: io::Error) -> LogError {
+    let beside = match error.kind() {
+        io::ErrorKind::NotFound => named_beside(path, &LOGS),
+        _ => String::new(),
+    };
+    LogError::Read {
+        file: shown(path),
+        remedy: format!("{}{beside}", remedy(&error)),
+        source: error,
+    }
+}
+
+/// SHA-256 of a whole file, hexadecimal.
+pub fn sha256(path: &Path) -> Result<String, LogError> {
+    sha256_of(&[path.to_owned()])
+}
+
+/// SHA-256 of bytes, hexadecimal.
+pub fn sha256_of_bytes(bytes: &[u8]) -> String {
+    let mut checksum = Checksum::default();
+    checksum.update(bytes);
+    checksum.hexadecimal()
+}
+
+/// Bytes of a whole file.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, LogError> {
+    let mut all = Vec::new();
+    let read = open(path)?.read_to_end(&mut all);
+    read.map_err(|error| failed(path, error))?;
+    Ok(all)
+}
+
+/// SHA-256 of whole files one after the other, hexadecimal.
+pub(super) fn sha256_of(paths: &[PathBuf]) -> Result<String, LogError> {
+    let mut checksum = Checksum::default();
+    let mut buffer = vec![0; 1 << 16];
+    for path in paths {
+        let mut file = open(path)?;
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(count) => checksum.update(&buffer[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(failed(path, error)),
+            }
+        }
+    }
+    Ok(checksum.hexadecimal())
+}
+
+/// SHA-256 of what it is given piece by piece.
+#[derive(Clone, Default)]
+pub(super) struct Checksum(Sha256);
+
+impl Checksum {
+    pub(super) fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// As hexadecimal digits.
+    pub(super) fn hexadecimal(self) -> String {
+        let digest = self.0.finalize();
+        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        // FIPS 180-2, appendix B.1.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(Provenance::of_text("abc", "abc").sha256, abc);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc.csv");
+        std::fs::write(&path, "abc").unwrap();
+        let provenance = Provenance::of_file(&path).unwrap();
+        assert_eq!(
+            (provenance.name.as_str(), provenance.sha256.as_str()),
+            ("abc.csv", abc)
+        );
+    }
+
+    #[test]
+    fn a_folder_and_a_missing_file_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder_error = sha256(folder.path()).unwrap_err().to_string();
+        assert!(
+            folder_error.contains("name a file inside"),
+            "{folder_error}"
+        );
+        let missing = sha256(&folder.path().join("none.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            missing.contains("none.csv") && missing.contains("check the path"),
+            "{missing}"
+        );
+    }
+}

@@ -1,0 +1,369 @@
+//! Text logs as they lie on the disk: header, then records one by one.
+
+use std::fmt;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use csv::ByteRecord;
+
+use super::{head, number};
+use crate::log::content::{Bytes, Content};
+use crate::log::layout::Layout;
+use crate::log::rows::Strictness;
+use crate::log::stream::Watch;
+use crate::log::time::Instant;
+use crate::log::{LogError, escape, source};
+use cft_ident_core::number::beyond;
+
+/// Bytes that one row may take.
+const LONGEST_ROW: usize = 1 << 20;
+/// Bytes read at once.
+const BUFFER: usize = 1 << 17;
+
+/// Ends the reading of a row that never ends, before it fills the memory.
+struct Guard {
+    inner: Bytes,
+    /// Bytes handed out since the last row was complete.
+    pending: usize,
+}
+
+impl fmt::Debug for Guard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Guard")
+    }
+}
+
+impl Read for Guard {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.pending > LONGEST_ROW + BUFFER {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        loop {
+            match self.inner.read(buffer) {
+                Ok(count) => {
+                    self.pending += count;
+                    return Ok(count);
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// A text log: its records one by one.
+#[derive(Debug)]
+pub(super) struct TextFile {
+    path: PathBuf,
+    reader: csv::Reader<Guard>,
+    record: ByteRecord,
+    previous: ByteRecord,
+    header: Vec<String>,
+    header_line: u64,
+    /// Columns are parted by runs of spaces: where the fields that are not empty stand.
+    runs: Option<Vec<usize>>,
+    decimal_comma: bool,
+    /// The record is a row that was not handed out yet.
+    ahead: bool,
+    strictness: Strictness,
+    malformed: u64,
+    /// What is known of a stream.
+    watch: Option<Watch>,
+}
+
+impl TextFile {
+    /// Reads the header of a text log.
+    pub(super) fn open(
+        path: &Path,
+        content: Content,
+        layout: &Layout,
+        strictness: Strictness,
+    ) -> Result<Self, LogError> {
+        let begin = content.head();
+        head::refuse_other_formats(path, begin)?;
+        let found = head::look_at(path, begin, layout.section.delimiter, layout.by_number())?;
+        let watch = content.watch.clone();
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(found.comment))
+            .delimiter(found.delimiter)
+            .buffer_capacity(BUFFER)
+            .from_reader(Guard {
+                inner: content.into_bytes(),
+                pending: 0,
+            });
+        let mut rows = Self {
+            path: path.to_owned(),
+            reader,
+            record: ByteRecord::new(),
+            previous: ByteRecord::new(),
+            header: Vec::new(),
+            header_line: found.header_line,
+            runs: found.spaces.then(Vec::new),
+            decimal_comma: found.delimiter != b',',
+            ahead: found.headerless,
+            strictness,
+            malformed: 0,
+            watch,
+        };
+        if let Some((names, _)) = found.header_in_comment {
+            let parts = head::split(&names, found.delimiter, found.spaces);
+            rows.header = parts.into_iter().map(str::to_owned).collect();
+            return Ok(rows);
+        }
+        while rows.advance()? && rows.is_blank() {}
+        let names = (0..rows.fields()).map(|index| {
+            if found.headerless {
+                return format!("#{}", index + 1);
+            }
+            let name = String::from_utf8_lossy(rows.field(index).unwrap_or_default());
+            name.trim().to_owned()
+        });
+        rows.header = names.collect();
+        // A delimiter at the end of the line names no column.
+        if rows.header.last().is_some_and(String::is_empty) {
+            rows.header.pop();
+        }
+        Ok(rows)
+    }
+
+    /// Column names, trimmed.
+    pub(super) fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// Line of the header.
+    pub(super) fn header_line(&self) -> u64 {
+        self.header_line
+    }
+
+    /// Goes on to the next row; false at the end of the file.
+    pub(super) fn next(&mut self) -> Result<bool, LogError> {
+        loop {
+            if std::mem::take(&mut self.ahead) {
+                return Ok(self.fields() > 0);
+            }
+            std::mem::swap(&mut self.record, &mut self.previous);
+            if !self.advance()? {
+                return Ok(false);
+            }
+            if let Some(watch) = &self.watch
+                && watch.is_cut_at(self.reader.position().byte())
+            {
+                return Err(LogError::CutLine { at: self.place() });
+            }
+            if self.fields() == self.header.len() || self.is_row() {
+                return Ok(true);
+            }
+            match self.strictness {
+                _ if self.is_blank() => {}
+                Strictness::Record => self.malformed += 1,
+                Strictness::Refuse => return Err(self.wrong_width()),
+            }
+        }
+    }
+
+    /// Reads one record.
+    fn advance(&mut self) -> Result<bool, LogError> {
+        self.reader.get_mut().pending = 0;
+        let more = match self.reader.read_byte_record(&mut self.record) {
+            Ok(more) => more,
+            Err(error) => return Err(self.failed(error)),
+        };
+        if let Some(runs) = &mut self.runs {
+            runs.clear();
+            let full = self.record.iter().enumerate();
+            runs.extend(
+                full.filter(|(_, field)| !field.is_empty())
+                    .map(|(index, _)| index),
+            );
+        }
+        Ok(more)
+    }
+
+    fn failed(&self, error: csv::Error) -> LogError {
+        let line = self.reader.position().line();
+        match error.into_kind() {
+            csv::ErrorKind::Io(error) if error.kind() == io::ErrorKind::FileTooLarge => {
+                LogError::LongLine {
+                    file: self.file(),
+                    line,
+                    limit: LONGEST_ROW,
+                }
+            }
+            csv::ErrorKind::Io(error) => source::failed(&self.path, error),
+            // Byte records of any length have no other error; should one appear, it is a read error.
+            other => source::failed(&self.path, io::Error::other(format!("{other:?}"))),
+        }
+    }
+
+    /// Whether a row that has another width than the header is one: more fields, all of them blank.
+    #[cold]
+    fn is_row(&self) -> bool {
+        let (found, expected) = (self.fields(), self.header.len());
+        found > expected
+            && !self.is_blank()
+            && (expected..found).all(|index| self.is_blank_field(index))
+    }
+
+    #[cold]
+    fn wrong_width(&self) -> LogError {
+        let (found, expected) = (self.fields(), self.header.len());
+        LogError::Fields {
+            file: self.file(),
+            line: self.line(),
+            found,
+            expected,
+            remedy: if found > expected {
+                "name every column, and write decimal points, not commas"
+            } else {
+                "the line is cut off or a field is missing: complete or delete it"
+            },
+        }
+    }
+
+    fn is_blank(&self) -> bool {
+        (0..self.fields()).all(|index| self.is_blank_field(index))
+    }
+
+    /// Whether a field of the current row is empty; false where there is none.
+    pub(super) fn is_blank_field(&self, index: usize) -> bool {
+        self.field(index)
+            .is_some_and(|field| field.trim_ascii().is_empty())
+    }
+
+    #[inline]
+    fn fields(&self) -> usize {
+        match &self.runs {
+            None => self.record.len(),
+            Some(runs) => runs.len(),
+        }
+    }
+
+    #[inline]
+    fn field(&self, column: usize) -> Option<&[u8]> {
+        match &self.runs {
+            None => self.record.get(column),
+            Some(runs) => self.record.get(*runs.get(column)?),
+        }
+    }
+
+    /// The number in a column of the current row, NaN and infinities included.
+    #[inline]
+    pub(super) fn number(&self, column: usize) -> Option<f64> {
+        self.field(column).and_then(number::parse)
+    }
+
+    /// Whether a field of the current row is no number because of its decimal comma.
+    #[cold]
+    pub(super) fn has_decimal_comma(&self, column: usize) -> bool {
+        let text =
+            String::from_utf8_lossy(self.field(column).unwrap_or_default()).replace(',', ".");
+        self.decimal_comma && number::parse(text.as_bytes()).is_some()
+    }
+
+    /// Why a column of the current row holds no number that can be used.
+    #[cold]
+    pub(super) fn no_number(&self, column: usize) -> LogError {
+        let field = self.field(column).unwrap_or_default();
+        let text = String::from_utf8_lossy(field);
+        let text = text.trim();
+        let name = self.header.get(column).map(|name| escape(name));
+        let (at, column_index) = (self.place(), column);
+        let column = name.unwrap_or_default();
+        if let Some(value) = number::parse(field) {
+            return LogError::NotFinite {
+                at,
+                column,
+                text: escape(text) + beyond(value),
+                remedy: "delete the rows without a measurement: a gap in time is handled, a made-up number is not",
+            };
+        }
+        let remedy = if text.is_empty() {
+            "delete the rows without a measurement: a gap in time is handled"
+        } else if self.has_decimal_comma(column_index) {
+            "write decimal points instead of decimal commas, e.g. `sed 's/,/./g'`"
+        } else if text.contains(':') {
+            "write the time as seconds from the start, or with its date: 2024-05-01T12:34:56.789Z"
+        } else {
+            "correct the field or delete the row"
+        };
+        LogError::NotANumber {
+            at,
+            column,
+            text: escape(text),
+            remedy,
+        }
+    }
+
+    /// The instant in a column of the current row: a date, or a number in units of 10^`power` s.
+    pub(super) fn instant(&self, column: usize, power: i32) -> Option<Instant> {
+        let field = self.field(column)?;
+        Instant::parse_decimal(field, power).or_else(|| Instant::parse_iso(field))
+    }
+
+    /// Whether a column of the current row holds a date.
+    pub(super) fn is_date(&self, column: usize) -> bool {
+        self.field(column)
+            .is_some_and(|field| Instant::parse_iso(field).is_some())
+    }
+
+    /// Whether the current row equals the one before it, byte for byte.
+    pub(super) fn repeats(&self) -> bool {
+        self.record == self.previous
+    }
+
+    /// Rows that were passed over because of their width.
+    pub(super) fn malformed(&self) -> u64 {
+        self.malformed
+    }
+
+    /// The file for a message.
+    pub(super) fn file(&self) -> String {
+        source::shown(&self.path)
+    }
+
+    /// File and line of the current row, for a message.
+    #[cold]
+    pub(super) fn place(&self) -> String {
+        format!("{}:{}", self.file(), self.line())
+    }
+
+    /// Line on which the current row ends.
+    ///
+    /// Counted again from the file's beginning: it is asked for once, on the way to an error, and
+    /// costs nothing before.
+    #[cold]
+    pub(super) fn line(&self) -> u64 {
+        if self.watch.is_some() {
+            // a stream cannot be read again
+            return self.line_hint();
+        }
+        let end = self.reader.position().byte().saturating_sub(1);
+        count_lines(&self.path, end).unwrap_or_else(|_| self.reader.position().line())
+    }
+
+    /// Line of the current row where no comment or blank line stands right before it.
+    pub(super) fn line_hint(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+}
+
+/// 1 + the line ends among the first `end` bytes; `\r\n` and a lone `\r` count as one each.
+fn count_lines(path: &Path, end: u64) -> io::Result<u64> {
+    let content = Content::open(path).map_err(io::Error::other)?;
+    let mut file = content.into_bytes().take(end);
+    let mut buffer = vec![0; BUFFER];
+    let (mut lines, mut after_return) = (1, false);
+    loop {
+        let count = file.read(&mut buffer)?;
+        if count == 0 {
+            return Ok(lines);
+        }
+        for byte in &buffer[..count] {
+            lines += u64::from(*byte == b'\r' || (*byte == b'\n' && !after_return));
+            after_return = *byte == b'\r';
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Rows as JSON objects, one a line: `{"t": 0.1, "q_q1": 0.2, "tau_q1": 3.0}` by the names of the columns,
+//! or `{"t": 0.1, "q": [0.2], "tau": [3.0]}` in joint order.
+
+use std::fmt;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+use crate::log::columns::choose;
+use crate::log::content::{Bytes, Content};
+use crate::log::layout::{Channel, Layout};
+use crate::log::rows::LogRows;
+use crate::log::stream::Watch;
+use crate::log::time::Stamped;
+use crate::log::{Block, LogError, escape, source};
+use cft_ident_core::number::is_usable;
+
+/// Bytes that one line may take.
+const LONGEST_LINE: usize = 1 << 20;
+
+/// A log of JSON lines.
+pub(in crate::log) struct JsonRows {
+    path: PathBuf,
+    reader: BufReader<Bytes>,
+    watch: Option<Watch>,
+    line: Vec<u8>,
+    number: u64,
+    /// Bytes read so far.
+    at: u64,
+    names: Vec<String>,
+    slots: Slots,
+    /// Numbers of the current row: time, positions, torques, velocities; NaN where none stands.
+    values: Vec<f64>,
+}
+
+impl fmt::Debug for JsonRows {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JsonRows")
+    }
+}
+
+/// Where each key's number goes.
+#[derive(Default)]
+struct Slots {
+    /// Key and place.
+    keys: Vec<(String, usize)>,
+    /// Lists in joint order: key, first place, length.
+    lists: [(&'static str, usize, usize); 3],
+    /// SI = factor x + offset, of each place.
+    scales: Vec<[f64; 2]>,
+    joints: usize,
+    torques: usize,
+}
+
+impl Slots {
+    fn of(layout: &Layout) -> Self {
+        let (n, k) = (layout.positions.len(), layout.torques.len());
+        let parts = [&layout.positions, &layout.torques, &layout.velocities];
+        let channels = std::iter::once(&layout.time).chain(parts.into_iter().flatten());
+        let scale = |c: &Channel| [c.factor, c.offset];
+        let scales: Vec<[f64; 2]> = channels.clone().map(scale).collect();
+        let keys = channels.enumerate();
+        Slots {
+            keys: keys.map(|(place, c)| (c.column.clone(), place)).collect(),
+            lists: [
+                ("q", 1, n),
+                ("tau", 1 + n, k),
+                ("dq", 1 + n + k, layout.velocities.len()),
+            ],
+            scales,
+            joints: n,
+            torques: k,
+        }
+    }
+}
+
+impl JsonRows {
+    pub(in crate::log) fn open(
+        path: &Path,
+        content: Content,
+        layout: &Layout,
+    ) -> Result<(Self, Layout), LogError> {
+        let watch = content.watch.clone();
+        let mut rows = Self {
+            path: path.to_owned(),
+            reader: BufReader::new(content.into_bytes()),
+            watch,
+            line: Vec::with_capacity(4096),
+            number: 0,
+            at: 0,
+            names: Vec::new(),
+            slots: Slots::default(),
+            values: Vec::new(),
+        };
+        let head = rows.peek()?;
+        rows.names = keys(&head, layout);
+        let layout = choose(&rows.names, layout);
+        rows.slots = Slots::of(&layout);
+        rows.values = vec![f64::NAN; rows.slots.scales.len()];
+        Ok((rows, layout))
+    }
+
+    /// The first line that is not blank; it is read again as the first row.
+    fn peek(&mut self) -> Result<Vec<u8>, LogError> {
+        let text = self.reader.fill_buf();
+        let text = text.map_err(|error| source::failed(&self.path, error))?;
+        let mut lines = text.split(|byte| *byte == b'\n');
+        let first = lines.find(|line| !line.trim_ascii().is_empty());
+        Ok(first.unwrap_or_default().to_vec())
+    }
+
+    fn wrong(&self, problem: &str) -> LogError {
+        LogError::JsonLine {
+            at: self.place(),
+            problem: problem.to_owned(),
+        }
+    }
+
+    /// Reads the next line that is not blank; false at the end.
+    fn advance(&mut self) -> Result<bool, LogError> {
+        loop {
+            self.line.clear();
+            self.number += 1;
+            let most = LONGEST_LINE as u64 + 1;
+            let mut limited = Read::by_ref(&mut self.reader).take(most);
+            let count = limited.read_until(b'\n', &mut self.line);
+            let count = count.map_err(|error| source::failed(&self.path, error))?;
+            if count == 0 {
+                return Ok(false);
+            }
+            if count > LONGEST_LINE {
+                return Err(LogError::LongLine {
+                    file: source::shown(&self.path),
+                    line: self.number,
+                    limit: LONGEST_LINE,
+                });
+            }
+            self.at += count as u64;
+            if !self.line.trim_ascii().is_empty() {
+                return Ok(true);
+            }
+        }
+    }
+}
+
+impl LogRows for JsonRows {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        if !self.advance()? {
+            return Ok(None);
+        }
+        self.values.fill(f64::NAN);
+        let row = Row {
+            slots: &self.slots,
+            values: &mut self.values,
+        };
+        let mut parser = serde_json::Deserializer::from_slice(&self.line);
+        let parsed = row
+            .deserialize(&mut parser)
+            .and_then(|()| parser.end())
+            .map_err(|error| error.to_string());
+        if let Err(problem) = parsed {
+            let cut = self.watch.as_ref().is_some_and(|w| w.is_cut_at(self.at));
+            return Err(match cut {
+                true => LogError::CutLine { at: self.place() },
+                false => self.wrong(&problem),
+            });
+        }
+        let t = self.values[0];
+        match is_usable(t) {
+            true => Ok(Some(Stamped::Seconds(t))),
+            false => Err(self.wrong(&format!(
+                "has no number `{}`, the time",
+                escape(&self.slots.keys[0].0)
+            ))),
+        }
+    }
+
+    fn logged(&self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let (n, k) = (self.slots.joints, self.slots.torques);
+        let needed = 1..1 + n + k;
+        if let Some(place) = needed.clone().find(|i| !is_usable(self.values[*i])) {
+            let key = escape(&self.slots.keys[place].0);
+            return Err(self.wrong(&format!("has no number `{key}`")));
+        }
+        block.q.extend_from_slice(&self.values[1..1 + n]);
+        block.tau.extend_from_slice(&self.values[1 + n..1 + n + k]);
+        Ok(())
+    }
+
+    fn place(&self) -> String {
+        format!("{}:{}", source::shown(&self.path), self.number)
+    }
+
+    fn number(&self) -> u64 {
+        self.number
+    }
+
+    fn is_recording(&self) -> bool {
+        false
+    }
+}
+
+/// Names of the columns that an object holds, lists by those of their joints.
+fn keys(line: &[u8], layout: &Layout) -> Vec<String> {
+    let object: serde_json::Map<String, serde_json::Value> =
+        serde_json::from_slice(line).unwrap_or_default();
+    let columns = |channels: &[Channel]| -> Vec<String> {
+        channels.iter().map(|c| c.column.clone()).collect()
+    };
+    let mut names = Vec::new();
+    for (key, value) in object {
+        match (key.as_str(), value.is_array()) {
+            ("q", true) => names.extend(columns(&layout.positions)),
+            ("tau", true) => names.extend(columns(&layout.torques)),
+            ("dq", true) => names.extend(columns(&layout.velocities)),
+            _ => names.push(key),
+        }
+    }
+    names
+}
+
+/// Fills the numbers of one object.
+struct Row<'a> {
+    slots: &'a Slots,
+    values: &'a mut [f64],
+}
+
+impl<'de> DeserializeSeed<'de> for Row<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_map(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Row<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("an object with the time, positions and torques of one row")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some(place) = map.next_key_seed(Key(self.slots))? {
+            match place {
+                Place::Number(i) => {
+                    let [factor, offset] = self.slots.scales[i];
+                    self.values[i] = map.next_value::<f64>()? * factor + offset;
+                }
+                Place::List(first, length) => map.next_value_seed(List {
+                    scales: &self.slots.scales[first..first + length],
+                    values: &mut self.values[first..first + length],
+                })?,
+                Place::None => drop(map.next_value::<IgnoredAny>()?),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a key stands for.
+enum Place {
+    Number(usize),
+    List(usize, usize),
+    None,
+}
+
+struct Key<'a>(&'a Slots);
+
+impl<'de> DeserializeSeed<'de> for Key<'_> {
+    type Value = Place;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Place, D::Error> {
+        deserializer.deserialize_identifier(self)
+    }
+}
+
+impl Visitor<'_> for Key<'_> {
+    type Value = Place;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a key")
+    }
+
+    fn visit_str<E: Error>(self, key: &str) -> Result<Place, E> {
+        let named = self.0.keys.iter().find(|(name, _)| name == key);
+        let listed = || self.0.lists.iter().find(|(name, ..)| *name == key);
+        Ok(match (named, listed()) {
+            (Some((_, place)), _) => Place::Number(*place),
+            (None, Some((_, first, length))) => Place::List(*first, *length),
+            (None, None) => Place::None,
+        })
+    }
+}
+
+struct List<'a> {
+    scales: &'a [[f64; 2]],
+    values: &'a mut [f64],
+}
+
+impl<'de> DeserializeSeed<'de> for List<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de> Visitor<'de> for List<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a list of {} numbers, one a joint", self.values.len())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        let expected = self.values.len();
+        let mut found = 0;
+        while let Some(x) = list.next_element::<f64>()? {
+            if let Some(value) = self.values.get_mut(found) {
+                let [factor, offset] = self.scales[found];
+                *value = x * factor + offset;
+            }
+            found += 1;
+        }
+        match found == expected {
+            true => Ok(()),
+            // velocities may be left out, an empty list stands for none
+            false if found == 0 => Ok(()),
+            false => Err(A::Error::invalid_length(found, &self)),
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! A text log as rows of channels in SI units.
+
+mod csv;
+mod head;
+mod json_lines;
+mod number;
+
+use std::path::Path;
+
+use self::csv::TextFile;
+pub(super) use self::json_lines::JsonRows;
+use super::columns::{Header, ScaledColumns, choose};
+use super::content::Content;
+use super::layout::Layout;
+use super::rows::{LogRows, Strictness};
+use super::time::{FAR_S, Stamped};
+use super::{Block, LogError};
+use cft_ident_core::number::is_usable;
+
+/// The time of a text log.
+#[derive(Debug, Clone, Copy)]
+struct TimeColumn {
+    index: usize,
+    /// Seconds per unit.
+    seconds: f64,
+    /// Read exactly, in units of 10^power s: dates, and numbers far from zero. Known from the first
+    /// row that has a time.
+    exact: Option<Option<i32>>,
+}
+
+/// A text log, and which of its columns are read.
+#[derive(Debug)]
+pub(super) struct TextRows {
+    file: TextFile,
+    columns: ScaledColumns,
+    time: Option<TimeColumn>,
+    /// Rate of a log without times [Hz], and rows so far.
+    even: Option<(f64, u64)>,
+    strictness: Strictness,
+}
+
+impl TextRows {
+    /// Reads the header and finds the columns; the layout that the log turns out to have, and what
+    /// keeps a strict reader from it.
+    pub(super) fn open(
+        path: &Path,
+        content: Content,
+        layout: &Layout,
+        strictness: Strictness,
+    ) -> Result<(Self, Layout, Option<LogError>), LogError> {
+        let file = TextFile::open(path, content, layout, strictness)?;
+        let header = Header {
+            file: file.file(),
+            line: file.header_line(),
+            names: file.header(),
+        };
+        let layout = choose(header.names, layout);
+        let (columns, refused) = match (header.columns(&layout), strictness) {
+            (Ok(columns), _) => (columns, None),
+            (Err(error), Strictness::Refuse) => return Err(error),
+            (Err(error), Strictness::Record) => (ScaledColumns::default(), Some(error)),
+        };
+        let mut rows = Self {
+            file,
+            time: None,
+            even: layout.section.rate_hz.map(|rate| (rate, 0)),
+            strictness,
+            columns,
+        };
+        if let Some(time) = rows.columns.time {
+            rows.set_time(time.index, time.factor);
+        }
+        Ok((rows, layout, refused))
+    }
+
+    /// Time of the current row, where it has one.
+    #[inline]
+    fn stamp(&mut self) -> Option<Stamped> {
+        if let Some((rate, row)) = &mut self.even {
+            let t = *row as f64 / *rate;
+            *row += 1;
+            return Some(Stamped::Seconds(t));
+        }
+        let (file, time) = (&self.file, self.time.as_mut()?);
+        let seconds = || {
+            let seconds = file.number(time.index)? * time.seconds;
+            is_usable(seconds).then_some(seconds)
+        };
+        let exact = match time.exact {
+            Some(exact) => exact,
+            None => {
+                let power = power_of_ten(time.seconds);
+                let exact = match file.is_date(time.index) {
+                    true => Some(power.unwrap_or(0)),
+                    false => power.filter(|_| seconds().is_some_and(|t| t.abs() >= FAR_S)),
+                };
+                // A first row without a time tells nothing.
+                if exact.is_none() {
+                    seconds()?;
+                }
+                *time.exact.insert(exact)
+            }
+        };
+        match exact {
+            Some(power) => file.instant(time.index, power).map(Stamped::Exact),
+            None => seconds().map(Stamped::Seconds),
+        }
+    }
+}
+
+impl LogRows for TextRows {
+    fn set_time(&mut self, index: usize, seconds: f64) {
+        self.time = Some(TimeColumn {
+            index,
+            seconds,
+            exact: None,
+        });
+    }
+
+    fn names(&self) -> &[String] {
+        self.file.header()
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        if !self.file.next()? {
+            return Ok(None);
+        }
+        match (self.stamp(), self.strictness, self.time) {
+            (Some(stamp), ..) => Ok(Some(stamp)),
+            (None, Strictness::Refuse, Some(time)) => Err(self.file.no_number(time.index)),
+            (None, ..) => Ok(Some(Stamped::NONE)),
+        }
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let parts = [
+            (&self.columns.positions, &mut block.q),
+            (&self.columns.torques, &mut block.tau),
+            (&self.columns.velocities, &mut block.dq),
+        ];
+        for (columns, to) in parts {
+            for column in columns {
+                let value = self.file.number(column.index);
+                match value.map(|value| value * column.factor + column.offset) {
+                    Some(value) if is_usable(value) => to.push(value),
+                    _ => return Err(self.file.no_number(column.index)),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn logged(&self, column: usize) -> Option<f64> {
+        self.file
+            .number(column)
+            .or_else(|| self.file.is_blank_field(column).then_some(f64::NAN))
+    }
+
+    fn refuse_comma(&self, column: usize) -> Result<(), LogError> {
+        match self.file.has_decimal_comma(column) {
+            true => Err(self.file.no_number(column)),
+            false => Ok(()),
+        }
+    }
+
+    fn has_velocities(&self) -> bool {
+        !self.columns.velocities.is_empty()
+    }
+
+    fn repeats(&self) -> bool {
+        self.file.repeats()
+    }
+
+    fn malformed(&self) -> u64 {
+        self.file.malformed()
+    }
+
+    fn place(&self) -> String {
+        self.file.place()
+    }
+
+    fn number(&self) -> u64 {
+        self.file.line_hint()
+    }
+
+    fn is_recording(&self) -> bool {
+        false
+    }
+}
+
+/// Exponent of a power of ten, for those that units of time have.
+fn power_of_ten(factor: f64) -> Option<i32> {
+    [(1.0, 0), (1e-3, -3), (1e-6, -6), (1e-9, -9)]
+        .into_iter()
+        .find(|(unit, _)| *unit == factor)
+        .map(|(_, power)| power)
+}

@@ -1,0 +1,258 @@
+//! Units that the names of columns state, or that their numbers suggest.
+
+use std::f64::consts::TAU;
+
+use super::column::LogColumn;
+use crate::inspect::words::words;
+use cft_ident_core::robot::JointKind;
+
+/// Largest position that a joint in radians has where it does not turn on and on.
+const TURN: f64 = 1.2 * TAU;
+/// Longest travel of a joint that slides \[m\].
+const TRAVEL_M: f64 = 20.0;
+/// Largest torque of a joint \[Nm\]: the largest arms stay below it.
+const TORQUE_NM: f64 = 2e4;
+
+/// A unit, as the keys of a joint in `[log.joint]` say it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Unit {
+    /// `position_unit` or `torque_unit`.
+    pub unit: Option<&'static str>,
+    /// `position_scale` or `torque_scale`.
+    pub scale: Option<f64>,
+    /// The numbers suggest it and no name states it, or it is not enough: what to look at.
+    pub check: Option<String>,
+    /// It is a current or a voltage, not a torque.
+    pub drive: bool,
+}
+
+fn says(column: &LogColumn, known: &[&str]) -> bool {
+    let unit = column.unit.as_deref().unwrap_or_default().to_lowercase();
+    known.contains(&unit.as_str())
+        || words(&column.name)
+            .iter()
+            .any(|word| known.contains(&word.text.as_str()))
+}
+
+/// The unit of the positions of all joints.
+pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Unit {
+    let Some(first) = columns.first() else {
+        return Unit::default();
+    };
+    let unit = |unit| Unit {
+        unit: Some(unit),
+        ..Unit::default()
+    };
+    if says(first, &["deg", "degs", "degree", "degrees", "°"]) {
+        return unit("deg");
+    }
+    if says(first, &["mm"]) {
+        return unit("mm");
+    }
+    if says(
+        first,
+        &["counts", "count", "ticks", "tick", "inc", "increments"],
+    ) {
+        return Unit {
+            check: Some("counts: give position_scale, rad or m per count".to_owned()),
+            ..unit("counts")
+        };
+    }
+    if says(first, &["rad", "rads", "radian", "radians", "m"]) {
+        return Unit::default();
+    }
+    let of = |kind: JointKind| {
+        let all = columns.iter().zip(kinds).filter(move |(_, k)| **k == kind);
+        all.map(|(column, _)| column.largest()).fold(0.0, f64::max)
+    };
+    let (turned, slid) = (of(JointKind::Revolute), of(JointKind::Prismatic));
+    let whole = columns.iter().all(|c| c.whole) && turned.max(slid) > 400.0;
+    if whole {
+        return Unit {
+            check: Some(format!(
+                "whole numbers up to {}: counts? then give position_scale, rad or m per count",
+                turned.max(slid)
+            )),
+            ..unit("counts")
+        };
+    }
+    if turned > TURN {
+        return Unit {
+            check: Some(format!(
+                "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
+            )),
+            ..unit("deg")
+        };
+    }
+    if slid > TRAVEL_M {
+        return Unit {
+            check: Some(format!(
+                "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
+            )),
+            ..unit("mm")
+        };
+    }
+    Unit::default()
+}
+
+/// The unit of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
+pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
+    let Some(first) = columns.first() else {
+        return Unit::default();
+    };
+    let drive = |unit| Unit {
+        unit: Some(unit),
+        drive: true,
+        ..Unit::default()
+    };
+    if says(first, &["mnm", "nmm"]) {
+        return Unit {
+            scale: Some(1e-3),
+            ..Unit::default()
+        };
+    }
+    let rated = |what: &str, part: &str| Unit {
+        check: Some(format!(
+            "{what}: give torque_scale, the rated torque of the joint over {part}"
+        )),
+        ..Unit::default()
+    };
+    if says(first, &["percent", "pct", "%", "load", "utilization"]) {
+        return rated("percent of a rated torque", "100");
+    }
+    if says(first, &["nm", "n"]) {
+        return Unit::default();
+    }
+    if says(first, &["ma"]) {
+        return Unit {
+            scale: Some(1e-3),
+            check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
+            ..drive("A")
+        };
+    }
+    let currents = [
+        "a", "amp", "amps", "ampere", "current", "currents", "curr", "cur", "iq", "i",
+    ];
+    if says(first, &currents) {
+        return drive("A");
+    }
+    if says(first, &["v", "volt", "volts", "voltage", "voltages", "u"]) {
+        return drive("V");
+    }
+    let largest: Vec<f64> = columns.iter().map(|c| c.largest()).collect();
+    let most = largest.iter().copied().fold(0.0, f64::max);
+    let known: Vec<f64> = (largest.iter().zip(limits))
+        .filter_map(|(largest, limit)| limit.map(|limit| largest / limit))
+        .collect();
+    // by the limits of the robot where it has some: no joint gives thirty times its largest torque
+    let beyond = match known.is_empty() {
+        true => most > TORQUE_NM,
+        false => known.iter().any(|ratio| *ratio > 30.0),
+    };
+    let whole = columns.iter().all(|c| c.whole);
+    if whole && most <= 300.0 {
+        return rated(&format!("whole numbers up to {most}: percent?"), "100");
+    }
+    if whole && most <= 3000.0 && known.iter().all(|ratio| *ratio > 1.5) {
+        return rated(
+            &format!("whole numbers up to {most}: thousandths of a rated torque?"),
+            "1000",
+        );
+    }
+    if beyond {
+        return Unit {
+            scale: Some(1e-3),
+            check: Some(format!(
+                "mNm is guessed: torques go to {most:.0}, and no joint gives that much in Nm"
+            )),
+            ..Unit::default()
+        };
+    }
+    Unit::default()
+}
+
+/// The range after which a position begins anew: a turn in rad or deg, or a power of two of counts, where
+/// single steps of nearly that size stand among small ones.
+pub(super) fn wrap_of(numbers: &[f64]) -> Option<f64> {
+    let finite = || numbers.iter().copied().filter(|x| x.is_finite());
+    let (low, high) = finite().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let span = high - low;
+    let mut steps: Vec<f64> = numbers.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
+    steps.retain(|step| step.is_finite());
+    let leaps = steps.iter().filter(|step| **step > 0.75 * span).count();
+    if steps.len() < 100 || leaps == 0 || leaps * 20 > steps.len() {
+        return None;
+    }
+    steps.sort_by(f64::total_cmp);
+    let usual = steps[steps.len() * 9 / 10];
+    let near =
+        |range: f64| span <= range * 1.0001 && range - span <= (3.0 * usual).max(0.001 * range);
+    let powers = (8..=32).map(|power| f64::from(power).exp2());
+    let mut known = [TAU, 360.0].into_iter().chain(powers);
+    known
+        .find(|range| near(*range))
+        .filter(|range| usual < 0.1 * range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(name: &str, largest: f64, whole: bool) -> LogColumn {
+        LogColumn {
+            range: [-largest, 0.9 * largest],
+            whole,
+            ..LogColumn::named(name)
+        }
+    }
+
+    #[test]
+    fn names_state_units_and_else_sizes_suggest_them() {
+        let turn = [JointKind::Revolute];
+        let position = |name: &str, largest| of_positions(&[&column(name, largest, false)], &turn);
+        assert_eq!(position("act_pos_mot_deg_1", 2.0).unit, Some("deg"));
+        assert_eq!(position("act_pos_mot_deg_1", 2.0).check, None);
+        assert_eq!(position("q1", 3.1), Unit::default());
+        assert_eq!(position("q1", 170.0).unit, Some("deg"));
+        assert!(position("q1", 170.0).check.is_some());
+        let slide = of_positions(&[&column("q1", 400.5, false)], &[JointKind::Prismatic]);
+        assert_eq!(slide.unit, Some("mm"));
+        let counts = of_positions(&[&column("q1", 90_000.0, true)], &turn);
+        assert_eq!(counts.unit, Some("counts"));
+        let torque =
+            |name: &str, largest, whole| of_torques(&[&column(name, largest, whole)], &[None]);
+        assert_eq!(torque("tau_mnm_1", 2e3, false).scale, Some(1e-3));
+        assert_eq!(torque("torque_nm_1", 2e3, true), Unit::default());
+        assert_eq!(torque("tau_1", 150.3, false), Unit::default());
+        assert!(
+            torque("tau_1", 87.0, true)
+                .check
+                .unwrap()
+                .contains("percent")
+        );
+        assert!(
+            torque("load_percent_1", 8.3, false)
+                .check
+                .unwrap()
+                .contains("percent")
+        );
+        assert_eq!(torque("tau_1", 150_300.5, false).scale, Some(1e-3));
+        assert!(torque("actual_current_0", 4.0, false).drive);
+        // beside the limits of the robot
+        let small = of_torques(&[&column("tau_1", 9000.5, false)], &[Some(12.0)]);
+        assert_eq!(small.scale, Some(1e-3));
+    }
+
+    #[test]
+    fn an_encoder_of_one_turn_is_seen_to_begin_anew() {
+        let motion = |k: u32| 5.0 * (f64::from(k) * 0.004).sin();
+        let wrapped: Vec<f64> = (0..4000).map(|k| motion(k).rem_euclid(TAU)).collect();
+        assert_eq!(wrap_of(&wrapped), Some(TAU));
+        let degrees: Vec<f64> = wrapped.iter().map(|q| q.to_degrees() - 180.0).collect();
+        assert_eq!(wrap_of(&degrees), Some(360.0));
+        let plain: Vec<f64> = (0..4000).map(motion).collect();
+        assert_eq!(wrap_of(&plain), None);
+        let noise: Vec<f64> = (0..4000u32).map(|k| f64::from(k * 7919 % 1000)).collect();
+        assert_eq!(wrap_of(&noise), None);
+    }
+}

@@ -1,0 +1,9 @@
+//! Tests of logs as they are read.
+
+mod log_bad_input;
+mod log_fixtures;
+mod log_formats;
+mod log_messages;
+mod log_recordings;
+mod log_shared_data;
+mod log_support;

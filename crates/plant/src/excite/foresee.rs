@@ -1,0 +1,262 @@
+//! What a motion will tell, before the robot moves: expected standard deviations, the weakest
+//! direction, the pair that it confounds.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::ExciteError;
+use super::information::{Information, normalised};
+use super::machine::ForeseenRobot;
+use super::motion::Motion;
+use cft_ident_core::math::rank;
+
+/// Samples of a period at which condition and determinant are taken.
+pub const SAMPLES: usize = 250;
+/// Samples per second of a motion that is no series.
+const RATE: f64 = 200.0;
+/// Share of the largest singular value (columns scaled) below which a direction is not excited.
+const NOTHING: f64 = 1e-8;
+/// The same of G, which holds squares, where rounding leaves less.
+const NOTHING_OF_SQUARES: f64 = 1e-13;
+/// Share of an unknown in a direction that is not excited from which on it counts as open.
+const PART: f64 = 1e-3;
+
+/// Condition numbers of the unweighted stacked regressor; null where its rank is short.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Condition {
+    pub raw: Option<f64>,
+    pub normalised: Option<f64>,
+}
+
+/// An unknown as a log of the motion is expected to give it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Expected {
+    pub name: String,
+    pub unit: String,
+    /// Value in the model that the motion was judged with; null where torques are not foreseen.
+    pub value: Option<f64>,
+    /// Expected standard deviation; null where the motion does not excite it.
+    pub std: Option<f64>,
+    /// Over the value's modulus.
+    pub relative_std: Option<f64>,
+}
+
+impl Expected {
+    pub(super) fn new(name: &str, unit: String, value: Option<f64>, std: Option<f64>) -> Self {
+        let size = value.map(f64::abs).filter(|size| *size > 0.0);
+        Self {
+            name: name.to_owned(),
+            unit,
+            value,
+            std,
+            relative_std: std.zip(size).map(|(std, size)| std / size),
+        }
+    }
+}
+
+/// Part of an unknown in a direction; columns are scaled to norm 1.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct UnknownShare {
+    pub parameter: String,
+    pub weight: f64,
+}
+
+/// The two unknowns whose expected errors are most correlated.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Pair {
+    pub first: String,
+    pub second: String,
+    /// Correlation of their expected errors.
+    pub correlation: f64,
+}
+
+/// What a motion tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Foresight {
+    pub condition: Condition,
+    pub rank: usize,
+    /// log det(F'F) of `samples` rows per joint, unweighted; null where the rank is short.
+    pub log_det: Option<f64>,
+    /// Rows per joint in condition and determinant.
+    pub samples: u64,
+    pub parameters: Vec<Expected>,
+    /// Largest parts first.
+    pub weakest_direction: Vec<UnknownShare>,
+    pub confounded: Option<Pair>,
+    /// Rows per joint that the deviations stand for.
+    pub rows: f64,
+    /// Standard deviation of each joint's torque noise, sample by sample \[N or N m\].
+    pub noise: Vec<f64>,
+}
+
+/// Information of the motion: of one period of a series, else of the whole motion; and the number
+/// of rows per joint that a log of it holds at the rate given \[Hz\] (whole periods alone; `seconds`
+/// long where the motion does not end by itself).
+///
+/// # Errors
+/// [`ExciteError::Robot`] where the machine cannot follow.
+pub fn information(
+    machine: &ForeseenRobot,
+    motion: &Motion,
+    rate_hz: f64,
+    seconds: f64,
+) -> Result<(Information, f64), ExciteError> {
+    Ok(match motion {
+        Motion::Periodic { series, blend } => (
+            Information::of_period(machine, series, SAMPLES)?,
+            rate_hz
+                * blend
+                    .periods
+                    .map_or(seconds, |whole| series.period() * f64::from(whole)),
+        ),
+        Motion::Path { at, seconds } => {
+            let samples = (RATE * seconds).ceil().max(2.0) as usize;
+            let step = seconds / samples as f64;
+            let at = |m: usize| at(step * (m as f64 + 0.5));
+            (
+                Information::of_path(machine, samples, &at)?,
+                rate_hz * seconds,
+            )
+        }
+    })
+}
+
+/// Foresees what a least-squares fit to a log of `rows` rows per joint will give, with white noise
+/// of `machine.noise` on every row and the friction known; `given` is (R'R by noise) of logs that
+/// are fitted together with it.
+///
+/// # Errors
+/// [`ExciteError`] where a number is not finite.
+pub fn foresee(
+    machine: &ForeseenRobot,
+    information: &Information,
+    rows: f64,
+    given: Option<&DMatrix<f64>>,
+) -> Result<Foresight, ExciteError> {
+    let (n, p) = (machine.coordinates(), machine.unknowns());
+    let names = machine.unknown_names();
+    let plain = information.stacked(&vec![1.0; n]);
+    let scaled = normalised(&plain)?;
+    let largest = scaled.s.iter().copied().next().unwrap_or(0.0);
+    let rank = scaled.s.iter().filter(|s| **s > NOTHING * largest).count();
+    let full = rank == p && largest > 0.0;
+    let singular = rank::svd(&plain)?.s;
+    let weakest = scaled.v.column(p - 1);
+    let mut weakest_direction: Vec<UnknownShare> = names
+        .iter()
+        .zip(weakest.iter())
+        .map(|(name, weight)| UnknownShare {
+            parameter: name.clone(),
+            weight: *weight,
+        })
+        .collect();
+    weakest_direction.sort_by(|a, b| b.weight.abs().total_cmp(&a.weight.abs()));
+    // the same direction whatever the sign of the decomposition
+    if weakest_direction
+        .first()
+        .is_some_and(|part| part.weight < 0.0)
+    {
+        for part in &mut weakest_direction {
+            part.weight = -part.weight;
+        }
+    }
+
+    let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
+    let weighted = information.stacked(&weights);
+    let mut g = weighted.tr_mul(&weighted) * (rows / information.rows as f64);
+    if let Some(given) = given {
+        g += given;
+    }
+    let (covariance, determined) = inverse(&g)?;
+    let values = machine.unknown_values();
+    let parameters = (0..p).map(|i| {
+        let std = determined[i].then(|| covariance[(i, i)].sqrt());
+        let value = machine.source.known().then_some(values[i]);
+        Expected::new(&names[i], unit(machine, i), value, std)
+    });
+    let parameters = parameters.collect();
+    Ok(Foresight {
+        condition: Condition {
+            raw: full.then(|| rank::condition(&singular)),
+            normalised: full.then(|| rank::condition(&scaled.s)),
+        },
+        rank,
+        log_det: full.then(|| 2.0 * singular.iter().map(|s| s.ln()).sum::<f64>()),
+        samples: information.rows,
+        parameters,
+        weakest_direction,
+        confounded: confounded(&covariance, &determined, &names),
+        rows,
+        noise: machine.noise.clone(),
+    })
+}
+
+/// Inverse of G on the directions that are excited, and which unknowns have no part in the others.
+fn inverse(g: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), ExciteError> {
+    let p = g.nrows();
+    let scale: Vec<f64> = (0..p)
+        .map(|i| {
+            let size = g[(i, i)].sqrt();
+            if size > 0.0 { 1.0 / size } else { 0.0 }
+        })
+        .collect();
+    let svd = rank::svd(&DMatrix::from_fn(p, p, |i, j| {
+        g[(i, j)] * scale[i] * scale[j]
+    }))?;
+    let mut determined: Vec<bool> = scale.iter().map(|s| *s > 0.0).collect();
+    let mut inverse = DMatrix::zeros(p, p);
+    for k in 0..p {
+        let v = svd.v.column(k);
+        if svd.s[k] > NOTHING_OF_SQUARES * svd.s[0] {
+            inverse += v * v.transpose() / svd.s[k];
+        } else {
+            for (open, part) in determined.iter_mut().zip(v.iter()) {
+                *open &= part.abs() <= PART;
+            }
+        }
+    }
+    let covariance = DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    Ok((covariance, determined))
+}
+
+fn confounded(covariance: &DMatrix<f64>, determined: &[bool], names: &[String]) -> Option<Pair> {
+    let p = names.len();
+    let mut most: Option<(f64, usize, usize)> = None;
+    for j in 0..p {
+        for i in 0..j {
+            if !(determined[i] && determined[j]) {
+                continue;
+            }
+            let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            let correlation = covariance[(i, j)] / scale;
+            if correlation.is_finite() && most.is_none_or(|(c, ..)| correlation.abs() > c.abs()) {
+                most = Some((correlation, i, j));
+            }
+        }
+    }
+    most.map(|(correlation, i, j)| Pair {
+        first: names[i].clone(),
+        second: names[j].clone(),
+        correlation,
+    })
+}
+
+/// Unit of unknown i.
+fn unit(machine: &ForeseenRobot, i: usize) -> String {
+    let robot = &machine.model.robot;
+    if let Some(info) = robot.parameters().get(i) {
+        return info.unit.to_string();
+    }
+    for (j, own) in machine.columns.own.iter().enumerate() {
+        let first = machine.columns.first_own(j);
+        if let Some(own) = i.checked_sub(first).and_then(|k| own.get(k)) {
+            let kind = robot.joint_kind(j);
+            return match own.name() {
+                "viscous" => format!("{} s/{}", kind.torque_unit(), kind.position_unit()),
+                _ => kind.torque_unit().to_owned(),
+            };
+        }
+    }
+    String::new()
+}

@@ -1,0 +1,394 @@
+//! The judgement of a motion before the robot moves: what a log of it will tell, and how near it
+//! comes to each limit.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::foresee::{Condition, Expected, Foresight, Pair, UnknownShare, foresee, information};
+use super::limits::{BoundedQuantity, Quantity};
+use super::machine::ForeseenRobot;
+use super::motion::{spectrum, torque_band};
+use super::usage::{Use, along_way};
+use super::{ExciteError, GivenInformation, Motion};
+use cft_ident_core::number;
+
+/// Share of the torque's power that its band holds.
+const BAND: f64 = 0.99;
+/// Correlation of expected errors from which on two parameters count as confounded.
+const ALIKE: f64 = 0.95;
+
+/// What there is to say about a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Judgement {
+    /// Of the unweighted stacked regressor, along a period of a series.
+    pub condition: Condition,
+    /// log det(F'F) of `samples_per_period` rows per joint, unweighted; null where the rank is short.
+    pub log_det: Option<f64>,
+    /// Directions of the parameters that the motion excites.
+    pub rank: usize,
+    /// Rows per joint in condition and determinant.
+    pub samples_per_period: u64,
+    /// Share of its limits that each designed coordinate takes.
+    pub limits_used: Vec<LimitsUsed>,
+    /// Every limit along the motion.
+    pub limits: Vec<LimitUse>,
+    /// Every limit on the straight way from the given pose to the first point, `t` as a share of the way; null
+    /// where no pose is given.
+    pub way: Option<Vec<LimitUse>>,
+    /// With what torques are foreseen, in one sentence.
+    pub torques: String,
+    /// Whether they are foreseen at all; where not, no limit of torque was checked.
+    pub torques_foreseen: bool,
+    /// What nobody looked at, in one sentence.
+    pub not_checked: String,
+    /// Expected deviations, friction known.
+    pub parameters: Vec<Expected>,
+    /// The combination of columns, scaled to norm 1, that is least certain; largest parts first.
+    pub weakest_direction: Vec<UnknownShare>,
+    pub confounded: Option<Pair>,
+    /// The same with what is given besides.
+    pub together: Option<GivenTogether>,
+    /// Of a one-joint move: what it tells about the joint's friction.
+    pub friction: Option<LawForeseen>,
+    /// The noise that deviations are expected from.
+    pub noise: Vec<TorqueNoise>,
+    /// Rows per joint that the deviations stand for.
+    pub rows: f64,
+    /// Rate of the log that is foreseen \[Hz\].
+    pub rate_hz: f64,
+    /// Of a series alone.
+    pub spectrum: Option<Vec<Amplitudes>>,
+    /// Of a series alone, where torques are foreseen.
+    pub band: Option<Vec<PowerBand>>,
+    /// Duration of the motion \[s\].
+    pub seconds: f64,
+    /// Whole periods between the ends, of a series.
+    pub periods: Option<u32>,
+    /// What the design made small.
+    pub criterion: String,
+    /// Seed of the design.
+    pub seed: u64,
+    /// Evaluations that the design took; null for a motion that was there.
+    pub evaluations: Option<u64>,
+    /// What a reader should know.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// Share of a coordinate's limits that a motion takes: 1 at a limit; null where there is none.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LimitsUsed {
+    pub coordinate: String,
+    pub position: Option<f64>,
+    pub speed: Option<f64>,
+    pub acceleration: Option<f64>,
+    pub volts: Option<f64>,
+}
+
+/// One limit along a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LimitUse {
+    /// Coordinate or joint.
+    pub name: String,
+    pub quantity: Quantity,
+    pub unit: String,
+    /// The least that is allowed \[unit\].
+    pub lower: f64,
+    /// The most that is allowed \[unit\]; null where nothing bounds it.
+    pub upper: f64,
+    /// Least along the motion \[unit\].
+    pub least: f64,
+    /// Most along the motion \[unit\].
+    pub most: f64,
+    /// Share of the limit: 1 at it; null where the machine cannot follow.
+    pub used: f64,
+    /// Time at which it comes nearest \[s\]; a share of the way on one.
+    pub t: f64,
+    pub broken: bool,
+}
+
+/// Expected deviations together with what is given besides.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct GivenTogether {
+    pub parameters: Vec<Expected>,
+    pub confounded: Option<Pair>,
+}
+
+/// Expected deviations of a friction law.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LawForeseen {
+    pub joint: String,
+    pub parameters: Vec<Expected>,
+    /// Relative deviations from the usual ladder, in the same order.
+    pub usual_relative_std: Option<Vec<Option<f64>>>,
+}
+
+/// Noise of a joint's torque.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TorqueNoise {
+    pub joint: String,
+    /// Standard deviation, sample by sample \[N or N m\].
+    pub torque_std: f64,
+}
+
+/// Amplitudes of a coordinate's speed.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Amplitudes {
+    pub coordinate: String,
+    /// "m/s" or "rad/s".
+    pub unit: String,
+    /// By harmonic, from the first \[unit\].
+    pub speed_amplitudes: Vec<f64>,
+}
+
+/// Where the power of a joint's torque lies.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct PowerBand {
+    pub joint: String,
+    /// Frequency below which 99 % of it lies \[Hz\].
+    pub torque_power_99_below_hz: f64,
+}
+
+/// Judgements of several motions, each designed to complement those before it: the last one's fields,
+/// and all of them where there are several.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Judgements {
+    #[serde(flatten)]
+    pub last: Judgement,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trajectories: Vec<Judgement>,
+}
+
+impl Judgements {
+    /// None where there is none.
+    pub fn of(mut all: Vec<Judgement>) -> Option<Self> {
+        let last = all.last()?.clone();
+        if all.len() == 1 {
+            all.clear();
+        }
+        Some(Judgements {
+            last,
+            trajectories: all,
+        })
+    }
+}
+
+/// How a motion is to be judged.
+#[derive(Debug, Clone)]
+pub struct Terms<'a> {
+    /// Limits that are looked at.
+    pub channels: &'a [BoundedQuantity],
+    /// What is used together with the motion.
+    pub given: Option<&'a GivenInformation>,
+    /// Of a one-joint move.
+    pub friction: Option<LawForeseen>,
+    /// Pose from which the robot goes to the first point, in the designed coordinates \[m or rad\].
+    pub from: Option<&'a [f64]>,
+    /// Rate of the log that is foreseen \[Hz\].
+    pub rate_hz: f64,
+    /// Its duration where the motion does not end by itself \[s\].
+    pub seconds: f64,
+    /// What the design made small, and its seed.
+    pub criterion: &'a str,
+    pub seed: u64,
+}
+
+/// Judges a motion.
+///
+/// # Errors
+/// [`ExciteError::Robot`] where the machine cannot follow.
+pub fn judge(
+    machine: &ForeseenRobot,
+    motion: &Motion,
+    terms: Terms,
+) -> Result<Judgement, ExciteError> {
+    let uses = motion.usage(machine, terms.channels);
+    let first = motion.at(0.0);
+    let way = (terms.from).map(|from| along_way(machine, terms.channels, from, &first));
+    let (information, rows) = information(machine, motion, terms.rate_hz, terms.seconds)?;
+    let foresight = foresee(machine, &information, rows, None)?;
+    let together = match terms.given {
+        Some(given) => {
+            let weights: Vec<f64> = machine.noise.iter().map(|s| 1.0 / s).collect();
+            let before = given.weighted(&weights);
+            let found = foresee(machine, &information, rows, Some(&before))?;
+            Some(GivenTogether {
+                parameters: found.parameters,
+                confounded: found.confounded,
+            })
+        }
+        None => None,
+    };
+    let (names, joints) = (
+        machine.coordinate_names(),
+        machine.model.robot.joint_names(),
+    );
+    let (spectrum, band, periods) = match motion {
+        Motion::Periodic { series, blend } => {
+            let rows = names.iter().zip(spectrum(series)).enumerate();
+            let of =
+                |(i, (coordinate, speed_amplitudes)): (usize, (&String, Vec<f64>))| Amplitudes {
+                    coordinate: coordinate.clone(),
+                    unit: format!("{}/s", machine.coordinate_unit(i)),
+                    speed_amplitudes,
+                };
+            let spectrum = rows.map(of).collect();
+            let of = |(joint, torque_power_99_below_hz): (&String, f64)| PowerBand {
+                joint: joint.clone(),
+                torque_power_99_below_hz,
+            };
+            let band = match machine.source.known() {
+                true => Some(torque_band(machine, series, BAND)?),
+                false => None,
+            };
+            let band = band.map(|band| joints.iter().zip(band).map(of).collect());
+            (Some(spectrum), band, blend.periods)
+        }
+        Motion::Path { .. } => (None, None, None),
+    };
+    // a one-joint move is not meant to tell the inertias apart
+    let warnings = match terms.friction {
+        None => cautions(&foresight, machine.unknowns()),
+        Some(_) => Vec::new(),
+    };
+    let noise = joints.iter().zip(&machine.noise);
+    Ok(Judgement {
+        condition: foresight.condition,
+        log_det: foresight.log_det,
+        rank: foresight.rank,
+        samples_per_period: foresight.samples,
+        limits_used: limits_used(&names, &uses),
+        limits: uses.iter().map(LimitUse::of).collect(),
+        torques: machine.source.sentence(),
+        torques_foreseen: machine.source.known(),
+        not_checked: machine.space.not_checked(way.is_some()),
+        way: way.map(|way| way.iter().map(LimitUse::of).collect()),
+        parameters: foresight.parameters,
+        weakest_direction: foresight.weakest_direction,
+        confounded: foresight.confounded,
+        together,
+        friction: terms.friction,
+        noise: noise
+            .map(|(joint, std)| TorqueNoise {
+                joint: joint.clone(),
+                torque_std: *std,
+            })
+            .collect(),
+        rows: foresight.rows,
+        rate_hz: terms.rate_hz,
+        spectrum,
+        band,
+        seconds: motion.seconds(),
+        periods,
+        criterion: terms.criterion.to_owned(),
+        seed: terms.seed,
+        evaluations: None,
+        warnings,
+    })
+}
+
+/// What the motion does not tell apart.
+fn cautions(foresight: &Foresight, unknowns: usize) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(pair) = &foresight.confounded
+        && pair.correlation.abs() > ALIKE
+    {
+        warnings.push(format!(
+            "this motion barely separates {} from {}: their errors correlate by {:.3}",
+            pair.first, pair.second, pair.correlation
+        ));
+    }
+    if foresight.rank < unknowns {
+        warnings.push(format!(
+            "this motion excites {} of {unknowns} directions of the parameters",
+            foresight.rank,
+        ));
+    }
+    warnings
+}
+
+fn limits_used(names: &[String], uses: &[Use]) -> Vec<LimitsUsed> {
+    let share = |quantity: Quantity, i: usize| {
+        let mut all = uses.iter();
+        all.find(|u| u.channel.quantity == quantity && u.channel.index == i)
+            .map(|u| u.share)
+    };
+    let of = |(i, name): (usize, &String)| LimitsUsed {
+        coordinate: name.clone(),
+        position: share(Quantity::Position, i),
+        speed: share(Quantity::Speed, i),
+        acceleration: share(Quantity::Acceleration, i),
+        volts: share(Quantity::Drive, i),
+    };
+    names.iter().enumerate().map(of).collect()
+}
+
+impl LimitUse {
+    fn of(along: &Use) -> Self {
+        let channel = &along.channel;
+        LimitUse {
+            name: channel.name.clone(),
+            quantity: channel.quantity,
+            unit: channel.unit.clone(),
+            lower: channel.lower,
+            upper: channel.upper,
+            least: along.range[0],
+            most: along.range[1],
+            used: along.share,
+            t: along.t,
+            broken: along.share > 1.0,
+        }
+    }
+
+    /// One sentence of a limit that is broken, on the way to the motion or along it.
+    fn sentence(&self, on_way: bool) -> String {
+        let what = format!("{} of {}", self.quantity.name(), self.name);
+        let unit = match self.unit.as_str() {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let (on, at) = match on_way {
+            true => {
+                let percent = number::significant(100.0 * self.t, 3);
+                (
+                    "on the way from the given pose ",
+                    format!("at {percent} % of it"),
+                )
+            }
+            false => ("", format!("at t = {:.4} s", self.t)),
+        };
+        if self.used.is_infinite() && !self.most.is_finite() {
+            return format!("{on}the robot cannot follow {at}, where {what} would be needed");
+        }
+        let value = |v: f64| number::significant(v, 5);
+        let (allowed, nearest) = if self.upper.is_finite() {
+            let allowed = format!("[{}, {}]", value(self.lower), value(self.upper));
+            (allowed, "farthest")
+        } else {
+            (format!("at least {}", value(self.lower)), "nearest")
+        };
+        format!(
+            "{on}{what} runs from {} to {}{unit}, allowed is {allowed}; {nearest} {at}",
+            value(self.least),
+            value(self.most),
+        )
+    }
+}
+
+impl Judgement {
+    /// One sentence for each limit that the motion breaks.
+    pub fn broken(&self) -> Vec<String> {
+        let way = self.way.iter().flatten().map(|limit| (limit, true));
+        let all = way.chain(self.limits.iter().map(|limit| (limit, false)));
+        let broken = all.filter(|(limit, _)| limit.broken);
+        broken
+            .map(|(limit, on_way)| limit.sentence(on_way))
+            .collect()
+    }
+
+    /// The limit of a coordinate, where it has one.
+    pub fn limit(&self, coordinate: &str, quantity: Quantity) -> Option<&LimitUse> {
+        let mut all = self.limits.iter();
+        all.find(|limit| limit.quantity == quantity && limit.name == coordinate)
+    }
+}

@@ -1,0 +1,394 @@
+//! One-joint experiments for the friction law: the speeds of the ladder, and the slowness of its
+//! reversals, that leave the least expected error of its slopes w1 and w2.
+//!
+//! Where a law bends, at speeds of about 1/w1 and 1/w2, is not known to the usual ladder, whose
+//! speeds stand in equal ratios and whose reversals take the same time everywhere. What a log of either will tell is the information of the law's five
+//! derivatives, less what inertia, gravity and a constant torque could take their place with.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::simulate::reference::TURN;
+use crate::simulate::{OneJointMove, Path, Reference};
+use cft_ident_core::math::minimise::nelder_mead;
+use cft_ident_core::math::rank;
+use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_files::config::identified::friction_unit;
+use cft_ident_files::config::trajectory::SingleJointMove;
+
+use super::ExciteError;
+use super::foresee::Expected;
+use super::limits::Quantity;
+use super::machine::ForeseenRobot;
+use super::motion::differentiated;
+use super::series::MOST;
+
+/// Samples per second at which information is gathered: a bend is passed in tens of milliseconds.
+const RATE: f64 = 250.0;
+/// Numbers of speeds that are tried.
+const COUNTS: [usize; 4] = [4, 6, 8, 10];
+/// Evaluations of each.
+const EVALUATIONS: u64 = 250;
+/// First steps of the logarithm of a speed, and of the time of a reversal.
+const SPREAD: f64 = 0.35;
+const SLOWER: f64 = 0.5;
+/// Shortest and longest time from zero speed to a slow plateau \[s\].
+const TURNS: [f64; 2] = [0.1, 5.0];
+/// Weight of the variances of the law's other parameters beside those of its slopes.
+const OTHERS: f64 = 0.1;
+/// A speed that is nearer to its limit than this share stands at it.
+const AT_LIMIT: f64 = 1e-6;
+/// Directions of the nuisance below this share of the largest carry nothing.
+const NOTHING: f64 = 1e-10;
+
+/// What is to be designed.
+#[derive(Debug, Clone)]
+pub struct LadderTask {
+    pub joint: String,
+    /// Duration of the experiment \[s\].
+    pub seconds: f64,
+    /// Shuffles the order of the strokes.
+    pub seed: u64,
+    /// Rate of the log \[Hz\].
+    pub rate_hz: f64,
+    /// Share of the drive's limit that is left free.
+    pub reserve: f64,
+}
+
+/// A ladder, and what it is expected to tell.
+#[derive(Debug, Clone)]
+pub struct DesignedLadder {
+    pub file: SingleJointMove,
+    /// The law's parameters, as a log of the design is expected to give them.
+    pub expected: Vec<Expected>,
+    /// Relative standard deviations from the usual ladder, in the same order.
+    pub usual: Vec<Option<f64>>,
+    pub evaluations: u64,
+}
+
+/// Designs the ladder of one joint.
+///
+/// # Errors
+/// [`ExciteError::NoLaw`] where the joint has no friction to tell, others where the machine has no such
+/// joint or its travel is not known.
+pub fn design_ladder(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+) -> Result<DesignedLadder, ExciteError> {
+    let joint = joint_of(machine, &task.joint)?;
+    if machine.model.friction[joint].parameters() == 0 {
+        return Err(ExciteError::NoLaw {
+            joint: task.joint.clone(),
+        });
+    }
+    let mut usual = Rungs {
+        speeds: usual_speeds(machine, task, joint)?,
+        turn: TURN,
+    };
+    keep_speed_limit(machine, task.reserve, joint, &mut usual.speeds);
+    let before = expectation(machine, task, joint, &usual)?;
+    let (slowest, fastest) = ends(&usual.speeds);
+    let value = |rungs: &Rungs| match expectation(machine, task, joint, rungs) {
+        Ok(expected) => score(&machine.model.friction[joint], &expected),
+        Err(_) => f64::INFINITY,
+    };
+    let found: Vec<(f64, Rungs, u64)> = COUNTS
+        .into_par_iter()
+        .map(|count| {
+            let ratio = |k: usize| k as f64 / (count - 1) as f64;
+            let mut start: Vec<f64> = (0..count)
+                .map(|k| (slowest.ln() + ratio(k) * (fastest / slowest).ln()).min(fastest.ln()))
+                .collect();
+            start.push(TURN.ln());
+            let rungs = |x: &[f64]| -> Rungs {
+                let within = |x: &f64| x.exp().clamp(0.2 * slowest, fastest);
+                let mut speeds: Vec<f64> = x[..count].iter().map(within).collect();
+                speeds.sort_by(f64::total_cmp);
+                let turn = x[count].exp().clamp(TURNS[0], TURNS[1]);
+                Rungs { speeds, turn }
+            };
+            let mut f = |x: &[f64]| value(&rungs(x));
+            // outwards steps would leave the motors' range at the top
+            let steps: Vec<f64> = (0..count)
+                .map(|k| SPREAD * (1.0 - 2.0 * ratio(k)))
+                .collect();
+            let steps: Vec<f64> = steps
+                .iter()
+                .map(|s| if s.abs() < 0.1 { 0.1 } else { *s })
+                .chain([SLOWER])
+                .collect();
+            let best = nelder_mead(&mut f, &start, &steps, 1e-4, EVALUATIONS);
+            (best.value, rungs(&best.x), best.evaluations)
+        })
+        .collect();
+    let evaluations = found.iter().map(|f| f.2).sum();
+    let best = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let at_start = score(&machine.model.friction[joint], &before);
+    let mut rungs = match best {
+        Some((value, rungs, _)) if value < at_start => rungs,
+        _ => usual,
+    };
+    // figures that a person can read
+    for number in rungs.speeds.iter_mut().chain([&mut rungs.turn]) {
+        *number = three_digits(*number);
+    }
+    let expected = expectation(machine, task, joint, &rungs)?;
+    Ok(DesignedLadder {
+        file: move_of(&task.joint, &rungs),
+        expected,
+        usual: before.iter().map(|e| e.relative_std).collect(),
+        evaluations,
+    })
+}
+
+/// What a log of a one-joint move tells about the joint's friction law.
+///
+/// # Errors
+/// As [`design_ladder`].
+pub fn foresee_ladder(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    file: &SingleJointMove,
+) -> Result<Vec<Expected>, ExciteError> {
+    let joint = joint_of(machine, &task.joint)?;
+    let reference = reference(machine, task, file)?;
+    expected(machine, task, joint, &reference).map(|(expected, _)| expected)
+}
+
+fn joint_of(machine: &ForeseenRobot, name: &str) -> Result<usize, ExciteError> {
+    let names = machine.model.robot.joint_names();
+    names
+        .iter()
+        .position(|n| n == name)
+        .ok_or_else(|| ExciteError::UnknownCoordinate {
+            name: name.to_owned(),
+            known: names.join(", "),
+        })
+}
+
+/// What a design turns.
+#[derive(Debug, Clone)]
+struct Rungs {
+    /// m/s or rad/s.
+    speeds: Vec<f64>,
+    /// Time from zero speed to a slow plateau \[s\].
+    turn: f64,
+}
+
+fn move_of(joint: &str, rungs: &Rungs) -> SingleJointMove {
+    SingleJointMove {
+        joint: joint.to_owned(),
+        speeds: rungs.speeds.clone(),
+        range: None,
+        acceleration: None,
+        turn_s: Some(rungs.turn),
+    }
+}
+
+/// Three significant digits, rounded down so that a top speed stays one.
+fn three_digits(v: f64) -> f64 {
+    let scale = 10f64.powf(2.0 - v.log10().floor());
+    // whole numbers over a power of ten print short
+    (v * scale + 1e-9).floor() / scale
+}
+
+fn ends(speeds: &[f64]) -> (f64, f64) {
+    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
+    let fastest = speeds.iter().copied().fold(0.0, f64::max);
+    (slowest, fastest)
+}
+
+/// Speeds of the ladder that the simulator runs where no file says otherwise.
+fn usual_speeds(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    joint: usize,
+) -> Result<Vec<f64>, ExciteError> {
+    let ladder = OneJointMove::new(joint, task.seconds, Some(task.seed));
+    let Path::Ladder { ladder, .. } = ladder.reference(&machine.mechanism)?.path else {
+        return Ok(Vec::new());
+    };
+    let mut speeds: Vec<f64> = ladder.plateaus().map(|(v, _)| v.abs()).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    Ok(speeds)
+}
+
+/// Brings speeds that would stand at the joint's limit, or beyond it, below it by the reserve.
+fn keep_speed_limit(machine: &ForeseenRobot, reserve: f64, joint: usize, speeds: &mut Vec<f64>) {
+    let quantity = match machine.mechanism.motors_at_joints() {
+        true => Quantity::Speed,
+        false => Quantity::JointSpeed,
+    };
+    let mut limits = machine.channels.iter();
+    let limit = limits.find(|c| c.quantity == quantity && c.index == joint);
+    let Some(limit) = limit.map(|c| c.upper) else {
+        return;
+    };
+    for speed in speeds.iter_mut().filter(|v| **v > limit * (1.0 - AT_LIMIT)) {
+        *speed = limit * (1.0 - reserve);
+    }
+    speeds.dedup();
+}
+
+/// The ladder of a file in joint coordinates.
+fn reference(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    file: &SingleJointMove,
+) -> Result<Reference<MOST>, ExciteError> {
+    let mechanism = &machine.mechanism;
+    let ladder = OneJointMove::of(file, &mechanism.robot, task.seconds, task.seed)?;
+    Ok(ladder.reference(mechanism)?)
+}
+
+/// Expected deviations of a ladder of these rungs, refused where the drive would be beyond its limit.
+fn expectation(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    joint: usize,
+    rungs: &Rungs,
+) -> Result<Vec<Expected>, ExciteError> {
+    let along = reference(machine, task, &move_of(&task.joint, rungs))?;
+    let (expected, used) = expected(machine, task, joint, &along)?;
+    if used > 1.0 - task.reserve {
+        return Err(ExciteError::NothingExcited {
+            unknowns: expected.len(),
+            starts: 1,
+        });
+    }
+    Ok(expected)
+}
+
+/// Sum of the logs of the slopes' relative variances, with a little of the others': the worst of
+/// them does not hide the rest.
+fn score(law: &JointFriction, expected: &[Expected]) -> f64 {
+    let slopes = matches!(law, JointFriction::DoubleTanh(_));
+    expected
+        .iter()
+        .map(|e| {
+            let relative = e.relative_std.unwrap_or(f64::INFINITY);
+            let weight = match slopes && !e.name.starts_with("slope") {
+                true => OTHERS,
+                false => 1.0,
+            };
+            weight * 2.0 * relative.ln()
+        })
+        .sum()
+}
+
+/// Expected deviations along a reference, and the largest share of a drive's limit.
+fn expected(
+    machine: &ForeseenRobot,
+    task: &LadderTask,
+    joint: usize,
+    along: &Reference<MOST>,
+) -> Result<(Vec<Expected>, f64), ExciteError> {
+    let model = &machine.model;
+    let law = &model.friction[joint];
+    let (mut g, used) = information(machine, task.seconds, joint, along)?;
+    g *= task.rate_hz / RATE / (machine.noise[joint] * machine.noise[joint]);
+    let (names, values): (&[&str], Vec<f64>) = match law {
+        JointFriction::DoubleTanh(law) => (&DoubleTanh::NAMES, law.parameters().to_vec()),
+        JointFriction::ViscousCoulomb(law) => {
+            (&ViscousCoulomb::NAMES, vec![law.viscous, law.coulomb])
+        }
+        JointFriction::None => (&[], Vec::new()),
+    };
+    let variances = variances(&g, model.theta.len() + 1)?;
+    let torque = model.robot.joint_unit(joint);
+    let rows = names.iter().zip(values).zip(variances);
+    let expected = rows.map(|((name, value), variance)| {
+        let unit = friction_unit(&model.robot, joint, name, torque);
+        Expected::new(name, unit, Some(value), variance.map(f64::sqrt))
+    });
+    Ok((expected.collect(), used))
+}
+
+/// Sums of squares and products of a joint's rows along a reference, for inertial parameters, a constant torque
+/// and the friction law; and the largest share of a drive's limit.
+fn information(
+    machine: &ForeseenRobot,
+    seconds: f64,
+    joint: usize,
+    along: &Reference<MOST>,
+) -> Result<(DMatrix<f64>, f64), ExciteError> {
+    let model = &machine.model;
+    let (n, p) = (machine.coordinates(), model.theta.len());
+    let law = &model.friction[joint];
+    let width = p + 1 + law.parameters();
+    let (mut y, mut tau, mut row) = (vec![0.0; n * p], vec![0.0; n], vec![0.0; width]);
+    let mut g = DMatrix::<f64>::zeros(width, width);
+    let mut used = 0.0_f64;
+    let drives = machine.channels.iter();
+    let drives: Vec<_> = drives.filter(|c| c.quantity == Quantity::Drive).collect();
+    for m in 0..(seconds * RATE).ceil() as usize {
+        let k = differentiated(along, (m as f64 + 0.5) / RATE);
+        let (q, v, a) = (&k.x[..n], &k.xd[..n], &k.xdd[..n]);
+        model.robot.regressor(q, v, a, &mut y);
+        row[..p].copy_from_slice(&y[joint * p..(joint + 1) * p]);
+        row[p] = 1.0;
+        law.gradient(v[joint], &mut row[p + 1..]);
+        for j in 0..width {
+            for i in 0..=j {
+                g[(i, j)] += row[i] * row[j];
+            }
+        }
+        for (j, tau) in tau.iter_mut().enumerate() {
+            let inertial = y[j * p..(j + 1) * p].iter().zip(&model.theta);
+            let inertial: f64 = inertial.map(|(y, t)| y * t).sum();
+            *tau = inertial + model.friction[j].torque(v[j]) + model.offset[j];
+        }
+        let drive = machine.drives(q, &tau)?;
+        for channel in &drives {
+            used = used.max(channel.used(drive[channel.index]));
+        }
+    }
+    for j in 0..width {
+        for i in 0..j {
+            g[(j, i)] = g[(i, j)];
+        }
+    }
+    Ok((g, used))
+}
+
+/// Variances of the unknowns behind the first `nuisance`, whose values are unknown too; `None` where
+/// nothing tells one from them.
+fn variances(g: &DMatrix<f64>, nuisance: usize) -> Result<Vec<Option<f64>>, ExciteError> {
+    let width = g.nrows();
+    let scale: Vec<f64> = (0..width)
+        .map(|i| {
+            let size = g[(i, i)].sqrt();
+            if size > 0.0 { 1.0 / size } else { 0.0 }
+        })
+        .collect();
+    let scaled = DMatrix::from_fn(width, width, |i, j| g[(i, j)] * scale[i] * scale[j]);
+    let f = width - nuisance;
+    let own = scaled.view((nuisance, nuisance), (f, f));
+    let mixed = scaled.view((0, nuisance), (nuisance, f));
+    let taken = rank::svd(&scaled.view((0, 0), (nuisance, nuisance)).into_owned())?;
+    let mut left = own.into_owned();
+    for k in 0..nuisance {
+        if taken.s[k] > NOTHING * taken.s[0] {
+            let along = mixed.tr_mul(&taken.v.column(k));
+            left -= &along * along.transpose() / taken.s[k];
+        }
+    }
+    let svd = rank::svd(&left)?;
+    Ok((0..f)
+        .map(|i| {
+            let mut variance = 0.0;
+            for k in 0..f {
+                let part = svd.v[(i, k)] * svd.v[(i, k)];
+                if svd.s[k] > NOTHING * svd.s[0] {
+                    variance += part / svd.s[k];
+                } else if part > NOTHING.sqrt() {
+                    return None;
+                }
+            }
+            let unscale = scale[nuisance + i];
+            (unscale > 0.0).then_some(variance * unscale * unscale)
+        })
+        .collect())
+}

@@ -1,0 +1,82 @@
+//! The augmented Lagrangian around the minimiser: argmin has no constraints of its own.
+//!
+//! Rounds of unconstrained minimisation of f + sum (max(0, lambda + rho g)^2 - lambda^2) / (2 rho),
+//! between which each multiplier moves to lambda + rho g (Nocedal and Wright 2006, section 17.3).
+//! The criterion's kink is sharpened from round to round.
+
+use cft_ident_core::math::minimise::lbfgs;
+
+use super::objective::{Multipliers, Objective, Work};
+
+/// One round: sharpness of the criterion, evaluations it may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Round {
+    pub sharpness: f64,
+    pub evaluations: u64,
+}
+
+/// A search that can be continued.
+#[derive(Debug, Clone)]
+pub(super) struct Search {
+    pub z: Vec<f64>,
+    multipliers: Multipliers,
+    pub evaluations: u64,
+}
+
+/// First weight of violations, its growth between rounds and its end.
+const WEIGHT: f64 = 2.0;
+const GROWTH: f64 = 2.5;
+const HEAVIEST: f64 = 2e3;
+/// Derivative below which a round is done.
+const FLAT: f64 = 1e-4;
+
+impl Search {
+    pub fn new(objective: &Objective, z: Vec<f64>) -> Self {
+        Self {
+            z,
+            multipliers: Multipliers::new(objective.constraints(), WEIGHT),
+            evaluations: 0,
+        }
+    }
+
+    /// Runs the rounds, up to `most` evaluations since the search began. `stop` is looked at before
+    /// each of them: when it is true the search ends where it is.
+    pub fn run(
+        &mut self,
+        objective: &Objective,
+        rounds: &[Round],
+        most: u64,
+        work: &mut Work,
+        stop: &dyn Fn() -> bool,
+    ) {
+        for round in rounds {
+            let left = most.saturating_sub(self.evaluations);
+            if stop() || left == 0 {
+                return;
+            }
+            let multipliers = &self.multipliers;
+            let mut f = |z: &[f64], gradient: &mut [f64]| {
+                if stop() {
+                    return f64::INFINITY;
+                }
+                objective
+                    .evaluate(z, round.sharpness, multipliers, work, gradient)
+                    .unwrap_or(f64::INFINITY)
+            };
+            let found = lbfgs(&mut f, &self.z, FLAT, round.evaluations.min(left));
+            self.evaluations += found.evaluations;
+            if found.value.is_finite() {
+                self.z = found.x;
+            }
+            let growth = if self.multipliers.weight < HEAVIEST {
+                GROWTH
+            } else {
+                1.0
+            };
+            let updated = objective.update(&self.z, &mut self.multipliers, growth, work);
+            if updated.is_err() {
+                return;
+            }
+        }
+    }
+}

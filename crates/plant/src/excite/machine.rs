@@ -1,0 +1,372 @@
+//! A machine as a design sees it: designed coordinates to joints, torques and volts, and what a fit
+//! would estimate from them.
+
+use std::cell::OnceCell;
+
+use crate::simulate::Mechanism;
+use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::robot::RobotError;
+use cft_ident_core::robot::model::{JointFriction, Model};
+use cft_ident_core::robot::tree::pose::{Frame, frames};
+use cft_ident_files::config::trajectory::Coordinates;
+
+use super::foreseen::TorqueSource;
+use super::limits::{BoundedQuantity, Quantity};
+use super::series::{Kinematics, MOST};
+use super::space::DesignSpace;
+
+/// A robot with the numbers that its torques are foreseen with, and its limits.
+#[derive(Debug, Clone)]
+pub struct ForeseenRobot {
+    pub model: Model,
+    /// Where the model's numbers come from, and how far its torques may be off.
+    pub source: TorqueSource,
+    /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
+    pub columns: RegressorColumns,
+    /// Motors and limits, as the simulator knows them.
+    pub mechanism: Mechanism<MOST>,
+    /// Points and links that some of the limits speak of.
+    pub space: DesignSpace,
+    /// Limits that a motion must keep.
+    pub channels: Vec<BoundedQuantity>,
+    /// Standard deviation of the noise on each joint's torque \[N or N m\], sample by sample.
+    pub noise: Vec<f64>,
+    /// Speeds above which the sign in a Coulomb column counts as whole, per joint \[m/s or rad/s\].
+    pub coulomb_speed: Vec<f64>,
+}
+
+/// Everything at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    /// Designed coordinates.
+    pub k: Kinematics,
+    /// Joint positions, velocities, accelerations.
+    pub q: [f64; MOST],
+    pub v: [f64; MOST],
+    pub a: [f64; MOST],
+    /// Joint torques \[N or N m\].
+    pub tau: [f64; MOST],
+    /// Volts (or torques where the motors are at the joints) in the order of the coordinates.
+    pub drive: [f64; MOST],
+}
+
+impl State {
+    pub(super) const EMPTY: Self = Self {
+        k: Kinematics::REST,
+        q: [0.0; MOST],
+        v: [0.0; MOST],
+        a: [0.0; MOST],
+        tau: [0.0; MOST],
+        drive: [0.0; MOST],
+    };
+}
+
+/// Friction and signs of one instant as straight lines in the velocities: what differences with
+/// steps wider than their bends may be taken of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Linearised {
+    friction: [(f64, f64); MOST],
+    sign: [(f64, f64); MOST],
+    v: [f64; MOST],
+}
+
+impl ForeseenRobot {
+    /// Number of designed coordinates, and of joints.
+    pub fn coordinates(&self) -> usize {
+        self.model.friction.len()
+    }
+
+    /// Number of unknowns p of the fit.
+    pub fn unknowns(&self) -> usize {
+        self.columns.unknowns()
+    }
+
+    /// Names of the designed coordinates: those of the motors.
+    pub fn coordinate_names(&self) -> Vec<String> {
+        self.model.robot.coordinate_names()
+    }
+
+    /// The coordinates in which motions of this machine are designed.
+    pub fn designed(&self) -> Coordinates {
+        match self.mechanism.motors_at_joints() {
+            true => Coordinates::Joint,
+            false => Coordinates::Cartesian,
+        }
+    }
+
+    /// Unit of coordinate i: "m" or "rad".
+    pub fn coordinate_unit(&self, i: usize) -> &'static str {
+        self.model.robot.coordinate_kind(i).position_unit()
+    }
+
+    /// Unit of what drives coordinate i: "V", or that of the joint's torque.
+    pub fn drive_unit(&self, i: usize) -> &'static str {
+        match self.mechanism.motors_at_joints() {
+            true => self.model.robot.joint_unit(i),
+            false => "V",
+        }
+    }
+
+    /// Names of the unknowns, in the order of the columns.
+    pub fn unknown_names(&self) -> Vec<String> {
+        let robot = &self.model.robot;
+        let mut names: Vec<String> = robot
+            .parameters()
+            .iter()
+            .map(|p| p.name.to_string())
+            .collect();
+        for (joint, own) in robot.joint_names().iter().zip(&self.columns.own) {
+            names.extend(own.iter().map(|own| format!("{}:{joint}", own.name())));
+        }
+        names
+    }
+
+    /// Values of the unknowns in the model.
+    pub fn unknown_values(&self) -> Vec<f64> {
+        let mut values = self.model.theta.clone();
+        for (j, own) in self.columns.own.iter().enumerate() {
+            values.extend(own.iter().map(|own| match (own, &self.model.friction[j]) {
+                (Own::Offset, _) => self.model.offset[j],
+                (Own::Viscous, JointFriction::ViscousCoulomb(law)) => law.viscous,
+                (Own::Coulomb, JointFriction::ViscousCoulomb(law)) => law.coulomb,
+                _ => 0.0,
+            }));
+        }
+        values
+    }
+
+    /// Whether nothing but the position of coordinate i itself depends on it.
+    pub(super) fn is_uniform(&self, i: usize) -> bool {
+        let practice = self.mechanism.practice.as_ref();
+        practice.is_some_and(|practice| practice.uniform == i)
+    }
+
+    /// Joint positions, velocities and accelerations of the coordinates.
+    ///
+    /// # Errors
+    /// [`RobotError`] where the machine cannot reach the position or is singular in it.
+    #[inline]
+    pub fn joints(&self, k: &Kinematics) -> Result<State, RobotError> {
+        let mut state = State::EMPTY;
+        self.follow(k, &mut state)?;
+        Ok(state)
+    }
+
+    /// [`Self::joints`] into a state whose torques and drives stay.
+    ///
+    /// # Errors
+    /// As there.
+    #[inline]
+    pub(super) fn follow(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
+        let (n, transmission) = (self.coordinates(), self.model.robot.transmission());
+        state.k.x[..n].copy_from_slice(&k.x[..n]);
+        state.k.xd[..n].copy_from_slice(&k.xd[..n]);
+        state.k.xdd[..n].copy_from_slice(&k.xdd[..n]);
+        let State { q, v, a, .. } = state;
+        transmission.joints(&k.x[..n], &mut q[..n])?;
+        transmission.joint_velocities(&q[..n], &k.xd[..n], &mut v[..n])?;
+        transmission.joint_accelerations(&q[..n], &v[..n], &k.xdd[..n], &mut a[..n])
+    }
+
+    /// Everything at one instant.
+    ///
+    /// # Errors
+    /// As [`Self::joints`].
+    pub fn state(&self, k: &Kinematics) -> Result<State, RobotError> {
+        let mut state = State::EMPTY;
+        self.fill(k, &mut state)?;
+        Ok(state)
+    }
+
+    /// [`Self::state`] into a state that is there.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn fill(&self, k: &Kinematics, state: &mut State) -> Result<(), RobotError> {
+        self.follow(k, state)?;
+        let (n, State { q, v, a, tau, .. }) = (self.coordinates(), &mut *state);
+        self.model.torque(&q[..n], &v[..n], &a[..n], &mut tau[..n]);
+        self.drive(state)
+    }
+
+    /// What drives the coordinates where the joints need the torques `tau` at the pose `q`.
+    ///
+    /// # Errors
+    /// As [`Self::joints`].
+    pub fn drives(&self, q: &[f64], tau: &[f64]) -> Result<[f64; MOST], RobotError> {
+        let mut state = State::EMPTY;
+        state.q[..q.len()].copy_from_slice(q);
+        state.tau[..tau.len()].copy_from_slice(tau);
+        self.drive(&mut state)?;
+        Ok(state.drive)
+    }
+
+    /// Fills in the volts of the torques.
+    #[inline]
+    fn drive(&self, state: &mut State) -> Result<(), RobotError> {
+        let (n, State { q, tau, drive, .. }) = (self.coordinates(), state);
+        let transmission = self.model.robot.transmission();
+        transmission.volts(&q[..n], &tau[..n], &mut drive[..n])
+    }
+
+    /// Friction and signs at the velocities of a state.
+    pub(super) fn linearised(&self, state: &State) -> Linearised {
+        let mut out = Linearised {
+            friction: [(0.0, 0.0); MOST],
+            sign: [(0.0, 0.0); MOST],
+            v: state.v,
+        };
+        for (j, law) in self.model.friction.iter().enumerate() {
+            let v = state.v[j];
+            let slope = match law {
+                JointFriction::None => 0.0,
+                JointFriction::DoubleTanh(law) => law.slope(v),
+                JointFriction::ViscousCoulomb(law) => law.slope(v),
+            };
+            out.friction[j] = (law.torque(v), slope);
+            let t = (v / self.coulomb_speed[j]).tanh();
+            out.sign[j] = (t, (1.0 - t * t) / self.coulomb_speed[j]);
+        }
+        out
+    }
+
+    /// The rows of the fit, n x p row-major, with the sign in Coulomb columns as a steep tanh, and
+    /// (where `torques` is set) the torques and volts of the state, friction by its straight line.
+    ///
+    /// # Errors
+    /// As [`Self::joints`].
+    pub(super) fn rows(
+        &self,
+        state: &mut State,
+        line: &Linearised,
+        torques: bool,
+        y: &mut [f64],
+    ) -> Result<(), RobotError> {
+        let (n, p, shared) = (self.coordinates(), self.unknowns(), self.columns.shared);
+        let (q, v, a) = (state.q, state.v, state.a);
+        self.model
+            .robot
+            .regressor(&q[..n], &v[..n], &a[..n], &mut y[..n * shared]);
+        if torques {
+            for (j, row) in y[..n * shared].chunks_exact(shared).enumerate() {
+                let inertial: f64 = row
+                    .iter()
+                    .zip(&self.model.theta)
+                    .map(|(y, theta)| y * theta)
+                    .sum();
+                let (at, slope) = line.friction[j];
+                let friction = at + slope * (v[j] - line.v[j]);
+                state.tau[j] = inertial + friction + self.model.offset[j];
+            }
+            self.drive(state)?;
+        }
+        if p > shared {
+            // spread the rows from the last to the first: they only move up
+            for j in (0..n).rev() {
+                y.copy_within(j * shared..(j + 1) * shared, j * p);
+                y[j * p + shared..(j + 1) * p].fill(0.0);
+                let first = self.columns.first_own(j);
+                for (c, own) in self.columns.own[j].iter().enumerate() {
+                    y[j * p + first + c] = match own {
+                        Own::Coulomb => line.sign[j].0 + line.sign[j].1 * (v[j] - line.v[j]),
+                        own => own.column(v[j]),
+                    };
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The rows of the fit as they are, n x p row-major.
+    pub(crate) fn exact_rows(&self, state: &State, y: &mut [f64]) {
+        let (n, p, shared) = (self.coordinates(), self.unknowns(), self.columns.shared);
+        let (q, v, a) = (&state.q[..n], &state.v[..n], &state.a[..n]);
+        self.model.robot.regressor(q, v, a, &mut y[..n * shared]);
+        for j in (0..n).rev() {
+            y.copy_within(j * shared..(j + 1) * shared, j * p);
+            y[j * p + shared..(j + 1) * p].fill(0.0);
+            let first = self.columns.first_own(j);
+            for (c, own) in self.columns.own[j].iter().enumerate() {
+                y[j * p + first + c] = own.column(v[j]);
+            }
+        }
+    }
+
+    /// What channels bound at a state.
+    #[inline]
+    pub fn quantities<'a>(&'a self, state: &'a State) -> Quantities<'a> {
+        Quantities {
+            machine: self,
+            state,
+            frames: OnceCell::new(),
+            half_widths: OnceCell::new(),
+        }
+    }
+}
+
+/// What channels bound at one state.
+#[derive(Debug)]
+pub struct Quantities<'a> {
+    machine: &'a ForeseenRobot,
+    state: &'a State,
+    /// Of the links, for the first channel that asks where they are and all after it.
+    frames: OnceCell<Vec<Frame>>,
+    /// How far the torques may be off, and the drives.
+    half_widths: OnceCell<[[f64; MOST]; 2]>,
+}
+
+impl Quantities<'_> {
+    /// How far the quantity of a channel may be off, 95 % of the time.
+    #[inline]
+    pub fn half_width(&self, channel: &BoundedQuantity) -> f64 {
+        if !channel.quantity.is_of_torque() {
+            return 0.0;
+        }
+        let [torques, drives] = self.half_widths.get_or_init(|| self.widths());
+        match channel.quantity {
+            Quantity::Torque => torques[channel.index],
+            _ => drives[channel.index],
+        }
+    }
+
+    fn widths(&self) -> [[f64; MOST]; 2] {
+        let (machine, n) = (self.machine, self.machine.coordinates());
+        let [q, v, a] = [&self.state.q, &self.state.v, &self.state.a].map(|x| &x[..n]);
+        let (mut torques, mut drives) = ([0.0; MOST], [0.0; MOST]);
+        machine.source.half_widths([q, v, a], &mut torques);
+        // a drive carries a share of each torque; as if all were off at once
+        for j in (0..n).filter(|j| torques[*j] > 0.0) {
+            let mut one = [0.0; MOST];
+            one[j] = torques[j];
+            if let Ok(of_one) = machine.drives(q, &one[..n]) {
+                for (sum, x) in drives.iter_mut().zip(of_one) {
+                    *sum += x.abs();
+                }
+            }
+        }
+        [torques, drives]
+    }
+
+    /// The quantity of a channel.
+    #[inline]
+    pub fn of(&self, channel: &BoundedQuantity) -> f64 {
+        let (i, machine, state) = (channel.index, self.machine, self.state);
+        let robot = &machine.model.robot;
+        let q = &state.q[..machine.coordinates()];
+        match channel.quantity {
+            Quantity::Position => state.k.x[i],
+            Quantity::Speed => state.k.xd[i],
+            Quantity::Acceleration => state.k.xdd[i],
+            Quantity::Drive => state.drive[i],
+            Quantity::Torque => state.tau[i],
+            Quantity::JointPosition => state.q[i],
+            Quantity::JointSpeed => state.v[i],
+            Quantity::JointAcceleration => state.a[i],
+            Quantity::Clearance => robot.transmission().clearance(q).unwrap_or(1.0),
+            place => {
+                let frames = self.frames.get_or_init(|| frames(robot.tree(), q));
+                machine.space.value(place, i, frames)
+            }
+        }
+    }
+}

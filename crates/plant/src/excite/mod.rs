@@ -1,0 +1,133 @@
+//! Design of the motions of a campaign: trajectories that make the parameters as certain as the
+//! machine allows, and are safe to run (sections 2.3.3 and 4.2.1 of the report).
+//!
+//! | file | what |
+//! |---|---|
+//! | [`series`], [`blend`] | finite Fourier series (43); rest at both ends |
+//! | [`machine`], [`limits`] | coordinates to joints, torques and volts; what is bounded |
+//! | [`foreseen`] | the numbers that torques are foreseen with |
+//! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
+//! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
+//! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
+//! | [`space`] | points above a floor and in a box, links apart |
+//! | [`judgement`] | the result: what a log of the motion will tell, and the limits along it |
+
+pub mod blend;
+pub mod criterion;
+pub mod foresee;
+pub mod foreseen;
+mod from_files;
+pub mod given;
+pub mod information;
+pub mod judgement;
+pub mod ladder;
+mod lagrangian;
+pub mod limits;
+pub mod machine;
+pub mod motion;
+mod objective;
+pub mod peak;
+mod repair;
+pub mod search;
+pub mod series;
+pub mod space;
+mod start;
+pub mod usage;
+mod variables;
+
+pub use criterion::Criterion;
+pub use foreseen::TorqueSource;
+pub use from_files::{machine, series_of, trajectory};
+pub use given::GivenInformation;
+pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
+pub use motion::Motion;
+pub use objective::{NoValue, PriorInformation};
+pub use start::usual_torque;
+
+use crate::simulate::SimulateError;
+use cft_ident_files::config::{ConfigError, did_you_mean};
+
+/// Why no motion came out. Each message says what to change.
+#[derive(Debug, thiserror::Error)]
+pub enum ExciteError {
+    #[error(
+        "the travel of {coordinate} is not known; write `[limits.{coordinate}] position = [low, high]` into the robot file"
+    )]
+    NoTravel { coordinate: String },
+    #[error(
+        "nothing bounds the speed of {coordinate}; write `[limits.{coordinate}] speed = ...` (or acceleration; or torque, and give a model with -m) into the robot file"
+    )]
+    NoSpeed { coordinate: String },
+    #[error(
+        "the offset {offset} of {coordinate} lies outside [{lower}, {upper}], its limits less the reserve; choose another offset or let the design choose it"
+    )]
+    OffsetOutside {
+        coordinate: String,
+        offset: f64,
+        lower: f64,
+        upper: f64,
+    },
+    #[error(
+        "{quantity} of {channel} would be {value} at rest already, outside [{lower}, {upper}]; widen that limit or check the model"
+    )]
+    CannotRest {
+        channel: String,
+        quantity: &'static str,
+        value: f64,
+        lower: f64,
+        upper: f64,
+    },
+    #[error(
+        "none of {starts} starts excites all {unknowns} unknowns within the limits; give more harmonics, wider limits or fewer parameters"
+    )]
+    NothingExcited { unknowns: usize, starts: usize },
+    #[error(
+        "rest at the ends needs blends longer than {seconds:.1} s: with those a limit is still used to {:.1} %; keep more in reserve (--margin)",
+        100.0 * share
+    )]
+    NoBlend { seconds: f64, share: f64 },
+    #[error(
+        "the pose of --from breaks a limit itself: the {what} is {value:.4}; give the pose in which the robot stands"
+    )]
+    BrokenPose { what: String, value: f64 },
+    #[error(
+        "no straight way leads from the given pose into the motion within the limits: one of them breaks that on the {what} after {percent} % of the way; give another pose with --from, or move the robot by hand and leave --from out"
+    )]
+    NoWay { what: String, percent: f64 },
+    #[error(
+        "`[limits.{joint}] volts` cannot be kept: the motors of this robot act on x_c1..x_c4; write the limit there, or limit the torque of {joint}"
+    )]
+    VoltsOfJoint { joint: String },
+    #[error("the series is written in other coordinates than the design's; write it in {wanted}")]
+    OtherCoordinates { wanted: String },
+    #[error(
+        "the machine has no coordinate {name}; {}its coordinates are {known}",
+        did_you_mean(name, known)
+    )]
+    UnknownCoordinate { name: String, known: String },
+    #[error(
+        "a blend of {blend_s:?} s is {periods:.3e} periods of {fundamental_hz:?} Hz, and at most {most} are judged; give a lower `fundamental_hz` or a shorter `blend_s`"
+    )]
+    LongBlend {
+        blend_s: f64,
+        fundamental_hz: f64,
+        periods: f64,
+        most: f64,
+    },
+    #[error(
+        "the motion lasts {seconds:?} s, and at most {most:.0} s are judged; give a shorter one"
+    )]
+    LongMotion { seconds: f64, most: f64 },
+    #[error("joint {joint} has no friction in the model; give one with -m that has")]
+    NoLaw { joint: String },
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Reference(#[from] SimulateError),
+    #[error(transparent)]
+    NoValue(#[from] NoValue),
+    #[error(transparent)]
+    Robot(#[from] cft_ident_core::robot::RobotError),
+    #[error(transparent)]
+    Math(#[from] cft_ident_core::math::MathError),
+}

@@ -1,0 +1,590 @@
+//! The function that a search makes small: a criterion, and the limits by an augmented Lagrangian,
+//! with the derivative by every coefficient.
+//!
+//! The regressor is differentiated along the path by the coordinates themselves. It is linear in
+//! the accelerations and quadratic in the speeds, so that differences by these are exact; by the
+//! positions a five-point rule is good to 1e-11. The sum that is differentiated is one number per
+//! sample, 2 (F S) . F + sum kappa c, with S and kappa fixed: the chain rule through the singular
+//! vectors and the multipliers.
+
+use nalgebra::DMatrix;
+
+use cft_ident_core::math::MathError;
+use cft_ident_core::robot::RobotError;
+
+use super::criterion::{Criterion, Slope};
+use super::limits::BoundedQuantity;
+use super::machine::{ForeseenRobot, Linearised, State};
+use super::series::{Basis, Kinematics, MOST, Series};
+use super::usage::along_period;
+use super::variables::Variables;
+
+/// Step in a position, as a share of half its span.
+const STEP: f64 = 2e-3;
+
+/// Samples of a limit for each of the regressor.
+const FINER: usize = 4;
+
+/// Why a point has no value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoValue {
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    #[error(transparent)]
+    Math(#[from] MathError),
+}
+
+/// Information that is there before the design, and how much the design adds.
+#[derive(Debug, Clone)]
+pub struct PriorInformation {
+    /// F'F of the logs that exist, rows weighted as the criterion wants them (p x p).
+    pub information: DMatrix<f64>,
+    /// Rows per joint that the design will add.
+    pub rows: f64,
+}
+
+/// Multipliers and weight of the augmented Lagrangian.
+#[derive(Debug, Clone)]
+pub(super) struct Multipliers {
+    /// One per constraint of [`Objective::constraints`].
+    pub lambda: Vec<f64>,
+    /// Weight rho of a violation's square.
+    pub weight: f64,
+}
+
+/// The function and all that it needs.
+#[derive(Debug, Clone)]
+pub(super) struct Objective<'a> {
+    pub machine: &'a ForeseenRobot,
+    pub criterion: &'a Criterion,
+    pub variables: Variables,
+    pub prior: Option<&'a PriorInformation>,
+    /// Samples at which the regressor is taken.
+    basis: Basis,
+    /// Samples at which limits are kept: friction turns round between those of the regressor.
+    fine: Basis,
+    /// Linear channels, then the others, as the search keeps them.
+    linear: Vec<BoundedQuantity>,
+    curved: Vec<BoundedQuantity>,
+    /// Weight of each joint's rows.
+    weights: Vec<f64>,
+}
+
+/// What an evaluation writes into: nothing is allocated per sample.
+#[derive(Debug, Clone)]
+pub(super) struct Work {
+    pub series: Series,
+    states: Vec<State>,
+    /// Beside them, where differences are taken.
+    beside: State,
+    lines: Vec<Linearised>,
+    /// Rows of the fit, sample after sample.
+    rows: Vec<f64>,
+    weights: Vec<f64>,
+    shifted: Vec<f64>,
+    kappas: Vec<f64>,
+    by_coefficients: Vec<f64>,
+}
+
+impl<'a> Objective<'a> {
+    /// `channels` are the limits as the search keeps them; `samples` those of the period.
+    pub fn new(
+        machine: &'a ForeseenRobot,
+        criterion: &'a Criterion,
+        channels: &[BoundedQuantity],
+        variables: Variables,
+        prior: Option<&'a PriorInformation>,
+        samples: usize,
+    ) -> Self {
+        let (linear, curved) = channels
+            .iter()
+            .cloned()
+            .partition(|c: &BoundedQuantity| c.quantity.is_linear());
+        let weights = if criterion.weighted() {
+            machine.noise.iter().map(|s| 1.0 / (s * s)).collect()
+        } else {
+            vec![1.0; machine.coordinates()]
+        };
+        Self {
+            machine,
+            criterion,
+            prior,
+            basis: Basis::new(samples, variables.harmonics),
+            fine: Basis::new(FINER * samples, variables.harmonics),
+            linear,
+            curved,
+            weights,
+            variables,
+        }
+    }
+
+    /// The same with those of the curved limits tightened that the motion at z exceeds between the
+    /// samples, by what it does; `None` where none is exceeded by more than the share given.
+    pub(crate) fn tightened(&self, z: &[f64], most: f64) -> Option<Self> {
+        let mut series = self.work().series;
+        self.variables.series(z, &mut series);
+        let uses = along_period(self.machine, &self.curved, &series);
+        let mut any = false;
+        let mut out = self.clone();
+        for (channel, found) in out.curved.iter_mut().zip(uses) {
+            if found.share > 1.0 + most && found.share.is_finite() {
+                any = true;
+                *channel = channel.reserved(1.0 - 1.0 / found.share);
+            }
+        }
+        any.then_some(out)
+    }
+
+    /// Empty buffers.
+    pub fn work(&self) -> Work {
+        let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
+        let samples = self.basis.samples;
+        let rest = self.machine.linearised(&State::EMPTY);
+        Work {
+            series: Series::still(self.variables.fundamental, n, self.variables.harmonics),
+            states: vec![State::EMPTY; samples],
+            beside: State::EMPTY,
+            lines: vec![rest; samples],
+            rows: vec![0.0; samples * n * p],
+            weights: vec![0.0; n * p],
+            shifted: vec![0.0; n * p],
+            kappas: vec![0.0; self.curved.len()],
+            by_coefficients: vec![0.0; n * (1 + 2 * self.variables.harmonics)],
+        }
+    }
+
+    /// Number of constraints: two sides of every channel at every sample.
+    pub(crate) fn constraints(&self) -> usize {
+        2 * (self.linear.len() + self.curved.len()) * self.fine.samples
+    }
+
+    /// Rows of the fit along the period, and F'F of them (with the prior).
+    fn information(&self, work: &mut Work) -> Result<DMatrix<f64>, NoValue> {
+        let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
+        let mut g = DMatrix::zeros(p, p);
+        for m in 0..self.basis.samples {
+            let k = self.kinematics(&self.basis, &work.series, m);
+            let state = &mut work.states[m];
+            self.machine.follow(&k, state)?;
+            let line = self.machine.linearised(state);
+            let y = &mut work.rows[m * n * p..(m + 1) * n * p];
+            self.machine.rows(state, &line, false, y)?;
+            for (row, weight) in y.chunks_exact(p).zip(&self.weights) {
+                for j in 0..p {
+                    let scaled = weight * row[j];
+                    for (i, other) in row[..=j].iter().enumerate() {
+                        g[(i, j)] += scaled * other;
+                    }
+                }
+            }
+            work.lines[m] = line;
+        }
+        for j in 0..p {
+            for i in 0..j {
+                g[(j, i)] = g[(i, j)];
+            }
+        }
+        if let Some(prior) = self.prior {
+            g *= prior.rows / self.basis.samples as f64;
+            g += &prior.information;
+        }
+        Ok(g)
+    }
+
+    /// Value at z; writes the derivative by z into `gradient`. `sharpness` is that of
+    /// [`Criterion::slope`].
+    ///
+    /// # Errors
+    /// [`NoValue`] where the machine cannot reach a sample.
+    pub fn evaluate(
+        &self,
+        z: &[f64],
+        sharpness: f64,
+        multipliers: &Multipliers,
+        work: &mut Work,
+        gradient: &mut [f64],
+    ) -> Result<f64, NoValue> {
+        self.variables.series(z, &mut work.series);
+        let g = self.information(work)?;
+        let Slope { value, matrix } = self.criterion.slope(&g, sharpness)?;
+        let mut total = value;
+        work.by_coefficients.fill(0.0);
+        total += self.linear_penalty(multipliers, work);
+        total += self.curved_penalty(multipliers, work)?;
+        self.along_the_path(&matrix, work)?;
+        self.variables.pull_back(&work.by_coefficients, gradient);
+        Ok(total)
+    }
+
+    /// Penalty of the linear channels, with its derivative.
+    fn linear_penalty(&self, multipliers: &Multipliers, work: &mut Work) -> f64 {
+        let width = 1 + 2 * self.variables.harmonics;
+        let mut total = 0.0;
+        let mut at = 0;
+        for channel in &self.linear {
+            let (i, d) = (channel.index, order(channel));
+            for m in 0..self.fine.samples {
+                let value = self.fine.at(&work.series, i, m)[d];
+                let mut by_value = 0.0;
+                for (g, slope) in channel.constraints(value) {
+                    let (penalty, kappa) = multipliers.penalty(at, g);
+                    total += penalty;
+                    by_value += kappa * slope;
+                    at += 1;
+                }
+                if by_value != 0.0 {
+                    let mut by = [0.0; 3];
+                    by[d] = by_value;
+                    let out = &mut work.by_coefficients[i * width..(i + 1) * width];
+                    self.fine.pull_back(work.series.fundamental, m, by, out);
+                }
+            }
+        }
+        total
+    }
+
+    /// The criterion's derivative, by way of the rows.
+    fn along_the_path(&self, slope: &DMatrix<f64>, work: &mut Work) -> Result<(), NoValue> {
+        let (n, p) = (self.machine.coordinates(), self.machine.unknowns());
+        let rows = self
+            .prior
+            .map_or(1.0, |prior| prior.rows / self.basis.samples as f64);
+        for m in 0..self.basis.samples {
+            let y = &work.rows[m * n * p..(m + 1) * n * p];
+            for (j, (row, out)) in y
+                .chunks_exact(p)
+                .zip(work.weights.chunks_exact_mut(p))
+                .enumerate()
+            {
+                for (k, out) in out.iter_mut().enumerate() {
+                    let column = slope.column(k);
+                    let sum: f64 = row.iter().zip(column.iter()).map(|(y, s)| y * s).sum();
+                    *out = 2.0 * rows * self.weights[j] * sum;
+                }
+            }
+            let state = work.states[m];
+            let line = work.lines[m];
+            let mut local = Local {
+                objective: self,
+                line: &line,
+                weights: Some(&work.weights),
+                kappas: &[],
+                rows: &mut work.shifted,
+                state: &mut work.beside,
+            };
+            let by = local.derivatives(&state)?;
+            self.basis
+                .pull_back_all(work.series.fundamental, m, &by, &mut work.by_coefficients);
+        }
+        Ok(())
+    }
+
+    /// Penalty of the channels that are not linear, with its derivative.
+    fn curved_penalty(&self, multipliers: &Multipliers, work: &mut Work) -> Result<f64, NoValue> {
+        let mut total = 0.0;
+        let mut at = 2 * self.linear.len() * self.fine.samples;
+        if self.curved.is_empty() {
+            return Ok(total);
+        }
+        let mut state = State::EMPTY;
+        for m in 0..self.fine.samples {
+            let k = self.kinematics(&self.fine, &work.series, m);
+            self.machine.fill(&k, &mut state)?;
+            let (mut pressed, quantities) = (false, self.machine.quantities(&state));
+            for (channel, sum) in self.curved.iter().zip(&mut work.kappas) {
+                *sum = 0.0;
+                let value = quantities.of(channel);
+                for (g, slope) in channel.constraints(value) {
+                    let (penalty, kappa) = multipliers.penalty(at, g);
+                    total += penalty;
+                    *sum += kappa * slope;
+                    pressed |= kappa > 0.0;
+                    at += 1;
+                }
+            }
+            if pressed {
+                let line = self.machine.linearised(&state);
+                let mut local = Local {
+                    objective: self,
+                    line: &line,
+                    weights: None,
+                    kappas: &work.kappas,
+                    rows: &mut work.shifted,
+                    state: &mut work.beside,
+                };
+                let by = local.derivatives(&state)?;
+                self.fine
+                    .pull_back_all(work.series.fundamental, m, &by, &mut work.by_coefficients);
+            }
+        }
+        Ok(total)
+    }
+
+    fn kinematics(&self, basis: &Basis, series: &Series, m: usize) -> Kinematics {
+        let mut k = Kinematics::REST;
+        for i in 0..self.machine.coordinates() {
+            [k.x[i], k.xd[i], k.xdd[i]] = basis.at(series, i, m);
+        }
+        k
+    }
+
+    /// Moves the multipliers to what the violations at z ask for, and the weight up.
+    ///
+    /// # Errors
+    /// As [`Self::evaluate`].
+    pub fn update(
+        &self,
+        z: &[f64],
+        multipliers: &mut Multipliers,
+        factor: f64,
+        work: &mut Work,
+    ) -> Result<(), NoValue> {
+        self.variables.series(z, &mut work.series);
+        let mut state = State::EMPTY;
+        let mut at = 0;
+        let mut renew = |at: &mut usize, channel: &BoundedQuantity, value: f64| {
+            for (g, _) in channel.constraints(value) {
+                let moved = multipliers.lambda[*at] + multipliers.weight * g;
+                multipliers.lambda[*at] = moved.max(0.0);
+                *at += 1;
+            }
+        };
+        for channel in &self.linear {
+            for m in 0..self.fine.samples {
+                let value = self.fine.at(&work.series, channel.index, m)[order(channel)];
+                renew(&mut at, channel, value);
+            }
+        }
+        if !self.curved.is_empty() {
+            for m in 0..self.fine.samples {
+                let k = self.kinematics(&self.fine, &work.series, m);
+                self.machine.fill(&k, &mut state)?;
+                let quantities = self.machine.quantities(&state);
+                for channel in &self.curved {
+                    renew(&mut at, channel, quantities.of(channel));
+                }
+            }
+        }
+        multipliers.weight *= factor;
+        Ok(())
+    }
+}
+
+/// Which of position, speed and acceleration a linear channel bounds.
+fn order(channel: &BoundedQuantity) -> usize {
+    match channel.quantity {
+        super::limits::Quantity::Position => 0,
+        super::limits::Quantity::Speed => 1,
+        _ => 2,
+    }
+}
+
+impl Multipliers {
+    /// All zero, with a first weight.
+    pub fn new(constraints: usize, weight: f64) -> Self {
+        Self {
+            lambda: vec![0.0; constraints],
+            weight,
+        }
+    }
+
+    /// Penalty of constraint `at` with the value g <= 0 where it holds, and its derivative by g.
+    #[inline]
+    fn penalty(&self, at: usize, g: f64) -> (f64, f64) {
+        let lambda = self.lambda[at];
+        let pressed = (lambda + self.weight * g).max(0.0);
+        (
+            (pressed * pressed - lambda * lambda) / (2.0 * self.weight),
+            pressed,
+        )
+    }
+}
+
+/// The number that is differentiated at one sample.
+struct Local<'a> {
+    objective: &'a Objective<'a>,
+    line: &'a Linearised,
+    /// 2 w F S, n x p.
+    weights: Option<&'a [f64]>,
+    /// Pressure of each curved channel; empty where only rows count.
+    kappas: &'a [f64],
+    rows: &'a mut [f64],
+    state: &'a mut State,
+}
+
+impl Local<'_> {
+    fn value(&mut self, k: &Kinematics) -> Result<f64, RobotError> {
+        let (machine, state) = (self.objective.machine, &mut *self.state);
+        machine.follow(k, state)?;
+        machine.rows(state, self.line, !self.kappas.is_empty(), self.rows)?;
+        let mut sum = 0.0;
+        if let Some(weights) = self.weights {
+            sum += self
+                .rows
+                .iter()
+                .zip(weights)
+                .map(|(y, w)| y * w)
+                .sum::<f64>();
+        }
+        let quantities = machine.quantities(state);
+        for (channel, kappa) in self.objective.curved.iter().zip(self.kappas) {
+            if *kappa != 0.0 {
+                sum += kappa * quantities.of(channel);
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Derivatives by position, speed and acceleration of every coordinate.
+    fn derivatives(&mut self, state: &State) -> Result<[[f64; 3]; MOST], RobotError> {
+        let variables = &self.objective.variables;
+        let n = self.objective.machine.coordinates();
+        let here = self.value(&state.k)?;
+        let mut by = [[0.0; 3]; MOST];
+        for (i, by) in by.iter_mut().enumerate().take(n) {
+            let mut k = state.k;
+            if !self.objective.machine.is_uniform(i) {
+                let h = STEP * variables.span[i].1;
+                let x = k.x[i];
+                let mut shifted = |steps: f64| {
+                    k.x[i] = x + steps * h;
+                    self.value(&k)
+                };
+                let near = shifted(1.0)? - shifted(-1.0)?;
+                let far = shifted(2.0)? - shifted(-2.0)?;
+                by[0] = (8.0 * near - far) / (12.0 * h);
+                k.x[i] = x;
+            }
+            let h = variables.speed[i];
+            k.xd[i] = state.k.xd[i] + h;
+            let up = self.value(&k)?;
+            k.xd[i] = state.k.xd[i] - h;
+            by[1] = (up - self.value(&k)?) / (2.0 * h);
+            k.xd[i] = state.k.xd[i];
+            let h = h * variables.fundamental * variables.harmonics as f64;
+            k.xdd[i] += h;
+            by[2] = (self.value(&k)? - here) / h;
+        }
+        Ok(by)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::excite::from_files::machine;
+    use crate::excite::start::random_motion;
+    use cft_ident_files::config::RobotFile;
+    use std::f64::consts::TAU;
+
+    fn built(file: &str) -> ForeseenRobot {
+        let robot = RobotFile::parse("robot.toml", file).expect("a robot file");
+        machine(&robot, None).expect("a machine")
+    }
+
+    /// Limits that random motions press against, on every quantity.
+    const CFT: &str = "[robot]\nmodel = \"cft\"\nsetup = \"dspace\"\n\
+        [limits.q4]\ntorque = 35.0\nspeed = 3.0\nacceleration = 12.0\nposition = [-1.2, -0.2]\n\
+        [limits.x_c3]\nacceleration = 3.0\n[limits.q2]\ntorque = 30.0\n";
+    const ONE: &str = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"prismatic\"\n\
+        [friction]\nfitted_with_inertias = true\noffset = true\n\
+        [friction.joint.q1]\nviscous = 0.3\ncoulomb = 0.5\n\
+        [limits.q1]\nposition = [-0.1, 0.2]\nspeed = 0.5\ntorque = 2.0\n";
+
+    /// Relative differences of the derivative and of central differences of the value.
+    fn compare(
+        machine: &ForeseenRobot,
+        criterion: &Criterion,
+        prior: Option<&PriorInformation>,
+        step: f64,
+    ) -> f64 {
+        let n = machine.coordinates();
+        let free = (0..n).map(|i| (i == 2).then_some(1.7)).collect();
+        let variables = Variables::new(&machine.channels, n, TAU * 0.4, 5, free);
+        // motions fill twice the room that the objective allows, so that penalties press
+        let tight: Vec<BoundedQuantity> =
+            machine.channels.iter().map(|c| c.reserved(0.5)).collect();
+        let objective = Objective::new(machine, criterion, &tight, variables, prior, 60);
+        let mut work = objective.work();
+        let mut worst = 0.0_f64;
+        for number in 0..3 {
+            let motion = random_motion(machine, &machine.channels, &objective.variables, 5, number);
+            let z = objective.variables.of(&motion);
+            let mut multipliers = Multipliers::new(objective.constraints(), 3.0);
+            for (k, lambda) in multipliers.lambda.iter_mut().enumerate() {
+                *lambda = 1e-3 * (k % 7) as f64;
+            }
+            let mut gradient = vec![0.0; z.len()];
+            let mut at = |z: &[f64], gradient: &mut [f64]| {
+                objective
+                    .evaluate(z, 20.0, &multipliers, &mut work, gradient)
+                    .expect("a value")
+            };
+            at(&z, &mut gradient);
+            let mut rest = vec![0.0; z.len()];
+            let differences: Vec<f64> = (0..z.len())
+                .map(|k| {
+                    let mut shifted = |h: f64| {
+                        let mut z = z.clone();
+                        z[k] += h;
+                        at(&z, &mut rest)
+                    };
+                    let near = shifted(step) - shifted(-step);
+                    let far = shifted(2.0 * step) - shifted(-2.0 * step);
+                    (8.0 * near - far) / (12.0 * step)
+                })
+                .collect();
+            let size = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+            let off = gradient.iter().zip(&differences);
+            let off = off.map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+            assert!(size > 1e-3 && size.is_finite(), "{size}");
+            worst = worst.max(off / size);
+        }
+        worst
+    }
+
+    #[test]
+    fn derivatives_of_every_criterion_and_limit_are_those_of_the_value() {
+        let machine = built(CFT);
+        let factors = (0..12).map(|k| 1.0 / (1.0 + f64::from(k))).collect();
+        let all = [
+            Criterion::Condition,
+            Criterion::ConditionNormalised,
+            Criterion::DOptimal,
+            Criterion::AOptimal(factors),
+        ];
+        for criterion in all {
+            let off = compare(&machine, &criterion, None, 1e-3);
+            assert!(off < 2e-7, "{criterion:?}: {off:e}");
+        }
+    }
+
+    #[test]
+    fn derivatives_hold_with_information_that_is_given() {
+        let machine = built(CFT);
+        let information = DMatrix::from_fn(12, 12, |i, j| if i == j { 30.0 } else { 1.0 });
+        let prior = PriorInformation {
+            information,
+            rows: 500.0,
+        };
+        let off = compare(&machine, &Criterion::Condition, Some(&prior), 1e-4);
+        assert!(off < 2e-7, "{off:e}");
+    }
+
+    #[test]
+    fn derivatives_hold_for_the_full_chain_and_for_one_joint() {
+        let full = CFT.replace("[limits.q4]", "parameters = 22\n[limits.q4]");
+        // short of such a motion, G of 22 parameters has the condition 1e13: differences of its
+        // value are all rounding, so that something is given besides
+        let prior = PriorInformation {
+            information: DMatrix::identity(22, 22),
+            rows: 60.0,
+        };
+        let normalised = Criterion::ConditionNormalised;
+        let off = compare(&built(&full), &normalised, Some(&prior), 1e-4);
+        assert!(off < 1e-6, "22 parameters: {off:e}");
+        // the sign in its Coulomb column turns round within a hundredth of the speed limit
+        let off = compare(&built(ONE), &Criterion::ConditionNormalised, None, 1e-5);
+        assert!(off < 1e-6, "one joint: {off:e}");
+    }
+}

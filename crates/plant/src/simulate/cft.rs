@@ -1,0 +1,240 @@
+//! The CFT robot with theta_1..theta_32, and experiments on it with sound defaults.
+
+use rand::RngExt;
+
+use super::SimulateError;
+use super::chance::{Purpose, stream};
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::joint_friction::SmoothFriction;
+use super::mechanism::Mechanism;
+use super::plant::Plant;
+use super::reference::{Fourier, Path, Reference, ReferenceFrame};
+use super::run::{MotorInput, Start, run};
+use super::settings::Settings;
+use super::simulated_run::SimulatedRun;
+use cft_ident_core::robot::Robot;
+use cft_ident_core::robot::cft::actuation::Setup;
+use cft_ident_core::robot::cft::{PRINTED, Structure, practice};
+use cft_ident_core::robot::friction::DoubleTanh;
+
+/// The true parameters of a simulated CFT robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CftTruth {
+    pub setup: Setup,
+    /// theta_1..theta_12, then the ten base parameters that the printed structure lacks (zero where
+    /// the robot is as the report models it), in the order of `robot::cft::EXTENDED`.
+    pub theta: [f64; 22],
+    /// Friction of q1, q2, q4, q5 (theta_13..theta_32).
+    pub friction: [DoubleTanh; 4],
+}
+
+/// Draws that [`CftTruth::varied`] makes before it gives up on a positive definite M.
+const DRAWS: usize = 1000;
+
+impl CftTruth {
+    /// The synthetic robot that the built-in campaign simulates.
+    pub fn synthetic(setup: Setup) -> Self {
+        let mut theta = [0.0; 22];
+        theta[..12].copy_from_slice(&practice::INERTIA);
+        Self {
+            setup,
+            theta,
+            friction: DoubleTanh::cft_joints(&practice::FRICTION),
+        }
+    }
+
+    /// The same robot with each parameter times 1 + U(-spread, spread), drawn anew until M is positive
+    /// definite over the workspace.
+    ///
+    /// # Errors
+    /// [`SimulateError::NotPositiveDefinite`] when no draw of a thousand is.
+    pub fn varied(&self, spread: f64, seed: u64) -> Result<Self, SimulateError> {
+        let mut chance = stream(seed, Purpose::Plant);
+        let mut outcome = Ok(*self);
+        for _ in 0..DRAWS {
+            let mut near = |x: f64| x * (1.0 + spread * chance.random_range(-1.0..=1.0));
+            let mut drawn = *self;
+            for value in &mut drawn.theta {
+                *value = near(*value);
+            }
+            for law in &mut drawn.friction {
+                *law = DoubleTanh::from_parameters(law.parameters().map(&mut near));
+            }
+            outcome = drawn.check().map(|()| drawn);
+            if outcome.is_ok() {
+                break;
+            }
+        }
+        outcome
+    }
+
+    /// # Errors
+    /// As [`Plant::check`].
+    pub fn check(&self) -> Result<(), SimulateError> {
+        self.plant()?.check()
+    }
+
+    /// The plant: of 12 parameters where the ten others are 0.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn plant(&self) -> Result<Plant<4>, SimulateError> {
+        let printed = self.theta[PRINTED..].iter().all(|x| *x == 0.0);
+        let (structure, count) = match printed {
+            true => (Structure::Printed12, PRINTED),
+            false => (Structure::Full22, self.theta.len()),
+        };
+        let mechanism = Mechanism::new(Robot::cft(self.setup, structure))?;
+        let law = |j: usize, _| SmoothFriction::DoubleTanh(self.friction[j]);
+        Plant::new(mechanism, &self.theta[..count], law, [0.0; 4])
+    }
+
+    /// theta_1..theta_12.
+    pub fn printed(&self) -> [f64; 12] {
+        std::array::from_fn(|i| self.theta[i])
+    }
+
+    /// theta_13..theta_32 in the report's order.
+    pub fn friction_theta(&self) -> [f64; 20] {
+        std::array::from_fn(|i| self.friction[i % 4].parameters()[i / 4])
+    }
+}
+
+/// The CFT robot on a set-up, with the limits of Table 5.
+///
+/// # Errors
+/// None: it has four joints.
+pub fn mechanism(setup: Setup) -> Result<Mechanism<4>, SimulateError> {
+    Mechanism::new(Robot::cft(setup, Structure::Printed12))
+}
+
+/// The Table 3 run on the set-up: on dSPACE x_c4 moves about the middle of its own limits.
+pub fn excitation(setup: Setup) -> Reference<4> {
+    excitation_of(Fourier::of(&practice::of(setup).excitation))
+}
+
+/// [`excitation`], begun anywhere in its period.
+pub fn excitation_at_random_phase(setup: Setup, seed: u64) -> Reference<4> {
+    excitation_of(Fourier::of(&practice::of(setup).excitation).at_random_phase(seed))
+}
+
+fn excitation_of(series: Fourier<4>) -> Reference<4> {
+    Reference {
+        frame: ReferenceFrame::Motors,
+        path: Path::Fourier(series),
+    }
+}
+
+/// The effects on a CFT robot.
+///
+/// # Errors
+/// As [`Effects::build`].
+pub fn effects(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    Effects::build(specs, &Sites::of(&truth.plant()?)?)
+}
+
+/// Runs a reference with the default gains, from the settled start.
+///
+/// # Errors
+/// As [`run`].
+pub fn follow(
+    truth: &CftTruth,
+    specs: &[EffectSpec],
+    reference: Reference<4>,
+    settings: &Settings<4>,
+) -> Result<SimulatedRun<4>, SimulateError> {
+    let plant = truth.plant()?;
+    plant.check()?;
+    let (effects, _) = Effects::build(specs, &Sites::of(&plant)?)?;
+    let drive = MotorInput::Follow {
+        reference,
+        control: plant.control(),
+    };
+    run(&plant, effects, &Start::Settled, &drive, settings)
+}
+
+/// Largest distance between the wanted and the actual motor coordinates, and its root mean square.
+pub fn tracking_error(plant: &Plant<4>, recording: &SimulatedRun<4>) -> ([f64; 4], [f64; 4]) {
+    let mut worst = [0.0; 4];
+    let mut squares = [0.0; 4];
+    for (q, target) in recording.actual.q.iter().zip(&recording.actual.target) {
+        let x = plant.mechanism.coordinates(q);
+        for i in 0..4 {
+            let error = (x[i] - target[i]).abs();
+            worst[i] = f64::max(worst[i], error);
+            squares[i] += error * error;
+        }
+    }
+    let rows = recording.rows().max(1) as f64;
+    (worst, squares.map(|s| (s / rows).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn synthetic_robots_are_physical_and_varied_ones_stay_within_the_spread() {
+        for setup in [Setup::Tuedacs, Setup::Dspace] {
+            let nominal = CftTruth::synthetic(setup);
+            nominal.check().expect("positive definite");
+            for seed in 0..20 {
+                let varied = nominal.varied(0.15, seed).expect("a draw is physical");
+                assert_eq!(varied, nominal.varied(0.15, seed).expect("repeats"));
+                let pairs = nominal.theta.iter().zip(&varied.theta);
+                let laws = nominal
+                    .friction_theta()
+                    .into_iter()
+                    .zip(varied.friction_theta());
+                for (a, b) in pairs.map(|(a, b)| (*a, *b)).chain(laws) {
+                    assert!((b - a).abs() <= 0.15 * a.abs() + 1e-15);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_inertia_is_refused_with_the_pose() {
+        let mut truth = CftTruth::synthetic(Setup::Tuedacs);
+        truth.theta[11] = -5.0;
+        assert!(matches!(
+            truth.check(),
+            Err(SimulateError::NotPositiveDefinite { .. })
+        ));
+        truth.theta[11] = f64::NAN;
+        assert!(truth.check().is_err());
+    }
+
+    #[test]
+    fn friction_parameters_come_back_in_the_order_of_the_report() {
+        let truth = CftTruth::synthetic(Setup::Tuedacs);
+        assert_eq!(truth.friction_theta(), practice::FRICTION);
+        assert_eq!(truth.printed(), practice::INERTIA);
+    }
+
+    #[test]
+    fn cft_parameters_carry_the_numbers_of_the_report() {
+        let truth = CftTruth::synthetic(Setup::Tuedacs);
+        let parameters = truth.plant().expect("a pose").parameters();
+        assert_eq!(parameters.len(), 32);
+        let mut numbers: Vec<u32> = parameters.iter().filter_map(|p| p.theta).collect();
+        numbers.sort_unstable();
+        assert_eq!(numbers, (1..=32).collect::<Vec<_>>());
+        let friction = truth.friction_theta();
+        for p in &parameters {
+            let number = p.theta.expect("every parameter has a number") as usize;
+            let value = if number <= 12 {
+                truth.theta[number - 1]
+            } else {
+                friction[number - 13]
+            };
+            assert_eq!(p.value, value, "theta_{number}");
+        }
+        let mut full = truth;
+        full.theta[17] = 0.1;
+        assert_eq!(full.plant().expect("a pose").parameters().len(), 42);
+    }
+}

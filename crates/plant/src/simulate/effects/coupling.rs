@@ -1,0 +1,70 @@
+//! `coupling`: a torque that follows another joint j, viscous v_j + coulomb sgn(v_i + r v_j) + inertia a_j.
+//!
+//! `from` is the number of joint j, counted from one. The torque acts on joint i alone: M is then no longer
+//! symmetric, and the plant solves it by elimination.
+
+use super::{Built, Effect, PlantLaw, PlantState, sign};
+use cft_ident_core::effect::coupling::ENTRY;
+use crate::simulate::SimulateError;
+
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    // the neighbour towards the base, and of the first joint the next
+    defaults: |site| {
+        let from = match site.joint() {
+            0 => 2.0,
+            joint => joint as f64,
+        };
+        vec![from, 0.2 * site.scale / site.speed, 0.0, 0.0, 1.0]
+    },
+    build: |site, machine, values| {
+        if machine.joints() < 2 {
+            return Err(site.refuse(ENTRY.name, "there is no other joint to follow"));
+        }
+        let from = values[0];
+        let known = (1..=machine.joints()).any(|number| number as f64 == from);
+        if !known || from == (site.joint() + 1) as f64 {
+            return Err(SimulateError::EffectNumber {
+                effect: ENTRY.name.to_owned(),
+                key: "from".to_owned(),
+                value: from,
+                rule: format!(
+                    "must be the number of another joint, 1 to {}",
+                    machine.joints()
+                ),
+            });
+        }
+        Built::plant(Coupling {
+            joint: site.joint(),
+            from: from as usize - 1,
+            viscous: values[1],
+            coulomb: values[2],
+            inertia: values[3],
+            ratio: values[4],
+            slope: site.slope(),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct Coupling {
+    joint: usize,
+    from: usize,
+    viscous: f64,
+    coulomb: f64,
+    inertia: f64,
+    ratio: f64,
+    slope: f64,
+}
+
+impl Effect for Coupling {
+    fn torque(&self, motion: &PlantState, torque: &mut [f64]) {
+        let other = motion.v[self.from];
+        let together = motion.v[self.joint] + self.ratio * other;
+        torque[self.joint] += self.viscous * other + self.coulomb * sign(self.slope, together);
+    }
+
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
+        mass[self.joint * motion.q.len() + self.from] += self.inertia;
+    }
+}

@@ -1,0 +1,107 @@
+//! `elasticity`: a spring between the motor, where the encoder sits, and the link.
+//!
+//! The link's side has `inertia`, the motor's side what is left of the joint's, all its friction and every
+//! torque that is no load, so that a stiff spring gives the rigid joint back. Unless it is told, the motor has a
+//! fifth of the joint's inertia ([`ROTOR`]; less where the least inertia of any pose asks for it, so that what is
+//! left to the link stays positive). With the deflection z = q_motor - q_link the spring passes on
+//! T = stiffness z + d dz/dt, d = 2 damping sqrt(stiffness inertia), and B (a + d2z/dt2) = tau - F - E - T on the
+//! motor's side. Both sides are integrated.
+
+use super::{Beginning, Built, Effect, PlantLaw, PlantState, Site, Twist};
+use cft_ident_core::effect::elasticity::ENTRY;
+use crate::simulate::SimulateError;
+
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| {
+        vec![
+            (std::f64::consts::TAU * FREQUENCY).powi(2) * site.inertia,
+            site.inertia - rotor(site),
+            DAMPING,
+        ]
+    },
+    build: |site, _, values| {
+        let &[stiffness, inertia, damping] = values else {
+            return Err(site.refuse(ENTRY.name, "it takes stiffness, inertia and damping"));
+        };
+        let refuse = |key: &str, value: f64, rule: &str| SimulateError::EffectNumber {
+            effect: ENTRY.name.to_owned(),
+            key: key.to_owned(),
+            value,
+            rule: rule.to_owned(),
+        };
+        let rotor = site.inertia - inertia;
+        if rotor <= 0.0 || inertia <= 0.0 || rotor >= site.least_inertia {
+            return Err(refuse(
+                "inertia",
+                inertia,
+                "must be below the joint's, and leave the motor less than the joint's least",
+            ));
+        }
+        Built::plant(Elasticity {
+            joint: site.joint(),
+            stiffness,
+            damping: 2.0 * damping * (stiffness * inertia).sqrt(),
+            rotor,
+        })
+    },
+};
+
+/// Default frequency of the joint's whole inertia on its spring \[Hz\].
+const FREQUENCY: f64 = 20.0;
+/// Share of the joint's inertia that is on the motor's side.
+const ROTOR: f64 = 0.2;
+/// The most that it may be of the joint's least inertia.
+const ROTOR_AT_MOST: f64 = 0.3;
+/// Damping ratio of the link on its spring.
+const DAMPING: f64 = 0.025;
+
+/// Default inertia on the motor's side, kg or kg m^2.
+fn rotor(site: &Site) -> f64 {
+    (ROTOR * site.inertia).min(ROTOR_AT_MOST * site.least_inertia)
+}
+
+#[derive(Debug)]
+struct Elasticity {
+    joint: usize,
+    stiffness: f64,
+    damping: f64,
+    rotor: f64,
+}
+
+impl Effect for Elasticity {
+    fn states(&self) -> usize {
+        2
+    }
+
+    fn inertia(&self, motion: &PlantState, mass: &mut [f64], _torque: &mut [f64]) {
+        mass[self.joint * (motion.q.len() + 1)] -= self.rotor;
+    }
+
+    fn twist(&self, z: &[f64]) -> Option<Twist> {
+        let &[deflection, rate] = z else {
+            return None;
+        };
+        Some(Twist {
+            joint: self.joint,
+            deflection,
+            rate,
+            torque: self.stiffness * deflection + self.damping * rate,
+        })
+    }
+
+    fn rates(&self, motion: &PlantState, dz: &mut [f64]) {
+        let (&[deflection, rate], [speed, acceleration]) = (motion.z, dz) else {
+            return;
+        };
+        let passed = self.stiffness * deflection + self.damping * rate;
+        *speed = rate;
+        *acceleration = (motion.net[self.joint] - passed) / self.rotor - motion.a[self.joint];
+    }
+
+    fn begin(&mut self, beginning: &Beginning, z: &mut [f64]) {
+        if let ([deflection, _], Some(load)) = (z, beginning.load.get(self.joint)) {
+            *deflection = load / self.stiffness;
+        }
+    }
+}

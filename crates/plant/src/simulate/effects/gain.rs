@@ -1,0 +1,27 @@
+//! `gain`: a wrong torque constant or gear, so that the logged torque is (1 + k) times the acting one.
+
+use super::{Built, Effect, PlantLaw};
+use cft_ident_core::effect::gain::ENTRY;
+
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |_| vec![0.1],
+    build: |site, _, values| {
+        Built::plant(Gain {
+            joint: site.joint(),
+            acting: 1.0 / (1.0 + values[0]),
+        })
+    },
+};
+
+#[derive(Debug)]
+struct Gain {
+    joint: usize,
+    acting: f64,
+}
+
+impl Effect for Gain {
+    fn drive(&self, acting: &mut [f64]) {
+        acting[self.joint] *= self.acting;
+    }
+}

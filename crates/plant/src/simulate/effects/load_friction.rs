@@ -1,0 +1,56 @@
+//! `load-friction`: friction that grows with the load, (mu_c + mu_v |v|) |tau_l| tanh(w v).
+//!
+//! tau_l = M a + C v + G is the rigid-body torque of the joint, which the acceleration depends on in turn.
+//! As the friction is piecewise linear in tau_l, the plant solves tau_l (1 + s) = what is left of the motor's
+//! torque in closed form, without iteration ([`super::Effect::load`]).
+
+use super::{Built, Effect, PlantLaw, PlantState};
+use cft_ident_core::effect::load_friction::ENTRY;
+use crate::simulate::SimulateError;
+
+pub static LAW: PlantLaw = PlantLaw {
+    entry: &ENTRY,
+    defaults: |site| vec![0.05, 0.0, site.slope().min(40.0 / site.speed)],
+    build: |site, _, values| {
+        let most = values[0].abs() + values[1].abs() * 4.0 * site.speed;
+        if most >= MOST {
+            return Err(SimulateError::EffectNumber {
+                effect: ENTRY.name.to_owned(),
+                key: "mu_c + mu_v |v|".to_owned(),
+                value: most,
+                rule: format!(
+                    "must stay below {MOST}: beyond it the joint locks itself under load"
+                ),
+            });
+        }
+        Built::plant(LoadFriction {
+            joint: site.joint(),
+            mu_c: values[0],
+            mu_v: values[1],
+            slope: values[2],
+        })
+    },
+};
+
+/// Share of the load that friction may take.
+const MOST: f64 = 0.95;
+
+#[derive(Debug)]
+struct LoadFriction {
+    joint: usize,
+    mu_c: f64,
+    mu_v: f64,
+    slope: f64,
+}
+
+impl Effect for LoadFriction {
+    fn load(&self, motion: &PlantState, share: &mut [[f64; 2]]) {
+        let v = motion.v[self.joint];
+        // Speeds far beyond the joint's own, as a rejected trial step has them, must not turn the balance over.
+        let mu = (self.mu_c + self.mu_v * v.abs()).clamp(-MOST, MOST);
+        let friction = mu * (self.slope * v).tanh();
+        let [positive, negative] = &mut share[self.joint];
+        *positive += friction;
+        *negative -= friction;
+    }
+}

@@ -1,0 +1,242 @@
+//! What a robot does: the motion that it is asked for, as a reference that its controller follows.
+
+use std::f64::consts::TAU;
+
+use super::SimulateError;
+use super::controller::ControllerSettings;
+use super::mechanism::Mechanism;
+use super::one_joint::{Mover, OneJointMove};
+use super::plant::Plant;
+use super::reference::{Fourier, Path, Points, Reference, ReferenceFrame};
+use cft_ident_files::config::trajectory::{self, Coordinates, Trajectory};
+
+/// Duration of a motion that sets none \[s\].
+pub const SECONDS: f64 = 20.0;
+
+/// Fundamental of the usual motion of several joints \[Hz\], its harmonics, and the share of a joint's half
+/// travel that their amplitudes sum to.
+const FUNDAMENTAL_HZ: f64 = 0.1;
+const HARMONICS: usize = 4;
+const SHARE: f64 = 0.8;
+
+/// What the robot is to do.
+#[derive(Debug, Clone, Copy)]
+pub enum Experiment<'a> {
+    /// Table 3 on the CFT robot, a ladder on a single joint, all joints at once on other robots.
+    Usual,
+    /// A trajectory file.
+    Trajectory(&'a Trajectory),
+    /// One joint (or motor's coordinate) runs a ladder of speeds, within a part of its range about the middle.
+    OneJoint { joint: &'a str, part: f64 },
+    /// Volts of a log: times \[s\], and volts row by row.
+    Volts { times: &'a [f64], volts: &'a [f64] },
+}
+
+impl<'a> Experiment<'a> {
+    /// One joint over all of its range.
+    pub fn of_joint(joint: &'a str) -> Self {
+        Self::OneJoint { joint, part: 1.0 }
+    }
+
+    /// The reference; `None` where volts are played back.
+    ///
+    /// # Errors
+    /// [`SimulateError`] where the experiment names what the robot does not have, or does not fit.
+    pub fn reference<const J: usize>(
+        &self,
+        mechanism: &Mechanism<J>,
+        seconds: Option<f64>,
+        seed: u64,
+    ) -> Result<Option<Reference<J>>, SimulateError> {
+        let ladder = OneJointMove::new(0, seconds.unwrap_or(SECONDS), Some(seed));
+        Ok(match *self {
+            Self::Usual => Some(usual(mechanism, &ladder)?),
+            Self::OneJoint { joint, part } => {
+                let mover = Mover::named(&mechanism.robot, joint)?;
+                let ladder = OneJointMove {
+                    mover,
+                    part,
+                    ..ladder
+                };
+                Some(ladder.reference(mechanism)?)
+            }
+            Self::Trajectory(file) => Some(of_file(mechanism, file, seconds, seed)?),
+            Self::Volts { .. } => None,
+        })
+    }
+}
+
+/// Reference of a trajectory file. Coordinates that a Fourier file leaves out stay in the middle of their
+/// travels.
+///
+/// # Errors
+/// [`SimulateError`] where the trajectory names what the robot does not have, or does not fit.
+pub fn of_file<const J: usize>(
+    mechanism: &Mechanism<J>,
+    file: &Trajectory,
+    seconds: Option<f64>,
+    seed: u64,
+) -> Result<Reference<J>, SimulateError> {
+    let frame = |coordinates| match coordinates {
+        Coordinates::Cartesian if !mechanism.motors_at_joints() => ReferenceFrame::Motors,
+        _ => ReferenceFrame::Joints,
+    };
+    match file {
+        Trajectory::Fourier(file) => fourier(mechanism, file, frame(file.coordinates)),
+        Trajectory::Points(file) => points(mechanism, file, frame(file.coordinates)),
+        Trajectory::SingleJoint(file) => {
+            let seconds = seconds.unwrap_or(SECONDS);
+            OneJointMove::of(file, &mechanism.robot, seconds, seed)?.reference(mechanism)
+        }
+    }
+}
+
+fn fourier<const J: usize>(
+    mechanism: &Mechanism<J>,
+    file: &trajectory::FourierSection,
+    frame: ReferenceFrame,
+) -> Result<Reference<J>, SimulateError> {
+    let middle = mechanism.middle();
+    let (names, rest) = match frame {
+        ReferenceFrame::Motors => (mechanism.robot.coordinate_names(), middle),
+        ReferenceFrame::Joints => (
+            mechanism.robot.joint_names().to_vec(),
+            mechanism.pose(&middle)?,
+        ),
+    };
+    let terms = file.series.iter().map(|series| series.a.len());
+    let terms = terms.max().unwrap_or(0);
+    let mut series = Fourier {
+        offset: rest,
+        a: vec![[0.0; J]; terms],
+        b: vec![[0.0; J]; terms],
+        fundamental: TAU * file.fundamental_hz,
+        start: file.start_s.unwrap_or(0.0),
+        blend: file.blend_s.unwrap_or(Fourier::<J>::BLEND),
+        periods: file.periods,
+    };
+    for coordinate in &file.series {
+        let Some(i) = names.iter().position(|name| *name == coordinate.name) else {
+            return Err(SimulateError::UnknownJoint {
+                name: coordinate.name.clone(),
+                known: names.join(", "),
+            });
+        };
+        series.offset[i] = coordinate.offset;
+        for (l, (a, b)) in coordinate.a.iter().zip(&coordinate.b).enumerate() {
+            series.a[l][i] = *a;
+            series.b[l][i] = *b;
+        }
+    }
+    Ok(Reference {
+        frame,
+        path: Path::Fourier(series),
+    })
+}
+
+fn points<const J: usize>(
+    mechanism: &Mechanism<J>,
+    file: &trajectory::PointsSection,
+    frame: ReferenceFrame,
+) -> Result<Reference<J>, SimulateError> {
+    let mut list = Vec::with_capacity(file.points.len());
+    let first = file.points.first().map_or(0.0, |point| point.t);
+    for (k, point) in file.points.iter().enumerate() {
+        let Some(pose) = mechanism.widened(&point.position, 0.0) else {
+            return Err(SimulateError::Reference {
+                what: format!(
+                    "point {} has {} coordinates and the robot has {}",
+                    k + 1,
+                    point.position.len(),
+                    mechanism.joints()
+                ),
+            });
+        };
+        list.push((point.t - first, pose));
+    }
+    Ok(Reference {
+        frame,
+        path: Path::Points(Points::new(&list)?),
+    })
+}
+
+/// What the robot does where nothing is asked for.
+fn usual<const J: usize>(
+    mechanism: &Mechanism<J>,
+    ladder: &OneJointMove,
+) -> Result<Reference<J>, SimulateError> {
+    if let Some(practice) = &mechanism.practice {
+        return Ok(Reference {
+            frame: ReferenceFrame::Motors,
+            path: Path::Fourier(Fourier::of(&practice.excitation)),
+        });
+    }
+    match mechanism.joints() {
+        1 => ladder.reference(mechanism),
+        _ => Ok(all_joints(mechanism)),
+    }
+}
+
+/// All joints over most of their travel, each with phases of its own.
+fn all_joints<const J: usize>(mechanism: &Mechanism<J>) -> Reference<J> {
+    let (mut a, mut b) = (vec![[0.0; J]; HARMONICS], vec![[0.0; J]; HARMONICS]);
+    let sum: f64 = (1..=HARMONICS).map(|k| 1.0 / k as f64).sum();
+    for k in 0..HARMONICS {
+        for j in 0..mechanism.joints() {
+            let (low, high) = mechanism.travel(j);
+            let amplitude = SHARE * 0.5 * (high - low) / (sum * (k + 1) as f64);
+            let phase = TAU * ((3 * k + 1) as f64 * (j as f64 + 0.7).sqrt()).fract();
+            a[k][j] = amplitude * phase.cos();
+            b[k][j] = amplitude * phase.sin();
+        }
+    }
+    Reference {
+        frame: ReferenceFrame::Joints,
+        path: Path::Fourier(Fourier {
+            offset: mechanism.middle(),
+            a,
+            b,
+            fundamental: TAU * FUNDAMENTAL_HZ,
+            start: 0.0,
+            blend: Fourier::<J>::BLEND,
+            periods: None,
+        }),
+    }
+}
+
+/// Own frequency \[rad/s\], damping, and corner frequency \[Hz\] of each joint under the usual gains: of one
+/// joint alone, and of several that push each other.
+const ALONE: [f64; 3] = [45.0, 0.6, 50.0];
+const SEVERAL: [f64; 3] = [30.0, 0.8, 100.0];
+/// Corner frequency \[Hz\] with gains that are known.
+const CORNER: f64 = 50.0;
+
+impl<const J: usize> Plant<J> {
+    /// Gains that hold and track well at 1 kHz: those of the laboratory, or by the inertia of each joint in
+    /// the middle of its travel.
+    pub fn control(&self) -> ControllerSettings<J> {
+        let m = &self.mechanism;
+        if let Some(practice) = &m.practice {
+            let [proportional, derivative] = &practice.control;
+            return ControllerSettings {
+                proportional: m.widened(proportional, 1.0).unwrap_or([1.0; J]),
+                derivative: m.widened(derivative, 0.0).unwrap_or([0.0; J]),
+                filter_hz: CORNER,
+            };
+        }
+        let [frequency, damping, filter_hz] = match m.joints() {
+            1 => ALONE,
+            _ => SEVERAL,
+        };
+        let stiffness = |j: usize| self.inertia[j] * frequency * frequency / m.gain[j];
+        let mut proportional = [1.0; J];
+        for (j, gain) in proportional.iter_mut().enumerate().take(m.joints()) {
+            *gain = stiffness(j);
+        }
+        ControllerSettings {
+            proportional,
+            derivative: m.filled(|j| 2.0 * damping / frequency * stiffness(j)),
+            filter_hz,
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! One-joint experiments: one joint, or one motor's coordinate, runs over its range at a ladder of speeds.
+
+use super::SimulateError;
+use super::mechanism::Mechanism;
+use super::reference::{
+    LadderPlan, Path, Reference, ReferenceFrame, TURN, Travel, middle_part, travel,
+};
+use cft_ident_core::robot::Robot;
+use cft_ident_files::config::trajectory::SingleJointMove;
+
+/// Share of the motors' top speed that a ladder uses.
+const SPEED_SHARE: f64 = 0.95;
+/// Distance to every limit, as a fraction of its span.
+const MARGIN: f64 = 0.05;
+/// Ratio of the fastest to the slowest plateau, where nothing is known of the speeds that matter.
+const SPEED_RATIO: f64 = 300.0;
+/// Strokes per second^2 that the acceleration stands for where nothing bounds it: a full one takes about a
+/// second.
+const STROKES: f64 = 8.0;
+
+/// What moves in a one-joint experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mover {
+    /// A joint, by its index.
+    Joint(usize),
+    /// A motor's coordinate, by its index; on the CFT robot q4 and q5 move together with x_c1 and x_c2.
+    Motor(usize),
+}
+
+impl Mover {
+    /// The joint or motor's coordinate of that name.
+    ///
+    /// # Errors
+    /// [`SimulateError::UnknownJoint`].
+    pub fn named(robot: &Robot, name: &str) -> Result<Self, SimulateError> {
+        let mut known = robot.joint_names().to_vec();
+        let joints = known.len();
+        if let Some(motors) = robot.transmission().coordinates() {
+            known.extend(motors.iter().map(|&motor| motor.to_owned()));
+        }
+        match known.iter().position(|n| n == name) {
+            Some(place) if place < joints => Ok(Self::Joint(place)),
+            Some(place) => Ok(Self::Motor(place - joints)),
+            None => Err(SimulateError::UnknownJoint {
+                name: name.to_owned(),
+                known: known.join(", "),
+            }),
+        }
+    }
+
+    fn index(self) -> usize {
+        match self {
+            Self::Joint(index) | Self::Motor(index) => index,
+        }
+    }
+
+    fn name(self, robot: &Robot) -> String {
+        match self {
+            Self::Joint(index) => robot.joint_names()[index].clone(),
+            Self::Motor(index) => robot.coordinate_names().swap_remove(index),
+        }
+    }
+}
+
+/// One joint moves over its range at a ladder of speeds, the others are commanded to hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OneJointMove {
+    pub mover: Mover,
+    /// Range of the mover, m or rad; what the limits leave in the middle of the others, with a margin, where
+    /// absent.
+    pub range: Option<(f64, f64)>,
+    /// Middle part of the range that the limits leave; all of it, 1, unless asked for.
+    pub part: f64,
+    /// Plateau speeds, m/s or rad/s; ten in equal ratios up to the motors' limit where absent.
+    pub speeds: Option<Vec<f64>>,
+    /// Largest acceleration, m/s^2 or rad/s^2; by what is known of robot and limits where absent.
+    pub acceleration: Option<f64>,
+    /// Time from zero speed to a slow plateau \[s\]; that of the usual ladder where absent.
+    pub turn: Option<f64>,
+    /// Duration \[s\].
+    pub seconds: f64,
+    /// Shuffles the order of the speeds and the end at which the motion starts.
+    pub seed: Option<u64>,
+}
+
+impl OneJointMove {
+    /// The default ladder of a joint.
+    pub fn new(joint: usize, seconds: f64, seed: Option<u64>) -> Self {
+        Self {
+            mover: Mover::Joint(joint),
+            range: None,
+            part: 1.0,
+            speeds: None,
+            acceleration: None,
+            turn: None,
+            seconds,
+            seed,
+        }
+    }
+
+    /// The ladder of a file.
+    ///
+    /// # Errors
+    /// [`SimulateError::UnknownJoint`].
+    pub fn of(
+        file: &SingleJointMove,
+        robot: &Robot,
+        seconds: f64,
+        seed: u64,
+    ) -> Result<Self, SimulateError> {
+        Ok(Self {
+            mover: Mover::named(robot, &file.joint)?,
+            range: file.range.map(|[low, high]| (low, high)),
+            speeds: Some(file.speeds.clone()),
+            acceleration: file.acceleration,
+            turn: file.turn_s,
+            ..Self::new(0, seconds, Some(seed))
+        })
+    }
+
+    /// The reference that the controller follows.
+    ///
+    /// # Errors
+    /// [`SimulateError`] when there is no such joint, its travel is not known or the ladder does not fit.
+    pub fn reference<const J: usize>(
+        &self,
+        mechanism: &Mechanism<J>,
+    ) -> Result<Reference<J>, SimulateError> {
+        let (m, place) = (mechanism, self.mover.index());
+        if place >= m.joints() {
+            return Err(SimulateError::UnknownJoint {
+                name: format!("number {place}"),
+                known: m.robot.joint_names().join(", "),
+            });
+        }
+        let (frame, mut pose, room) = self.room(m)?;
+        let range = self.range.unwrap_or(middle_part(room.range, self.part));
+        let low = room.range.0 - 1e-9;
+        // what stands at the joint itself is looked at while it runs
+        if !m.motors_at_joints() && (range.0 < low || range.1 > room.range.1 + 1e-9) {
+            return Err(SimulateError::Reference {
+                what: format!(
+                    "{} cannot move over [{}, {}]: at this pose the limits leave [{:.4}, {:.4}]",
+                    self.mover.name(&m.robot),
+                    range.0,
+                    range.1,
+                    room.range.0,
+                    room.range.1
+                ),
+            });
+        }
+        let ladder = self.ladder(m, range, &room)?;
+        pose[place] = ladder.at(0.0).0;
+        Ok(Reference {
+            frame,
+            path: Path::Ladder {
+                moving: place,
+                pose,
+                ladder,
+            },
+        })
+    }
+
+    /// Frame and pose of the others, and the room that the limits leave the mover.
+    fn room<const J: usize>(
+        &self,
+        m: &Mechanism<J>,
+    ) -> Result<(ReferenceFrame, [f64; J], Travel), SimulateError> {
+        let (place, middle) = (self.mover.index(), m.middle());
+        let speeds = match &m.practice {
+            Some(practice) => m.filled(|i| practice.speeds[i]),
+            None => [f64::INFINITY; J],
+        };
+        if let (Mover::Joint(_), false) = (self.mover, m.motors_at_joints()) {
+            let pose = m.pose(&middle)?;
+            let room = travel(m, &pose, place, MARGIN, &speeds)?;
+            return Ok((ReferenceFrame::Joints, pose, room));
+        }
+        let gap = MARGIN * (m.upper[place] - m.lower[place]);
+        let room = Travel {
+            range: (m.lower[place] + gap, m.upper[place] - gap),
+            top_speed: speeds[place],
+        };
+        let known = self.range.unwrap_or(room.range);
+        if !(known.0.is_finite() && known.1.is_finite()) {
+            let name = self.mover.name(&m.robot);
+            return Err(SimulateError::Reference {
+                what: format!(
+                    "the travel of {name} is not known; write `[limits.{name}] position = [low, high]` into \
+                     the robot file"
+                ),
+            });
+        }
+        let frame = match self.mover {
+            Mover::Joint(_) => ReferenceFrame::Joints,
+            Mover::Motor(_) => ReferenceFrame::Motors,
+        };
+        Ok((frame, middle, room))
+    }
+
+    fn ladder<const J: usize>(
+        &self,
+        m: &Mechanism<J>,
+        range: (f64, f64),
+        room: &Travel,
+    ) -> Result<super::reference::LadderReference, SimulateError> {
+        let place = self.mover.index();
+        let given = m.given.get(&self.mover.name(&m.robot));
+        let of_practice = m.practice.as_ref().map(|practice| match self.mover {
+            Mover::Joint(_) => practice.joint_ladders[place],
+            Mover::Motor(_) => practice.coordinate_ladders[place],
+        });
+        let whole = self.range.unwrap_or(room.range);
+        let acceleration = of_practice
+            .map(|[_, acceleration]| acceleration)
+            .or_else(|| given?.acceleration)
+            .unwrap_or(STROKES * (whole.1 - whole.0));
+        // strokes last as long as those of the whole range, so that the controller follows them as well
+        let acceleration = self.acceleration.unwrap_or(self.part * acceleration);
+        if let Some(speeds) = &self.speeds {
+            let plan = LadderPlan {
+                range,
+                speeds: speeds.clone(),
+                acceleration,
+                turn: self.turn.unwrap_or(TURN),
+                seconds: self.seconds,
+            };
+            // any turn may be given
+            return plan.within_range(plan.build_seeded(self.seed)?);
+        }
+        let ends = match of_practice {
+            Some([lowest, _]) => (lowest, SPEED_SHARE * room.top_speed),
+            None => {
+                let fastest = LadderPlan::fastest(range, acceleration);
+                let top = given.and_then(|given| given.speed);
+                let top = fastest.min(top.unwrap_or(fastest));
+                (top / SPEED_RATIO, top)
+            }
+        };
+        LadderPlan::usual(range, ends, acceleration, self.seconds, self.seed)
+    }
+}

@@ -1,0 +1,490 @@
+//! A simulation as the user orders it: robot file, model, motion, effects; and the log that comes back.
+
+use std::ops::ControlFlow;
+
+use super::SimulateError;
+use super::effects::{EffectSpec, EffectValue, Effects, Sites};
+use super::experiment::{Experiment, SECONDS};
+use super::mechanism::Mechanism;
+use super::plant::Plant;
+use super::recorder::{Recorder, Waiting};
+use super::reference::Path;
+use super::run::{MotorInput, Start, run_in_blocks};
+use super::settings::Settings;
+use super::settings_file;
+use super::simulated_run::{LimitEvent, MotorStatus, RunEnding, SimulatedRun};
+use super::temperature::PlantTemperatures;
+use super::truth::TruthFile;
+use super::volts::VoltSeries;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::robot_file::RobotFile;
+use cft_ident_logs::log::{Channel, DeclaredChannels, Layout};
+
+/// What is asked of the simulator.
+#[derive(Debug, Clone)]
+pub struct Order<'a> {
+    pub robot: &'a RobotFile,
+    /// Model whose parameters are the truth, and its name in messages; the synthetic ones of the CFT
+    /// robot where absent.
+    pub model: Option<(&'a str, &'a ModelFile)>,
+    pub experiment: Experiment<'a>,
+    /// Duration \[s\]; the motion's own, or 20 s, where absent.
+    pub seconds: Option<f64>,
+    pub effects: Vec<EffectSpec>,
+    pub seed: u64,
+}
+
+/// What is known of a simulated log beside its rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulationSummary {
+    pub truth: TruthFile,
+    pub limits: Vec<LimitEvent>,
+    pub ending: RunEnding,
+    /// Share of the rows at which each motor channel is saturated, by coordinate.
+    pub saturated: Vec<(String, f64)>,
+}
+
+/// A simulated log in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedLog {
+    /// Column names.
+    pub header: Vec<String>,
+    /// Rows, one after the other.
+    pub values: Vec<f64>,
+    pub truth: TruthFile,
+    pub limits: Vec<LimitEvent>,
+    pub ending: RunEnding,
+    /// Share of the rows at which each motor channel is saturated, by coordinate.
+    pub saturated: Vec<(String, f64)>,
+}
+
+impl SimulatedLog {
+    /// The rows.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
+        self.values.chunks_exact(self.header.len())
+    }
+}
+
+/// Takes the rows of a simulated log.
+pub trait Rows {
+    /// Called while the robot moves and no row is ready yet: whether to go on.
+    fn goes_on(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Takes the next rows, one after the other, each with a number for every name of the header; whether to
+    /// go on.
+    fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()>;
+}
+
+/// Rows that are handed on at once.
+const BLOCK: usize = 4096;
+
+/// Initial conditions of the report's block, in motor coordinates (x_c1..x_c4; the joint of a single
+/// joint).
+#[derive(Debug, Clone, PartialEq)]
+pub struct InitialConditions {
+    /// m or rad.
+    pub position: Vec<f64>,
+    /// m/s or rad/s.
+    pub speed: Vec<f64>,
+}
+
+impl InitialConditions {
+    fn start<const J: usize>(&self, mechanism: &Mechanism<J>) -> Result<Start<J>, SimulateError> {
+        let of = |numbers: &[f64]| {
+            let widened = mechanism.widened(numbers, 0.0);
+            widened.ok_or(SimulateError::Parameter {
+                name: "number of initial conditions of a kind",
+                value: numbers.len() as f64,
+                rule: "must be one per motor",
+            })
+        };
+        Ok(Start::State {
+            position: of(&self.position)?,
+            speed: of(&self.speed)?,
+        })
+    }
+}
+
+/// Simulates what is ordered, from the settled start ([`Start::Settled`]).
+///
+/// # Errors
+/// [`SimulateError`]; reaching a limit is none.
+pub fn simulate(order: &Order) -> Result<SimulatedLog, SimulateError> {
+    simulate_from(order, None)
+}
+
+/// Simulates what is ordered, from initial conditions where they are given.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+) -> Result<SimulatedLog, SimulateError> {
+    #[derive(Default)]
+    struct InMemory {
+        header: Vec<String>,
+        values: Vec<f64>,
+    }
+    impl Rows for InMemory {
+        fn take(&mut self, header: &[String], values: &[f64]) -> ControlFlow<()> {
+            if self.header.is_empty() {
+                self.header = header.to_vec();
+            }
+            self.values.extend_from_slice(values);
+            ControlFlow::Continue(())
+        }
+    }
+    let mut rows = InMemory::default();
+    let simulated = run_any(order, initial, &mut rows, true)?;
+    Ok(SimulatedLog {
+        header: rows.header,
+        values: rows.values,
+        truth: simulated.truth,
+        limits: simulated.limits,
+        ending: simulated.ending,
+        saturated: simulated.saturated,
+    })
+}
+
+/// Simulates what is ordered and hands the rows on block by block, so that memory does not grow with the log;
+/// only a log with a fault of the data is simulated as a whole first.
+///
+/// # Errors
+/// As [`simulate`], and [`SimulateError::Stopped`] where the rows are wanted no more.
+pub fn simulate_rows(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+    rows: &mut dyn Rows,
+) -> Result<SimulationSummary, SimulateError> {
+    run_any(order, initial, rows, false)
+}
+
+fn run_any(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+    rows: &mut dyn Rows,
+    in_memory: bool,
+) -> Result<SimulationSummary, SimulateError> {
+    match order.robot.joint_names().len() {
+        1 => run_order::<1>(order, initial, rows, in_memory),
+        2 => run_order::<2>(order, initial, rows, in_memory),
+        // others share the code of a few widths, of which each takes a while to compile
+        3..=4 => run_order::<4>(order, initial, rows, in_memory),
+        5..=8 => run_order::<8>(order, initial, rows, in_memory),
+        _ => run_order::<32>(order, initial, rows, in_memory),
+    }
+}
+
+/// Runs the order with vectors of room for J joints, and lays the log out as the robot file's `[log]` reads it.
+fn run_order<const J: usize>(
+    order: &Order,
+    initial: Option<&InitialConditions>,
+    rows: &mut dyn Rows,
+    in_memory: bool,
+) -> Result<SimulationSummary, SimulateError> {
+    let plant = Plant::<J>::of(order.robot, order.model)?;
+    let declared = &order.robot.sensors.temperature;
+    let warm = PlantTemperatures::of(declared, plant.mechanism.robot.joint_names());
+    let sites = Sites {
+        temperatures: warm.clone(),
+        ..Sites::of(&plant)?
+    };
+    let (effects, effect_values) = built_effects(order, &sites)?;
+    let mechanism = &plant.mechanism;
+    let mut settings = settings_file::settings(order.robot, mechanism)?;
+    settings.seconds = order.seconds.unwrap_or(SECONDS);
+    settings.seed = order.seed;
+    // A fault of the data may reach back, or ahead, as far as it likes.
+    let in_memory = in_memory || effects.first_fault().is_some();
+    let length = |settings: &Settings<J>| match in_memory {
+        true => settings.samples_in_memory(),
+        false => settings.samples(),
+    };
+    // before a ladder of that length is built
+    length(&settings)?;
+    let (drive, own_seconds) = drive(order, &plant)?;
+    let start = initial.map_or(Ok(Start::Settled), |given| given.start(mechanism))?;
+    settings.seconds = order.seconds.or(own_seconds).unwrap_or(SECONDS);
+    length(&settings)?;
+
+    let mut recorder = Recorder::new(&settings.sensors, settings.seed);
+    let mut waiting = Waiting::new(mechanism.joints());
+    let block = (!in_memory).then_some(BLOCK);
+    let (mut run, effects) = run_in_blocks(
+        &plant,
+        effects,
+        &start,
+        &drive,
+        &settings,
+        block,
+        &mut |block| {
+            recorder.hear(block);
+            waiting.push(block)?;
+            go_on(rows.goes_on())
+        },
+    )?;
+    recorder.hear(&run);
+    let layout = LogLayout::of(order.robot, &run, warm);
+    let mut saturated = Saturated::default();
+    let mut give = |run: &mut SimulatedRun<J>| {
+        recorder.measure(run, mechanism, &effects);
+        saturated.add(run);
+        go_on(rows.take(&layout.header, &layout.values(run)))
+    };
+    match in_memory {
+        true => give(&mut run)?,
+        false => {
+            waiting.push(&run)?;
+            let mut waited = waiting.rewind()?;
+            while waited.next(BLOCK as u64, &mut run)? {
+                give(&mut run)?;
+            }
+        }
+    }
+    Ok(SimulationSummary {
+        truth: truth_of(order, &plant, &run, effect_values),
+        saturated: saturated.shares(&run.coordinates),
+        ending: run.ending,
+        limits: run.limits,
+    })
+}
+
+fn go_on(wish: ControlFlow<()>) -> Result<(), SimulateError> {
+    match wish {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(SimulateError::Stopped),
+    }
+}
+
+/// How often the amplifiers saturate.
+#[derive(Debug, Default)]
+struct Saturated {
+    /// Saturated rows of each motor.
+    counts: Vec<u64>,
+    rows: u64,
+}
+
+impl Saturated {
+    fn add<const J: usize>(&mut self, run: &SimulatedRun<J>) {
+        self.counts.resize(J, 0);
+        for status in &run.status {
+            for (count, status) in self.counts.iter_mut().zip(status) {
+                *count += u64::from(*status == MotorStatus::Saturated);
+            }
+        }
+        self.rows += run.rows() as u64;
+    }
+
+    /// Share of the rows, by coordinate.
+    fn shares(&self, coordinates: &[String]) -> Vec<(String, f64)> {
+        let rows = self.rows.max(1) as f64;
+        let shares = self.counts.iter().map(|count| *count as f64 / rows);
+        coordinates.iter().cloned().zip(shares).collect()
+    }
+}
+
+/// What drives the motors, and how long it lasts where it says so \[s\].
+fn drive<const J: usize>(
+    order: &Order,
+    plant: &Plant<J>,
+) -> Result<(MotorInput<J>, Option<f64>), SimulateError> {
+    let mechanism = &plant.mechanism;
+    let experiment = order.experiment;
+    if let Some(reference) = experiment.reference(mechanism, order.seconds, order.seed)? {
+        let seconds = match &reference.path {
+            // A ladder lasts as long as it was built for; a list may end before the next sample.
+            Path::Points(points) => Some(points.seconds()),
+            Path::Fourier(series) => series.seconds(),
+            _ => None,
+        };
+        let control = settings_file::control(order.robot, plant)?;
+        return Ok((MotorInput::Follow { reference, control }, seconds));
+    }
+    let Experiment::Volts { times, volts } = experiment else {
+        return Err(SimulateError::Reference {
+            what: "there is neither a reference nor a series of volts".to_owned(),
+        });
+    };
+    let n = mechanism.joints();
+    if !volts.len().is_multiple_of(n) {
+        return Err(SimulateError::Volts {
+            what: format!("the robot has {n} motors, and the rows do not divide into {n} volts"),
+        });
+    }
+    let rows = volts.chunks_exact(n);
+    let rows = rows.filter_map(|row| mechanism.widened(row, 0.0)).collect();
+    // A log's clock need not start at 0.
+    let first = times.first().copied().unwrap_or(0.0);
+    let times: Vec<f64> = times.iter().map(|t| t - first).collect();
+    let series = VoltSeries::new(times, rows)?;
+    let seconds = Some(series.seconds()).filter(|s| s.is_finite());
+    Ok((MotorInput::Volts(series), seconds))
+}
+
+/// Effects of the model, then those of the order. An effect of the model that cannot be run names its table.
+fn built_effects(
+    order: &Order,
+    sites: &Sites,
+) -> Result<(Effects, Vec<EffectValue>), SimulateError> {
+    let mut asked = Vec::new();
+    if let Some((file, model)) = order.model {
+        for (place, effect) in model.effects.iter().enumerate() {
+            let values = effect.parameters.iter();
+            let spec = EffectSpec {
+                name: effect.name.clone(),
+                joint: effect.joint.clone(),
+                values: values.map(|(key, p)| (key.clone(), p.value)).collect(),
+                own: None,
+            }
+            .or_own(&model.candidates);
+            // Tried alone, so that what is wrong with it is said of the file and not of the command line.
+            Effects::build(std::slice::from_ref(&spec), sites).map_err(|source| {
+                SimulateError::ModelEffect {
+                    file: file.to_owned(),
+                    number: place + 1,
+                    name: effect.name.clone(),
+                    source: Box::new(source),
+                }
+            })?;
+            asked.push(spec);
+        }
+    }
+    asked.extend(order.effects.iter().cloned());
+    let (effects, values) = Effects::build(&asked, sites)?;
+    let joint_channels = order.robot.layout().channels == DeclaredChannels::Joint;
+    match effects.first_fault() {
+        Some(fault) if !joint_channels => Err(SimulateError::EffectPlace {
+            effect: fault.to_owned(),
+            place: "this log".to_owned(),
+            why: "the robot file's [log] has the motors' channels alone, and faults of the data sit in joint \
+                  channels; let [log] read those"
+                .to_owned(),
+        }),
+        _ => Ok((effects, values)),
+    }
+}
+
+fn truth_of<const J: usize>(
+    order: &Order,
+    plant: &Plant<J>,
+    recording: &SimulatedRun<J>,
+    effects: Vec<EffectValue>,
+) -> TruthFile {
+    let robot = &plant.mechanism.robot;
+    let n = robot.joints();
+    let mut ending = match recording.ending {
+        RunEnding::Completed => "completed".to_owned(),
+        RunEnding::StoppedAtLimit => "stopped at a limit".to_owned(),
+    };
+    for event in &recording.limits {
+        ending += &format!(
+            "; {} = {:.5} at t = {:.4} s",
+            event.coordinate, event.value, event.t
+        );
+    }
+    TruthFile {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: order.seed,
+        model: order.robot.robot.model.name().to_owned(),
+        setup: robot
+            .transmission()
+            .setup()
+            .map(|setup| setup.name().to_owned()),
+        ending,
+        volt_noise: recording.volt_noise[..n].to_vec(),
+        torque_noise: recording.torque_noise[..n].to_vec(),
+        parameters: plant.parameters(),
+        effects,
+    }
+}
+
+/// Names, signs, scales and offsets with which the robot file reads logs: joint channels where it reads those,
+/// and for the CFT robot the raw channels and status behind them.
+struct LogLayout {
+    layout: Layout,
+    header: Vec<String>,
+    /// Joints that have a temperature.
+    warm: Vec<usize>,
+    temperatures: PlantTemperatures,
+}
+
+impl LogLayout {
+    fn of<const J: usize>(
+        robot: &RobotFile,
+        run: &SimulatedRun<J>,
+        temperatures: PlantTemperatures,
+    ) -> Self {
+        let layout = robot.layout();
+        let mut header = vec![layout.time.column.clone()];
+        let (joint, actuator) = parts(&layout);
+        for part in [joint, actuator].into_iter().flatten() {
+            let channels = part.positions.iter().chain(&part.torques);
+            header.extend(channels.map(|c| c.column.clone()));
+        }
+        if actuator.is_some() {
+            let motors = 1..=run.coordinates.len();
+            header.extend(motors.map(|i| format!("status_{i}")));
+        }
+        let warm = |j: &usize| temperatures.at(*j, 0.0).is_some();
+        let warm: Vec<usize> = (0..run.joints.len()).filter(warm).collect();
+        header.extend(warm.iter().map(|j| {
+            let joint = &run.joints[*j];
+            let named = robot.log.joint.get(joint);
+            let named = named.and_then(|of| of.temperature.as_ref());
+            named.map_or(format!("temperature_{joint}"), |name| name.0.clone())
+        }));
+        Self {
+            layout,
+            header,
+            warm,
+            temperatures,
+        }
+    }
+
+    /// The rows as the log shows them, one after the other.
+    fn values<const J: usize>(&self, run: &SimulatedRun<J>) -> Vec<f64> {
+        let (joint, actuator) = parts(&self.layout);
+        let mut values = Vec::with_capacity(self.header.len() * run.rows());
+        for k in 0..run.rows() {
+            values.push(logged(&self.layout.time, run.t[k]));
+            if let Some(part) = joint {
+                extend(&mut values, &part.positions, &run.q[k]);
+                extend(&mut values, &part.torques, &run.torque[k]);
+            }
+            if let Some(part) = actuator {
+                extend(&mut values, &part.positions, &run.x[k]);
+                extend(&mut values, &part.torques, &run.volts[k]);
+                let status = run.status[k].iter().take(run.coordinates.len());
+                values.extend(status.map(|s| f64::from(s.code())));
+            }
+            let warm = self.warm.iter();
+            values.extend(warm.filter_map(|j| self.temperatures.at(*j, run.t[k])));
+        }
+        values
+    }
+}
+
+/// The parts of a layout that read joint channels, and motor channels.
+fn parts(layout: &Layout) -> (Option<&Layout>, Option<&Layout>) {
+    match layout.channels {
+        DeclaredChannels::Joint => (Some(layout), layout.otherwise.as_deref()),
+        DeclaredChannels::Actuator => (None, Some(layout)),
+    }
+}
+
+fn extend(values: &mut Vec<f64>, channels: &[Channel], numbers: &[f64]) {
+    values.extend(
+        channels
+            .iter()
+            .zip(numbers)
+            .map(|(channel, x)| logged(channel, *x)),
+    );
+}
+
+/// The number that the channel shows for an SI value.
+fn logged(channel: &Channel, value: f64) -> f64 {
+    (value - channel.offset) / channel.factor
+}

@@ -1,0 +1,5 @@
+//! One value (verdict, tables, figures, notes) as terminal text, page and JSON.
+
+#![forbid(unsafe_code)]
+
+pub mod report;

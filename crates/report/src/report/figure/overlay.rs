@@ -1,0 +1,185 @@
+//! Friction curves of two models over each other, joint by joint.
+
+use super::axis;
+use super::cell::{self, Cells};
+use super::colour;
+use super::friction::{band, lines, runs, spread};
+use super::joint_grid::{self, Heading};
+use super::legend::Key;
+use super::panel::Panel;
+use super::svg::{Anchor, Stroke, Svg, Type, fitted};
+use cft_ident_core::friction::estimate::FrictionCurvePoint;
+
+/// The friction of one joint by two models.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverlayPanel {
+    /// Name of the joint.
+    pub joint: String,
+    /// `m/s` or `rad/s`.
+    pub speed_unit: String,
+    /// `N` or `Nm`.
+    pub torque_unit: String,
+    /// Both curves in order of `v`; a point that is not finite splits one, and a model without
+    /// friction there has none.
+    pub curves: [Vec<FrictionCurvePoint>; 2],
+    /// Velocity and friction along the logs, of a model whose effects make its friction differ from a
+    /// curve over velocity; it has no curve then.
+    pub clouds: [Vec<[f64; 2]>; 2],
+}
+
+/// A figure of one panel per joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverlayFigure {
+    /// Heading.
+    pub title: String,
+    /// What the legend calls the two models.
+    pub names: [String; 2],
+    /// The joints in reading order.
+    pub panels: Vec<OverlayPanel>,
+}
+
+/// Room for one name in the legend [px].
+const LABEL: f64 = 250.0;
+/// Height of a panel by itself [px], and most rows of a cloud.
+const ALONE: f64 = 180.0;
+const ROWS: usize = 500;
+
+/// Told apart by dashes as well as by colour.
+const STROKES: [Stroke; 2] = [
+    Stroke::solid(colour::BLUE, 1.8),
+    Stroke::dashed(colour::VERMILLION, 1.6, "7 3"),
+];
+
+impl OverlayFigure {
+    /// The panels as pictures of their own.
+    pub fn cells(&self) -> Cells {
+        let picture = |panel: &OverlayPanel| {
+            let title = format!("friction of {}", panel.joint);
+            let told = format!("{title} by {} and {}", self.names[0], self.names[1]);
+            cell::cell(&title, &told, ALONE, |svg, frame| panel.draw(svg, frame))
+        };
+        let keys = STROKES.iter().zip(&self.names);
+        let keys: Vec<(Key, &str)> = keys
+            .map(|(stroke, name)| (Key::Band(*stroke), name.as_str()))
+            .collect();
+        Cells {
+            title: self.title.clone(),
+            key: cell::key(&keys),
+            pictures: self.panels.iter().map(picture).collect(),
+            apart: true,
+            words: Vec::new(),
+        }
+    }
+
+    /// The figure as an SVG document.
+    pub fn svg(&self) -> String {
+        let joints: Vec<&str> = self.panels.iter().map(|p| p.joint.as_str()).collect();
+        let description = format!(
+            "Friction torque over velocity by two models with 95 % bands, joints {}",
+            joints.join(", ")
+        );
+        let names = self.names.each_ref().map(|name| fitted(name, 11.0, LABEL));
+        let keys = STROKES.map(Key::Band);
+        let heading = Heading {
+            title: &self.title,
+            description: &description,
+            legend: &[(keys[0], names[0].as_str()), (keys[1], names[1].as_str())],
+        };
+        joint_grid::draw(&heading, &self.panels, OverlayPanel::draw)
+    }
+}
+
+impl OverlayPanel {
+    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+        let [left, top, ..] = frame;
+        let style = Type::new(11.5, Anchor::Start);
+        svg.heading([left, top - 7.0], &self.joint, "", style);
+        let points = || self.curves.iter().flatten();
+        let rows = || self.clouds.iter().flatten();
+        let speeds = axis::interval(points().map(|p| p.v).chain(rows().map(|r| r[0])), 0.03);
+        let torques = points().flat_map(spread).chain(rows().map(|r| r[1]));
+        let torques = axis::interval(torques, 0.06);
+        let (Some(speeds), Some(torques)) = (speeds, torques) else {
+            Panel::empty(svg, frame, "no friction in either model");
+            return;
+        };
+        let panel = Panel::new(frame, speeds, torques, [4, 6]);
+        panel.grid(svg);
+        svg.clip(frame);
+        for (curve, stroke) in self.curves.iter().zip(STROKES) {
+            for run in runs(curve, |point| point.std.is_finite()) {
+                svg.area(&band(&panel, &run), stroke.colour, 0.18);
+            }
+        }
+        for (cloud, stroke) in self.clouds.iter().zip(STROKES) {
+            let every = cloud.len().div_ceil(ROWS).max(1);
+            let shown = cloud.iter().step_by(every);
+            for [v, torque] in shown.filter(|row| row.iter().all(|x| x.is_finite())) {
+                svg.dot([panel.x.px(*v), panel.y.px(*torque)], 1.3, stroke.colour);
+            }
+        }
+        for (curve, stroke) in self.curves.iter().zip(STROKES) {
+            svg.curve(&panel.place(lines(curve, |_, _| true)), stroke);
+        }
+        svg.end_clip();
+        panel.outline(svg);
+        panel.x_numbers(svg);
+        panel.x_title(svg, "velocity", &self.speed_unit);
+        panel.y_title(svg, 46.0, "friction", &self.torque_unit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(height: f64, std: f64) -> Vec<FrictionCurvePoint> {
+        [-1.0, -0.5, 0.5, 1.0]
+            .map(|v: f64| FrictionCurvePoint {
+                v,
+                torque: height * v.signum(),
+                std,
+            })
+            .to_vec()
+    }
+
+    fn figure(curves: [Vec<FrictionCurvePoint>; 2]) -> OverlayFigure {
+        OverlayFigure {
+            title: "t".into(),
+            names: ["A: first.toml".into(), "B: second.toml".into()],
+            panels: vec![OverlayPanel {
+                joint: "q1".into(),
+                speed_unit: "m/s".into(),
+                torque_unit: "N".into(),
+                curves,
+                clouds: [Vec::new(), vec![[0.3, 1.5], [0.4, f64::NAN]]],
+            }],
+        }
+    }
+
+    #[test]
+    fn both_curves_are_drawn_and_named() {
+        let svg = figure([curve(1.0, 0.1), curve(2.0, 0.1)]).svg();
+        for part in [
+            "first.toml",
+            "second.toml",
+            STROKES[0].colour,
+            STROKES[1].colour,
+        ] {
+            assert!(svg.contains(part), "{part}");
+        }
+        assert!(svg.contains("stroke-dasharray"));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_never_reach_the_picture() {
+        let svg = figure([curve(f64::NAN, 0.1), curve(1.0, f64::NAN)]).svg();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        let cloud = figure([Vec::new(), Vec::new()]);
+        assert_eq!(cloud.cells().pictures[0].matches("<circle").count(), 1);
+        let mut none = cloud;
+        none.panels[0].clouds[1].clear();
+        let none = none.svg();
+        assert!(none.contains("no friction in either model"));
+    }
+}

@@ -1,0 +1,259 @@
+//! What a residual depends on, before and after: over position, velocity, load and time, forward and
+//! backward apart, and its spectra over order and frequency.
+
+use super::axis;
+use super::cell::{self, Cells};
+use super::colour;
+use super::decimate::decimated;
+use super::legend::{self, Key};
+use super::panel::Panel;
+use super::svg::{Anchor, Stroke, Svg, Type, fitted, width_of};
+use cft_ident_core::number;
+
+/// One panel: a quantity below, and lines before and after.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualPanel {
+    /// What stands below, and its unit.
+    pub over: (String, String),
+    /// What stands at the left, and its unit.
+    pub of: (String, String),
+    /// Lines of (x, y); a y that is not finite parts a line.
+    pub lines: Vec<(When, Vec<[f64; 2]>)>,
+    /// Places below that are marked, with what stands there.
+    pub marks: Vec<(f64, String)>,
+}
+
+/// Which line it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    Before,
+    /// Before, of backward motion.
+    BeforeBackward,
+    After,
+    /// After, of backward motion.
+    AfterBackward,
+}
+
+/// Panels of every joint, three in a row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualFigure {
+    pub title: String,
+    pub joints: Vec<(String, Vec<ResidualPanel>)>,
+}
+
+const WIDTH: f64 = 860.0;
+const LEFT: f64 = 62.0;
+const RIGHT: f64 = 10.0;
+const HEAD: f64 = 58.0;
+const NAME: f64 = 22.0;
+const PLOT: f64 = 118.0;
+const NUMBERS: f64 = 42.0;
+const COLUMNS: usize = 3;
+const POINTS: usize = 500;
+
+impl When {
+    fn stroke(self) -> Stroke {
+        match self {
+            When::Before => Stroke::solid(colour::VERMILLION, 1.1),
+            When::BeforeBackward => Stroke::dashed(colour::VERMILLION, 1.1, "4 3"),
+            When::After => Stroke::solid(colour::BLUE, 1.4),
+            When::AfterBackward => Stroke::dashed(colour::BLUE, 1.4, "4 3"),
+        }
+    }
+}
+
+impl ResidualFigure {
+    /// The figure as an SVG document.
+    pub fn svg(&self) -> String {
+        let rows = |panels: usize| panels.div_ceil(COLUMNS) as f64;
+        let height: f64 = HEAD
+            + self
+                .joints
+                .iter()
+                .map(|(_, p)| NAME + rows(p.len()) * (PLOT + NUMBERS))
+                .sum::<f64>();
+        let names: Vec<&str> = self.joints.iter().map(|(name, _)| name.as_str()).collect();
+        let description = format!(
+            "Torque residual over position, velocity, load, time, order and frequency, joints {}",
+            names.join(", ")
+        );
+        let mut svg = Svg::new(WIDTH, height, &self.title, &description);
+        svg.text(
+            [LEFT, 22.0],
+            &fitted(&self.title, 15.0, WIDTH - LEFT - RIGHT),
+            Type::new(14.0, Anchor::Start).bold(),
+        );
+        let entries = self.entries();
+        legend::draw(&mut svg, [LEFT, 44.0], &entries);
+        let column = WIDTH / COLUMNS as f64;
+        let mut top = HEAD;
+        for (name, panels) in &self.joints {
+            svg.heading([LEFT, top + 13.0], name, "", Type::new(11.5, Anchor::Start));
+            for (i, panel) in panels.iter().enumerate() {
+                let (row, at) = (i / COLUMNS, i % COLUMNS);
+                let frame = [
+                    column * at as f64 + LEFT,
+                    top + NAME + row as f64 * (PLOT + NUMBERS),
+                    column - LEFT - RIGHT,
+                    PLOT,
+                ];
+                panel.draw(&mut svg, frame);
+            }
+            top += NAME + rows(panels.len()) * (PLOT + NUMBERS);
+        }
+        svg.finish()
+    }
+
+    /// The panels as pictures of their own, joint by joint.
+    pub fn cells(&self) -> Vec<Cells> {
+        let entries = self.entries();
+        let of_joint = |(name, panels): &(String, Vec<ResidualPanel>)| {
+            let picture = |panel: &ResidualPanel| {
+                let title = format!("residual of {name} over {}", panel.over.0);
+                cell::nameless(&title, &panel.words(name), PLOT, |svg, frame| {
+                    panel.draw(svg, frame)
+                })
+            };
+            Cells {
+                title: format!("{}, {name}", self.title),
+                key: cell::key(&entries),
+                pictures: panels.iter().map(picture).collect(),
+                apart: false,
+                words: Vec::new(),
+            }
+        };
+        self.joints.iter().map(of_joint).collect()
+    }
+
+    /// Only what is drawn is in the legend; a residual that nothing came after is not `before`.
+    fn entries(&self) -> Vec<(Key, &'static str)> {
+        let drawn = |when: When| {
+            let mut panels = self.joints.iter().flat_map(|(_, panels)| panels);
+            panels.any(|panel| panel.lines.iter().any(|(w, _)| *w == when))
+        };
+        let alone = !drawn(When::After) && !drawn(When::AfterBackward);
+        let names = [
+            (When::Before, ["as given", "residual"]),
+            (
+                When::BeforeBackward,
+                ["as given, backward", "residual, backward"],
+            ),
+            (When::After, ["after", ""]),
+            (When::AfterBackward, ["after, backward", ""]),
+        ];
+        let there = names.into_iter().filter(|(when, _)| drawn(*when));
+        there
+            .map(|(when, names)| (Key::Line(when.stroke()), names[usize::from(alone)]))
+            .collect()
+    }
+}
+
+impl ResidualPanel {
+    /// What a screen reader says: the greatest of each line.
+    fn words(&self, joint: &str) -> String {
+        let most = |wanted: [When; 2]| {
+            let lines = self.lines.iter().filter(|(when, _)| wanted.contains(when));
+            let values = lines.flat_map(|(_, line)| line.iter().map(|p| p[1].abs()));
+            values.filter(|y| y.is_finite()).reduce(f64::max)
+        };
+        let told = |x: f64| format!("{} {}", number::significant(x, 3), self.of.1);
+        let before = most([When::Before, When::BeforeBackward]);
+        let after = most([When::After, When::AfterBackward]);
+        let (what, over) = (&self.of.0, &self.over.0);
+        match (before, after) {
+            (Some(before), Some(after)) => format!(
+                "greatest {what} of {joint} over {over}: {} as given, {} after",
+                told(before),
+                told(after)
+            ),
+            (Some(only), None) | (None, Some(only)) => {
+                format!("greatest {what} of {joint} over {over}: {}", told(only))
+            }
+            (None, None) => format!("not enough motion of {joint} to tell"),
+        }
+    }
+
+    fn draw(&self, svg: &mut Svg, frame: [f64; 4]) {
+        let points = || self.lines.iter().flat_map(|(_, line)| line);
+        let finite = |v: &f64| v.is_finite();
+        let x = axis::interval(points().map(|p| p[0]).filter(finite), 0.0);
+        let y = axis::interval(points().map(|p| p[1]).filter(finite), 0.06);
+        let (Some(x), Some(y)) = (x, y) else {
+            Panel::empty(svg, frame, "not enough motion");
+            return;
+        };
+        let panel = Panel::new(frame, x, y, [4, 4]);
+        panel.grid(svg);
+        svg.clip(frame);
+        for (when, line) in &self.lines {
+            let (x, y): (Vec<f64>, Vec<f64>) = line.iter().map(|p| (p[0], p[1])).unzip();
+            svg.curve(&panel.place(decimated(&x, &y, POINTS)), when.stroke());
+        }
+        svg.end_clip();
+        self.mark(svg, &panel);
+        panel.outline(svg);
+        panel.y_title(svg, 46.0, &self.of.0, &self.of.1);
+        panel.x_numbers(svg);
+        panel.x_title(svg, &self.over.0, &self.over.1);
+    }
+}
+
+impl ResidualPanel {
+    /// Marks, with their names above the frame where these do not meet.
+    fn mark(&self, svg: &mut Svg, panel: &Panel) {
+        let [_, top, _, height] = panel.frame;
+        let mut marks: Vec<&(f64, String)> = self.marks.iter().collect();
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free = f64::NEG_INFINITY;
+        let within = |x: f64| panel.x.from <= x && x <= panel.x.to;
+        for (x, name) in marks.into_iter().filter(|(x, _)| within(*x)) {
+            let at = panel.x.px(*x);
+            let line = Stroke::dashed(colour::INK, 0.9, "2 2");
+            svg.line([at, top], [at, top + height], line);
+            let half = 0.5 * width_of(name, 10.0) + 2.0;
+            if at - half > free {
+                svg.text([at, top - 3.0], name, Type::new(10.0, Anchor::Middle));
+                free = at + half;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_both_kinds_are_drawn_and_an_empty_panel_says_so() {
+        let panel = |line: Vec<[f64; 2]>| ResidualPanel {
+            over: ("velocity".into(), "rad/s".into()),
+            of: ("residual".into(), "Nm".into()),
+            lines: vec![(When::Before, line.clone()), (When::AfterBackward, line)],
+            marks: vec![(1.0, "1.00".into()), (9.0, "9.00".into())],
+        };
+        let figure = ResidualFigure {
+            title: "a<b".into(),
+            joints: vec![(
+                "q<1".into(),
+                vec![
+                    panel(vec![[0.0, 1.0], [1.0, 2.0], [2.0, 1.5]]),
+                    panel(vec![]),
+                ],
+            )],
+        };
+        let svg = figure.svg();
+        assert!(svg.contains("velocity [rad/s]") && svg.contains("residual [Nm]"));
+        assert!(svg.contains("not enough motion"));
+        assert!(svg.contains("q&lt;1") && !svg.contains("NaN"));
+        // what lies beyond the axis is not marked
+        assert!(svg.contains(">1.00</text>") && !svg.contains(">9.00</text>"));
+        let cells = figure.cells();
+        assert_eq!(cells[0].pictures.len(), 2);
+        let told = "greatest residual of q&lt;1 over velocity: 2.00 Nm as given, 2.00 Nm after";
+        assert!(
+            cells[0].pictures[0].contains(told),
+            "{}",
+            cells[0].pictures[0]
+        );
+    }
+}

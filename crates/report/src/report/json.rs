@@ -1,0 +1,242 @@
+//! The JSON document of a command: the envelope that all of them share.
+//!
+//! `{"schema": "cft-ident/<command>/1", "version", "inputs": [..], "warnings": [..], ...}`, followed
+//! by the fields of the command's own result. Numbers that are not finite become null, since JSON
+//! has no other word for them. Nothing of the moment (clock, duration, threads, absolute path)
+//! belongs in it.
+
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use thiserror::Error;
+
+use cft_ident_logs::log::Provenance;
+
+/// What a document may not be made from.
+#[derive(Debug, Error)]
+pub enum JsonError {
+    /// The result is not an object with named fields.
+    #[error("the result of `{command}` is {found}, and a document needs named fields")]
+    NotAnObject {
+        command: String,
+        found: &'static str,
+    },
+    /// The result repeats a field of the envelope.
+    #[error("the result of `{command}` has a field `{field}` of its own, which the envelope holds")]
+    FieldTaken { command: String, field: String },
+    /// The result cannot be expressed in JSON.
+    #[error("the result of `{command}` cannot be expressed in JSON: {source}")]
+    Serialize {
+        command: String,
+        source: serde_json::Error,
+    },
+}
+
+/// A complete document, ready to be printed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Document {
+    fields: Map<String, Value>,
+}
+
+impl Document {
+    /// The document of `command` (`"friction"`, ...) around the fields of `result`.
+    ///
+    /// # Errors
+    /// When `result` is no object, repeats a field of the envelope, or cannot be expressed in JSON.
+    pub fn new<T: Serialize>(
+        command: &str,
+        inputs: &[Provenance],
+        warnings: &[String],
+        result: &T,
+    ) -> Result<Self, JsonError> {
+        let value = |result: serde_json::Result<Value>| {
+            result.map_err(|source| JsonError::Serialize {
+                command: command.to_owned(),
+                source,
+            })
+        };
+        let mut fields = Map::new();
+        fields.insert("schema".into(), format!("cft-ident/{command}/1").into());
+        fields.insert("version".into(), env!("CARGO_PKG_VERSION").into());
+        fields.insert("inputs".into(), value(serde_json::to_value(inputs))?);
+        fields.insert("warnings".into(), warnings.into());
+        let found = match value(serde_json::to_value(result))? {
+            Value::Object(own) => {
+                for (field, value) in own {
+                    if fields.contains_key(&field) {
+                        let command = command.to_owned();
+                        return Err(JsonError::FieldTaken { command, field });
+                    }
+                    fields.insert(field, value);
+                }
+                return Ok(Document { fields });
+            }
+            Value::Null => "null",
+            Value::Bool(_) => "a truth value",
+            Value::Number(_) => "a number",
+            Value::String(_) => "a text",
+            Value::Array(_) => "a list",
+        };
+        Err(JsonError::NotAnObject {
+            command: command.to_owned(),
+            found,
+        })
+    }
+
+    /// The warnings in it.
+    pub fn warnings(&self) -> impl Iterator<Item = &str> {
+        self.fields
+            .get("warnings")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_str)
+    }
+
+    /// Puts further warnings before those that are in it; none stands there twice.
+    pub fn warn_first(&mut self, further: Vec<String>) {
+        let own: Vec<String> = self.warnings().map(str::to_owned).collect();
+        let mut all = further;
+        all.retain(|text| !own.contains(text));
+        all.extend(own);
+        self.fields.insert("warnings".into(), all.into());
+    }
+
+    /// The fields, the envelope's first.
+    pub fn fields(&self) -> &Map<String, Value> {
+        &self.fields
+    }
+
+    /// The text of the document, indented, with a line end.
+    pub fn text(&self) -> String {
+        // `Value`'s alternate form is the indented one; it cannot fail, keys are strings already.
+        format!("{:#}\n", Value::Object(self.fields.clone()))
+    }
+}
+
+/// The schema of a command's document around a result of type `T`: the fields that a script may rely on.
+/// A document may hold others.
+pub fn schema<T: JsonSchema>(command: &str) -> Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut generator = settings.into_generator();
+    let inputs = generator.subschema_for::<Vec<Provenance>>();
+    let mut found = Value::from(generator.into_root_schema_for::<T>());
+    found["title"] = format!("JSON document of `cft-ident {command}`").into();
+    let mut properties = Map::new();
+    let version = format!("cft-ident/{command}/1");
+    properties.insert("schema".into(), json!({ "const": version }));
+    properties.insert("version".into(), json!({"type": "string"}));
+    properties.insert("inputs".into(), inputs.into());
+    let texts = json!({"type": "array", "items": {"type": "string"}});
+    properties.insert("warnings".into(), texts);
+    let mut required: Vec<Value> = properties.keys().map(|name| json!(name)).collect();
+    if let Some(Value::Object(own)) = found.get_mut("properties").map(Value::take) {
+        properties.extend(own);
+    }
+    if let Some(Value::Array(own)) = found.get_mut("required").map(Value::take) {
+        required.extend(own);
+    }
+    found["properties"] = properties.into();
+    found["required"] = required.into();
+    with_null(&mut found);
+    found
+}
+
+/// A number that is not finite becomes null, so every number of a schema may be null.
+fn with_null(schema: &mut Value) {
+    match schema {
+        Value::Object(fields) => {
+            if fields.get("type").is_some_and(|kind| kind == "number") {
+                fields.insert("type".into(), json!(["number", "null"]));
+            }
+            fields.values_mut().for_each(with_null);
+        }
+        Value::Array(items) => items.iter_mut().for_each(with_null),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input() -> Provenance {
+        Provenance {
+            role: None,
+            name: "q4.csv".into(),
+            span: Some("0..70%".into()),
+            sha256: "00ff".into(),
+            samples: 14_000,
+            duration_s: 14.0,
+        }
+    }
+
+    #[test]
+    fn the_envelope_comes_first_and_the_result_follows_in_its_order() {
+        let result = json!({"joints": [], "condition": {"raw": 2.5}});
+        let document = Document::new("lsq", &[input()], &["a gap".into()], &result).unwrap();
+        let keys: Vec<_> = document.fields().keys().map(String::as_str).collect();
+        let expected = [
+            "schema",
+            "version",
+            "inputs",
+            "warnings",
+            "joints",
+            "condition",
+        ];
+        assert_eq!(keys, expected);
+        let back: Value = serde_json::from_str(&document.text()).unwrap();
+        assert_eq!(back["schema"], "cft-ident/lsq/1");
+        assert_eq!(back["version"], env!("CARGO_PKG_VERSION"));
+        assert_eq!(back["inputs"][0]["samples"], 14_000);
+        assert_eq!(document.warnings().collect::<Vec<_>>(), ["a gap"]);
+        assert!(document.text().ends_with("}\n"));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_become_null() {
+        #[derive(Serialize)]
+        struct Odd {
+            value: f64,
+            list: Vec<f64>,
+        }
+        let odd = Odd {
+            value: f64::NAN,
+            list: vec![f64::INFINITY, 0.1 + 0.2, f64::NEG_INFINITY],
+        };
+        let document = Document::new("friction", &[], &[], &odd).unwrap();
+        let back: Value = serde_json::from_str(&document.text()).unwrap();
+        assert_eq!(back["value"], Value::Null);
+        assert_eq!(back["list"], json!([null, 0.30000000000000004, null]));
+    }
+
+    #[test]
+    fn a_schema_has_the_envelope_and_the_fields_of_the_result() {
+        /// Any.
+        #[derive(Serialize, JsonSchema)]
+        struct Fitted {
+            /// Root mean square [N].
+            rmse: f64,
+            std: Option<f64>,
+            joints: Vec<String>,
+        }
+        let schema = schema::<Fitted>("lsq");
+        let required = [
+            "schema", "version", "inputs", "warnings", "rmse", "std", "joints",
+        ];
+        assert_eq!(schema["required"], json!(required));
+        assert_eq!(schema["properties"]["schema"]["const"], "cft-ident/lsq/1");
+        let rmse = &schema["properties"]["rmse"];
+        assert_eq!(rmse["type"], json!(["number", "null"]));
+        assert_eq!(rmse["description"], "Root mean square [N].");
+    }
+
+    #[test]
+    fn a_result_without_fields_or_with_fields_of_the_envelope_is_refused() {
+        let list = Document::new("lsq", &[], &[], &json!([1, 2]));
+        assert!(matches!(list, Err(JsonError::NotAnObject { found, .. }) if found == "a list"));
+        let twice = Document::new("lsq", &[], &[], &json!({"version": 3}));
+        assert!(matches!(twice, Err(JsonError::FieldTaken { field, .. }) if field == "version"));
+    }
+}

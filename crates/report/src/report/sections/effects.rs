@@ -1,0 +1,53 @@
+//! One card per effect that was added: what it is, the residual without it over the signal on which it depends with
+//! the torque that it adds, what is left with it, and what to do about it.
+
+use crate::report::Writer;
+use crate::report::figure::EffectFigure;
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::number::{self, MILLIMETRES};
+use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::replay::EffectRows;
+
+/// The card of an effect of `model` with what is said of it besides, over logs that are called `data`.
+pub fn card(
+    page: &mut Writer,
+    (machine, model): (&LoggedRobot, &AugmentedModel),
+    of: &EffectRows,
+    said: Vec<String>,
+    data: &str,
+) {
+    let effect = &model.effects[of.effect];
+    let robot = &machine.robot;
+    let joint = &robot.joint_names()[of.joint];
+    let unit = machine.file.torque_unit(of.joint);
+    let own = machine.file.torque_unit(effect.place.joint().unwrap_or(0));
+    let [without, with] = of
+        .rms
+        .map(|rms| format!("{} {unit}", number::significant(rms, 3)));
+    let torque = if unit == "N" { "force" } else { "torque" };
+    let told = format!(
+        "The residual of {joint} on {data} is {without} rms with this {torque} left out and the rest as it is, and {with} with it."
+    );
+    let small = of.over.1 == "m" && of.rows.iter().all(|row| row[0].abs() < MILLIMETRES);
+    let (scale, over) = match small {
+        true => (1e3, (of.over.0.clone(), "mm".to_owned())),
+        false => (1.0, of.over.clone()),
+    };
+    let along = match of.along_motion {
+        true => ", along the motion",
+        false => "",
+    };
+    let figure = EffectFigure {
+        title: effect.said_and_named(robot, own),
+        told: told.clone(),
+        over,
+        of: (format!("{torque}{along}"), unit.to_owned()),
+        rows: (of.rows.iter())
+            .map(|[x, without, added]| [scale * x, *without, *added])
+            .collect(),
+    };
+    let mut words = vec![told];
+    words.push(format!("What to do: {}.", effect.law.entry.remedy));
+    words.extend(said);
+    page.figures(&figure.cells(words));
+}

@@ -1,0 +1,145 @@
+//! What the logs hold and what is wrong with them.
+
+use crate::report::Writer;
+use cft_ident_core::number;
+use cft_ident_logs::inspect::{Findings, Severity};
+use cft_ident_logs::log::escape;
+
+/// Faults that are told; a log with more of them has one cause.
+const MOST: usize = 30;
+
+/// Cells of a fault's row that may differ where the fault is the same.
+const CHANNEL: usize = 3;
+const SPAN: usize = 4;
+
+/// Whether two rows are of one fault, on other channels or in other spans.
+fn alike(a: &[String], b: &[String]) -> bool {
+    let mut cells = a.iter().zip(b).enumerate();
+    cells.all(|(cell, (a, b))| a == b || cell == CHANNEL || cell == SPAN)
+}
+
+/// Adds an entry to a list in a cell, once.
+fn also(cell: &mut String, entry: &str) {
+    if !cell.split(", ").any(|known| known == entry) {
+        *cell += &format!(", {entry}");
+    }
+}
+
+/// A log as it was found, or why it could not be inspected.
+pub struct Inspected {
+    /// Name of the log.
+    pub name: String,
+    pub found: Result<Findings, String>,
+}
+
+/// The section: every log once, and its faults, the worst first.
+pub fn section(page: &mut Writer, logs: &[Inspected], warnings: &[String]) {
+    page.heading("Data quality");
+    let (mut rows, mut faults) = (Vec::new(), Vec::<Vec<String>>::new());
+    let mut hidden = 0;
+    for log in logs {
+        let name = escape(&log.name);
+        let found = match &log.found {
+            Ok(found) => found,
+            Err(reason) => {
+                page.paragraph(&format!("{name} was not inspected: {reason}"));
+                continue;
+            }
+        };
+        let count = |severity| found.of(severity).count().to_string();
+        let absent = f64::NAN;
+        rows.push(vec![
+            name.clone(),
+            found.rows.to_string(),
+            number::significant(found.duration_s, 5),
+            number::significant(found.rate_hz.unwrap_or(absent), 5),
+            number::percent(found.jitter.unwrap_or(absent)),
+            found.gaps.len().to_string(),
+            count(Severity::Error),
+            count(Severity::Warning),
+            count(Severity::Info),
+        ]);
+        for fault in &found.faults {
+            let row = vec![
+                name.clone(),
+                fault.severity.word().to_owned(),
+                fault.kind.word().to_owned(),
+                fault.channel.as_deref().map(escape).unwrap_or_default(),
+                format!("{} s", fault.span()),
+                fault.effect.clone(),
+                fault.remedy.clone(),
+            ];
+            if let Some(known) = faults.iter_mut().find(|known| alike(known, &row)) {
+                for cell in [CHANNEL, SPAN] {
+                    also(&mut known[cell], &row[cell]);
+                }
+            } else if faults.len() == MOST {
+                hidden += 1;
+            } else {
+                faults.push(row);
+            }
+        }
+    }
+    page.rows(
+        "logs",
+        &[
+            "log",
+            "rows",
+            "duration [s]",
+            "rate [Hz]",
+            "jitter",
+            "gaps",
+            "errors",
+            "warnings",
+            "notes",
+        ],
+        rows,
+    );
+    match faults.is_empty() {
+        true => page.paragraph("No fault was found in the logs."),
+        false => page.rows(
+            "faults, the worst of each log first",
+            &[
+                "log",
+                "severity",
+                "fault",
+                "channel",
+                "when",
+                "what it is",
+                "remedy",
+            ],
+            faults,
+        ),
+    }
+    if hidden > 0 {
+        page.paragraph(&format!("`cft-ident inspect` lists {hidden} more."));
+    }
+    if !warnings.is_empty() {
+        page.paragraph("Warnings of this run:");
+        page.list(warnings);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_fault_on_several_channels_is_one_row() {
+        let row = |channel: &str, effect: &str| -> Vec<String> {
+            [
+                "a.csv", "info", "kind", channel, "0..1 s", effect, "mend it",
+            ]
+            .map(String::from)
+            .to_vec()
+        };
+        let (mut first, second) = (row("q1", "noise"), row("q2", "noise"));
+        assert!(alike(&first, &second) && !alike(&first, &row("q1", "gap")));
+        also(&mut first[CHANNEL], &second[CHANNEL]);
+        also(&mut first[SPAN], &second[SPAN]);
+        assert_eq!(
+            (first[CHANNEL].as_str(), first[SPAN].as_str()),
+            ("q1, q2", "0..1 s")
+        );
+    }
+}

@@ -1,0 +1,144 @@
+//! Measured and reconstructed torque over time, and how far they are apart.
+
+use crate::report::figure::{JointTorque, TorqueFigure};
+use crate::report::{Trace, TraceLine, TracePanel, TraceStyle, Traces, Writer};
+use cft_ident_core::number;
+use cft_ident_stages::identify::LoggedRobot;
+use cft_ident_stages::replay::{JointSeries, TorqueSeries};
+
+/// How the torque of a model is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawn {
+    /// Name of its torque, and of its residual.
+    pub names: [&'static str; 2],
+    pub styles: [TraceStyle; 2],
+}
+
+/// The only model.
+pub const ONLY: Drawn = Drawn {
+    names: ["reconstructed", "measured \u{2212} reconstructed"],
+    styles: [TraceStyle::Model, TraceStyle::Residual],
+};
+
+/// Torques of logs by models that are drawn so.
+fn traces(machine: &LoggedRobot, of: &[TorqueSeries], models: &[Drawn]) -> Traces {
+    // each log in two forms
+    let several = of.len() > 2;
+    let traces = of.iter().map(|series| {
+        let what = match series.cutoff_hz {
+            Some(cutoff) => format!(
+                "below {} Hz, as in the errors",
+                number::significant(cutoff, 3)
+            ),
+            None => "as logged, every sample".to_owned(),
+        };
+        let name = match several {
+            true => format!("{}: {what}", series.log),
+            false => what,
+        };
+        trace(machine, series, models, name)
+    });
+    Traces {
+        label: "Measured and reconstructed torque over time".into(),
+        traces: traces.collect(),
+    }
+}
+
+fn trace(machine: &LoggedRobot, of: &TorqueSeries, models: &[Drawn], name: String) -> Trace {
+    let mut panels = Vec::new();
+    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    for (j, (joint, series)) in joints.enumerate() {
+        let unit = machine.file.torque_unit(j).to_owned();
+        let mut lines = vec![TraceLine {
+            name: "measured".into(),
+            style: TraceStyle::Measured,
+            values: series.measured.clone(),
+        }];
+        let mut differences = Vec::new();
+        for (drawn, hat) in models.iter().zip(&series.reconstructed) {
+            lines.push(TraceLine {
+                name: drawn.names[0].into(),
+                style: drawn.styles[0],
+                values: hat.clone(),
+            });
+            let apart = series.measured.iter().zip(hat);
+            differences.push(TraceLine {
+                name: drawn.names[1].into(),
+                style: drawn.styles[1],
+                values: apart.map(|(a, b)| a - b).collect(),
+            });
+        }
+        let quantity = if unit == "N" { "force" } else { "torque" };
+        let panel = |small, name: &str, quantity: &str, lines| TracePanel {
+            name: name.to_owned(),
+            quantity: quantity.to_owned(),
+            unit: unit.clone(),
+            small,
+            limits: None,
+            lines,
+        };
+        panels.push(panel(false, joint, quantity, lines));
+        panels.push(panel(true, "", "residual", differences));
+    }
+    Trace {
+        name,
+        t: of.t.clone(),
+        breaks: of.breaks.clone(),
+        panels,
+    }
+}
+
+/// The still picture of a log, by the last of its models.
+fn still(machine: &LoggedRobot, of: &TorqueSeries, title: &str) -> TorqueFigure {
+    let whole = |values: &[f64]| -> Vec<f64> {
+        let mut out = Vec::with_capacity(values.len() + of.breaks.len());
+        for (k, v) in values.iter().enumerate() {
+            if k > 0 && of.breaks.contains(&k) {
+                // a row that is not finite parts the lines at a gap
+                out.push(f64::NAN);
+            }
+            out.push(*v);
+        }
+        out
+    };
+    let joint = |(j, (name, series)): (usize, (&String, &JointSeries))| {
+        Some(JointTorque {
+            joint: name.clone(),
+            unit: machine.file.torque_unit(j).to_owned(),
+            t: whole(&of.t),
+            measured: whole(&series.measured),
+            reconstructed: whole(series.reconstructed.last()?),
+            relative_error: series.relative_error,
+            rmse: series.rmse,
+        })
+    };
+    let joints = machine.robot.joint_names().iter().zip(&of.joints);
+    TorqueFigure {
+        title: title.to_owned(),
+        joints: joints.enumerate().filter_map(joint).collect(),
+    }
+}
+
+/// The section.
+pub fn section(
+    page: &mut Writer,
+    machine: &LoggedRobot,
+    of: &[TorqueSeries],
+    models: &[Drawn],
+    title: &str,
+) {
+    page.heading("Torque, measured and reconstructed");
+    let figure = of.first().map_or(String::new(), |first| {
+        // without a script, and in print, one log stands for all
+        let title = match of.len() > 2 {
+            true => format!("{}, the first of {} logs", first.log, of.len() / 2),
+            false => title.to_owned(),
+        };
+        let title = match models {
+            [.., last] if models.len() > 1 => format!("{title}: {}", last.names[0]),
+            _ => title,
+        };
+        still(machine, first, &title).by_joint()
+    });
+    page.traces(&traces(machine, of, models), &figure);
+}

@@ -1,0 +1,68 @@
+//! What the page of a diagnosis shows first: errors per joint as bars, and the next thing to do.
+
+use crate::report::Writer;
+use crate::report::figure::{ErrorBar, ErrorFigure, JointBars};
+use cft_ident_core::diagnose::Errors;
+use cft_ident_stages::identify::{Diagnosed, LoggedRobot};
+
+/// Errors per joint as bars, and the next thing to do.
+pub fn show(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    page.figure(&bars(machine, found).svg());
+    page.paragraph(&next(machine, found));
+}
+
+/// Errors of every joint before and after: held-out ones where there are any.
+fn bars(machine: &LoggedRobot, found: &Diagnosed) -> ErrorFigure {
+    let d = &found.diagnosis;
+    let (data, errors) = match (&d.before.holdout, &d.after.holdout) {
+        (Some(before), Some(after)) => ("held-out data", [before, after]),
+        _ => ("the fitted data", [&d.before.train, &d.after.train]),
+    };
+    let bar = |errors: &Errors, j: usize| ErrorBar {
+        error: errors.joints[j].relative_error,
+        interval_95: Some(errors.joints[j].interval_95),
+    };
+    let joints = machine.robot.joint_names().iter().enumerate();
+    let joints = joints.map(|(j, joint)| JointBars {
+        joint: joint.clone(),
+        before: (!d.steps.is_empty()).then(|| bar(errors[0], j)),
+        after: bar(errors[1], j),
+    });
+    ErrorFigure {
+        title: format!("Relative torque error on {data}"),
+        names: ["as given", "after"],
+        joints: joints.collect(),
+        limit: None,
+    }
+}
+
+/// What to do next.
+pub fn next(machine: &LoggedRobot, found: &Diagnosed) -> String {
+    let d = &found.diagnosis;
+    let open = d.steps.iter().find(|step| !step.alternatives.is_empty());
+    if let Some(step) = open {
+        let effect = &d.model.effects[step.effect];
+        return format!(
+            "Next: {}. That separates {} from {}.",
+            effect.law.entry.separate_by,
+            effect.title(&machine.robot),
+            step.alternatives[0].effect.title(&machine.robot)
+        );
+    }
+    let share = |j: &usize| d.unexplained[*j].share;
+    let worst = d
+        .structured_joints()
+        .max_by(|a, b| share(a).total_cmp(&share(b)));
+    match worst {
+        Some(j) => format!(
+            "Next: look at the residual of {}, which has a pattern that no known effect explains, and \
+             log it at other speeds and loads.",
+            machine.robot.joint_names()[j]
+        ),
+        None if d.steps.is_empty() => {
+            "Next: use the model (`cft-ident torque`, `cft-ident export`).".to_owned()
+        }
+        None => "Next: try the refined model on a log of another motion (`cft-ident validate`)."
+            .to_owned(),
+    }
+}

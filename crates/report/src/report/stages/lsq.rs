@@ -1,0 +1,467 @@
+//! The report of `lsq`.
+
+use crate::report::sections::quality::{self, Inspected};
+use crate::report::sections::{fit, friction, parameters, provenance, residual, torque};
+use crate::report::table::{Align, Table, unbroken};
+use crate::report::{Report, Writer, summary};
+use cft_ident_core::math::descent::Ending;
+use cft_ident_core::number;
+use cft_ident_core::verdict::{IDENTIFIED, Verdict, WEAK};
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::{Provenance, escape};
+use cft_ident_stages::identify::{
+    Account, ConsistentLinks, FrictionOfFit, Gain, IdentifiedDynamics, JointAccount, LoggedRobot,
+    MotionFit,
+};
+use cft_ident_stages::replay::Replayed;
+
+/// What the report is made from.
+pub struct Lsq<'a> {
+    pub machine: &'a LoggedRobot,
+    pub found: &'a IdentifiedDynamics,
+    /// The model that was fitted.
+    pub file: &'a ModelFile,
+    /// Names of the logs.
+    pub logs: &'a [String],
+}
+
+/// Parameters that a screen has room for.
+const FEW: usize = 8;
+
+/// The verdict, the residual of the fit, the parameters and the quality of the fit.
+pub fn lsq(of: &Lsq) -> Report {
+    let names: Vec<String> = of.logs.iter().map(|name| escape(name)).collect();
+    let mut report = Report::new(&format!("Least squares fit to {}", names.join(", ")));
+    let (text, good) = parameters::tally(of.file);
+    let apart = far_off(of.found);
+    let good = good && apart.is_none();
+    let text = format!("{text}.{}", apart.unwrap_or_default());
+    report.everywhere().verdict(&text, good);
+    report.terminal().line("");
+    gains(&mut report.terminal(), &of.found.gains);
+    residuals(&mut report.terminal(), of.found);
+    let mut parameters = match of.found.unknowns.len() <= FEW {
+        true => report.terminal(),
+        false => report.detail(),
+    };
+    parameters.line("");
+    fitted(&mut parameters, of.found);
+    groupings(&mut parameters, of.found);
+    if let Some(fit) = &of.found.by_motion {
+        motion(&mut report.terminal(), fit);
+    }
+    known_friction(&mut report.detail(), &of.found.friction);
+    report.terminal().line("");
+    condition(&mut report.terminal(), of.found);
+    fit_quality(&mut report.detail(), of.found);
+    if let Some(links) = &of.found.consistent {
+        consistent(&mut report.terminal(), links);
+    }
+    let mut page = report.page();
+    gains(&mut page, &of.found.gains);
+    known_friction(&mut page, &of.found.friction);
+    if let Some(fit) = &of.found.by_motion {
+        motion(&mut page, fit);
+    }
+    residuals(&mut page, of.found);
+    page.paragraph(
+        "These errors are those of the data that were fitted; `validate` gives those of others.",
+    );
+    report
+}
+
+/// What a page has room for besides; `given` are the robot file and the model that gave the friction,
+/// `replayed` is absent where the logs are too long to be held.
+pub fn pictures(
+    page: &mut Writer,
+    of: &Lsq,
+    replayed: Option<&Replayed>,
+    given: &[Provenance],
+    quality: &[Inspected],
+    command: &str,
+) {
+    page.paragraph(&first_words(of.found));
+    parameters::section(page, of.file, &|_| None);
+    if let Some(replayed) = replayed {
+        let (machine, logs) = (of.machine, &replayed.logs);
+        friction::section(page, machine, &replayed.friction, logs);
+        let title = logs.join(", ");
+        torque::section(page, machine, &replayed.torque, &[torque::ONLY], &title);
+        let figure = residual::figure(machine, &replayed.residual);
+        residual::section(page, &figure);
+    }
+    fit::section(page, of.found, of.file);
+    quality::section(page, quality, &of.found.warnings);
+    let inputs: Vec<Provenance> = given.iter().chain(&of.found.inputs).cloned().collect();
+    let (file, summary) = (&of.machine.file, Some(&of.found.summary));
+    provenance::section(page, file, &inputs, &[], summary, command);
+}
+
+/// How good the fit is, and what to do next.
+fn first_words(found: &IdentifiedDynamics) -> String {
+    let square = |x: f64| x * x;
+    let sum: f64 = found.joints.iter().map(|j| square(j.relative_error)).sum();
+    let rms = number::percent((sum / found.joints.len().max(1) as f64).sqrt());
+    let worst = found.joints.iter();
+    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
+    let fit = match worst.filter(|_| found.joints.len() > 1) {
+        Some(worst) => format!(
+            "The fit leaves {rms} of the torque, as the rms over the joints; most at {}: {}.",
+            worst.joint,
+            number::percent(worst.relative_error)
+        ),
+        None => format!("The fit leaves {rms} of the torque."),
+    };
+    format!("{fit} Next: `cft-ident validate` on a log that was not fitted.")
+}
+
+/// A joint's error is far above the others from so many times their median on, and from so much.
+const FAR: f64 = 3.0;
+const LEAST: f64 = 0.05;
+
+/// Joints whose error is far above those of the others, as a sentence.
+fn far_off(found: &IdentifiedDynamics) -> Option<String> {
+    let error = |j: usize| found.joints[j].relative_error;
+    let median = |without: usize| {
+        let others = (0..found.joints.len()).filter(|k| *k != without);
+        let mut errors: Vec<f64> = others.map(error).collect();
+        errors.sort_by(f64::total_cmp);
+        errors.get(errors.len() / 2).copied()
+    };
+    let far = (0..found.joints.len()).filter_map(|j| {
+        let median = median(j)?;
+        (error(j) > LEAST && error(j) > FAR * median).then(|| {
+            format!(
+                " The error of {}, {}, is far above that of the others, {} in the median.",
+                found.joints[j].joint,
+                number::percent(error(j)),
+                number::percent(median)
+            )
+        })
+    });
+    Some(far.collect::<String>()).filter(|text| !text.is_empty())
+}
+
+/// The residual of the fit, joint by joint.
+pub fn residuals(writer: &mut Writer, found: &IdentifiedDynamics) {
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("relative error", Align::Decimal),
+        ("residual rms", Align::Decimal),
+        ("torque rms", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption("residual of the fit, on the logs that were fitted");
+    for (joint, rms) in found.joints.iter().zip(&found.fit.torque_rms) {
+        let torque = |v: f64| number::significant(v, 3);
+        table.row([
+            joint.joint.as_str(),
+            &number::percent(joint.relative_error),
+            &torque(joint.rmse),
+            &torque(*rms),
+            joint.unit,
+        ]);
+    }
+    writer.table(table);
+}
+
+/// The fit to the motion: what it added, and by how much simulated positions are off before and after.
+fn motion(writer: &mut Writer, fit: &MotionFit) {
+    writer.line("");
+    let chosen = match fit.window_given {
+        true => String::new(),
+        false => format!(", a length that {} blocks set aside chose", fit.blocks),
+    };
+    writer.paragraph(&format!(
+        "Fitted to the motion that the torques of {} make in windows of {} s{chosen}.",
+        fit.joint, fit.window_s
+    ));
+    let mut table = Table::new(&[
+        ("rms error of simulated positions", Align::Left),
+        ("least squares", Align::Decimal),
+        ("fit to the motion", Align::Decimal),
+        ("unit", Align::Left),
+    ]);
+    let (before, after) = (&fit.before, &fit.after);
+    let blocks = "blocks set aside, from begin to end".to_owned();
+    let windows = format!("windows of {} s", fit.window_s);
+    for (what, from, to) in [
+        (windows, before.windows, after.windows),
+        (blocks, before.blocks, after.blocks),
+    ] {
+        let [from, to] = [from, to].map(|x| number::significant(x, 3));
+        table.row([what.as_str(), &from, &to, fit.unit]);
+    }
+    writer.table(table);
+    let added = fit.effects.iter().flat_map(|effect| {
+        let numbers = effect.parameters.iter().filter(|(_, p)| !p.bound);
+        numbers.map(move |(key, p)| {
+            [effect.name.as_str(), key, &told(p.value, p.std), &p.unit].join(" ")
+        })
+    });
+    let added: Vec<String> = added.collect();
+    if !added.is_empty() {
+        writer.paragraph(&format!("Friction that was added: {}.", added.join(", ")));
+    }
+}
+
+/// A number with its deviation, where it has one.
+fn told(value: f64, std: Option<f64>) -> String {
+    match std {
+        Some(std) => number::plus_minus(value, std),
+        None => number::significant(value, 4),
+    }
+}
+
+/// Gains of the torque channels, where they were fitted.
+fn gains(writer: &mut Writer, gains: &[Gain]) {
+    if gains.is_empty() {
+        return;
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("gain", Align::Decimal),
+        ("std", Align::Decimal),
+        ("unit", Align::Left),
+        ("verdict", Align::Left),
+    ])
+    .caption("gains of the torque channels");
+    for gain in gains {
+        let (value, std) = number::value_and_std(gain.value, gain.std);
+        let verdict = gain.verdict.word();
+        table.row([&gain.joint, &value, &std, &gain.unit, verdict]);
+    }
+    writer.table(table);
+    writer.line("");
+}
+
+/// The friction that was known before, and what the fit made of it: the shift in deviations of before.
+fn known_friction(writer: &mut Writer, friction: &[FrictionOfFit]) {
+    let moved = |joint: &&FrictionOfFit| joint.parameters.values().any(|p| !p.held);
+    if !friction.iter().any(|joint| moved(&joint)) {
+        return;
+    }
+    let mut table = Table::new(&[
+        ("joint", Align::Left),
+        ("parameter", Align::Left),
+        ("value", Align::Decimal),
+        ("std", Align::Decimal),
+        ("before", Align::Decimal),
+        ("std before", Align::Decimal),
+        ("shift", Align::Decimal),
+        ("unit", Align::Left),
+    ])
+    .caption("friction refined with the inertias; the shift is in deviations of before");
+    for joint in friction.iter().filter(moved) {
+        for (name, p) in &joint.parameters {
+            let pair = |value: f64, std: Option<f64>| match std {
+                Some(std) => number::value_and_std(value, std),
+                None => (number::significant(value, 4), String::new()),
+            };
+            let (value, std) = pair(p.value, p.std);
+            let (before, std_before) = pair(p.prior, p.prior_std);
+            let shift = match (p.held, p.prior_std) {
+                (true, _) => "held".to_owned(),
+                (false, Some(std)) => format!("{:+.1}", (p.value - p.prior) / std),
+                (false, None) => String::new(),
+            };
+            table.row([
+                joint.joint.as_str(),
+                name.as_str(),
+                value.as_str(),
+                std.as_str(),
+                before.as_str(),
+                std_before.as_str(),
+                shift.as_str(),
+                p.unit.as_str(),
+            ]);
+        }
+    }
+    writer.line("");
+    writer.table(table);
+}
+
+/// The parameters for a terminal.
+fn fitted(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let rows: Vec<summary::ParameterRow> = found
+        .unknowns
+        .iter()
+        .map(|u| summary::ParameterRow {
+            joint: u.joint.as_deref().unwrap_or(""),
+            name: &u.key,
+            theta: None,
+            value: u.value.unwrap_or(f64::NAN),
+            std: u.std.unwrap_or(f64::NAN),
+            unit: &u.unit,
+            verdict: if u.negligible && u.fitted_relative_std() > IDENTIFIED {
+                "negligible"
+            } else {
+                u.verdict.word()
+            },
+            truth: None,
+        })
+        .collect();
+    terminal.table(summary::parameters("parameters", &rows));
+}
+
+/// What the short names of base parameters stand for; nothing where they are names already.
+fn groupings(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let grouped = || found.unknowns.iter().filter(|u| u.name != u.key);
+    if grouped().next().is_some() {
+        terminal.line("");
+        terminal.line("parameters that stand for combinations");
+        terminal.list(grouped().map(|u| &u.name));
+    }
+}
+
+/// Condition, rank and effective sample size of the fit.
+pub(crate) fn condition(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let fit = &found.fit;
+    let condition = |c: Option<f64>| c.map_or("infinite".to_owned(), |c| number::significant(c, 4));
+    terminal.paragraph(&format!(
+        "condition {} raw, {} normalised; rank {} of {}; {} rows a joint, effective sample size {:.0}",
+        condition(fit.condition.raw),
+        condition(fit.condition.normalised),
+        fit.rank,
+        found.unknowns.len(),
+        fit.rows,
+        fit.effective_rows,
+    ));
+    open_directions(terminal, found);
+}
+
+/// How the fit came about, and which parameters are significant.
+pub(crate) fn fit_quality(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    cutoffs(terminal, found);
+    account(terminal, &found.account);
+    let alone = found.essential.joints.iter();
+    let alone = alone.map(|e| {
+        unbroken(&format!(
+            "{} {}",
+            e.joint,
+            number::percent(e.relative_error)
+        ))
+    });
+    terminal.paragraph(&format!(
+        "{} of {} parameters are significant (F test, 1 %); residual with them alone: {}",
+        found.essential.count,
+        found.unknowns.len(),
+        alone.collect::<Vec<_>>().join(", ")
+    ));
+}
+
+/// The position cut-offs that were found, and what they leave of friction's errors at reversals.
+fn cutoffs(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let found = found.position_cutoffs.iter().filter(|c| !c.declared);
+    let found: Vec<String> = found
+        .map(|c| {
+            let (hz, off) = (c.cutoff_hz, c.smear.hypot(c.noise));
+            unbroken(&format!(
+                "{} {} Hz ({} {})",
+                c.joint,
+                number::significant(hz, 3),
+                number::significant(off, 2),
+                c.unit
+            ))
+        })
+        .collect();
+    if !found.is_empty() {
+        terminal.paragraph(&format!(
+            "position cut-offs found from the logs, and the error of friction that is left at reversals: {}",
+            found.join(", ")
+        ));
+    }
+}
+
+/// What rank and verdicts say together, where a parameter is called not identifiable: that the
+/// motion does not excite it, or that the noise is larger than its torque.
+fn open_directions(terminal: &mut Writer, found: &IdentifiedDynamics) {
+    let unknowns = found.unknowns.iter();
+    let open = unknowns.filter(|u| u.verdict == Verdict::NotIdentifiable);
+    let all = open.count();
+    if all == 0 {
+        return;
+    }
+    let missing = found.unknowns.len().saturating_sub(found.fit.rank);
+    let noise = format!("a standard deviation above {:.0} %", 100.0 * WEAK);
+    terminal.paragraph(&match missing {
+        0 => format!(
+            "all {} base parameters are excited; {all} have {noise}",
+            found.unknowns.len()
+        ),
+        _ => format!(
+            "{missing} combinations of parameters are not excited; the {all} not-identifiable are in these, or \
+             have {noise}"
+        ),
+    });
+}
+
+/// How the estimator went; nothing for least squares.
+fn account(terminal: &mut Writer, account: &Account) {
+    let ended = match account.status {
+        Ending::Converged => "converged",
+        Ending::IterationLimit => "stopped at the limit of iterations",
+        Ending::Diverged => "diverged",
+    };
+    if account.iterations > 1 {
+        terminal.line(&format!(
+            "{}: {ended} after {} passes over the logs",
+            account.estimator.name(),
+            account.iterations
+        ));
+    }
+    let each = |told: &dyn Fn(&JointAccount) -> Option<String>| {
+        let joints = account.joints.iter();
+        let words = joints.filter_map(|of| Some(format!("{} {}", of.joint, told(of)?)));
+        Some(words.collect::<Vec<_>>().join(", ")).filter(|words| !words.is_empty())
+    };
+    if let Some(shares) = each(&|of| of.down_weighted.map(number::percent)) {
+        terminal.line(&format!("rows of less than half weight: {shares}"));
+    }
+    if let Some(simulated) = &account.simulated {
+        let gains = each(&|of| {
+            let [k, d] = [of.proportional?, of.derivative?].map(|x| number::significant(x, 3));
+            Some(format!("{k} and {d}"))
+        });
+        terminal.line(&format!(
+            "simulated in closed loop at {} rad/s, gains on position and velocity: {}",
+            number::significant(simulated.loop_frequency, 3),
+            gains.unwrap_or_default()
+        ));
+    }
+    if let Some(errors) = each(&|of| of.relative_error_before.map(number::percent)) {
+        terminal.line(&format!("residual before the refinement: {errors}"));
+    }
+}
+
+/// Links that can exist, and by how much the fit suffers.
+fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
+    let numbers = ["mass", "x", "y", "z", "Ixx", "Iyy", "Izz"].map(|name| (name, Align::Decimal));
+    let mut columns = vec![("link", Align::Left)];
+    columns.extend(numbers);
+    let mut table = Table::new(&columns)
+        .caption("links that can exist: kg, centre of gravity in m, moments about it in kg m^2");
+    for link in &found.links {
+        let [xx, _, _, yy, _, zz] = link.inertia;
+        let mut row = vec![link.name.clone(), number::significant(link.mass, 4)];
+        row.extend(link.centre.map(|x| number::significant(x, 3)));
+        row.extend([xx, yy, zz].map(|x| number::significant(x, 3)));
+        table.row(row);
+    }
+    terminal.table(table);
+    let drives = found.drives.iter();
+    let drives: Vec<String> = drives
+        .map(|drive| format!("{} {}", drive.joint, number::significant(drive.inertia, 3)))
+        .collect();
+    if !drives.is_empty() {
+        terminal.line(&format!("drive inertias: {}", drives.join(", ")));
+    }
+    let both = found.relative_error_before.iter();
+    let both = both.zip(&found.relative_error_after);
+    let change = both.map(|(before, after)| {
+        let [from, to] = [before, after].map(|e| number::percent(e.relative_error));
+        unbroken(&format!("{} {from} to {to}", before.joint))
+    });
+    let change: Vec<String> = change.collect();
+    terminal.paragraph(&format!("the fit suffers: {}", change.join(", ")));
+}

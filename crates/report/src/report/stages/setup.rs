@@ -1,0 +1,42 @@
+//! What the check of a set-up found, for every report.
+
+use crate::report::Writer;
+use cft_ident_stages::setup::{FindingSeverity, SetupReport};
+
+/// The findings, nothing where there is none.
+pub fn section(out: &mut Writer, report: &SetupReport) {
+    if report.findings.is_empty() && report.friction_power.is_empty() {
+        return;
+    }
+    out.line("set-up of the robot file");
+    for finding in &report.findings {
+        let severity = finding.severity;
+        out.line("");
+        let head = format!("{} {}", severity.word(), finding.kind.word());
+        out.note("", &head, 0);
+        if severity == FindingSeverity::Hint {
+            out.note("    ", &finding.told(), 4);
+            continue;
+        }
+        out.note("    ", &finding.meaning, 4);
+        if !finding.remedy.is_empty() {
+            out.note("    ", &format!("-> write {}", finding.remedy), 4);
+        }
+        for tie in finding
+            .tied_with
+            .iter()
+            .filter(|tie| !tie.remedy.is_empty())
+        {
+            out.note(
+                "    ",
+                &format!("-> or, by these data as well: {}", tie.remedy),
+                4,
+            );
+        }
+    }
+    for power in &report.friction_power {
+        out.line("");
+        out.note("", &power.sentence(), 0);
+    }
+    out.line("");
+}

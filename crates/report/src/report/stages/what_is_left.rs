@@ -1,0 +1,96 @@
+//! What of the residual no effect explains: on which signals it depends, in sentences and as pictures.
+
+use super::step_words::chance;
+use crate::report::Writer;
+use crate::report::figure::MapFigure;
+use cft_ident_core::diagnose::{ResidualMap, Signal};
+use cft_ident_core::number::{self, MILLIMETRES};
+use cft_ident_stages::identify::{Diagnosed, LoggedRobot, signal_words};
+
+/// What the residual that is left depends on, a sentence for each joint.
+pub(super) fn sentences(machine: &LoggedRobot, found: &Diagnosed) -> Vec<String> {
+    let names = machine.robot.joint_names();
+    let all = &found.diagnosis.dependence;
+    let of_joint = |(j, name): (usize, &String)| {
+        let told = all.iter().filter(|d| d.joint == j).map(|d| {
+            let signals = d.signals.iter().map(|s| signal_words(names, j, *s));
+            let signals: Vec<String> = signals.collect();
+            format!(
+                "{} ({} of its square, {})",
+                signals.join(" with "),
+                number::percent(d.share),
+                chance(d.p_value)
+            )
+        });
+        let told: Vec<String> = told.collect();
+        (!told.is_empty()).then(|| {
+            format!(
+                "the residual of {name} still depends on {}",
+                told.join(", ")
+            )
+        })
+    };
+    names.iter().enumerate().filter_map(of_joint).collect()
+}
+
+/// The residual over the two signals on which it depends most, a map and a curve for each joint.
+pub(super) fn section(page: &mut Writer, machine: &LoggedRobot, found: &Diagnosed) {
+    let all = found.diagnosis.dependence.iter();
+    let drawn = all.filter_map(|d| d.map.as_ref().map(|map| figure(machine, d.joint, map)));
+    let drawn: Vec<MapFigure> = drawn.collect();
+    if drawn.is_empty() {
+        return;
+    }
+    page.heading("What is left");
+    page.paragraph(
+        "Mean residual on the fitted logs over the two signals on which it depends most, and over the first of them. \
+         Where a pattern stands in these, physics is missing; --candidates takes a formula for it.",
+    );
+    for figure in drawn {
+        page.figures(&figure.cells(Vec::new()));
+    }
+}
+
+fn figure(machine: &LoggedRobot, joint: usize, map: &ResidualMap) -> MapFigure {
+    let names = machine.robot.joint_names();
+    let torque = machine.file.torque_unit(joint);
+    let over = map.signals.map(|signal| {
+        let position = |j: usize| machine.robot.joint_kind(j).position_unit();
+        let unit = match signal {
+            Signal::Position(j) => position(j).to_owned(),
+            Signal::Speed(j) => format!("{}/s", position(j)),
+            Signal::Acceleration => format!("{}/s\u{b2}", position(joint)),
+            Signal::Load => torque.to_owned(),
+            Signal::Direction => "1".to_owned(),
+            Signal::SinceReversal | Signal::Time => "s".to_owned(),
+            Signal::Temperature(_) => "degC".to_owned(),
+        };
+        (signal_words(names, joint, signal), unit)
+    });
+    let small = [0, 1]
+        .map(|s: usize| over[s].1 == "m" && map.ends[s].iter().all(|end| end.abs() < MILLIMETRES));
+    let scale = small.map(|small| if small { 1e3 } else { 1.0 });
+    let over = [0, 1].map(|s: usize| {
+        let (name, unit) = over[s].clone();
+        (name, if small[s] { "mm".to_owned() } else { unit })
+    });
+    let means = map.curve.iter().map(|[_, mean, _]| *mean);
+    let [low, high] =
+        [f64::min as fn(f64, f64) -> f64, f64::max].map(|of| means.clone().fold(0.0, of));
+    MapFigure {
+        title: format!("what is left of {}", names[joint]),
+        told: format!(
+            "Over {} the mean residual goes from {} to {} {torque}",
+            over[0].0,
+            number::significant(low, 2),
+            number::significant(high, 2)
+        ),
+        unit: torque.to_owned(),
+        over,
+        ends: [0, 1].map(|s: usize| map.ends[s].map(|end| scale[s] * end)),
+        cells: map.cells.clone(),
+        curve: (map.curve.iter())
+            .map(|[x, mean, std]| [scale[0] * x, *mean, *std])
+            .collect(),
+    }
+}

@@ -1,0 +1,454 @@
+//! Plain-text tables that fit a terminal of 80 columns.
+//!
+//! Numbers line up at the decimal point; a column of words is wrapped when the table would be too
+//! wide. No colour: the text is the same in a file, a pipe and a terminal.
+
+use std::fmt;
+
+use cft_ident_logs::log::escape_whole;
+
+/// Columns of a terminal that a table keeps to where it can.
+pub const WIDTH: usize = 80;
+/// A column of words is not wrapped below this.
+const NARROWEST: usize = 10;
+/// Columns between two of a table: the most, and the least where it would be too wide.
+const GAPS: [usize; 2] = [2, 1];
+
+/// Where the cells of a column line up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Align {
+    /// Words: at the left, wrapped at spaces when the table is too wide.
+    Left,
+    /// Whole numbers and short marks: at the right.
+    Right,
+    /// Numbers: at the decimal point.
+    Decimal,
+}
+
+/// A table under construction; `Display` renders it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Table {
+    caption: Option<String>,
+    columns: Vec<(String, Align)>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table with these headers.
+    pub fn new(columns: &[(&str, Align)]) -> Self {
+        Table {
+            caption: None,
+            columns: columns
+                .iter()
+                .map(|(name, align)| (escape_whole(name), *align))
+                .collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// A table for a page, which tells numbers from words by itself.
+    pub(crate) fn of_words(caption: &str, head: &[&str], rows: Vec<Vec<String>>) -> Self {
+        let columns: Vec<(&str, Align)> = head.iter().map(|name| (*name, Align::Left)).collect();
+        let mut table = Table::new(&columns).caption(caption);
+        rows.into_iter().for_each(|row| table.row(row));
+        table
+    }
+
+    /// A line above the headers.
+    pub fn caption(mut self, text: &str) -> Self {
+        self.caption = Some(escape_whole(text));
+        self
+    }
+
+    /// Adds a row; missing cells are empty, surplus cells are dropped.
+    pub fn row<S: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        let mut row: Vec<String> = cells
+            .into_iter()
+            .take(self.columns.len())
+            .map(|cell| escape_whole(cell.as_ref()))
+            .collect();
+        row.resize(self.columns.len(), String::new());
+        self.rows.push(row);
+    }
+
+    /// Caption, names of the columns and rows, for another way to show them.
+    pub(super) fn parts(&self) -> (&str, Vec<&str>, &[Vec<String>]) {
+        let names = self.columns.iter().map(|(name, _)| name.as_str());
+        (
+            self.caption.as_deref().unwrap_or(""),
+            names.collect(),
+            &self.rows,
+        )
+    }
+
+    /// Whether no row was added.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Widths of the columns and the gap between them, after words were narrowed to fit [`WIDTH`].
+    fn widths(&self, cells: &[Vec<String>]) -> (Vec<usize>, usize) {
+        let natural: Vec<usize> = (0..self.columns.len())
+            .map(|j| {
+                let header = length(&self.columns[j].0);
+                cells
+                    .iter()
+                    .map(|row| length(&row[j]))
+                    .fold(header, usize::max)
+            })
+            .collect();
+        let [wide, narrow] = GAPS;
+        let fits = |widths: &[usize], gap: usize| {
+            widths.iter().sum::<usize>() + gap * widths.len().saturating_sub(1) <= WIDTH
+        };
+        let widths = self.narrowed(natural.clone(), |widths| fits(widths, wide));
+        match fits(&widths, wide) {
+            true => (widths, wide),
+            false => (
+                self.narrowed(natural, |widths| fits(widths, narrow)),
+                narrow,
+            ),
+        }
+    }
+
+    /// Columns of words, narrowed until all fit or none can give more.
+    fn narrowed(&self, mut widths: Vec<usize>, fits: impl Fn(&[usize]) -> bool) -> Vec<usize> {
+        while !fits(&widths) {
+            // The widest column of words gives first, down to the longest of them.
+            let widest = (0..widths.len())
+                .filter(|&j| self.columns[j].1 == Align::Left)
+                .filter(|&j| widths[j] > NARROWEST.max(length(&self.columns[j].0)))
+                .max_by_key(|&j| widths[j]);
+            match widest {
+                Some(j) => widths[j] -= 1,
+                None => break,
+            }
+        }
+        widths
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut rows = self.rows.clone();
+        for (j, (_, align)) in self.columns.iter().enumerate() {
+            if *align == Align::Decimal {
+                line_up(&mut rows, j);
+            }
+        }
+        let (widths, gap) = self.widths(&rows);
+        if let Some(caption) = &self.caption {
+            for line in flowed(caption, WIDTH) {
+                writeln!(f, "{line}")?;
+            }
+        }
+        let headers: Vec<String> = self.columns.iter().map(|(name, _)| name.clone()).collect();
+        self.write_line(f, &headers, &widths, gap)?;
+        let rules: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
+        self.write_line(f, &rules, &widths, gap)?;
+        for row in &rows {
+            let parts: Vec<Vec<String>> = row
+                .iter()
+                .zip(&widths)
+                .zip(&self.columns)
+                .map(|((cell, &width), (_, align))| match align {
+                    Align::Left => wrapped(cell, width),
+                    _ => vec![cell.clone()],
+                })
+                .collect();
+            let height = parts.iter().map(Vec::len).max().unwrap_or(0);
+            for line in 0..height {
+                let cells: Vec<String> = parts
+                    .iter()
+                    .map(|part| part.get(line).cloned().unwrap_or_default())
+                    .collect();
+                self.write_line(f, &cells, &widths, gap)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Table {
+    fn write_line(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        cells: &[String],
+        widths: &[usize],
+        gap: usize,
+    ) -> fmt::Result {
+        let mut line = String::new();
+        for (j, cell) in cells.iter().enumerate() {
+            if j > 0 {
+                line.push_str(&" ".repeat(gap));
+            }
+            let padding = " ".repeat(widths[j].saturating_sub(length(cell)));
+            match self.columns[j].1 {
+                Align::Left => line.extend([cell.as_str(), &padding]),
+                Align::Right | Align::Decimal => line.extend([padding.as_str(), cell]),
+            }
+        }
+        writeln!(f, "{}", line.trim_end())
+    }
+}
+
+/// Pads the cells of column `j` at their ends, so that right alignment puts the points in one place.
+fn line_up(rows: &mut [Vec<String>], j: usize) {
+    let tail = |cell: &str| -> usize {
+        let whole = cell.find(['.', 'e', ' ']).unwrap_or(cell.len());
+        length(&cell[whole..])
+    };
+    let numeric = |cell: &str| cell.contains(|c: char| c.is_ascii_digit());
+    let longest = rows
+        .iter()
+        .filter(|row| numeric(&row[j]))
+        .map(|row| tail(&row[j]))
+        .max()
+        .unwrap_or(0);
+    for row in rows {
+        if numeric(&row[j]) {
+            let missing = longest - tail(&row[j]);
+            row[j].push_str(&" ".repeat(missing));
+        }
+    }
+}
+
+/// `head` and `text` as lines that fit [`WIDTH`], those after the first indented by `indent` columns,
+/// each with its line end.
+pub fn hanging(head: &str, text: &str, indent: usize) -> String {
+    let room = WIDTH.saturating_sub(indent.max(length(head)));
+    let lines = flowed(&escape_whole(text), room);
+    let mut out = String::new();
+    for (i, line) in lines.iter().enumerate() {
+        match i {
+            0 => out.push_str(head),
+            _ => out.push_str(&" ".repeat(indent)),
+        }
+        out.push_str(line);
+        out.push('\n');
+    }
+    out
+}
+
+/// `text` for a terminal: a line that is too long goes on below, further in.
+pub fn folded(text: &str) -> String {
+    let fold = |line: &str| {
+        if length(line) <= WIDTH {
+            return format!("{line}\n");
+        }
+        let words = line.trim_start();
+        let margin = length(line) - length(words);
+        hanging(&" ".repeat(margin), words, margin + 2)
+    };
+    text.lines().map(fold).collect()
+}
+
+/// A space at which no line ends; shown as a common one.
+const UNBROKEN: char = '\u{a0}';
+
+/// `text` as one word, which the end of a line does not part.
+pub(crate) fn unbroken(text: &str) -> String {
+    text.replace(' ', UNBROKEN.encode_utf8(&mut [0; 2]))
+}
+
+/// Whether the end of a line may not part these words: a number and its unit, or the two sides of a
+/// sign between numbers.
+fn belong_together(before: &str, after: &str) -> bool {
+    const UNITS: [&str; 16] = [
+        "%", "N", "Nm", "kg", "m", "s", "ms", "rad", "deg", "V", "A", "Hz", "kHz", "1", "2",
+        "speed",
+    ];
+    let ended = |word: &str| word.ends_with([',', ';', ':', ')']);
+    let is_unit = |word: &str| {
+        let word = word.trim_end_matches([',', ';', ':', '.', ')']);
+        let named = !word.starts_with(|c: char| c.is_ascii_digit()) || word.starts_with("1/");
+        named && word.split(['/', '^']).all(|part| UNITS.contains(&part))
+    };
+    let is_number = |word: &str| {
+        let word = word.trim_start_matches(['(', '-', '+']);
+        word.starts_with(|c: char| c.is_ascii_digit()) && !ended(word)
+    };
+    let is_sign = |word: &str| matches!(word, "±" | "=");
+    is_sign(before)
+        || is_sign(after)
+        || is_unit(after) && (is_number(before) || is_unit(before) && !ended(before))
+}
+
+/// Words that the end of a line does not part, with a space between them, where a line holds them.
+fn groups(text: &str, width: usize) -> Vec<String> {
+    let mut groups: Vec<String> = Vec::new();
+    let mut last = "";
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        let fits = |group: &str| length(group) + 1 + length(word) <= width;
+        match groups.last_mut() {
+            Some(group) if belong_together(last, word) && fits(group) => {
+                group.push(' ');
+                group.push_str(word);
+            }
+            _ => groups.push(word.to_owned()),
+        }
+        last = word;
+    }
+    groups
+}
+
+/// `text` in lines of at most `width` characters, broken at spaces but not between a number and its
+/// unit; a word that alone is longer stays whole, for it may be a path.
+fn flowed(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for group in groups(text, width) {
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => *line = group,
+            Some(line) if length(line) + 1 + length(&group) <= width => {
+                line.push(' ');
+                line.push_str(&group);
+            }
+            _ => lines.push(group),
+        }
+    }
+    lines
+        .iter()
+        .map(|line| line.replace(UNBROKEN, " "))
+        .collect()
+}
+
+/// The same for the cell of a table: a word that is longer is cut, after a part of it where one ends.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    for line in flowed(text, width) {
+        let mut rest = line.as_str();
+        while let Some((end, _)) = rest.char_indices().nth(width.max(1)) {
+            let part = rest[..end].rfind(['_', '/', '.', '-']).map(|at| at + 1);
+            let (line, after) = rest.split_at(part.unwrap_or(end));
+            lines.push(line.to_owned());
+            rest = after;
+        }
+        lines.push(rest.to_owned());
+    }
+    lines
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_line_up_at_the_point_and_words_at_the_left() {
+        let mut table = Table::new(&[
+            ("name", Align::Left),
+            ("theta", Align::Right),
+            ("value", Align::Decimal),
+            ("unit", Align::Left),
+        ])
+        .caption("Friction of q1");
+        table.row(["viscous", "13", "13.521", "N s/m"]);
+        table.row(["coulomb_1", "14", "-2.5", "N"]);
+        table.row(["slope_1", "15", "1300", "s/m"]);
+        table.row(["slope_2", "16", "-"]);
+        let expected = "\
+Friction of q1
+name       theta     value  unit
+---------  -----  --------  -----
+viscous       13    13.521  N s/m
+coulomb_1     14    -2.5    N
+slope_1       15  1300      s/m
+slope_2       16         -
+";
+        assert_eq!(table.to_string(), expected);
+    }
+
+    #[test]
+    fn words_are_wrapped_to_80_columns_and_numbers_are_not() {
+        let mut table = Table::new(&[
+            ("effect", Align::Left),
+            ("reason", Align::Left),
+            ("bic", Align::Decimal),
+        ]);
+        let reason = "the residual repeats with the angle of the motor and not with the joint, and is far above the floor";
+        table.row(["cogging", reason, "12345.678"]);
+        let text = table.to_string();
+        assert!(
+            text.lines().all(|line| line.chars().count() <= WIDTH),
+            "{text}"
+        );
+        assert!(text.lines().count() > 3);
+        let words: Vec<&str> = text.split_whitespace().collect();
+        for word in reason.split(' ').chain(["12345.678"]) {
+            assert!(words.contains(&word), "{word} is lost in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_word_longer_than_its_column_is_cut_and_kept_whole_in_sum() {
+        assert_eq!(wrapped("ab cdefgh i", 3), ["ab", "cde", "fgh", "i"]);
+        assert_eq!(wrapped("", 3), [""]);
+        assert_eq!(wrapped("tau_elbow_joint", 11), ["tau_elbow_", "joint"]);
+    }
+
+    #[test]
+    fn the_end_of_a_line_parts_no_number_from_its_unit() {
+        let text =
+            "sin = 1.153 ± 0.023 N, viscous 9.00 ± 0.01 Nm s/rad, q1 13.2 % (2.99 Nm), 39.00 s";
+        for width in 30..60 {
+            let lines = flowed(text, width);
+            assert_eq!(lines.join(" "), text);
+            for line in &lines {
+                assert!(line.chars().count() <= width);
+                let start = line.split(' ').next().unwrap();
+                assert!(
+                    !["=", "±", "N,", "%", "Nm", "Nm),", "s/rad,", "s"].contains(&start),
+                    "{lines:?}"
+                );
+                assert!(!line.ends_with(['=', '±']), "{lines:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_do_not_fit_move_together_before_they_leave_the_terminal() {
+        let mut table = Table::new(&[("a", Align::Right); 8]);
+        table.row(["123456789"; 8]);
+        let text = table.to_string();
+        assert!(text.lines().all(|line| line.len() == 79), "{text}");
+    }
+
+    #[test]
+    fn what_is_unbroken_stays_in_one_line_with_common_spaces() {
+        let list = [unbroken("q1 1.04 %"), unbroken("q2 0.134 %")].join(", ");
+        assert_eq!(flowed(&list, 15), ["q1 1.04 %,", "q2 0.134 %"]);
+    }
+
+    #[test]
+    fn later_lines_of_a_hanging_text_stand_below_it() {
+        let told = hanging("  1. ", &"word ".repeat(20), 5);
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines.len(), 2);
+        assert!(lines[0].starts_with("  1. word") && lines[1].starts_with("     word"));
+        assert!(lines.iter().all(|line| line.len() <= WIDTH));
+    }
+
+    #[test]
+    fn a_message_is_folded_and_a_path_in_it_stays_whole() {
+        let path = format!("/{}/log.csv", "folder".repeat(14));
+        let told = folded(&format!(
+            "error: no data\nhint: {} {path}\n",
+            "look ".repeat(20)
+        ));
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines[0], "error: no data");
+        assert!(lines[1].starts_with("hint: look") && lines[1].len() <= WIDTH);
+        assert!(lines[2].starts_with("  look"));
+        assert_eq!(lines[3].trim_start(), path);
+    }
+
+    #[test]
+    fn control_characters_in_a_name_are_shown() {
+        let mut table = Table::new(&[("channel", Align::Left)]);
+        table.row(["q1\u{1b}[2J"]);
+        assert!(table.to_string().contains("q1\\u{1b}[2J"));
+    }
+}

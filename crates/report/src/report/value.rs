@@ -1,0 +1,225 @@
+//! What a run has to say, as one value: verdict, tables, figures and notes in their order. A terminal
+//! and a page are two renderings of it ([`super::text`], [`super::page`]); each part says where it is
+//! shown, since a page has room for more.
+
+use super::figure::Cells;
+use super::table::Table;
+use super::traces::Traces;
+
+/// Where a part is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    Everywhere,
+    Terminal,
+    /// On a terminal that is to show little.
+    Brief,
+    /// On a terminal that is to show everything.
+    Detail,
+    Page,
+}
+
+/// How much of a report a terminal shows.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// The verdict; of a report without one what is usual.
+    Brief,
+    /// About a screen.
+    #[default]
+    Usual,
+    /// Everything.
+    Full,
+}
+
+/// One part of a report.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Part {
+    /// The verdict in words; `good` where nothing calls for attention.
+    Verdict {
+        text: String,
+        good: bool,
+    },
+    /// Begins a section.
+    Heading(String),
+    Paragraph(String),
+    /// A paragraph that begins with `head`; on a terminal its further lines stand `margin` columns in.
+    Note {
+        head: String,
+        text: String,
+        margin: usize,
+    },
+    /// A line as it stands, of any length: a path, a command to type.
+    Line(String),
+    List(Vec<String>),
+    Table(Table),
+    /// An SVG document.
+    Figure(String),
+    /// Small pictures that belong together.
+    Figures(Cells),
+    /// Small pictures that are folded away.
+    Folded {
+        summary: String,
+        cells: Cells,
+    },
+    /// Series over time that can be zoomed, as the page's viewer reads them, and the SVG document that
+    /// is shown without a script.
+    Traces {
+        data: String,
+        still: String,
+    },
+    /// A command line.
+    Code(String),
+    /// Text that is folded away, as it stands.
+    Details {
+        summary: String,
+        text: String,
+    },
+}
+
+/// A report under construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    title: String,
+    parts: Vec<(Shown, Part)>,
+}
+
+impl Report {
+    /// An empty report; the title is that of its page.
+    pub fn new(title: &str) -> Self {
+        Report {
+            title: title.to_owned(),
+            parts: Vec::new(),
+        }
+    }
+
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// The parts that are shown in one of these places or everywhere, in their order.
+    pub fn parts<'a>(&'a self, places: &'a [Shown]) -> impl Iterator<Item = &'a Part> + Clone {
+        let there = |shown: Shown| shown == Shown::Everywhere || places.contains(&shown);
+        let parts = self.parts.iter().filter(move |(shown, _)| there(*shown));
+        parts.map(|(_, part)| part)
+    }
+
+    /// Adds parts that are shown everywhere.
+    pub fn everywhere(&mut self) -> Writer<'_> {
+        self.shown(Shown::Everywhere)
+    }
+
+    /// Adds parts that only a terminal shows.
+    pub fn terminal(&mut self) -> Writer<'_> {
+        self.shown(Shown::Terminal)
+    }
+
+    /// Adds a verdict that a terminal shows where little is asked for, and others have said in more words.
+    pub fn brief(&mut self) -> Writer<'_> {
+        self.shown(Shown::Brief)
+    }
+
+    /// Adds parts that a terminal shows where everything is asked for.
+    pub fn detail(&mut self) -> Writer<'_> {
+        self.shown(Shown::Detail)
+    }
+
+    /// Adds parts that only a page has room for.
+    pub fn page(&mut self) -> Writer<'_> {
+        self.shown(Shown::Page)
+    }
+
+    fn shown(&mut self, shown: Shown) -> Writer<'_> {
+        let parts = &mut self.parts;
+        Writer { parts, shown }
+    }
+}
+
+/// Adds parts to a report that are shown in one place.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    parts: &'a mut Vec<(Shown, Part)>,
+    shown: Shown,
+}
+
+impl Writer<'_> {
+    fn push(&mut self, part: Part) {
+        self.parts.push((self.shown, part));
+    }
+
+    pub fn verdict(&mut self, text: &str, good: bool) {
+        let text = text.to_owned();
+        self.push(Part::Verdict { text, good });
+    }
+
+    pub fn heading(&mut self, text: &str) {
+        self.push(Part::Heading(text.to_owned()));
+    }
+
+    pub fn paragraph(&mut self, text: &str) {
+        self.push(Part::Paragraph(text.to_owned()));
+    }
+
+    pub fn note(&mut self, head: &str, text: &str, margin: usize) {
+        self.push(Part::Note {
+            head: head.to_owned(),
+            text: text.to_owned(),
+            margin,
+        });
+    }
+
+    pub fn line(&mut self, text: &str) {
+        self.push(Part::Line(text.to_owned()));
+    }
+
+    /// A list of sentences; nothing where there are none.
+    pub fn list<S: AsRef<str>>(&mut self, items: impl IntoIterator<Item = S>) {
+        let items: Vec<String> = items.into_iter().map(|i| i.as_ref().to_owned()).collect();
+        if !items.is_empty() {
+            self.push(Part::List(items));
+        }
+    }
+
+    pub fn table(&mut self, table: Table) {
+        self.push(Part::Table(table));
+    }
+
+    /// The table of these columns, without alignments: those of a page's columns are seen from its cells.
+    pub fn rows(&mut self, caption: &str, head: &[&str], rows: Vec<Vec<String>>) {
+        self.table(Table::of_words(caption, head, rows));
+    }
+
+    pub fn figure(&mut self, svg: &str) {
+        self.push(Part::Figure(svg.to_owned()));
+    }
+
+    /// Small pictures that belong together.
+    pub fn figures(&mut self, cells: &Cells) {
+        self.push(Part::Figures(cells.clone()));
+    }
+
+    /// Small pictures that are folded away.
+    pub(crate) fn folded(&mut self, summary: &str, cells: &Cells) {
+        self.push(Part::Folded {
+            summary: summary.to_owned(),
+            cells: cells.clone(),
+        });
+    }
+
+    /// Series over time, and the still picture that is shown without a script.
+    pub fn traces(&mut self, traces: &Traces, still: &str) {
+        self.push(Part::Traces {
+            data: traces.data(),
+            still: still.to_owned(),
+        });
+    }
+
+    pub fn code(&mut self, text: &str) {
+        self.push(Part::Code(text.to_owned()));
+    }
+
+    pub(crate) fn details(&mut self, summary: &str, text: &str) {
+        self.push(Part::Details {
+            summary: summary.to_owned(),
+            text: text.to_owned(),
+        });
+    }
+}

@@ -1,0 +1,395 @@
+//! Blocks of logs, and the model without each of them.
+
+use nalgebra::{DMatrix, DVector};
+
+use cft_ident_core::effect::{Added, AugmentedModel, Role, Scene};
+use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch, rest};
+use cft_ident_core::robot::model::{JointFriction, Model};
+
+/// Samples that are looked at together.
+const PIECE: usize = 16_384;
+/// Share of what all blocks tell that holds a model to itself: no direction is left without it that one
+/// block alone determines.
+const HOLD: f64 = 0.01;
+
+/// Blocks of the same number of samples, one behind the other through all logs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Folds {
+    /// Log and time of the first sample of each.
+    begins: Vec<(usize, f64)>,
+}
+
+impl Folds {
+    /// So many blocks of these stretches, which stand in the order of their logs.
+    pub fn of(stretches: &[Stretch], count: usize) -> Self {
+        let samples: usize = stretches.iter().map(Stretch::len).sum();
+        let begin = |fold: usize| {
+            let mut at = fold * samples / count;
+            for s in stretches {
+                if at < s.len() {
+                    return (s.log, s.t[at]);
+                }
+                at -= s.len();
+            }
+            (usize::MAX, f64::INFINITY)
+        };
+        Self {
+            begins: (0..count).map(begin).collect(),
+        }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.begins.len()
+    }
+
+    /// The block of a time in a log.
+    pub fn of_time(&self, log: usize, t: f64) -> usize {
+        let later = |(of, begin): &&(usize, f64)| *of < log || (*of == log && *begin <= t);
+        self.begins.iter().take_while(later).count().max(1) - 1
+    }
+}
+
+/// Which columns the logs determined beside the inertial parameters and the effects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeColumns {
+    pub friction: Vec<bool>,
+    pub offset: Vec<bool>,
+}
+
+/// Linear parameters of a model in one row: inertial, friction of each joint, offsets, effects.
+struct Layout {
+    theta: usize,
+    /// First place and number of each joint's friction.
+    friction: Vec<(usize, usize)>,
+    offset: Vec<Option<usize>>,
+    effects: Vec<usize>,
+    count: usize,
+}
+
+impl Layout {
+    fn of(model: &AugmentedModel, free: &FreeColumns) -> Self {
+        let theta = model.model.theta.len();
+        let mut count = theta;
+        let mut take = |k: usize| {
+            count += k;
+            count - k
+        };
+        let friction = model.model.friction.iter().zip(&free.friction);
+        let friction = friction
+            .map(|(law, free)| {
+                let k = if *free { linear_of(law) } else { 0 };
+                (take(k), k)
+            })
+            .collect();
+        let offset = free.offset.iter().map(|free| free.then(|| take(1)));
+        let offset = offset.collect();
+        let effects = model.effects.iter().map(|e| take(e.linear.len())).collect();
+        Layout {
+            theta,
+            friction,
+            offset,
+            effects,
+            count,
+        }
+    }
+}
+
+/// Parameters that a law is linear in: they come first among its own.
+fn linear_of(law: &JointFriction) -> usize {
+    match law {
+        JointFriction::None => 0,
+        JointFriction::DoubleTanh(_) => 3,
+        JointFriction::ViscousCoulomb(_) => 2,
+    }
+}
+
+/// The model with the linear parameters that all blocks but one give it, for each block: one step of least squares
+/// from the model, weighted by the residual of each joint, rows at rest left out.
+///
+/// # Errors
+/// [`MotionError`] of the filter.
+pub fn without_each(
+    model: &AugmentedModel,
+    free: &FreeColumns,
+    stretches: &[Stretch],
+    filters: &ParallelFilters,
+    rest_speed: &[f64],
+    folds: &Folds,
+) -> Result<Vec<AugmentedModel>, MotionError> {
+    let layout = Layout::of(model, free);
+    let (n, u) = (model.model.robot.joints(), layout.count);
+    let mut sums = vec![vec![Sums::new(u); n]; folds.count()];
+    for stretch in stretches {
+        add(model, &layout, stretch, filters, rest_speed, &mut |row| {
+            let fold = folds.of_time(stretch.log, row.t);
+            sums[fold][row.joint].add(row.places, row.columns, row.error);
+        })?;
+    }
+    // one weight a joint, that of its residual in all blocks
+    let weight = |j: usize| {
+        let (square, rows) = sums.iter().fold((0.0, 0.0), |(s, r), fold| {
+            (s + fold[j].square, r + fold[j].rows)
+        });
+        if square > 0.0 { rows / square } else { 0.0 }
+    };
+    let weights: Vec<f64> = (0..n).map(weight).collect();
+    let joined = |fold: &Vec<Sums>| {
+        let mut h = DMatrix::zeros(u, u);
+        let mut g = DVector::zeros(u);
+        for (sums, w) in fold.iter().zip(&weights) {
+            h += &sums.normal * *w;
+            g += &sums.gradient * *w;
+        }
+        (h, g)
+    };
+    let each: Vec<(DMatrix<f64>, DVector<f64>)> = sums.iter().map(joined).collect();
+    let mut whole = (DMatrix::zeros(u, u), DVector::zeros(u));
+    for (h, g) in &each {
+        whole.0 += h;
+        whole.1 += g;
+    }
+    let (h, g) = whole;
+    let scale = DVector::from_fn(u, |i, _| {
+        let d: f64 = h[(i, i)];
+        if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
+    });
+    let solve = |h: &DMatrix<f64>, g: &DVector<f64>| -> DVector<f64> {
+        let scaled = DMatrix::from_fn(u, u, |i, k| {
+            let x = h[(i, k)] * scale[i] * scale[k];
+            // what no row determines stays as it is
+            if i == k { x.max(1e-12) + 1e-9 } else { x }
+        });
+        match scaled.cholesky() {
+            Some(factor) => factor.solve(&g.component_mul(&scale)).component_mul(&scale),
+            None => DVector::zeros(u),
+        }
+    };
+    let all = solve(&(&h * (1.0 + HOLD)), &g);
+    let models = each.iter().map(|(of_h, of_g)| {
+        let step = solve(&(&h * (1.0 + HOLD) - of_h), &(&g - of_g)) - &all;
+        moved(model, &layout, &step)
+    });
+    Ok(models.collect())
+}
+
+/// Normal equations of one joint in one block.
+#[derive(Clone)]
+struct Sums {
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
+    square: f64,
+    rows: f64,
+}
+
+impl Sums {
+    fn new(u: usize) -> Self {
+        Sums {
+            normal: DMatrix::zeros(u, u),
+            gradient: DVector::zeros(u),
+            square: 0.0,
+            rows: 0.0,
+        }
+    }
+
+    /// Adds a row whose entries stand at `places`; all others are 0.
+    fn add(&mut self, places: &[usize], columns: &[f64], error: f64) {
+        self.square += error * error;
+        self.rows += 1.0;
+        for (i, x) in places.iter().zip(columns) {
+            self.gradient[*i] += x * error;
+            for (k, y) in places.iter().zip(columns) {
+                self.normal[(*k, *i)] += x * y;
+            }
+        }
+    }
+}
+
+/// A filtered row of one joint.
+struct Row<'a> {
+    t: f64,
+    joint: usize,
+    /// Where its entries stand among the unknowns.
+    places: &'a [usize],
+    columns: &'a [f64],
+    error: f64,
+}
+
+/// Filtered, decimated rows of a stretch, piece by piece.
+fn add(
+    model: &AugmentedModel,
+    layout: &Layout,
+    stretch: &Stretch,
+    filters: &ParallelFilters,
+    rest_speed: &[f64],
+    take: &mut dyn FnMut(&Row),
+) -> Result<(), MotionError> {
+    let n = model.model.robot.joints();
+    let filter = filters.of(stretch);
+    let torques = model.torques(stretch);
+    let residual = model.residual(stretch, &torques);
+    // effects remember: their columns are those of the whole stretch
+    let plain = (!model.effects.is_empty())
+        .then(|| AugmentedModel::plain(model.model.clone()).torques(stretch));
+    let scene = Scene {
+        robot: &model.model.robot,
+        theta: &model.model.theta,
+        laws: &model.model.friction,
+        stretch,
+        hat: plain.as_ref().map_or(&torques.hat, |plain| &plain.hat),
+        load: &torques.load,
+        direction: &torques.direction,
+        tilt: Some(&torques.tilt),
+    };
+    let joints: Vec<OfJoint> = model
+        .model
+        .robot
+        .parameters_by_joint()
+        .into_iter()
+        .enumerate()
+        .map(|(j, theta)| OfJoint::new(model, layout, &scene, (j, theta)))
+        .collect();
+    let p = layout.theta;
+    let mut regressor = vec![0.0; n * p];
+    let mut channels: Vec<Vec<Vec<f64>>> = joints
+        .iter()
+        .map(|of| vec![Vec::new(); of.places.len() + 2])
+        .collect();
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for from in (0..stretch.len()).step_by(PIECE) {
+        let piece = from..(from + PIECE).min(stretch.len());
+        if filter.rows(piece.len()) < 2 {
+            continue;
+        }
+        channels.iter_mut().flatten().for_each(Vec::clear);
+        for k in piece.clone() {
+            stretch.at(k, &mut q, &mut v, &mut a);
+            model.model.robot.regressor(&q, &v, &a, &mut regressor);
+            for (j, (of, channels)) in joints.iter().zip(&mut channels).enumerate() {
+                let mut entries = [0.0; 5];
+                model.model.friction[j].gradient(v[j], &mut entries);
+                let row = &regressor[j * p..(j + 1) * p];
+                let theta = of.theta.iter().map(|i| row[*i]);
+                let friction = entries[..of.friction].iter().copied();
+                let offset = of.offset.then_some(1.0);
+                let added = of.added.iter().map(|column| column[k]);
+                let last = [residual[j][k], rest::movement(v[j], rest_speed[j])];
+                let all = theta.chain(friction).chain(offset).chain(added).chain(last);
+                channels
+                    .iter_mut()
+                    .zip(all)
+                    .for_each(|(channel, x)| channel.push(x));
+            }
+        }
+        for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {
+            let u = of.places.len();
+            let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
+            let rows = filter.run(&channels)?;
+            let jumps = model.model.friction[j].jumps();
+            let mut columns = vec![0.0; u];
+            for i in 0..filter.rows(piece.len()) {
+                if jumps && rest::rests(rows[u + 1][i]) {
+                    continue;
+                }
+                for (x, row) in columns.iter_mut().zip(&rows) {
+                    *x = row[i];
+                }
+                take(&Row {
+                    t: stretch.t[piece.start + filter.sample_of(i)],
+                    joint: j,
+                    places: &of.places,
+                    columns: &columns,
+                    error: rows[u][i],
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The columns that a joint's rows have.
+struct OfJoint {
+    /// Inertial parameters that its torque holds.
+    theta: Vec<usize>,
+    /// Number of its friction's parameters.
+    friction: usize,
+    offset: bool,
+    /// Columns of the effects, along the whole stretch.
+    added: Vec<Vec<f64>>,
+    /// Where all of them stand among the unknowns, in this order.
+    places: Vec<usize>,
+}
+
+impl OfJoint {
+    fn new(
+        model: &AugmentedModel,
+        layout: &Layout,
+        scene: &Scene,
+        (j, theta): (usize, Vec<usize>),
+    ) -> Self {
+        let mut places = theta.clone();
+        let (first, friction) = layout.friction[j];
+        places.extend(first..first + friction);
+        places.extend(layout.offset[j]);
+        let mut added = Vec::new();
+        let effects = model.effects.iter().zip(&layout.effects);
+        for (effect, first) in
+            effects.filter(|(effect, _)| is_linear(effect) && effect.place.touches(j))
+        {
+            let columns = effect.columns(scene, j);
+            places.extend(*first..*first + columns.len());
+            added.extend(columns);
+        }
+        OfJoint {
+            theta,
+            friction,
+            offset: layout.offset[j].is_some(),
+            added,
+            places,
+        }
+    }
+}
+
+fn is_linear(effect: &Added) -> bool {
+    effect.law.entry.role != Role::Shift
+}
+
+/// The model a step further.
+fn moved(model: &AugmentedModel, layout: &Layout, step: &DVector<f64>) -> AugmentedModel {
+    let mut out = model.clone();
+    let Model {
+        theta,
+        friction,
+        offset,
+        ..
+    } = &mut out.model;
+    for (i, theta) in theta.iter_mut().enumerate() {
+        *theta += step[i];
+    }
+    for (law, (first, count)) in friction.iter_mut().zip(&layout.friction) {
+        let by = |c: usize| if c < *count { step[first + c] } else { 0.0 };
+        match law {
+            JointFriction::None => {}
+            JointFriction::DoubleTanh(law) => {
+                law.viscous += by(0);
+                law.coulomb_1 += by(1);
+                law.coulomb_2 += by(2);
+            }
+            JointFriction::ViscousCoulomb(law) => {
+                law.viscous += by(0);
+                law.coulomb += by(1);
+            }
+        }
+    }
+    for (offset, place) in offset.iter_mut().zip(&layout.offset) {
+        *offset += place.map_or(0.0, |place| step[place]);
+    }
+    for (effect, first) in out.effects.iter_mut().zip(&layout.effects) {
+        if is_linear(effect) {
+            for (c, x) in effect.linear.iter_mut().enumerate() {
+                *x += step[first + c];
+            }
+        }
+    }
+    out
+}

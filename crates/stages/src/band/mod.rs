@@ -1,0 +1,143 @@
+//! Prediction bands of torques: noise, the parameters' deviations, and the model's own error as data show
+//! it that were set aside.
+//!
+//! [`without_each`] moves a model's linear parameters to what the logs say without each of some blocks; what
+//! those models leave in the block that they did not see is an error of prediction, and its quantiles are the
+//! band (split conformal prediction: Papadopoulos et al. 2002; Lei et al. 2018; blocks, as errors of
+//! neighbouring samples are alike: Chernozhukov, Wuthrich and Zhu 2018). They are kept by ranges of speed and
+//! of the model's torque. Half the width at a sample is sqrt(h^2 + 1.96^2 g'Cg), g the torque's gradient by the
+//! parameters, C their covariance: h is the quantile of sqrt(e^2 - 1.96^2 g'Cg), so that the band holds what
+//! it is asked to where data were and widens where parameters are used that the data hardly tell.
+//!
+//! | file | what |
+//! |---|---|
+//! | `folds` | blocks, and models without each |
+//! | `directions` | the deviation by the parameters that logs tell least of, for observers |
+//! | `quantiles` | from errors to [`HeldOut`] |
+//! | this one | the band at a sample; motions that leave what was seen |
+
+mod directions;
+mod folds;
+mod quantiles;
+
+pub use directions::{Direction, Directions};
+pub use folds::{Folds, FreeColumns, without_each};
+pub use quantiles::{Error, edges, held_out, quantile};
+
+use cft_ident_core::number;
+pub use cft_ident_core::robot::deviation::{Deviation, NORMAL_95};
+use cft_ident_core::robot::model::Model;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::held_out::HeldOut;
+
+/// The band of a model that knows what it left of data set aside.
+pub struct Band<'a> {
+    deviation: Deviation<'a>,
+    held: &'a [HeldOut],
+}
+
+impl<'a> Band<'a> {
+    /// None where the file does not hold what it takes.
+    pub fn new(file: &'a ModelFile, model: &'a Model) -> Option<Self> {
+        (file.held_out.len() == model.robot.joints()).then(|| Self {
+            deviation: Deviation::new(&file.model_covariance(model), model),
+            held: &file.held_out,
+        })
+    }
+
+    /// What was seen of each joint.
+    pub fn held(&self) -> &'a [HeldOut] {
+        self.held
+    }
+
+    /// Half the width of every joint's 95 % band at q, v, a, where the model's torque is `tau`.
+    pub fn half_widths(&self, motion: [&[f64]; 3], tau: &[f64], out: &mut [f64]) {
+        self.deviation.variances(motion, out);
+        for (j, (out, held)) in out.iter_mut().zip(self.held).enumerate() {
+            let own = held.half_width(motion[1][j], tau[j]);
+            *out = (own * own + NORMAL_95 * NORMAL_95 * *out).sqrt();
+        }
+    }
+}
+
+/// How to get a band where the model file has none.
+pub const NO_BAND: &str = "the model file holds no [[held_out]], so that it is not known how far its torques are off: no band; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside for that";
+
+/// Ranges that a motion takes up, beside those that a model was fitted and tried in.
+pub struct Reach<'a> {
+    held: &'a [HeldOut],
+    /// Greatest speed and torque, least and greatest position of each joint.
+    seen: Vec<[f64; 4]>,
+    samples: u64,
+    /// Samples beyond, of each joint.
+    beyond: Vec<u64>,
+}
+
+/// Share by which a motion may go beyond what was seen before it is told.
+const SLACK: f64 = 0.05;
+
+impl<'a> Reach<'a> {
+    pub fn new(held: &'a [HeldOut]) -> Self {
+        Self {
+            held,
+            seen: vec![[0.0, 0.0, f64::INFINITY, f64::NEG_INFINITY]; held.len()],
+            samples: 0,
+            beyond: vec![0; held.len()],
+        }
+    }
+
+    /// Takes a sample with the model's torque.
+    pub fn take(&mut self, q: &[f64], v: &[f64], tau: &[f64]) {
+        self.samples += 1;
+        for (j, held) in self.held.iter().enumerate() {
+            let seen = &mut self.seen[j];
+            seen[0] = seen[0].max(v[j].abs());
+            seen[1] = seen[1].max(tau[j].abs());
+            seen[2] = seen[2].min(q[j]);
+            seen[3] = seen[3].max(q[j]);
+            let [low, high] = held.positions_seen;
+            let room = SLACK * (high - low);
+            let out = v[j].abs() > (1.0 + SLACK) * held.speed_seen
+                || tau[j].abs() > (1.0 + SLACK) * held.torque_seen
+                || q[j] < low - room
+                || q[j] > high + room;
+            self.beyond[j] += u64::from(out);
+        }
+    }
+
+    /// What was left, joint by joint, in sentences.
+    pub fn told(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        for (j, held) in self.held.iter().enumerate() {
+            if self.beyond[j] == 0 {
+                continue;
+            }
+            let [speed, torque, low, high] = self.seen[j];
+            let mut parts = Vec::new();
+            let mut more = |what: &str, x: f64, seen: f64| {
+                if x > (1.0 + SLACK) * seen {
+                    let [x, seen] = [x, seen].map(|x| number::significant(x, 3));
+                    parts.push(format!("{what} up to {x}, where {seen} was seen"));
+                }
+            };
+            more("speeds", speed, held.speed_seen);
+            more("torques", torque, held.torque_seen);
+            let [from, to] = held.positions_seen;
+            let room = SLACK * (to - from);
+            if low < from - room || high > to + room {
+                let [low, high, from, to] =
+                    [low, high, from, to].map(|x| number::significant(x, 3));
+                parts.push(format!(
+                    "positions {low}..{high}, where {from}..{to} was seen"
+                ));
+            }
+            let share = number::percent(self.beyond[j] as f64 / self.samples as f64);
+            out.push(format!(
+                "{} leaves what the model was fitted on in {share} of the samples, where its band is a guess: {}",
+                held.joint,
+                parts.join("; ")
+            ));
+        }
+        out
+    }
+}

@@ -1,0 +1,182 @@
+//! A fit by least squares of torques refined by the motion that the torques make: single axes.
+
+use nalgebra::DMatrix;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::hold_out::{hold_out, or_warning};
+use super::in_memory::read_each;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::lsq::IdentifiedDynamics;
+use super::model::{in_file, refined};
+use super::motion_fit::MotionFit;
+use super::position_cutoff::known;
+use super::reduced::error::ReducedError;
+use super::residual::JointResidual;
+use super::validate::validate;
+use crate::open_loop::{AxisError, AxisFit, BLOCKS, fit_axis};
+use cft_ident_core::effect::{Added, AugmentedModel};
+use cft_ident_core::inertia::verdict::verdict;
+use cft_ident_core::math::descent::Ending;
+use cft_ident_core::motion::FilterSettings;
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::verdict::Verdict;
+use cft_ident_files::config::model_file::EffectSection;
+
+/// Windows for each number below which deviations are not trusted.
+const FEW: f64 = 4.0;
+
+/// Refines what `lsq` found on these logs by the motion that the torques make, in windows of so many seconds; without a
+/// length, blocks of the logs that are set aside choose it.
+///
+/// # Errors
+/// [`IdentifyError::NotByMotion`] for robots of several axes and friction of another law, logs that are too short, and
+/// a motion that goes astray.
+pub fn by_motion(
+    machine: &LoggedRobot,
+    found: &mut IdentifiedDynamics,
+    logs: &[Log],
+    window: Option<f64>,
+    control: &Control,
+) -> Result<(), IdentifyError> {
+    if let Some(part) = logs.iter().find_map(Log::reduced) {
+        return Err(ReducedError::NeedsLog {
+            log: part.name().to_owned(),
+            what: "the motion that --open-loop simulates".to_owned(),
+            remedy: "give the log itself",
+        }
+        .into());
+    }
+    let file = found.model(machine, None);
+    let start = refined(&file, &machine.name)?;
+    let one_axis = machine.robot.joints() == 1;
+    let linear = |law: &JointFriction| matches!(law, JointFriction::ViscousCoulomb(_));
+    if !one_axis || !start.model.friction.iter().all(linear) {
+        return Err(IdentifyError::NotByMotion);
+    }
+    let filtered = &machine.with_position_cutoffs(logs, &known(&start.model), control)?;
+    let settings = filtered.settings();
+    let settings = FilterSettings {
+        // where the position filter has no neighbours speeds are wrong, and a window that begins there with them
+        q_trim_s: None,
+        trim_s: Some(0.0),
+        ..settings
+    };
+    let whole = read_each(filtered, &vec![settings; logs.len()], logs, control)?;
+    let work = control.begin("fit to the motion", None);
+    let offset = machine.file.friction.offset;
+    let fit = fit_axis(&start, &whole.stretches, (window, offset), &|| {
+        control.stopped()
+    });
+    let fit = fit.map_err(|error| match error {
+        AxisError::Stopped => IdentifyError::Interrupted,
+        error => IdentifyError::ByMotion(error),
+    })?;
+    drop(work);
+    take(machine, found, &fit, window.is_some());
+    let file = found.model(machine, None);
+    let model = refined(&file, &machine.name)?;
+    let errors = validate(machine, (&model, None), logs, control, &mut |_, _| {})?;
+    let errors = errors.validation.errors.joints.into_iter();
+    for (j, (joint, error)) in found.joints.iter_mut().zip(errors).enumerate() {
+        found.fit.residual_std[j] *= error.rmse / joint.rmse;
+        *joint = JointResidual {
+            joint: error.joint,
+            unit: error.unit,
+            rmse: error.rmse,
+            relative_error: error.relative_error,
+            relative_error_moving: error.relative_error_moving,
+            relative_error_rest: error.relative_error_rest,
+        };
+    }
+    let file = found.model(machine, None);
+    let smoothed = machine.smoothed_as(&found.position_cutoffs);
+    let held = hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control);
+    found.held = or_warning(held, &mut found.warnings)?;
+    Ok(())
+}
+
+/// Puts the numbers of a fit to the motion in place of those of least squares.
+fn take(machine: &LoggedRobot, found: &mut IdentifiedDynamics, fit: &AxisFit, given: bool) {
+    let model = &fit.model;
+    let mut values = model.model.theta.clone();
+    if let JointFriction::ViscousCoulomb(law) = &model.model.friction[0] {
+        values.extend([law.viscous, law.coulomb]);
+    }
+    values.extend(&model.model.offset);
+    let torque_rms = found.fit.torque_rms[0];
+    for (i, unknown) in found.unknowns.iter_mut().enumerate() {
+        let (value, std) = (values[i], fit.covariance[(i, i)].max(0.0).sqrt());
+        let share = 2.0 * std * found.fit.column_rms[(0, i)] / torque_rms;
+        let determined = fit.free.contains(&i);
+        let (verdict, negligible) = verdict(value, std, determined, share);
+        let told = verdict != Verdict::NotIdentifiable;
+        (unknown.fitted, unknown.fitted_std) = (value, std);
+        (unknown.verdict, unknown.negligible) = (verdict, negligible);
+        unknown.value = told.then_some(value);
+        unknown.std = told.then_some(std);
+        unknown.relative_std = told.then(|| std / value.abs());
+    }
+    let u = found.unknowns.len();
+    found.covariance = fit.covariance.view((0, 0), (u, u)).into_owned();
+    let AxisFit { before, after, .. } = *fit;
+    if fit.apart < FEW * fit.free.len() as f64 {
+        found.warnings.push(format!(
+            "fit to the motion: the logs hold {:.0} windows of {} s behind one another for {} numbers; their standard deviations are rough; give longer logs",
+            fit.apart,
+            fit.window_s,
+            fit.free.len()
+        ));
+    }
+    if fit.ending == Ending::IterationLimit {
+        found.warnings.push(format!(
+            "fit to the motion: did not settle in {} steps; its last result stands",
+            fit.steps
+        ));
+    }
+    if after.blocks >= before.blocks {
+        found.warnings.push(
+            "fit to the motion: on blocks set aside it is no better than least squares of torques; take that, without --open-loop"
+                .to_owned(),
+        );
+    }
+    found.by_motion = Some(MotionFit {
+        joint: machine.robot.joint_names()[0].clone(),
+        unit: machine.robot.joint_kind(0).position_unit(),
+        window_s: fit.window_s,
+        window_given: given,
+        windows: fit.windows as u64,
+        windows_apart: fit.apart,
+        blocks: BLOCKS as u64,
+        before,
+        after,
+        status: fit.ending,
+        steps: fit.steps as u64,
+        effects: effects(machine, model, fit),
+        tried: fit.tried.clone(),
+    });
+}
+
+/// Effects as a model file holds them; what the fit left where it was is held.
+fn effects(machine: &LoggedRobot, model: &AugmentedModel, fit: &AxisFit) -> Vec<EffectSection> {
+    let mut first =
+        fit.covariance.nrows() - model.effects.iter().map(Added::parameters).sum::<usize>();
+    let of = |effect: &Added| {
+        let (n, shapes) = (effect.parameters(), effect.shape.len());
+        let mut effect = effect.clone();
+        let mut covariance = DMatrix::zeros(n, n);
+        covariance.copy_from(&fit.covariance.view((first, first), (n, n)));
+        for i in 0..n {
+            effect.held[i] = i >= shapes && !fit.free.contains(&(first + i));
+        }
+        first += n;
+        let told = effect.numbers(
+            &machine.robot,
+            machine.file.torque_unit(0),
+            Some(covariance.as_slice()),
+        );
+        in_file(&effect, machine, &told)
+    };
+    model.effects.iter().map(of).collect()
+}

@@ -1,0 +1,511 @@
+//! What the torque residual still holds, and the effects behind it.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::control::{Control, Progress};
+use super::error::IdentifyError;
+use super::hold_out::{Held, hold_out, or_warning};
+use super::in_memory::{InMemory, read_each, read_wider};
+use super::known_friction::before_these;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::{in_file, new_model, own_laws, refined};
+use super::position_cutoff::known;
+use super::prior::{information, moved_alone, open};
+use super::repeated::each_row_once;
+use super::temperatures;
+use crate::setup::{Finding, FindingKind};
+use cft_ident_core::diagnose::{
+    self, Case, DiagnoseError, Diagnosis, Heard, LogRole, ParameterPrior, SelectionLimits,
+    Suspicion, Unknown, WIDE_TIMES, Watch, WideMotion,
+};
+use cft_ident_core::effect::{self, AugmentedModel, EffectNumber};
+use cft_ident_core::motion::{MotionError, ParallelFilters, Stretch};
+use cft_ident_core::robot::drive::JointDrive;
+use cft_ident_core::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::verdict::{Verdict, verdict_of};
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::candidates::CandidateSection;
+use cft_ident_files::config::model_file::{FrictionPrior, Parameter};
+use cft_ident_logs::log::DataRole;
+
+/// Logs by what they are for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DiagnoseLogs<'a> {
+    /// Fitted.
+    pub train: &'a [Log],
+    /// May veto a step; without any, blocks of the others are set aside for it.
+    pub veto: &'a [Log],
+    /// Evaluated once, after everything is decided; without any, blocks are set aside.
+    pub holdout: &'a [Log],
+}
+
+/// How effects are looked for.
+#[derive(Debug, Clone, Default)]
+pub struct DiagnoseSettings {
+    /// The given model stays within its covariance: finds payload, gain and tilt.
+    pub keep: bool,
+    /// What an effect must keep to be accepted.
+    pub limits: SelectionLimits,
+    /// Effects of the user's own, tried beside those that are known.
+    pub candidates: Vec<CandidateSection>,
+    /// The friction of the given model stays as it is; its covariance is in the deviations of the others.
+    pub hold_friction: bool,
+}
+
+/// What the stage ends with.
+pub enum DiagnoseEnd {
+    /// A diagnosis.
+    Diagnosed(Box<Diagnosed>),
+    /// A fault of the data, which comes before any physics.
+    DataFault(DataFault),
+}
+
+/// What `diagnose` found.
+pub struct Diagnosed {
+    pub diagnosis: Diagnosis,
+    /// The logs that it looked at.
+    pub in_memory: InMemory,
+    /// Names of the logs, in order: fitted, veto, holdout.
+    pub logs: Vec<String>,
+    /// The model as it was given.
+    pub given: AugmentedModel,
+    /// What the refined model leaves of data set aside.
+    pub held: Held,
+    /// What a refined model keeps of the friction before these logs.
+    friction_prior: Vec<FrictionPrior>,
+    /// Effects of the user's own that were tried.
+    candidates: Vec<CandidateSection>,
+    /// The friction was held.
+    hold_friction: bool,
+    pub filters: ParallelFilters,
+    pub cutoff_hz: f64,
+}
+
+/// A fault of the data.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct DataFault {
+    pub kind: String,
+    pub channel: Option<String>,
+    pub effect: String,
+    pub remedy: String,
+}
+
+/// Refuses effects of a user's own that cannot be tried beside a model, whose file is called `name`.
+///
+/// # Errors
+/// Formulas that are none on this robot, and a name that the model has for another effect.
+pub fn check_candidates(
+    candidates: &[CandidateSection],
+    machine: &LoggedRobot,
+    (name, file): (&str, &ModelFile),
+) -> Result<(), IdentifyError> {
+    own_laws(candidates, &machine.robot)?;
+    let other = |own: &&CandidateSection| {
+        let mut known = file.candidates.iter();
+        known.any(|known| known.name == own.name && known != *own)
+    };
+    match candidates.iter().find(other) {
+        Some(own) => Err(IdentifyError::CandidateOfModel {
+            name: own.name.clone(),
+            model: name.to_owned(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Diagnoses a model, whose file is called `name`, on logs.
+///
+/// # Errors
+/// Logs or a model that cannot be used, and logs too short to look for effects.
+pub fn diagnose(
+    machine: &LoggedRobot,
+    (name, file): (&str, &ModelFile),
+    logs: &DiagnoseLogs,
+    settings: &DiagnoseSettings,
+    control: &Control,
+) -> Result<DiagnoseEnd, IdentifyError> {
+    let given = refined(file, name)?;
+    check_candidates(&settings.candidates, machine, (name, file))?;
+    if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
+        return Ok(DiagnoseEnd::DataFault(fault));
+    }
+    each_row_once(
+        machine,
+        &[
+            ("fit", logs.train),
+            ("veto", logs.veto),
+            ("holdout", logs.holdout),
+        ],
+    )?;
+    let groups = [
+        (logs.train, LogRole::Train),
+        (logs.veto, LogRole::Veto),
+        (logs.holdout, LogRole::Holdout),
+    ];
+    let roles = |(logs, role): &(&[Log], LogRole)| vec![*role; logs.len()];
+    let roles: Vec<LogRole> = groups.iter().flat_map(roles).collect();
+    let all = [logs.train, logs.veto, logs.holdout].concat();
+    let laws = known(&given.model);
+    let together = machine.with_position_cutoffs(&all, &laws, control)?;
+    let each = machine.settings_of_each(&all, &laws, &together, control)?;
+    let machine = &together;
+    let mut in_memory = read_each(machine, &each, &all, control)?;
+    let mut taken = temperatures::of_model(&given);
+    taken.extend(temperatures::of_laws(&own_laws(
+        &settings.candidates,
+        &machine.robot,
+    )?));
+    machine.check_taken(&taken, &all, &in_memory.stretches)?;
+    let fitted = match settings.keep {
+        true => &[],
+        false => &in_memory.inputs[..logs.train.len()],
+    };
+    let (before, friction_prior) = match settings.hold_friction {
+        true => (file.clone(), file.friction_prior.clone()),
+        false => before_these((name, file), fitted)?,
+    };
+    let (fitted, vetoed) = (logs.train.len(), logs.train.len() + logs.veto.len());
+    for (at, input) in in_memory.inputs.iter_mut().enumerate() {
+        input.role = Some(match at {
+            at if at < fitted => DataRole::Fitted,
+            at if at < vetoed => DataRole::Vetoed,
+            _ => DataRole::HeldOut,
+        });
+    }
+    let wider = (each.as_slice(), WIDE_TIMES);
+    let wide = read_wider(machine, wider, &all, &in_memory.stretches, control)?;
+    let mut case = case(
+        machine,
+        (name, file, &before),
+        given,
+        &mut in_memory,
+        (roles, settings),
+    )?;
+    case.wide = wide_motion(machine, &case.stretches, wide)
+        .map_err(|error| IdentifyError::motion(name, error))?;
+    let work = control.begin("search for effects", None);
+    let tell = |heard: Heard| {
+        control.tell(match heard {
+            Heard::Begin(part, steps) => Progress::Begin(part, Some(steps)),
+            Heard::Step => Progress::Advance(1),
+            Heard::End => Progress::End,
+            Heard::Said(text) => Progress::Note(text),
+        });
+    };
+    let watch = Watch {
+        tell: &tell,
+        stop: &|| control.stopped(),
+    };
+    let found = diagnose::diagnose(&case, watch);
+    drop(work);
+    let diagnosis = match found {
+        Ok(diagnosis) => diagnosis,
+        Err(DiagnoseError::Channels(found)) => {
+            return Ok(DiagnoseEnd::DataFault(wrong_channel(machine, found)));
+        }
+        Err(DiagnoseError::Interrupted) => return Err(IdentifyError::Interrupted),
+        Err(error) => return Err(IdentifyError::Diagnose(error)),
+    };
+    in_memory.stretches = case.stretches;
+    let train = logs.train;
+    let logs: Vec<String> = all.iter().map(Log::name).collect();
+    for aside in &diagnosis.set_aside {
+        if aside.role == LogRole::Holdout {
+            let text = format!(
+                "{}: {:.2}..{:.2} s set aside as the holdout",
+                logs[aside.log], aside.from_s, aside.to_s
+            );
+            control.note(&text);
+        }
+    }
+    let mut found = Diagnosed {
+        diagnosis,
+        in_memory,
+        logs,
+        given: case.given,
+        held: Held::default(),
+        friction_prior,
+        candidates: settings.candidates.clone(),
+        hold_friction: settings.hold_friction,
+        filters: case.filters,
+        cutoff_hz: case.cutoff_hz,
+    };
+    let refined = found.model(machine, file);
+    let tried = hold_out(
+        machine,
+        (&refined, &found.diagnosis.model),
+        (train, &found.in_memory.inputs),
+        control,
+    );
+    found.held = or_warning(tried, &mut found.in_memory.warnings)?;
+    Ok(DiagnoseEnd::Diagnosed(Box::new(found)))
+}
+
+/// The logs through a wider position filter, beside the stretches of a case; none where no log gives one.
+fn wide_motion(
+    machine: &LoggedRobot,
+    stretches: &[Stretch],
+    wide: Vec<Stretch>,
+) -> Result<Option<WideMotion>, MotionError> {
+    // the slowest log carries the lowest cut-off
+    let Some(dt) = wide.iter().map(|s| s.dt).max_by(f64::total_cmp) else {
+        return Ok(None);
+    };
+    let settings = machine.settings().widened(WIDE_TIMES, 1.0 / dt);
+    WideMotion::beside(stretches, wide, &settings).map(Some)
+}
+
+/// Channels that are no torques, as a fault: gains that differ look like friction and loads.
+fn without_gains(machine: &LoggedRobot) -> Option<DataFault> {
+    let error = machine.check_gains().err()?.to_string();
+    let (effect, remedy) = error.split_once("; ").unwrap_or((&error, ""));
+    Some(DataFault {
+        kind: "gains".to_owned(),
+        channel: Some("torque".to_owned()),
+        effect: effect.to_owned(),
+        remedy: remedy.to_owned(),
+    })
+}
+
+/// The first fault for which a fit refuses one of the logs.
+fn refused(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    control: &Control,
+) -> Result<Option<DataFault>, IdentifyError> {
+    for log in logs {
+        if let Some(fault) = machine.fault(log, control)? {
+            return Ok(Some(DataFault {
+                kind: fault.kind.word().to_owned(),
+                channel: fault.channel,
+                effect: format!("{}: {}", log.name(), fault.effect),
+                remedy: fault.remedy,
+            }));
+        }
+    }
+    Ok(None)
+}
+
+/// How many times as firm as its covariance a friction that is held stands against the data.
+const HELD: f64 = 1e6;
+
+/// What the search is about; it takes the stretches of the logs. `before` is the model `file` with the friction
+/// that is known without these logs.
+fn case(
+    machine: &LoggedRobot,
+    (name, file, before): (&str, &ModelFile, &ModelFile),
+    given: AugmentedModel,
+    in_memory: &mut InMemory,
+    (roles, settings): (Vec<LogRole>, &DiagnoseSettings),
+) -> Result<Case, IdentifyError> {
+    let processing = machine.settings();
+    let filters = ParallelFilters::design(&processing, &in_memory.stretches)
+        .map_err(|error| IdentifyError::motion(name, error))?;
+    let hold = settings.hold_friction;
+    let open = open(machine, file, &given, hold);
+    let rate = filters.row_rate_hz();
+    let alone = moved_alone(&given, &in_memory.stretches, &roles);
+    // what is held is known so many times better than these data can say; its own spread, which placebos draw and
+    // deviations hold, stays that of its covariance
+    let firm = if hold { HELD } else { 1.0 };
+    let prior = ParameterPrior {
+        information: information(before, &given, &open, (settings.keep, hold), &alone),
+        centre: refined(before, name)?,
+        rows_per_independent: firm * (rate / (2.0 * processing.cutoff_hz)).max(1.0),
+    };
+    Ok(Case {
+        given,
+        prior,
+        open,
+        stretches: std::mem::take(&mut in_memory.stretches),
+        roles,
+        wide: None,
+        filters,
+        cutoff_hz: processing.cutoff_hz,
+        rest_speed: in_memory.rest_speed.clone(),
+        drives: drives(machine),
+        units: (0..machine.robot.joints())
+            .map(|j| machine.file.torque_unit(j).to_owned())
+            .collect(),
+        averaged: in_memory.averaged,
+        keep: settings.keep,
+        without: Vec::new(),
+        own: own_laws(&settings.candidates, &machine.robot)?,
+        limits: settings.limits,
+    })
+}
+
+/// The drives that the robot file declares, joint by joint.
+fn drives(machine: &LoggedRobot) -> Vec<JointDrive> {
+    let names = machine.robot.joint_names().iter();
+    let declared = names.map(|name| machine.file.drive.get(name).cloned());
+    declared.map(Option::unwrap_or_default).collect()
+}
+
+/// A torque channel that the model knows otherwise, as a fault.
+fn wrong_channel(machine: &LoggedRobot, found: Suspicion) -> DataFault {
+    let names = machine.robot.joint_names();
+    let (joint, effect, remedy) = match found {
+        Suspicion::Turned { joint } => (
+            joint,
+            format!(
+                "the torque of {} has the other sign than the model's",
+                names[joint]
+            ),
+            "set `torque_scale` of the joint to its negative in [log], or correct the log",
+        ),
+        Suspicion::Exchanged { joint, with } => (
+            joint,
+            format!(
+                "the torques of {} and {} have changed places",
+                names[joint], names[with]
+            ),
+            "exchange the two torque columns in [log]",
+        ),
+    };
+    DataFault {
+        kind: effect::wrong_sign_or_order::ENTRY.name.to_owned(),
+        channel: Some(names[joint].clone()),
+        effect,
+        remedy: remedy.to_owned(),
+    }
+}
+
+impl Diagnosed {
+    /// Parameters of an accepted effect with their standard deviations.
+    pub fn told(&self, machine: &LoggedRobot, effect: usize) -> Vec<EffectNumber> {
+        let added = &self.diagnosis.model.effects[effect];
+        let joint = added.place.joint().unwrap_or(0);
+        let covariance = self.diagnosis.covariance_of(effect);
+        added.numbers(
+            &machine.robot,
+            machine.file.torque_unit(joint),
+            Some(&covariance),
+        )
+    }
+
+    /// The refined model, where `file` is the one that was given: that file itself where nothing was added.
+    pub fn model(&self, machine: &LoggedRobot, file: &ModelFile) -> ModelFile {
+        let diagnosis = &self.diagnosis;
+        if diagnosis.steps.is_empty() {
+            return file.clone();
+        }
+        let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
+        model.parameters.clone_from(&file.parameters);
+        model.friction_prior.clone_from(&self.friction_prior);
+        let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
+        let mut undetermined = Vec::new();
+        for (i, unknown) in diagnosis.unknowns.iter().enumerate() {
+            if self.hold_friction && matches!(unknown, Unknown::Friction { .. }) {
+                continue;
+            }
+            let Some((name, joint, value)) = self.fitted(*unknown) else {
+                continue;
+            };
+            let there = |p: &&mut Parameter| p.name == name && p.joint == joint;
+            let Some(p) = model.parameters.iter_mut().find(there) else {
+                continue;
+            };
+            let variance = diagnosis.covariance[(i, i)];
+            let found = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+            match put(p, value, found) {
+                Some(factor) => {
+                    widened.push(factor);
+                    keys.push(p.key());
+                    places.push(i);
+                }
+                None => undetermined.push(p.key()),
+            }
+        }
+        model.forget_covariance(&undetermined);
+        model.replace_covariance(&keys, &|a, b| {
+            widened[a] * widened[b] * diagnosis.covariance[(places[a], places[b])]
+        });
+        let joints = machine.robot.joint_names().iter();
+        for (joint, std) in joints.zip(&diagnosis.residual_std) {
+            model.residual_std.insert(joint.clone(), *std);
+        }
+        let effects = diagnosis.model.effects.iter().enumerate();
+        model.effects = effects
+            .map(|(i, added)| in_file(added, machine, &self.told(machine, i)))
+            .collect();
+        let of_model = |c: &&CandidateSection| model.effects.iter().any(|e| e.name == c.name);
+        let known = file.candidates.iter().chain(&self.candidates);
+        for candidate in known.filter(of_model) {
+            if !model.candidates.contains(candidate) {
+                model.candidates.push(candidate.clone());
+            }
+        }
+        self.held.write_into(&mut model);
+        model
+    }
+
+    /// Name, joint and value of an unknown that model files hold; none for those of effects.
+    fn fitted(&self, unknown: Unknown) -> Option<(String, Option<String>, f64)> {
+        let fitted = &self.diagnosis.model.model;
+        let robot = &fitted.robot;
+        let (name, joint, value) = match unknown {
+            Unknown::Theta(k) => (
+                robot.parameters()[k].name.to_string(),
+                None,
+                fitted.theta[k],
+            ),
+            Unknown::Offset(j) => ("offset".to_owned(), Some(j), fitted.offset[j]),
+            Unknown::Friction { joint, k } => match &fitted.friction[joint] {
+                JointFriction::None => return None,
+                JointFriction::DoubleTanh(law) => (
+                    DoubleTanh::NAMES[k].to_owned(),
+                    Some(joint),
+                    law.parameters()[k],
+                ),
+                JointFriction::ViscousCoulomb(law) => (
+                    ViscousCoulomb::NAMES[k].to_owned(),
+                    Some(joint),
+                    [law.viscous, law.coulomb][k],
+                ),
+            },
+            Unknown::Linear { .. } | Unknown::Shape { .. } => return None,
+        };
+        Some((name, joint.map(|j| robot.joint_names()[j].clone()), value))
+    }
+}
+
+/// Gives a parameter the value and the standard deviation that were found, and says by how much the
+/// latter is widened; none where other parameters explain the same torque in these logs.
+fn put(p: &mut Parameter, value: f64, found: f64) -> Option<f64> {
+    if !found.is_finite() {
+        p.value = value;
+        p.std = None;
+        p.verdict = Some(Verdict::NotIdentifiable);
+        return None;
+    }
+    // what smoothing and the encoders' steps did to the given model, they do to this one
+    let std = found.max(p.std.unwrap_or(0.0));
+    // a parameter without a torque worth mentioning is known well enough as it is
+    let negligible = p.is_negligible();
+    p.value = value;
+    p.std = Some(std);
+    if !negligible {
+        p.verdict = Some(verdict_of(value, std));
+    }
+    Some(if found > 0.0 { std / found } else { 1.0 })
+}
+
+impl DataFault {
+    /// A set-up that the torques contradict, as a fault of the data.
+    pub fn of_setup(finding: &Finding) -> Self {
+        let kind = match finding.kind {
+            FindingKind::Sign | FindingKind::Order => effect::wrong_sign_or_order::ENTRY.name,
+            other => other.word(),
+        };
+        Self {
+            kind: kind.to_owned(),
+            channel: finding.joint.clone(),
+            effect: finding.meaning.clone(),
+            remedy: format!("write {}", finding.remedy),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Why a stage ends without a result.
+
+use super::error_kind::ErrorKind;
+use super::gain_error::GainError;
+use super::reduced::error::ReducedError;
+use super::track_error::TrackError;
+use crate::open_loop::AxisError;
+use cft_ident_core::diagnose::DiagnoseError;
+use cft_ident_core::effect::EffectError;
+use cft_ident_core::effect::formula::FormulaError;
+use cft_ident_core::friction::excitation::FrictionError;
+use cft_ident_core::inertia::solution::FitError;
+use cft_ident_core::motion::{MotionError, RunError};
+use cft_ident_files::config::ConfigError;
+use cft_ident_logs::inspect::LogFault;
+use cft_ident_logs::log::{LogError, did_you_mean, escape};
+
+/// An error of a stage. Its text reads `what is wrong; what to do`.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error(transparent)]
+    Reduced(#[from] ReducedError),
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    #[error("interrupted")]
+    Interrupted,
+    #[error("no log is given")]
+    NoLog,
+    /// Rows that would count twice, or be fitted and held out.
+    #[error(
+        "{second} ({second_role}) holds rows that {first} ({first_role}) holds: deviations come out too small, or what was fitted is no holdout; give each row once, spans as in LOG@0..70% and LOG@70..100%"
+    )]
+    SameRows {
+        first: String,
+        first_role: &'static str,
+        second: String,
+        second_role: &'static str,
+    },
+    /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
+    #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
+    Refused { log: String, fault: Box<LogFault> },
+    /// The motion of a log, or the processing that a robot file asks for.
+    #[error("{of}: {error}")]
+    Motion { of: String, error: MotionError },
+    #[error(
+        "{log}: more than {most} rows; the friction filter passes over a one-joint log many times and holds it in memory; give a span of it, such as FILE@0..600s: minutes are enough for friction"
+    )]
+    TooManyRows { log: String, most: usize },
+    #[error(
+        "{log}: {samples} samples are more than the {most} that are held in memory; choose spans of the logs, as in LOG@0..20%"
+    )]
+    TooManySamples {
+        log: String,
+        samples: usize,
+        most: usize,
+    },
+    #[error(
+        "the robot has no joint `{joint}`; {}its joints are {known}", did_you_mean(.joint, .known)
+    )]
+    NoJoint { joint: String, known: String },
+    #[error("{logs}: {error}")]
+    Friction { logs: String, error: FrictionError },
+    #[error(
+        "{estimator} is linear, and the double-tanh law of friction is not; take `--estimator oe`, which refines the law with the inertias; or give the friction with -m, or set `law = \"viscous-coulomb\"`"
+    )]
+    LawIsNotLinear { estimator: &'static str },
+    #[error(
+        "these data determine none of the parameters; excite every joint with more speed and acceleration"
+    )]
+    NothingDetermined,
+    /// Channels of several joints in a unit that is no torque.
+    #[error(
+        "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them; give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]; or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`; or go on with one gain for all joints, and a model in {unit}, by `--as-declared`"
+    )]
+    WithoutGains {
+        robot: String,
+        joints: String,
+        unit: &'static str,
+    },
+    /// No axis that is fitted to its motion.
+    #[error(
+        "--open-loop fits single axes whose robot file says `law = \"viscous-coulomb\"` and `fitted_with_inertias = true` in [friction]; fit this robot without it"
+    )]
+    NotByMotion,
+    #[error(transparent)]
+    ByMotion(#[from] AxisError),
+    #[error(transparent)]
+    Gains(#[from] GainError),
+    #[error("{model}: {error}; {}correct the [[effect]] table, or take it out", near(.error))]
+    Effect { model: String, error: EffectError },
+    /// A formula of the user's own that is none on this robot.
+    #[error("{0}; correct the [[candidate]] table")]
+    Formula(FormulaError),
+    /// A log without a temperature that a formula takes.
+    #[error("{log}: `{effect}` takes the temperature of {joint}, and none is known: {why}")]
+    NoTemperature {
+        log: String,
+        effect: String,
+        joint: String,
+        why: String,
+    },
+    /// A candidate whose name the given model has for something else.
+    #[error(
+        "candidate `{name}`: {model} has an effect of that name with another [[candidate]] table; give the candidate another name, or leave it as it is there"
+    )]
+    CandidateOfModel { name: String, model: String },
+    /// A model that nothing was set aside for.
+    #[error(
+        "{model}: holds no [[held_out]] and [excesses], so that it is not known how large external torques are where nothing touches the robot; fit it again with `lsq` or `diagnose` of this version, which set blocks of their logs aside; or give a log of the robot moving freely by `--unloaded LOG`"
+    )]
+    NothingHeldOut { model: String },
+    #[error(transparent)]
+    Diagnose(DiagnoseError),
+    #[error(
+        "{first} and {second} are models of different robots: the joints are {ours} in the first and {theirs} in the second; give two models that were identified on one robot"
+    )]
+    OtherRobot {
+        first: String,
+        second: String,
+        ours: String,
+        theirs: String,
+    },
+}
+
+/// What was meant by a name that is not known.
+fn near(error: &EffectError) -> String {
+    match error {
+        EffectError::Unknown { name, known } => did_you_mean(name, known),
+        EffectError::Joint { joint, known, .. } => did_you_mean(joint, known),
+        _ => String::new(),
+    }
+}
+
+impl IdentifyError {
+    /// What it is about.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Interrupted => ErrorKind::Interrupted,
+            Self::NoLog
+            | Self::NoJoint { .. }
+            | Self::LawIsNotLinear { .. }
+            | Self::NotByMotion => ErrorKind::Usage,
+            Self::Fit(FitError::TooFewRows { .. } | FitError::NothingExcited)
+            | Self::Friction { .. }
+            | Self::ByMotion(_)
+            | Self::NothingDetermined => ErrorKind::Undetermined,
+            Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
+            Self::Diagnose(_) => ErrorKind::Undetermined,
+            Self::Gains(error) => error.kind(),
+            Self::Reduced(ReducedError::Empty) | Self::Track(TrackError::Empty) => ErrorKind::Usage,
+            Self::Reduced(_)
+            | Self::Track(_)
+            | Self::WithoutGains { .. }
+            | Self::Log(_)
+            | Self::Config(_)
+            | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
+            | Self::Refused { .. }
+            | Self::SameRows { .. }
+            | Self::Motion { .. }
+            | Self::TooManyRows { .. }
+            | Self::TooManySamples { .. }
+            | Self::Effect { .. }
+            | Self::Formula(_)
+            | Self::NoTemperature { .. }
+            | Self::NothingHeldOut { .. }
+            | Self::CandidateOfModel { .. }
+            | Self::OtherRobot { .. } => ErrorKind::Input,
+        }
+    }
+
+    /// What to do, where the text does not say it.
+    pub fn remedy(&self) -> Option<&str> {
+        match self {
+            Self::Refused { fault, .. } => Some(&fault.remedy),
+            _ => None,
+        }
+    }
+
+    /// The motion of a log.
+    pub(super) fn motion(of: &str, error: MotionError) -> Self {
+        Self::Motion {
+            of: of.to_owned(),
+            error,
+        }
+    }
+
+    /// What ended a run through a log.
+    pub fn of_run(log: &str, error: RunError<ReadError>) -> Self {
+        match error {
+            RunError::Source(error) => error.into(),
+            RunError::Motion(error) => Self::motion(log, error),
+        }
+    }
+}
+
+/// What stops the reading of a log.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl From<ReadError> for IdentifyError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Log(error) => Self::Log(error),
+            ReadError::Interrupted => Self::Interrupted,
+        }
+    }
+}

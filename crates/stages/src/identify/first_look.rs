@@ -1,0 +1,16 @@
+//! What is known of a log before it is used.
+
+use cft_ident_logs::inspect::Gate;
+
+/// What the first look at a log found.
+#[derive(Debug, Clone)]
+pub(super) struct FirstLook {
+    /// Faults, and rows to leave out.
+    pub(super) gate: Gate,
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub(super) rest_speed: Vec<f64>,
+    /// Greatest speed of each joint [m/s or rad/s].
+    pub(super) fastest: Vec<f64>,
+    /// Its first and last time, from where its times are counted [s].
+    pub(super) bounds: [f64; 2],
+}

@@ -1,0 +1,495 @@
+//! The inertial parameters by linear least squares, and friction with them where it is not known.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::consistent::{ConsistentLinks, consistent};
+use super::control::Control;
+use super::error::IdentifyError;
+use super::estimate::{Account, Estimated, estimate};
+use super::gain_error::GainError;
+use super::gains::{CurrentGains, Gain};
+use super::geometry::geometry;
+use super::hold_out::{Held, hold_out, or_warning};
+use super::known_friction::{FrictionBefore, FrictionOfFit};
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::model::{new_model, refined};
+use super::motion_fit::MotionFit;
+use super::own_settings::CutoffCosts;
+use super::passes::Passes;
+use super::position_cutoff::PositionCutoff;
+use super::reduced::error::ReducedError;
+use super::reduced::reduced_log::{MadeWith, ReducedLog};
+use super::repeated::each_row_once;
+use super::residual::{JointResidual, RelativeError};
+use super::unknowns::{FittedUnknown, columns, unknowns};
+use super::weakest::{WeakestPart, weakest};
+use crate::setup::Finding;
+use cft_ident_core::inertia::columns::RegressorColumns;
+use cft_ident_core::inertia::essential::{Essential, essential};
+use cft_ident_core::inertia::gains::by_gains;
+use cft_ident_core::inertia::instruments::ReferenceSource;
+use cft_ident_core::inertia::solution::{ConditionNumbers, Confounded, FitError};
+use cft_ident_core::inertia::solve::{Fit, factor, residual_of, weights_of};
+use cft_ident_core::math::descent::Ending;
+use cft_ident_core::motion::Summary;
+use cft_ident_core::number;
+use cft_ident_core::robot::friction::DoubleTanh;
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_core::verdict::Verdict;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_files::config::identified::friction_meaning;
+use cft_ident_files::config::model_file::{FrictionPrior, Parameter, is_positive};
+use cft_ident_files::config::robot_file::FrictionLawKind;
+use cft_ident_logs::log::Provenance;
+
+/// How the inertial parameters are fitted.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LsqSettings<'a> {
+    /// How parameters are estimated from the rows.
+    pub estimator: EstimatorKind,
+    /// Only physically consistent parameters.
+    pub consistent: bool,
+    /// The model that holds the friction of every joint, and its name for messages; without one,
+    /// friction is fitted together with the inertias.
+    pub friction: Option<(&'a str, &'a ModelFile)>,
+    /// The friction of `friction` stays as it is; otherwise it is refined with the inertias, but for `ols`.
+    pub hold_friction: bool,
+    /// Gains that were fitted before, whose uncertainty the parameters share.
+    pub gains: Option<&'a CurrentGains>,
+}
+
+/// What `lsq` found.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct IdentifiedDynamics {
+    #[serde(rename = "parameters")]
+    pub unknowns: Vec<FittedUnknown>,
+    /// The friction that was known, before and after the fit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub friction: Vec<FrictionOfFit>,
+    /// Gains of the torque channels, where they were fitted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gains: Vec<Gain>,
+    pub essential: EssentialFit,
+    /// Physically consistent links, where they were asked for.
+    #[serde(rename = "feasible")]
+    pub consistent: Option<ConsistentLinks>,
+    pub condition: ConditionNumbers,
+    /// Directions of the parameters that the rows determine.
+    pub rank: usize,
+    /// The combination of parameters that they tell least about.
+    pub weakest_direction: Vec<WeakestPart>,
+    /// Rows of all joints.
+    pub samples: u64,
+    /// Effective sample size, of all joints.
+    pub effective_samples: f64,
+    /// Residual of the fit.
+    pub joints: Vec<JointResidual>,
+    /// The fit to the motion, where one was asked for; `parameters` and `joints` are its own then.
+    #[serde(rename = "open_loop", skip_serializing_if = "Option::is_none")]
+    pub by_motion: Option<MotionFit>,
+    /// By which filter positions became velocities; joints that never move are left out.
+    pub position_cutoffs: Vec<PositionCutoff>,
+    #[serde(rename = "estimator")]
+    pub account: Account,
+    #[serde(rename = "processing")]
+    pub summary: Summary,
+    /// What the check of the set-up found, where it was made.
+    pub setup: Vec<Finding>,
+    #[serde(skip)]
+    pub columns: RegressorColumns,
+    #[serde(skip)]
+    pub fit: Fit,
+    /// Covariance of the unknowns and of the known friction of each joint.
+    #[serde(skip)]
+    pub covariance: DMatrix<f64>,
+    /// What a model file keeps of the friction before the fit.
+    #[serde(skip)]
+    pub friction_prior: Vec<FrictionPrior>,
+    /// What the model leaves of data set aside.
+    #[serde(skip)]
+    pub held: Held,
+    #[serde(skip)]
+    pub inputs: Vec<Provenance>,
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// The unknowns that the data are really about.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct EssentialFit {
+    /// How many they are.
+    pub count: usize,
+    /// Residual of the fit with those alone.
+    pub joints: Vec<RelativeError>,
+}
+
+/// Fits the inertial parameters.
+///
+/// # Errors
+/// Logs that cannot be used, settings that contradict the robot file, and data that determine none
+/// of the parameters.
+pub fn lsq(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    settings: &LsqSettings,
+    control: &Control,
+) -> Result<IdentifiedDynamics, IdentifyError> {
+    let LsqSettings {
+        estimator,
+        friction,
+        ..
+    } = *settings;
+    machine.check_gains()?;
+    each_row_once(machine, &[("fit", logs)])?;
+    if settings.gains.is_some() && friction.is_some() {
+        return Err(GainError::FrictionGiven.into());
+    }
+    let law = friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh;
+    if law && !matches!(estimator, EstimatorKind::Wls | EstimatorKind::Oe) {
+        return Err(IdentifyError::LawIsNotLinear {
+            estimator: estimator.name(),
+        });
+    }
+    let reduced: Vec<&ReducedLog> = logs.iter().filter_map(Log::reduced).collect();
+    if let Some(part) = reduced.first()
+        && !matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls)
+    {
+        return Err(ReducedError::NeedsLog {
+            log: part.name().to_owned(),
+            what: format!("what the estimator {} reads", estimator.name()),
+            remedy: "give the log itself, or take `--estimator wls` or `ols`, with `--feasible` if wanted",
+        }
+        .into());
+    }
+    let before = friction.map(|given| {
+        let hold = settings.hold_friction || estimator == EstimatorKind::Ols || !reduced.is_empty();
+        FrictionBefore::of(machine, given, logs, (estimator, hold), control)
+    });
+    let before = before.transpose()?;
+    let linear = columns(machine, before.as_ref().map(|b| b.known.as_slice()));
+    let name = friction.map(|(name, _)| name);
+    let wanted = MadeWith::of(
+        &machine.file,
+        name.zip(before.as_ref().map(|b| b.known.as_slice())),
+    );
+    for part in &reduced {
+        part.belongs_to(&wanted)?;
+    }
+    let known = linear.known.iter();
+    let laws: Vec<_> = known
+        .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
+        .collect();
+    let own = machine.own_settings(logs, &laws, control)?;
+    let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
+    let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
+    let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    if let Some(gains) = settings.gains {
+        share_uncertainty(&mut estimated, gains)?;
+    }
+    let (essential, essential_error) = essentials(&estimated)?;
+    let resting = estimated.basis.sums.resting_shares();
+    let consistent = match settings.consistent {
+        true => Some(consistent(machine, &mut estimated)?),
+        false => None,
+    };
+    let Estimated {
+        columns,
+        fit,
+        mut covariance,
+        account,
+        ..
+    } = estimated;
+    let u = fit.theta.len();
+    covariance
+        .view_mut((0, 0), (u, u))
+        .copy_from(&fit.covariance);
+    let mut warnings = machine.file.notes.0.clone();
+    warnings.extend(settings.gains.iter().flat_map(|g| g.warnings.clone()));
+    warnings.extend(consistent.iter().flat_map(ConsistentLinks::warnings));
+    if friction.is_none() {
+        warnings.push(with_friction(law).to_owned());
+    }
+    warnings.extend(account.warnings());
+    warnings.extend(held_by_parts(settings, &reduced));
+    warnings.append(&mut passes.warnings);
+    warnings.extend(rests(machine, &resting));
+    let mut friction_of_fit = Vec::new();
+    let mut friction_prior = Vec::new();
+    if let (Some(before), Some((_, file))) = (&before, friction) {
+        friction_prior = before.kept(file, &passes.inputs);
+        // `oe` has the friction among its unknowns
+        if estimator != EstimatorKind::Oe {
+            friction_of_fit = before.after(machine, &columns, &covariance);
+            let fastest = machine.fastest(logs, control)?;
+            warnings.extend(before.beyond(machine, &columns, &covariance, &fastest));
+        }
+    }
+    let summary = passes.summary.take().ok_or(IdentifyError::NoLog)?;
+    let mut inputs = std::mem::take(&mut passes.inputs);
+    inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
+    let unknowns = unknowns(machine, &columns, &fit, &essential);
+    warnings.extend(confounded(&fit, &unknowns));
+    warnings.extend(negative(&unknowns));
+    let costs: Vec<&CutoffCosts> = costs.iter().collect();
+    let (position_cutoffs, wrong) = CutoffCosts::told(&costs, machine, &columns, &fit);
+    warnings.extend(wrong);
+    if unknowns
+        .iter()
+        .all(|u| u.verdict == Verdict::NotIdentifiable)
+    {
+        return Err(IdentifyError::NothingDetermined);
+    }
+    let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
+    let told = of_geometry.iter().map(|finding| &finding.meaning);
+    warnings.extend(
+        told.map(|told| format!("{told}; take the plain number unless it was measured so")),
+    );
+    let names = machine.robot.joint_names().iter().enumerate();
+    let joints = names.map(|(j, joint)| JointResidual {
+        joint: joint.clone(),
+        unit: machine.file.torque_unit(j),
+        rmse: fit.relative_error[j].rms,
+        relative_error: fit.relative_error[j].all,
+        relative_error_moving: fit.relative_error[j].moving,
+        relative_error_rest: fit.relative_error[j].rest,
+    });
+    let mut found = IdentifiedDynamics {
+        held: Held::default(),
+        by_motion: None,
+        essential: EssentialFit {
+            count: essential.essential.iter().filter(|e| **e).count(),
+            joints: RelativeError::each(machine, &essential_error),
+        },
+        condition: fit.condition,
+        rank: fit.rank,
+        weakest_direction: weakest(&fit, &unknowns),
+        samples: fit.rows * machine.robot.joints() as u64,
+        effective_samples: fit.effective_rows * machine.robot.joints() as f64,
+        joints: joints.collect(),
+        friction: friction_of_fit,
+        friction_prior,
+        position_cutoffs,
+        columns,
+        fit,
+        covariance,
+        account,
+        gains: settings.gains.map_or(Vec::new(), |g| g.joints.clone()),
+        consistent,
+        unknowns,
+        summary,
+        inputs,
+        warnings,
+        setup: of_geometry,
+    };
+    // what is set aside is looked at row by row
+    if reduced.is_empty() {
+        let file = found.model(machine, friction.map(|(_, file)| file));
+        let smoothed = machine.smoothed_as(&found.position_cutoffs);
+        let tried = refined(&file, &machine.name)
+            .and_then(|model| hold_out(&smoothed, (&file, &model), (logs, &found.inputs), control));
+        found.held = or_warning(tried, &mut found.warnings)?;
+    }
+    Ok(found)
+}
+
+/// Adds to the covariance of a fit that of the gains by which its torques were made.
+fn share_uncertainty(estimated: &mut Estimated, gains: &CurrentGains) -> Result<(), FitError> {
+    let (fit, basis) = (&mut estimated.fit, &estimated.basis);
+    let std = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let weights = weights_of(&basis.sums, &std);
+    let slopes = by_gains(&basis.sums, &weights, &basis.shift)?;
+    fit.covariance += &slopes * &gains.covariance * slopes.transpose();
+    Ok(())
+}
+
+/// Friction that could move with the rows of logs stays where reduced ones have it: a warning.
+fn held_by_parts(settings: &LsqSettings, reduced: &[&ReducedLog]) -> Option<String> {
+    let part = reduced.first()?;
+    let moved = settings.friction.is_some()
+        && !settings.hold_friction
+        && settings.estimator == EstimatorKind::Wls;
+    moved.then(|| {
+        format!(
+            "the friction stays as it was given to `reduce`, as by --hold-friction: {} is a reduced log, and its rows hold no other; give logs to refine it",
+            part.name()
+        )
+    })
+}
+
+fn with_friction(law: bool) -> &'static str {
+    match law {
+        true => {
+            "friction is fitted together with the inertias, for there are no one-joint logs of it: linear columns first, then the law of (18) by refinement"
+        }
+        false => {
+            "friction is fitted together with the inertias (viscous and Coulomb terms), for there are no one-joint logs of it"
+        }
+    }
+}
+
+impl Account {
+    /// What did not come as it should, as warnings.
+    fn warnings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if self.estimator == EstimatorKind::Oe && !self.law_refined {
+            out.push("no parameter of this model is nonlinear: oe gives what wls gives".to_owned());
+        }
+        if let Some(simulated) = &self.simulated {
+            if simulated.reference == ReferenceSource::Smoothed {
+                out.push("iv: no log channel is named as the reference, so the measured position, smoothed to half the cut-off, stands for it; a part of its noise stays in the instruments. Name the channel: `reference = \"COLUMN\"` in [log.joint.NAME]".to_owned());
+            }
+            if simulated.failed_steps_share > 0.0 {
+                out.push(format!(
+                    "iv: at {} of the simulated steps the motion could not be computed or went astray, and joints were moved by themselves or put back; instruments are poorer for it",
+                    number::percent(simulated.failed_steps_share)
+                ));
+            }
+        }
+        if self.status == Ending::IterationLimit {
+            out.push(format!(
+                "{} did not settle in {} passes over the logs; its last result stands",
+                self.estimator.name(),
+                self.iterations
+            ));
+        }
+        out
+    }
+}
+
+/// Share of a joint's rows at rest from which on they are told.
+const TOLD: f64 = 0.01;
+
+/// Rows at rest that are not fitted, as a warning.
+fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
+    let joints = machine.robot.joint_names().iter().zip(shares);
+    let told: Vec<String> = joints
+        .filter(|(_, share)| **share >= TOLD)
+        .map(|(joint, share)| format!("{joint} {}", number::percent(*share)))
+        .collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted",
+            told.join(", ")
+        )
+    })
+}
+
+/// Friction and inertias that are below zero by more than two deviations, as a warning.
+fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
+    let positive = |u: &&FittedUnknown| is_positive(&u.key, u.joint.is_some());
+    let below = |u: &&FittedUnknown| u.fitted < -2.0 * u.fitted_std;
+    let names: Vec<String> = unknowns
+        .iter()
+        .filter(positive)
+        .filter(below)
+        .map(|u| match &u.joint {
+            Some(joint) => format!("{}:{joint}", u.key),
+            None => u.key.clone(),
+        })
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not separate these parameters from others",
+            names.join(", ")
+        )
+    })
+}
+
+/// What the data do not separate, as warnings.
+fn confounded(fit: &Fit, unknowns: &[FittedUnknown]) -> Vec<String> {
+    let sentence = |c: &Confounded| {
+        let most = || c.terms.iter().take(6);
+        let names: Vec<&str> = most().map(|(i, _)| unknowns[*i].key.as_str()).collect();
+        let words: Vec<String> = most()
+            .map(|(i, x)| format!("{x:+.3} {}", unknowns[*i].key))
+            .collect();
+        format!(
+            "these data cannot separate {}: their combination {} (columns scaled to norm 1) changes nothing",
+            names.join(", "),
+            words.join(" ")
+        )
+    };
+    fit.confounded.iter().map(sentence).collect()
+}
+
+/// The essential unknowns, and the relative residual of each joint with those alone.
+fn essentials(estimated: &Estimated) -> Result<(Essential, Vec<f64>), IdentifyError> {
+    let (fit, basis) = (&estimated.fit, &estimated.basis);
+    let weights = weights_of(
+        &basis.sums,
+        &residual_of(&basis.sums, &(&fit.theta - &basis.shift))?,
+    );
+    let factor = factor(&basis.sums, &weights)?;
+    // targets without the laws that the rows are linear about: a parameter is absent at 0
+    let mut whole = factor.clone();
+    let u = factor.ncols() - 1;
+    let target = factor.column(u) + factor.columns(0, u) * &basis.shift;
+    whole.set_column(u, &target);
+    let rows = (fit.rows * basis.sums.columns.joints as u64) as f64;
+    let found = essential(&whole, rows, fit.effective_rows / fit.rows as f64)?;
+    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let whole = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let alone = residual_of(&basis.sums, &(&found.theta - &basis.shift))?;
+    let growth = alone
+        .iter()
+        .zip(&whole)
+        .map(|(a, w)| if *w > 0.0 { a / w } else { 1.0 });
+    let error = growth.zip(&fit.relative_error).map(|(g, e)| g * e.all);
+    Ok((found, error.collect()))
+}
+
+impl IdentifiedDynamics {
+    /// The model: friction as it was known, and what was fitted, with their joint covariance.
+    pub fn model(&self, machine: &LoggedRobot, friction: Option<&ModelFile>) -> ModelFile {
+        let mut model = new_model(machine, "lsq", &self.inputs);
+        model.parameters = self.unknowns.iter().map(FittedUnknown::parameter).collect();
+        let robot = &machine.robot;
+        let mut keys: Vec<String> = model.parameters.iter().map(Parameter::key).collect();
+        if let Some(friction) = friction {
+            let known = &self.columns.known;
+            let names = robot.joint_names().iter().enumerate();
+            // where it was refined it is among what was fitted
+            for (j, joint) in names.filter(|(j, _)| known[*j].is_some()) {
+                for name in DoubleTanh::NAMES {
+                    let Some(p) = friction.find(name, Some(joint)) else {
+                        continue;
+                    };
+                    keys.push(p.key());
+                    let found = self.friction.get(j).and_then(|f| f.parameters.get(name));
+                    model.parameters.push(match found {
+                        Some(found) if !found.held => Parameter {
+                            value: found.value,
+                            std: found.std,
+                            verdict: found.verdict,
+                            meaning: friction_meaning(name).to_owned(),
+                            ..p.clone()
+                        },
+                        found => Parameter {
+                            value: found.map_or(p.value, |found| found.value),
+                            ..p.clone()
+                        },
+                    });
+                }
+            }
+            model.effects = friction.effects.clone();
+            model.friction_prior.clone_from(&self.friction_prior);
+        }
+        if let Some(by_motion) = &self.by_motion {
+            model.effects.clone_from(&by_motion.effects);
+        }
+        let fit = &self.fit;
+        model.replace_covariance(&keys, &|a, b| self.covariance[(a, b)]);
+        for (joint, std) in robot.joint_names().iter().zip(&fit.residual_std) {
+            model.residual_std.insert(joint.clone(), *std);
+        }
+        if let Some(consistent) = &self.consistent {
+            consistent.write_into(&mut model);
+        }
+        self.held.write_into(&mut model);
+        model
+    }
+}

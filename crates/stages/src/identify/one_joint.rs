@@ -1,0 +1,92 @@
+//! One-joint logs in memory, smoothed for the friction filter.
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::log::Log;
+use super::logged_robot::{LoggedRobot, narrowed};
+use cft_ident_core::friction::motions::motions;
+use cft_ident_core::friction::prepare::SmoothedMotion;
+use cft_ident_core::motion::{Differences, FilterSettings};
+use cft_ident_logs::log::{Block, Provenance};
+
+/// Cut-off of the position filter for the friction filter's known inputs [Hz], where the robot
+/// file names none and the sampling rate allows it. Wide, because the acceleration of stationary joints
+/// answers to reversals within milliseconds; wider would let in more of the encoders' steps.
+const FRICTION_POSITION_CUTOFF_HZ: f64 = 100.0;
+
+/// Most rows of a one-joint log: half an hour at 1 kHz. A row takes 80 bytes per joint for its
+/// motion, smoothed twice, and 16 bytes per nuisance direction for each of at most three problems
+/// at a time: about 1 kB for a robot of four joints.
+const MOST_ROWS: usize = 2_000_000;
+
+/// A one-joint log, read and smoothed.
+pub struct OneJointLog {
+    pub motions: Vec<SmoothedMotion>,
+    /// The same with a narrower position filter.
+    pub narrower: Vec<SmoothedMotion>,
+    /// The torque comes from a zero-order hold.
+    pub zero_order_hold: bool,
+    pub provenance: Provenance,
+    /// What the reader left out, dropped or chose.
+    pub warnings: Vec<String>,
+}
+
+/// Smoothing of the motion that the friction filter takes as known.
+fn processing(machine: &LoggedRobot, rate_hz: f64) -> FilterSettings {
+    FilterSettings {
+        q_cutoff_hz: Some(
+            machine
+                .file
+                .filter
+                .position_cutoff_hz
+                .unwrap_or(FRICTION_POSITION_CUTOFF_HZ)
+                .min(0.2 * rate_hz),
+        ),
+        differences: Differences::HighOrder,
+        q_trim_s: None,
+        // the filter takes rows as they come, and needs none between
+        bridge_s: 0.0,
+        ..machine.settings()
+    }
+}
+
+/// Reads a one-joint log into memory and smooths its motion, once as declared and once with a
+/// narrower filter, by which the smoothing's own part in an estimate is seen.
+pub fn read(
+    machine: &LoggedRobot,
+    log: &Log,
+    control: &Control,
+) -> Result<OneJointLog, IdentifyError> {
+    let (mut open, zero_order_hold) = machine.open_raw(log, control)?;
+    let mut whole = Block::default();
+    let mut block = Block::default();
+    while open.read(&mut block)? {
+        whole.t.extend_from_slice(&block.t);
+        if whole.t.len() > MOST_ROWS {
+            return Err(IdentifyError::TooManyRows {
+                log: log.name(),
+                most: MOST_ROWS,
+            });
+        }
+        whole.q.extend_from_slice(&block.q);
+        whole.tau.extend_from_slice(&block.tau);
+    }
+    let rate = match (whole.t.first(), whole.t.last()) {
+        (Some(first), Some(last)) if last > first => (whole.t.len() - 1) as f64 / (last - first),
+        _ => 1.0,
+    };
+    let declared = processing(machine, rate);
+    let narrower = narrowed(&declared, rate);
+    let smooth = |settings: &FilterSettings| {
+        let n = machine.robot.joints();
+        motions(&whole.t, &whole.q, &whole.tau, n, settings)
+            .map_err(|e| IdentifyError::motion(&log.name(), e))
+    };
+    Ok(OneJointLog {
+        motions: smooth(&declared)?,
+        narrower: smooth(&narrower)?,
+        zero_order_hold,
+        warnings: open.warnings(),
+        provenance: open.provenance()?,
+    })
+}

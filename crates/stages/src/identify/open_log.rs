@@ -1,0 +1,157 @@
+//! A log that is being read for a fit: rows that are marked bad left out, torques at their rows' time.
+
+use std::sync::Arc;
+
+use super::control::Control;
+use super::error::{IdentifyError, ReadError};
+use super::first_look::FirstLook;
+use cft_ident_core::motion::{Summary, ZeroOrderHold};
+use cft_ident_core::number::clock;
+use cft_ident_core::robot::Robot;
+use cft_ident_logs::inspect::Cutter;
+use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
+
+/// A log that is being read.
+pub struct OpenLog<'a> {
+    pub(super) reader: Reader,
+    pub(super) control: &'a Control,
+    /// Brings motor forces by a zero-order hold to the rows' own time and pose.
+    pub(super) centre: Option<(&'a Robot, ZeroOrderHold)>,
+    pub(super) name: String,
+    pub(super) look: Arc<FirstLook>,
+    pub(super) cutter: Cutter,
+}
+
+impl OpenLog<'_> {
+    /// The next block, without the rows that are marked bad; false at the end.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn read(&mut self, block: &mut Block) -> Result<bool, ReadError> {
+        loop {
+            if self.control.stopped() {
+                return Err(ReadError::Interrupted);
+            }
+            let more = self.reader.read(block)?;
+            if let Some((robot, hold)) = &mut self.centre {
+                hold.centre(robot, block);
+            }
+            if block.tau.is_empty() {
+                // a log without torques moves with none
+                block.tau.resize(block.q.len(), 0.0);
+            }
+            self.cutter.cut(block);
+            if !more || !block.is_empty() {
+                return Ok(more);
+            }
+        }
+    }
+
+    /// Which columns are read.
+    pub(super) fn layout(&self) -> &Layout {
+        self.reader.layout()
+    }
+
+    /// The instant from which the times of the blocks are counted.
+    pub fn origin(&self) -> Instant {
+        self.look.gate.origin()
+    }
+
+    /// What was left out, mended or chosen, once the last block is read: how many rows each cause costs,
+    /// the most first, then what and where.
+    pub fn warnings(&self) -> Vec<String> {
+        self.costs_and_places(0)
+    }
+
+    /// The same with what the processing left out.
+    pub fn told(&self, summary: &Summary) -> Vec<String> {
+        let mut out = self.costs_and_places(summary.skipped.samples);
+        out.extend(summary_warnings(&self.name, self.origin(), summary));
+        out
+    }
+
+    fn costs_and_places(&self, too_short: u64) -> Vec<String> {
+        let by_reader = self.reader.left_out();
+        let mut costs: Vec<(u64, String)> = (self.look.gate.costs().iter())
+            .map(|cost| (cost.rows, cost.text()))
+            .chain(by_reader.map(|(rows, kind)| (rows, format!("{rows} {kind}"))))
+            .chain([(
+                too_short,
+                format!("{too_short} in stretches too short to filter"),
+            )])
+            .filter(|(rows, _)| *rows > 0)
+            .collect();
+        costs.sort_by_key(|(rows, _)| std::cmp::Reverse(*rows));
+        let mut out = Vec::new();
+        if !costs.is_empty() {
+            let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
+            let rows = self.reader.samples() + dropped;
+            let told = match self.cutter.removed() + dropped + too_short {
+                0 => format!("none of {rows} rows is left out in all"),
+                removed => format!(
+                    "{removed} of {rows} rows are left out in all, those next to bad ones included"
+                ),
+            };
+            let causes: Vec<String> = costs.into_iter().map(|(_, text)| text).collect();
+            out.push(format!(
+                "{}: {told}: {}; see `cft-ident inspect`",
+                self.name,
+                causes.join(", ")
+            ));
+        }
+        out.extend(self.reader.warnings());
+        let found = self.look.gate.warnings().into_iter();
+        out.extend(found.map(|text| format!("{}: {text}", self.name)));
+        out
+    }
+
+    /// Whether torques come from a zero-order hold and so are means of two rows here.
+    pub(crate) fn is_centred(&self) -> bool {
+        self.centre.is_some()
+    }
+
+    /// Name, span, checksum and size of what was read.
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    pub fn provenance(&self) -> Result<Provenance, IdentifyError> {
+        Ok(self.reader.provenance()?)
+    }
+}
+
+/// Warnings about what the processing left out of a log.
+fn summary_warnings(name: &str, origin: Instant, summary: &Summary) -> Vec<String> {
+    let zero = origin.seconds();
+    let mut out = Vec::new();
+    if summary.skipped.segments > 0 {
+        let spans: Vec<String> = summary
+            .skipped
+            .spans_s
+            .iter()
+            .take(3)
+            .map(|[a, b]| format!("{}..{} s", clock(zero + a), clock(zero + b)))
+            .collect();
+        out.push(format!(
+            "{name}: {} between gaps, too short to filter, left out ({} samples; {})",
+            match summary.skipped.segments {
+                1 => "1 stretch".to_owned(),
+                many => format!("{many} stretches"),
+            },
+            summary.skipped.samples,
+            spans.join(", ")
+        ));
+    }
+    if summary.segments > 1 {
+        out.push(format!(
+            "{name}: gaps part it into {} stretches; nothing is differentiated across them",
+            summary.segments
+        ));
+    }
+    if summary.interpolated > 0 {
+        out.push(format!(
+            "{name}: the clock is uneven; its {} samples were resampled to an even one, with {} points interpolated",
+            summary.samples, summary.interpolated
+        ));
+    }
+    out
+}

@@ -1,0 +1,105 @@
+//! Logs reduced to what a linear fit needs of them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::control::Control;
+use super::error::IdentifyError;
+use super::known_friction::FrictionBefore;
+use super::log::Log;
+use super::logged_robot::LoggedRobot;
+use super::passes::{Passes, PositionFilter};
+use super::reduced::{MadeWith, Readings, ReducedLog, ReducedLogs};
+use super::repeated::each_row_once;
+use super::unknowns::columns;
+use cft_ident_core::inertia::encoder::GRIDS;
+use cft_ident_core::robot::model::JointFriction;
+use cft_ident_files::config::ModelFile;
+use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_files::config::robot_file::FrictionLawKind;
+
+impl ReducedLogs {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_bytes`], and a file that cannot be read.
+    pub fn load(path: &Path) -> Result<Self, IdentifyError> {
+        let bytes = cft_ident_logs::log::bytes(path)?;
+        Ok(Self::from_bytes(&path.to_string_lossy(), &bytes)?)
+    }
+
+    /// The same as logs of a stage.
+    pub fn as_logs(&self) -> Vec<Log> {
+        let logs = self.logs().iter();
+        logs.map(|log| Log::Reduced(log.clone())).collect()
+    }
+}
+
+/// Reduces logs. With `friction`, a model and its name, the friction of that model is known to a fit and held.
+///
+/// # Errors
+/// Logs that cannot be used, a friction law that is not linear and that no model gives, and rows that are
+/// given twice.
+pub fn reduce(
+    machine: &LoggedRobot,
+    logs: &[Log],
+    friction: Option<(&str, &ModelFile)>,
+    control: &Control,
+) -> Result<ReducedLogs, IdentifyError> {
+    machine.check_gains()?;
+    each_row_once(machine, &[("reduce", logs)])?;
+    if friction.is_none() && machine.file.friction_law() == FrictionLawKind::DoubleTanh {
+        return Err(IdentifyError::LawIsNotLinear {
+            estimator: "reduce",
+        });
+    }
+    let before = friction
+        .map(|given| FrictionBefore::of(machine, given, logs, (EstimatorKind::Wls, true), control));
+    let known = before.transpose()?.map(|before| before.known);
+    let made_with = MadeWith::of(&machine.file, friction.map(|f| f.0).zip(known.as_deref()));
+    let made_with = Arc::new(made_with);
+    let linear = columns(machine, known.as_deref());
+    let laws: Vec<Option<JointFriction>> = (linear.known.iter())
+        .map(|known| Some(JointFriction::DoubleTanh(known.as_ref()?.law)))
+        .collect();
+    let mut sets = Vec::new();
+    for log in logs {
+        if let Log::Reduced(log) = log {
+            log.belongs_to(&made_with)?;
+            let logs = vec![log.clone()];
+            sets.push(ReducedLogs::of(logs));
+            continue;
+        }
+        let one = std::slice::from_ref(log);
+        let own = machine.own_settings(one, &laws, control)?;
+        let fastest = machine.fastest(one, control)?;
+        let mut passes = Passes::new(machine, one, control).each_by_itself(own.clone());
+        let declared = passes.read_condensed(&linear)?;
+        let narrower = passes.read(PositionFilter::Narrower, &linear, None)?;
+        let mut shifted = Vec::new();
+        if machine.robot.transmission().encoder_steps().is_some() {
+            for grid in 0..GRIDS {
+                shifted.extend(passes.read_shifted(&linear, grid, None)?);
+            }
+        }
+        let bounds_s = machine.bounds(log, control)?;
+        let (Some(own), Some(summary), Some(provenance)) =
+            (own.into_iter().next(), passes.summary, passes.inputs.pop())
+        else {
+            return Err(IdentifyError::NoLog);
+        };
+        let reduced = ReducedLog {
+            made_with: made_with.clone(),
+            bounds_s,
+            warnings: passes.warnings,
+            summary,
+            own,
+            fastest,
+            readings: Readings::of(declared, narrower, shifted),
+            provenance,
+        };
+        let logs = vec![Arc::new(reduced)];
+        sets.push(ReducedLogs::of(logs));
+    }
+    Ok(ReducedLogs::merge(sets)?)
+}

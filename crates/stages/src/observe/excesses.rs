@@ -1,0 +1,234 @@
+//! From external torques of an untouched robot to deviations and thresholds.
+
+use crate::band::quantile;
+use cft_ident_files::config::held_out::{Excesses, HeldOut};
+
+/// Samples of a period of the cut-off that are kept.
+pub const KEPT: f64 = 20.0;
+/// Clusters from which on a law of excesses has a shape.
+const SHAPED: usize = 50;
+/// Clusters that a level has, if it can.
+const ENOUGH: usize = 40;
+/// Levels to try: shares of the samples below.
+const LEVELS: [f64; 6] = [0.995, 0.99, 0.98, 0.96, 0.93, 0.9];
+/// Peaks that are kept at most.
+const PEAKS: usize = 256;
+/// Share of the external torques' mean square that the parameters' deviation leaves at least.
+const LEFT: f64 = 0.04;
+/// Samples that a deviation of its own takes.
+const LEAST: usize = 40;
+
+/// Time without an excess that ends a cluster or an alarm \[s\].
+pub fn hold_s(cutoff_hz: f64) -> f64 {
+    2.0 / cutoff_hz
+}
+
+/// External torques and speeds of one sample, and whether one went before it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuietSample {
+    pub t: f64,
+    pub begins: bool,
+    pub external: Vec<f64>,
+    pub speed: Vec<f64>,
+    /// Variance of the model's torque by its parameters \[N^2 or Nm^2\].
+    pub variance: Vec<f64>,
+}
+
+/// External torques of a robot that nothing touched.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Quiet {
+    samples: Vec<QuietSample>,
+    /// From one to the next \[s\].
+    step_s: f64,
+}
+
+impl Quiet {
+    /// Samples `step_s` seconds apart.
+    pub fn new(step_s: f64) -> Self {
+        Self {
+            samples: Vec::new(),
+            step_s,
+        }
+    }
+
+    pub fn push(&mut self, sample: QuietSample) {
+        self.samples.push(sample);
+    }
+
+    /// Completes what was held out with deviations of external torques, and tells their excesses; none where there
+    /// are too few samples.
+    pub fn learn(
+        &self,
+        held: &mut [HeldOut],
+        cutoff_hz: f64,
+        position_cutoff_hz: f64,
+    ) -> Option<Excesses> {
+        if self.samples.len() < LEAST {
+            return None;
+        }
+        for (j, held) in held.iter_mut().enumerate() {
+            let squares = |range: Option<usize>| {
+                let own = |s: &&QuietSample| {
+                    let of = |edge: &&f64| s.speed[j] > **edge;
+                    let at = held.speed_edges.iter().take_while(of).count();
+                    range.is_none_or(|range| range == at)
+                };
+                let chosen = self.samples.iter().filter(own);
+                let (sum, own, count) = chosen.fold((0.0, 0.0, 0usize), |(sum, own, n), s| {
+                    let square = s.external[j] * s.external[j];
+                    (sum + square, own + square - s.variance[j], n + 1)
+                });
+                // what the parameters' deviation leaves, of which something always is there
+                (own.max(LEFT * sum), count)
+            };
+            let (all, count) = squares(None);
+            let all = (all / count as f64).sqrt().max(f64::MIN_POSITIVE);
+            let each = (0..=held.speed_edges.len()).map(|range| match squares(Some(range)) {
+                (sum, count) if count >= LEAST && sum > 0.0 => (sum / count as f64).sqrt(),
+                _ => all,
+            });
+            held.external_std = each.collect();
+            let share = |s: &QuietSample| {
+                s.external[j].abs() / held.external_std(s.speed[j], s.variance[j])
+            };
+            let mut shares: Vec<f64> = self.samples.iter().map(share).collect();
+            held.external_99 = quantile(&mut shares, 0.99).max(f64::MIN_POSITIVE);
+        }
+        let greatest = |s: &QuietSample| {
+            let each = held.iter().enumerate().map(|(j, held)| {
+                s.external[j].abs()
+                    / (held.external_std(s.speed[j], s.variance[j]) * held.external_99)
+            });
+            each.fold(0.0, f64::max)
+        };
+        let sizes: Vec<f64> = self.samples.iter().map(greatest).collect();
+        let mut sorted = sizes.clone();
+        let tried: Vec<(f64, Vec<f64>)> = LEVELS
+            .iter()
+            .map(|p| {
+                let level = quantile(&mut sorted, *p);
+                (level, self.peaks(&sizes, level, hold_s(cutoff_hz)))
+            })
+            .collect();
+        let enough = tried.iter().find(|(_, peaks)| peaks.len() >= ENOUGH);
+        let most = || tried.iter().max_by_key(|(_, peaks)| peaks.len());
+        let (level, peaks) = enough.or_else(most)?;
+        if peaks.is_empty() || *level <= 0.0 {
+            return None;
+        }
+        let (scale, shape) = pareto(peaks.iter().map(|peak| peak - level).collect());
+        Some(Excesses {
+            observed_s: self.samples.len() as f64 * self.step_s,
+            position_cutoff_hz,
+            level: *level,
+            clusters: peaks.len() as u64,
+            scale,
+            shape,
+            largest: largest(peaks),
+        })
+    }
+
+    /// The greatest size of each cluster beyond a level.
+    fn peaks(&self, sizes: &[f64], level: f64, hold_s: f64) -> Vec<f64> {
+        let mut peaks: Vec<f64> = Vec::new();
+        let mut last = f64::NEG_INFINITY;
+        for (s, size) in self.samples.iter().zip(sizes) {
+            if s.begins {
+                last = f64::NEG_INFINITY;
+            }
+            if *size <= level {
+                continue;
+            }
+            match peaks.last_mut() {
+                Some(peak) if s.t - last <= hold_s => *peak = peak.max(*size),
+                _ => peaks.push(*size),
+            }
+            last = s.t;
+        }
+        peaks
+    }
+}
+
+/// The largest of some peaks, from the largest on.
+fn largest(peaks: &[f64]) -> Vec<f64> {
+    let mut peaks = peaks.to_vec();
+    peaks.sort_by(|a, b| b.total_cmp(a));
+    peaks.truncate(PEAKS);
+    peaks
+}
+
+/// Scale and shape of the generalised Pareto law of excesses by probability-weighted moments (Hosking and Wallis
+/// 1987); of shape 0, an exponential, where they are few.
+fn pareto(mut x: Vec<f64>) -> (f64, f64) {
+    x.sort_by(f64::total_cmp);
+    let n = x.len() as f64;
+    let mean = x.iter().sum::<f64>() / n;
+    let mean = mean.max(1e-6);
+    if x.len() < SHAPED {
+        return (mean, 0.0);
+    }
+    let above = |(i, x): (usize, &f64)| (n - 1.0 - i as f64) / (n - 1.0) * x;
+    let weighted = x.iter().enumerate().map(above).sum::<f64>() / n;
+    // their k is the negative of the shape here
+    let k = mean / (mean - 2.0 * weighted) - 2.0;
+    let shape = (-k).clamp(-0.3, 0.3);
+    // the mean is scale / (1 - shape)
+    (mean * (1.0 - shape), shape)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that are one after the other in a fixed, disorderly way, 0..1.
+    fn uniform(k: usize) -> f64 {
+        ((k * 7919 + 13) % 100_003) as f64 / 100_003.0
+    }
+
+    #[test]
+    fn a_pareto_law_is_found_again() {
+        for (scale, shape) in [(0.4, 0.0), (0.3, -0.2), (1.5, 0.15)] {
+            let draw = |k: usize| {
+                let u: f64 = 1.0 - uniform(k);
+                match shape == 0.0 {
+                    true => -scale * u.ln(),
+                    false => scale * (u.powf(-shape) - 1.0) / shape,
+                }
+            };
+            let (s, x) = pareto((0..5000).map(draw).collect());
+            assert!((s / scale - 1.0).abs() < 0.05, "{s} {scale}");
+            assert!((x - shape).abs() < 0.05, "{x} {shape}");
+        }
+    }
+
+    #[test]
+    fn the_threshold_is_crossed_as_often_as_was_stated() {
+        // bursts of 10 samples whose sizes have exponential tails, one joint, 100 Hz
+        let burst = |k: usize| -(1.0 - uniform(k / 10)).ln();
+        let sample = |k: usize| QuietSample {
+            t: k as f64 * 0.01,
+            begins: k == 0,
+            external: vec![if k % 100 < 10 {
+                burst(k / 10 * 10)
+            } else {
+                0.01
+            }],
+            speed: vec![0.1],
+            variance: vec![0.0],
+        };
+        let mut quiet = Quiet::new(0.01);
+        (0..200_000).for_each(|k| quiet.push(sample(k)));
+        let mut held = [HeldOut {
+            joint: "a".to_owned(),
+            ..HeldOut::default()
+        }];
+        let law = quiet.learn(&mut held, 10.0, 60.0).unwrap();
+        assert!((law.observed_s - 2000.0).abs() < 1e-6);
+        // one burst a second: 3600 an hour, of which the share beyond x is e^-x
+        for per_hour in [60.0, 150.0] {
+            let wanted = (3600.0f64 / per_hour).ln();
+            let found = law.threshold(per_hour) * held[0].external_std[0] * held[0].external_99;
+            assert!((found - wanted).abs() < 0.15 * wanted, "{found} {wanted}");
+        }
+    }
+}

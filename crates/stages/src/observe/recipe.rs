@@ -1,0 +1,88 @@
+//! An observer for one sampling step as numbers, for generated code.
+
+use super::observer::{Late, ORDER, SETTLED};
+use crate::band::{Direction, Directions};
+use cft_ident_core::effect::AugmentedModel;
+use cft_ident_core::math::causal::delay_samples;
+use cft_ident_core::math::sos::{Section, Sos, steady};
+use cft_ident_core::motion::{CausalFilter, FilterSettings, MotionError};
+pub use cft_ident_export::export::recipe::Recipe;
+use cft_ident_export::export::recipe::{Cascade, Late as LateOf, Uncertain, Untouched};
+use cft_ident_files::config::held_out::{Excesses, HeldOut};
+
+fn cascade(sos: Option<&Sos>, settle: usize) -> Cascade {
+    let Some(sos) = sos else {
+        // lets everything through
+        return Cascade {
+            sections: vec![[1.0, 0.0, 0.0, 0.0, 0.0]],
+            steady: vec![[0.0; 2]],
+            settle,
+        };
+    };
+    let sections = sos.sections();
+    let flat = |s: &Section| [s.b[0], s.b[1], s.b[2], s.a[0], s.a[1]];
+    Cascade {
+        sections: sections.iter().map(flat).collect(),
+        steady: steady(sections),
+        settle,
+    }
+}
+
+/// What [`super::Observer`] and [`super::Alarms`] do with rows `step_s` seconds apart, at so many false alarms an
+/// hour.
+///
+/// # Errors
+/// [`MotionError`] for filters that the sampling rate does not carry.
+pub fn recipe(
+    (model, uncertain): (&AugmentedModel, &Directions),
+    settings: &FilterSettings,
+    (held, excesses): (&[HeldOut], &Excesses),
+    step_s: f64,
+    per_hour: f64,
+) -> Result<Recipe, MotionError> {
+    let CausalFilter {
+        sos,
+        settle,
+        delay_s,
+    } = CausalFilter::design(settings, step_s)?;
+    let smooth = Sos::butterworth(ORDER, settings.cutoff_hz, 1.0 / step_s)?;
+    let late = Late::of(model, step_s);
+    let lead = late.as_ref().map_or(0, |late| late.lead);
+    let threshold = excesses.threshold(per_hour);
+    let untouched = |held: &HeldOut| Untouched {
+        speed_edges: held.speed_edges.clone(),
+        std: held.external_std.clone(),
+        band: held.external_99,
+        limit: threshold * held.external_99,
+    };
+    let robot = uncertain.robot();
+    let mut each = uncertain.each().to_vec();
+    if each.is_empty() {
+        // tables of C have at least one entry
+        each.push(Direction::of(
+            &model.model,
+            &vec![0.0; model.model.parameters()],
+        ));
+    }
+    let uncertain = each.iter().map(|of| Uncertain {
+        bodies: robot.link_parameters(&of.theta),
+        drives: robot.drive_parameters(&of.theta),
+        couplings: robot.coupling_parameters(&of.theta),
+        friction: of.friction.clone(),
+        offset: of.offset.clone(),
+    });
+    Ok(Recipe {
+        step_s,
+        delay_s: delay_s + step_s * (delay_samples(&smooth) + lead as f64),
+        per_hour,
+        position: cascade(sos.as_ref(), settle),
+        smooth: cascade(Some(&smooth), smooth.settle_samples(SETTLED)),
+        late: late.map(|late| LateOf {
+            lead: late.lead,
+            size: late.size,
+            by: late.by,
+        }),
+        joints: held.iter().map(untouched).collect(),
+        uncertain: uncertain.collect(),
+    })
+}

@@ -1,0 +1,321 @@
+//! What a fit to the motion of one axis has: how long its windows are, and which friction it adds, both by blocks of
+//! the logs that are set aside one after the other and simulated from begin to end.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::fit::{Fitted, Span, apart, errors, fit, rms, windows};
+use super::numbers::{Columns, columns, numbers};
+use cft_ident_core::effect::{
+    Added, AugmentedModel, Cover, Family, LAWS, Law, Place, Role, Search,
+};
+use cft_ident_core::math::descent::Ending;
+use cft_ident_core::motion::Stretch;
+use cft_ident_core::number;
+
+/// Blocks that are set aside one after the other.
+pub const BLOCKS: usize = 4;
+/// Shortest windows that are tried \[s\]; the next are twice as long each.
+const SHORTEST_S: f64 = 0.25;
+/// Share of the error on blocks set aside that friction must take away to be added.
+const PAYS: f64 = 0.1;
+/// Least samples of a window.
+const LEAST: usize = 20;
+/// Every sample of a block set aside.
+const ALL: usize = usize::MAX;
+
+/// Why no fit is made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AxisError {
+    /// Blocks that are set aside hold no window.
+    #[error(
+        "windows of {window_s} s do not fit into a quarter of the logs, which is set aside to check the fit ({} s): give longer logs, or --open-loop=SECONDS with fewer seconds",
+        number::significant(*block_s, 3)
+    )]
+    TooShort { window_s: f64, block_s: f64 },
+    /// The motion that the model of the torques makes is none.
+    #[error(
+        "the motion simulated from the torques goes astray with the numbers that least squares finds: look at mass and viscous friction, which must be above 0, with `lsq` without --open-loop"
+    )]
+    Astray,
+    /// Somebody stopped it.
+    #[error("interrupted")]
+    Stopped,
+}
+
+/// One model that was tried on blocks set aside.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct TriedAxis {
+    /// Length of its windows \[s\].
+    pub window_s: f64,
+    /// Effect that it adds to the model before it.
+    pub effect: Option<&'static str>,
+    /// Root mean square of the positions' errors on the blocks [m or rad]; none where a motion goes astray.
+    pub held_out: Option<f64>,
+    /// It was taken.
+    pub taken: bool,
+}
+
+/// Errors of simulated positions, root mean squares [m or rad].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct PositionErrors {
+    /// In the windows of the fit.
+    pub windows: f64,
+    /// Of blocks, from begin to end.
+    pub blocks: f64,
+}
+
+/// A model of one axis fitted to its motion.
+#[derive(Debug, Clone)]
+pub struct AxisFit {
+    pub model: AugmentedModel,
+    /// Of all its numbers: inertial parameters, viscous, Coulomb, offset, then shape and coefficients of each effect.
+    pub covariance: DMatrix<f64>,
+    /// Which of them were moved.
+    pub free: Vec<usize>,
+    /// Length of the windows \[s\].
+    pub window_s: f64,
+    /// Windows, which overlap.
+    pub windows: usize,
+    /// Windows that do not.
+    pub apart: f64,
+    /// Of the model before.
+    pub before: PositionErrors,
+    /// After; blocks are those of fits without them.
+    pub after: PositionErrors,
+    pub ending: Ending,
+    /// Steps of the last fit.
+    pub steps: usize,
+    pub tried: Vec<TriedAxis>,
+}
+
+/// Fits a model of one axis to its motion, in windows of `window` seconds or of a length that blocks set aside choose.
+/// `offset` says whether the constant torque is fitted; `stop` is asked now and then.
+///
+/// # Errors
+/// [`AxisError`].
+pub fn fit_axis(
+    start: &AugmentedModel,
+    stretches: &[Stretch],
+    (window, offset): (Option<f64>, bool),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<AxisFit, AxisError> {
+    let trial = Trial {
+        stretches,
+        cover: Cover::of(&start.model.robot, stretches, 0.0),
+        offset,
+        stop,
+    };
+    let block_s = (0..BLOCKS).flat_map(|b| trial.block(b));
+    let block_s = block_s.map(|(s, from, to)| (to - from - 1) as f64 * stretches[s].dt);
+    let block_s = block_s.fold(0.0, f64::max);
+    let dt = stretches.iter().map(|s| s.dt).fold(0.0, f64::max);
+    let shortest = window.unwrap_or(SHORTEST_S);
+    if shortest > block_s || shortest < LEAST as f64 * dt {
+        let window_s = shortest.max(LEAST as f64 * dt);
+        return Err(AxisError::TooShort { window_s, block_s });
+    }
+    let doubled = std::iter::successors(Some(shortest), |s| Some(2.0 * s));
+    let lengths: Vec<f64> = match window {
+        Some(length) => vec![length],
+        None => doubled.take_while(|s| *s <= block_s).collect(),
+    };
+    let mut tried = Vec::new();
+    let (mut model, mut score) = (
+        start.clone(),
+        trial.best_length(start, &lengths, &mut tried)?,
+    );
+    loop {
+        let rivals: Vec<AugmentedModel> = trial.rivals(&model);
+        let scores: Vec<Option<f64>> = rivals
+            .iter()
+            .map(|rival| trial.held_out(rival, score.1))
+            .collect::<Result<_, _>>()?;
+        let first = tried.len();
+        tried.extend(
+            rivals
+                .iter()
+                .zip(&scores)
+                .map(|(rival, held_out)| TriedAxis {
+                    window_s: score.1,
+                    effect: rival.effects.last().map(Added::name),
+                    held_out: *held_out,
+                    taken: false,
+                }),
+        );
+        let scores = scores.iter().enumerate();
+        let best = scores
+            .filter_map(|(i, e)| Some((i, (*e)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, error)) = best.filter(|(_, e)| *e < (1.0 - PAYS) * score.0) else {
+            break;
+        };
+        tried[first + i].taken = true;
+        model = rivals[i].clone();
+        score = match lengths.len() {
+            1 => (error, score.1),
+            _ => trial.best_length(&model, &lengths, &mut tried)?,
+        };
+    }
+    let all = trial.whole();
+    let windows = windows(stretches, &all, score.1);
+    let columns = trial.columns(&model);
+    let fitted = trial
+        .fit(&model, &columns, (&all, score.1), true)?
+        .ok_or(AxisError::Astray)?;
+    let of_start = |windows: &[Span], positions| {
+        errors(start, stretches, windows, positions).ok_or(AxisError::Astray)
+    };
+    let blocks: Vec<Span> = (0..BLOCKS).flat_map(|b| trial.block(b)).collect();
+    Ok(AxisFit {
+        window_s: score.1,
+        free: columns.free,
+        apart: apart(&windows, stretches, score.1),
+        before: PositionErrors {
+            windows: rms(&of_start(&windows, super::fit::POSITIONS)?),
+            blocks: rms(&of_start(&blocks, ALL)?),
+        },
+        after: PositionErrors {
+            windows: fitted.rms,
+            blocks: score.0,
+        },
+        windows: windows.len(),
+        model: fitted.model,
+        covariance: fitted.covariance,
+        ending: fitted.ending,
+        steps: fitted.steps,
+        tried,
+    })
+}
+
+struct Trial<'a> {
+    stretches: &'a [Stretch],
+    cover: Cover,
+    offset: bool,
+    stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Trial<'_> {
+    /// All samples.
+    fn whole(&self) -> Vec<Span> {
+        let each = self.stretches.iter().enumerate();
+        each.map(|(s, stretch)| (s, 0, stretch.len())).collect()
+    }
+
+    /// One of the blocks: a quarter of each stretch.
+    fn block(&self, block: usize) -> Vec<Span> {
+        let at = |of: &Stretch, b: usize| b * (of.len() - 1) / BLOCKS;
+        let each = self.stretches.iter().enumerate();
+        let spans = each.map(|(s, of)| (s, at(of, block), at(of, block + 1) + 1));
+        spans.filter(|(_, from, to)| to - from >= LEAST).collect()
+    }
+
+    /// What is before and behind one of the blocks.
+    fn without(&self, block: usize) -> Vec<Span> {
+        let out = self
+            .block(block)
+            .into_iter()
+            .flat_map(|(s, from, to)| [(s, 0, from + 1), (s, to - 1, self.stretches[s].len())]);
+        out.filter(|(_, from, to)| to - from >= LEAST).collect()
+    }
+
+    /// Which numbers of a model may move.
+    fn columns(&self, model: &AugmentedModel) -> Columns {
+        let mut held = vec![false; numbers(model).len()];
+        let inertial = model.model.theta.len();
+        held[inertial + 2] = !self.offset;
+        columns(model, self.stretches, &held)
+    }
+
+    fn fit(
+        &self,
+        model: &AugmentedModel,
+        columns: &Columns,
+        (spans, length): (&[Span], f64),
+        told: bool,
+    ) -> Result<Option<Fitted>, AxisError> {
+        if (self.stop)() {
+            return Err(AxisError::Stopped);
+        }
+        let windows = windows(self.stretches, spans, length);
+        Ok(fit(model, self.stretches, &windows, columns, told))
+    }
+
+    /// Error on each block of a fit to the others; none where a motion goes astray.
+    fn held_out(&self, model: &AugmentedModel, length: f64) -> Result<Option<f64>, AxisError> {
+        let columns = self.columns(model);
+        // a start that is near saves steps, and changes no result
+        let Some(near) = self.fit(model, &columns, (&self.whole(), length), false)? else {
+            return Ok(None);
+        };
+        let near = near.model;
+        let of_block = |block: usize| -> Result<Option<Vec<f64>>, AxisError> {
+            let fitted = self.fit(&near, &columns, (&self.without(block), length), false)?;
+            let held = self.block(block);
+            Ok(fitted.and_then(|f| errors(&f.model, self.stretches, &held, ALL)))
+        };
+        let found: Result<Vec<_>, AxisError> = (0..BLOCKS).into_par_iter().map(of_block).collect();
+        let found: Option<Vec<Vec<f64>>> = found?.into_iter().collect();
+        Ok(found.map(|errors| rms(&errors.concat())))
+    }
+
+    /// The least error on blocks over lengths of windows, and that length.
+    fn best_length(
+        &self,
+        model: &AugmentedModel,
+        lengths: &[f64],
+        tried: &mut Vec<TriedAxis>,
+    ) -> Result<(f64, f64), AxisError> {
+        let mut best: Option<(f64, f64, usize)> = None;
+        for length in lengths {
+            let held_out = self.held_out(model, *length)?;
+            if let Some(error) = held_out
+                && best.is_none_or(|(least, ..)| error < least)
+            {
+                best = Some((error, *length, tried.len()));
+            }
+            tried.push(TriedAxis {
+                window_s: *length,
+                effect: None,
+                held_out,
+                taken: false,
+            });
+        }
+        let (error, length, at) = best.ok_or(AxisError::Astray)?;
+        tried[at].taken = true;
+        Ok((error, length))
+    }
+
+    /// The model with one more effect: friction that is a law of speed, each from the shape that the torques tell best.
+    fn rivals(&self, model: &AugmentedModel) -> Vec<AugmentedModel> {
+        let of_speed = |law: &&&Law| {
+            let entry = law.entry;
+            entry.friction
+                && entry.families.contains(&Family::Velocity)
+                && entry.role == Role::Columns
+                && entry.search != Search::Orders
+                && law.memory.is_none()
+                && law.varied.is_none()
+                && !model.effects.iter().any(|e| e.name() == entry.name)
+        };
+        let place = Place::Joint(0);
+        let laws = LAWS.iter().filter(of_speed).filter(|law| {
+            let places = law.places(&model.model.robot, &model.model.friction);
+            places.contains(&place)
+        });
+        let best = laws.filter_map(|law| {
+            let starts = law.starts_on(&self.cover, place).ok()?;
+            let with = starts.into_iter().map(|shape| {
+                let mut with = model.clone();
+                let linear = vec![0.0; law.linear.len()];
+                with.effects.push(Added::new(law, place, shape, linear));
+                let left = self.columns(&with).left;
+                (with, left)
+            });
+            with.min_by(|a, b| a.1.total_cmp(&b.1))
+        });
+        best.map(|(with, _)| with).collect()
+    }
+}

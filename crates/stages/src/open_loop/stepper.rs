@@ -1,0 +1,218 @@
+//! One step of a model's forward dynamics.
+
+use nalgebra::{DMatrix, DVector};
+
+use cft_ident_core::effect::{AugmentedModel, Sampled};
+use cft_ident_core::motion::Stretch;
+use cft_ident_core::robot::dynamics::Dynamics;
+use cft_ident_core::robot::model::JointFriction;
+
+/// Sweeps over the joints in which impulses of friction settle.
+const SWEEPS: usize = 50;
+
+/// A model in motion.
+pub struct Stepper {
+    model: AugmentedModel,
+    effects: Sampled,
+    dynamics: Dynamics,
+    dt: f64,
+    /// Joints whose friction jumps at rest and is held there by it.
+    jumps: Vec<bool>,
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    a: Vec<f64>,
+    mass: Vec<f64>,
+    bias: Vec<f64>,
+    with: Vec<f64>,
+    plain: Vec<f64>,
+    force: Vec<f64>,
+    /// Greatest impulse of friction that jumps.
+    limit: Vec<f64>,
+    change: Vec<f64>,
+}
+
+impl Stepper {
+    /// For steps of `dt` seconds.
+    pub fn new(model: &AugmentedModel, dt: f64) -> Self {
+        let n = model.model.robot.joints();
+        let remembers = |j: usize| {
+            let mut at = model.effects.iter().filter(|e| e.place.joint() == Some(j));
+            at.any(|e| e.law.memory.is_some())
+        };
+        let laws = model.model.friction.iter().enumerate();
+        Stepper {
+            effects: Sampled::new(model.clone(), dt),
+            dynamics: model.model.robot.dynamics(&model.model.theta),
+            dt,
+            // what remembers has a friction of its own at rest
+            jumps: laws.map(|(j, law)| law.jumps() && !remembers(j)).collect(),
+            q: vec![0.0; n],
+            v: vec![0.0; n],
+            a: vec![0.0; n],
+            mass: vec![0.0; n * n],
+            bias: vec![0.0; n],
+            with: vec![0.0; n],
+            plain: vec![0.0; n],
+            force: vec![0.0; n],
+            limit: vec![0.0; n],
+            change: vec![0.0; n],
+            model: model.clone(),
+        }
+    }
+
+    /// Begins at positions and velocities.
+    pub fn begin(&mut self, q: &[f64], v: &[f64]) {
+        self.q.copy_from_slice(q);
+        self.v.copy_from_slice(v);
+        self.a.fill(0.0);
+        self.effects.begin();
+    }
+
+    /// Takes the temperatures of sample `k` for the steps from here on.
+    pub fn set_temperatures(&mut self, stretch: &Stretch, k: usize) {
+        let of = |j: usize| stretch.temperature.get(j)?.get(k).copied();
+        self.effects.set_temperatures(of);
+    }
+
+    /// Goes one step on under these torques, `since` seconds after the begin of the log; false where the inertia
+    /// matrix is none or the motion is no longer finite.
+    pub fn step(&mut self, since: f64, tau: &[f64]) -> bool {
+        let (n, dt) = (self.q.len(), self.dt);
+        self.dynamics
+            .inertia_and_bias(&self.q, &self.v, &mut self.mass, &mut self.bias);
+        let model = &self.model.model;
+        if !self.model.effects.is_empty() {
+            let motion = [&self.q[..], &self.v, &self.a];
+            self.effects.torque(since, motion, &mut self.with);
+            model.torque(&self.q, &self.v, &self.a, &mut self.plain);
+        }
+        for (j, tau) in tau.iter().enumerate() {
+            let v = self.v[j];
+            self.limit[j] = 0.0;
+            let (friction, slope) = match &model.friction[j] {
+                JointFriction::None => (0.0, 0.0),
+                JointFriction::DoubleTanh(law) => (law.torque(v), law.slope(v).max(0.0)),
+                // what is proportional to the speed by the trapezoidal rule: its error falls with dt^2
+                JointFriction::ViscousCoulomb(law) if self.jumps[j] => {
+                    self.limit[j] = law.coulomb.max(0.0) * dt;
+                    (law.viscous * v, 0.5 * law.viscous.max(0.0))
+                }
+                JointFriction::ViscousCoulomb(law) => (law.torque(v), 0.5 * law.viscous.max(0.0)),
+            };
+            let added = self.with[j] - self.plain[j];
+            self.force[j] = tau - self.bias[j] - friction - model.offset[j] - added;
+            self.mass[j * n + j] += dt * slope;
+        }
+        let found = match n {
+            1 => self.change_of_one(),
+            _ => self.change_of_all(),
+        };
+        if !found {
+            return false;
+        }
+        for (j, change) in self.change.iter().enumerate() {
+            // constant acceleration over the step
+            self.q[j] += dt * (self.v[j] + 0.5 * change);
+            self.v[j] += change;
+            self.a[j] = change / dt;
+        }
+        self.q.iter().chain(&self.v).all(|x| x.is_finite())
+    }
+
+    /// Change of the speed of a single axis; false where it has no mass.
+    fn change_of_one(&mut self) -> bool {
+        let (mass, limit) = (self.mass[0], self.limit[0]);
+        if mass.is_nan() || mass <= 0.0 {
+            return false;
+        }
+        let free = self.force[0] * self.dt / mass;
+        // as much as stops it, where friction is as much
+        let impulse = (-(self.v[0] + free) * mass).clamp(-limit, limit);
+        self.change[0] = free + impulse / mass;
+        true
+    }
+
+    /// Changes of all speeds; false where the inertia matrix is none.
+    fn change_of_all(&mut self) -> bool {
+        let n = self.v.len();
+        let implicit = DMatrix::from_row_slice(n, n, &self.mass);
+        let Some(factor) = implicit.cholesky() else {
+            return false;
+        };
+        let force = DVector::from_column_slice(&self.force);
+        let mut change = factor.solve(&(force * self.dt));
+        let limit = &self.limit;
+        if limit.iter().any(|limit| *limit > 0.0) {
+            let inverse = factor.inverse();
+            let mut impulse = vec![0.0; n];
+            for _ in 0..SWEEPS {
+                let mut moved = 0.0f64;
+                for j in (0..n).filter(|j| limit[*j] > 0.0) {
+                    let next = self.v[j] + change[j];
+                    let wanted = impulse[j] - next / inverse[(j, j)];
+                    let allowed = wanted.clamp(-limit[j], limit[j]);
+                    let step = allowed - impulse[j];
+                    impulse[j] = allowed;
+                    moved = moved.max(step.abs() / limit[j]);
+                    for i in 0..n {
+                        change[i] += inverse[(i, j)] * step;
+                    }
+                }
+                if moved < 1e-10 {
+                    break;
+                }
+            }
+        }
+        self.change.copy_from_slice(change.as_slice());
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cft_ident_core::robot::friction::ViscousCoulomb;
+    use cft_ident_core::robot::model::Model;
+    use cft_ident_core::robot::{JointKind, Robot};
+
+    fn mass(viscous: f64, coulomb: f64) -> AugmentedModel {
+        AugmentedModel::plain(Model {
+            robot: Robot::single_joint("q1", JointKind::Prismatic),
+            theta: vec![2.0],
+            friction: vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
+                viscous,
+                coulomb,
+            })],
+            offset: vec![0.0],
+        })
+    }
+
+    #[test]
+    fn a_mass_that_slides_stops_where_its_friction_says_and_stays() {
+        // 2 kg at 1 m/s against 4 N: 0.5 s and 0.25 m; 3.9 N do not move it after
+        let mut stepper = Stepper::new(&mass(0.0, 4.0), 1e-3);
+        stepper.begin(&[0.0], &[1.0]);
+        for k in 0..2000 {
+            let tau = if k < 600 { 0.0 } else { 3.9 };
+            assert!(stepper.step(f64::from(k) * 1e-3, &[tau]));
+        }
+        assert!((stepper.q[0] - 0.25).abs() < 1e-9, "{}", stepper.q[0]);
+        assert!(stepper.v[0].abs() < 1e-12, "{}", stepper.v[0]);
+    }
+
+    #[test]
+    fn a_driven_mass_moves_as_the_closed_solution_says() {
+        // m v' = u - b v - c from rest
+        let (b, c, u) = (3.0, 1.0, 7.0);
+        let mut stepper = Stepper::new(&mass(b, c), 1e-4);
+        stepper.begin(&[0.0], &[0.0]);
+        for k in 0..10_000 {
+            assert!(stepper.step(f64::from(k) * 1e-4, &[u]));
+        }
+        let end = (u - c) / b;
+        let decay = (-b / 2.0f64).exp();
+        let wanted = end * (1.0 - 2.0 / b * (1.0 - decay));
+        assert!((stepper.v[0] - end * (1.0 - decay)).abs() < 1e-4);
+        assert!((stepper.q[0] - wanted).abs() < 1e-4, "{}", stepper.q[0]);
+    }
+}

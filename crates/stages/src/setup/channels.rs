@@ -1,0 +1,312 @@
+//! From logged channels to joints under a correction.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::correction::Correction;
+use super::sample::Row;
+use cft_ident_core::robot::Robot;
+
+/// What the channels of a log are of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drive {
+    /// Joints.
+    Joints,
+    /// Motors behind coupled gears, p = R q and tau = R' c: R and its inverse.
+    Gears(DMatrix<f64>, DMatrix<f64>),
+    /// Motors behind the robot's linkage.
+    Motors,
+}
+
+/// The channels of a log as they are declared: SI value = gain x logged number + offset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channels {
+    pub drive: Drive,
+    pub position_gain: Vec<f64>,
+    pub position_offset: Vec<f64>,
+    pub torque_gain: Vec<f64>,
+}
+
+/// One row on the joint side, under a correction.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Carried {
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
+    pub a: Vec<f64>,
+    pub sign: Vec<f64>,
+    /// What each channel gives to each joint, n x n row-major by joint: summed with the weights of
+    /// [`Channels::mix`].
+    pub tau: Vec<f64>,
+    /// Known friction of each joint, where the row has it: no number elsewhere.
+    pub friction: Vec<f64>,
+    /// Work space.
+    x: [Vec<f64>; 3],
+    before: [Vec<f64>; 3],
+    u: Vec<f64>,
+    force: Vec<f64>,
+}
+
+impl Carried {
+    pub fn new(n: usize) -> Self {
+        let zeros = || vec![0.0; n];
+        Self {
+            q: zeros(),
+            v: zeros(),
+            a: zeros(),
+            sign: zeros(),
+            tau: vec![0.0; n * n],
+            friction: vec![f64::NAN; n],
+            x: [zeros(), zeros(), zeros()],
+            before: [zeros(), zeros(), zeros()],
+            u: zeros(),
+            force: zeros(),
+        }
+    }
+}
+
+impl Channels {
+    /// Channels that are the joints' own in SI units.
+    pub fn of_joints(joints: usize) -> Self {
+        Self {
+            drive: Drive::Joints,
+            position_gain: vec![1.0; joints],
+            position_offset: vec![0.0; joints],
+            torque_gain: vec![1.0; joints],
+        }
+    }
+
+    /// Weights by which the channels' torques sum up to those of each joint.
+    pub(super) fn mix(&self, by: &Correction) -> Vec<DVector<f64>> {
+        let n = by.torque_factor.len();
+        let of = |j: usize| {
+            let mut a = DVector::zeros(n);
+            match self.drive {
+                Drive::Joints => {
+                    let k = by.torque_from[j];
+                    a[k] = by.torque_factor[j] * self.torque_gain[j] / self.torque_gain[k];
+                }
+                _ => a.copy_from_slice(&by.torque_factor),
+            }
+            a
+        };
+        (0..n).map(of).collect()
+    }
+
+    /// Whether two corrections give the same rows but for the weights of [`Self::mix`].
+    pub(super) fn same_rows(&self, a: &Correction, b: &Correction) -> bool {
+        a.moves_as(b) && (self.drive == Drive::Joints || a.torque_from == b.torque_from)
+    }
+
+    /// A row under a correction; false where it is a pose that the robot does not have.
+    pub(super) fn carry(
+        &self,
+        robot: &Robot,
+        row: Row,
+        by: &Correction,
+        out: &mut Carried,
+    ) -> bool {
+        let n = row.q.len();
+        match &self.drive {
+            Drive::Joints => {
+                for j in 0..n {
+                    let k = by.position_from[j];
+                    let f = self.position_factor(by, j);
+                    out.q[j] = f * (row.q[k] - self.position_offset[k])
+                        + self.position_offset[j]
+                        + by.zero[j];
+                    out.v[j] = f * row.v[k];
+                    out.a[j] = f * row.a[k];
+                    out.sign[j] = f.signum() * row.sign[k];
+                    out.tau[j * n..(j + 1) * n].copy_from_slice(row.tau);
+                    // the law is odd; at another speed it is not in the row
+                    let friction = row.friction.get(j).filter(|_| k == j && f.abs() == 1.0);
+                    out.friction[j] = friction.map_or(f64::NAN, |friction| f * friction);
+                }
+                true
+            }
+            Drive::Gears(r, inverse) => {
+                self.through_gears([r, inverse], row, by, out);
+                true
+            }
+            Drive::Motors => self.through_linkage(robot, row, by, out).is_some(),
+        }
+    }
+
+    pub(super) fn position_factor(&self, by: &Correction, j: usize) -> f64 {
+        let k = by.position_from[j];
+        by.position_factor[j] * self.position_gain[j] / self.position_gain[k]
+    }
+
+    fn through_gears(
+        &self,
+        [r, inverse]: [&DMatrix<f64>; 2],
+        row: Row,
+        by: &Correction,
+        out: &mut Carried,
+    ) {
+        let n = row.q.len();
+        let [position, velocity, acceleration] = &mut out.before;
+        for j in 0..n {
+            let times = |x: &dyn Fn(usize) -> f64| (0..n).map(|i| r[(j, i)] * x(i)).sum::<f64>();
+            position[j] = times(&|i| row.q[i] - self.position_offset[i]);
+            velocity[j] = times(&|i| row.v[i]);
+            acceleration[j] = times(&|i| row.a[i]);
+        }
+        for j in 0..n {
+            let times = |x: &[f64]| -> f64 {
+                let motor = |i: usize| self.position_factor(by, i) * x[by.position_from[i]];
+                (0..n).map(|i| inverse[(j, i)] * motor(i)).sum()
+            };
+            out.q[j] = times(position) + self.position_offset[j] + by.zero[j];
+            out.v[j] = times(velocity);
+            out.a[j] = times(acceleration);
+            out.sign[j] = cft_ident_core::robot::friction::sign(out.v[j]);
+        }
+        for k in 0..n {
+            let from = by.torque_from[k];
+            let gain = self.torque_gain[k] / self.torque_gain[from];
+            let motor: f64 = (0..n).map(|i| inverse[(i, from)] * row.tau[i]).sum();
+            for j in 0..n {
+                out.tau[j * n + k] = r[(k, j)] * gain * motor;
+            }
+        }
+    }
+
+    fn through_linkage(
+        &self,
+        robot: &Robot,
+        row: Row,
+        by: &Correction,
+        out: &mut Carried,
+    ) -> Option<()> {
+        let n = row.q.len();
+        let drive = robot.transmission();
+        let Carried {
+            q,
+            v,
+            a,
+            x,
+            u,
+            force,
+            ..
+        } = out;
+        let offset = &self.position_offset;
+        let [moved, speed, change] = x;
+        let coordinates = moved.iter_mut().zip(speed).zip(change).enumerate();
+        for (j, ((x, xd), xdd)) in coordinates {
+            let (k, f) = (by.position_from[j], self.position_factor(by, j));
+            *x = f * (row.q[k] - offset[k]) + offset[j] + by.zero[j];
+            *xd = f * row.v[k];
+            *xdd = f * row.a[k];
+        }
+        let [moved, speed, change] = x;
+        drive.joints(moved, q).ok()?;
+        drive.joint_velocities(q, speed, v).ok()?;
+        drive.joint_accelerations(q, v, change, a).ok()?;
+        for k in 0..n {
+            let from = by.torque_from[k];
+            u.fill(0.0);
+            u[k] = row.tau[from] * self.torque_gain[k] / self.torque_gain[from];
+            drive.torques(q, u, force);
+            for (j, force) in force.iter().enumerate() {
+                out.tau[j * n + k] = *force;
+            }
+        }
+        for (sign, v) in out.sign.iter_mut().zip(&out.v) {
+            *sign = cft_ident_core::robot::friction::sign(*v);
+        }
+        let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+        (finite(&out.q) && finite(&out.v) && finite(&out.a) && finite(&out.tau)).then_some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setup::{Change, ChannelKind};
+    use cft_ident_core::robot::cft::{Setup, Structure};
+
+    fn carried(channels: &Channels, robot: &Robot, row: [&[f64]; 4], by: &Correction) -> Carried {
+        let n = row[0].len();
+        let mut out = Carried::new(n);
+        let sign = vec![0.0; n];
+        let [q, v, a, tau] = row;
+        let row = Row {
+            q,
+            v,
+            a,
+            sign: &sign,
+            tau,
+            friction: &[],
+        };
+        assert!(channels.carry(robot, row, by, &mut out));
+        out
+    }
+
+    fn torques(channels: &Channels, row: &Carried, by: &Correction) -> Vec<f64> {
+        let mix = channels.mix(by);
+        let of =
+            |(tau, mix): (&[f64], &DVector<f64>)| tau.iter().zip(mix).map(|(t, m)| t * m).sum();
+        row.tau.chunks_exact(mix.len()).zip(&mix).map(of).collect()
+    }
+
+    const ROW: [[f64; 4]; 4] = [
+        [0.35, 0.2, 0.9, 0.8],
+        [0.1, -0.4, 0.3, 0.6],
+        [1.0, 2.0, -3.0, 0.5],
+        [20.0, 3.0, -4.0, 5.0],
+    ];
+
+    #[test]
+    fn rows_are_as_declared_without_a_correction_and_motors_turn_joints_together() {
+        let robot = Robot::cft(Setup::default(), Structure::Printed12);
+        let r = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.5, 1.0,
+            ],
+        );
+        let inverse = r.clone().try_inverse().unwrap();
+        for drive in [Drive::Joints, Drive::Gears(r, inverse), Drive::Motors] {
+            let channels = Channels {
+                drive,
+                ..Channels::of_joints(4)
+            };
+            let mut logged = ROW;
+            if channels.drive == Drive::Motors {
+                let drive = robot.transmission();
+                let [q, v, a, tau] = &ROW;
+                drive.positions(q, &mut logged[0]);
+                drive.velocities(q, v, &mut logged[1]);
+                drive.accelerations(q, v, a, &mut logged[2]);
+                drive.volts(q, tau, &mut logged[3]).unwrap();
+            }
+            let row = logged.each_ref().map(|x| &x[..]);
+            let none = Correction::none(4);
+            let plain = carried(&channels, &robot, row, &none);
+            let found = torques(&channels, &plain, &none);
+            for j in 0..4 {
+                let pairs = [
+                    (plain.q[j], ROW[0][j]),
+                    (plain.v[j], ROW[1][j]),
+                    (plain.a[j], ROW[2][j]),
+                ];
+                for (x, y) in pairs.into_iter().chain([(found[j], ROW[3][j])]) {
+                    assert!((x - y).abs() < 1e-9, "{:?} {x} {y}", channels.drive);
+                }
+            }
+            let turned = none.with(&Change::Sign(ChannelKind::Torque, vec![3]));
+            let other = torques(&channels, &plain, &turned);
+            let changed = (0..4)
+                .filter(|j| (other[*j] - found[*j]).abs() > 1e-9)
+                .count();
+            // behind these gears the last motor turns two joints
+            let least = if matches!(channels.drive, Drive::Gears(..)) {
+                2
+            } else {
+                1
+            };
+            assert!(changed >= least, "{:?} {changed}", channels.drive);
+        }
+    }
+}

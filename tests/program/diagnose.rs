@@ -1,0 +1,517 @@
+//! `diagnose` through the command line: on measured logs against what others reached, and on
+//! simulated logs with an effect in them that the declared model lacks.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use rand::SeedableRng;
+use rand_distr::Distribution;
+use serde_json::Value;
+
+/// Runs the tool in a folder and returns its JSON document.
+fn run(folder: &Path, arguments: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_cft-ident"))
+        .current_dir(folder)
+        .args(arguments)
+        .args(["--json", "-", "-q"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A measured log; none, said aloud, where the measured logs are not there.
+fn measured(path: &str) -> Option<String> {
+    let file = PathBuf::from(cft_ident_support::ROOT)
+        .join("../shared/data")
+        .join(path);
+    if file.exists() {
+        return Some(file.to_string_lossy().into_owned());
+    }
+    println!("SKIPPED: {path} is not there (docs/data.md says where it is from)");
+    None
+}
+
+/// A drive like the EMPS as a model file, with a robot file beside it.
+const DRIVE: &str = r#"
+[[parameter]]
+name = "inertia"
+value = 95.0
+unit = "kg"
+
+[[parameter]]
+name = "viscous"
+joint = "q1"
+value = 200.0
+unit = "N s/m"
+
+[[parameter]]
+name = "coulomb"
+joint = "q1"
+value = 20.0
+unit = "N"
+"#;
+
+/// The drive's robot file.
+const ROBOT: &str = "robot.toml";
+
+/// Writes the drive's model file and simulates a log of it.
+fn simulate(folder: &Path, log: &str, seconds: &str, seed: &str, effects: &[&str]) {
+    let robot = Path::new(cft_ident_support::ROOT).join("configs/emps-symmetric.toml");
+    let text = std::fs::read_to_string(robot).unwrap();
+    let robot = text + "\n[limits.q1]\nposition = [0.0, 0.25]\n";
+    std::fs::write(folder.join(ROBOT), &robot).unwrap();
+    std::fs::write(folder.join("drive.toml"), format!("{robot}{DRIVE}")).unwrap();
+    let mut arguments = vec!["simulate", "-r", ROBOT, "-m", "drive.toml"];
+    arguments.extend(["--seconds", seconds, "--seed", seed, "-o", log]);
+    for effect in effects {
+        arguments.extend(["--effect", *effect]);
+    }
+    run(folder, &arguments);
+}
+
+fn mean(document: &Value, when: &str, rows: &str) -> f64 {
+    document[when][rows]["overall"]["mean_relative_error"]
+        .as_f64()
+        .unwrap()
+}
+
+fn effects(document: &Value) -> Vec<(&str, Option<&str>)> {
+    let steps = document["steps"].as_array().unwrap();
+    steps
+        .iter()
+        .map(|s| (s["effect"].as_str().unwrap(), s["joint"].as_str()))
+        .collect()
+}
+
+/// Value and standard deviation of a step's parameter.
+fn number(step: &Value, key: &str) -> (f64, f64) {
+    let p = &step["parameters"][key];
+    (p["value"].as_f64().unwrap(), p["std"].as_f64().unwrap())
+}
+
+#[test]
+fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_validate() {
+    let (Some(id), Some(unseen)) = (
+        measured("emps/emps_id.csv"),
+        measured("emps/emps_pulses_val.csv"),
+    ) else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    run(
+        at,
+        &[
+            "lsq",
+            &id,
+            "-r",
+            "configs/emps-symmetric.toml",
+            "-o",
+            "declared.toml",
+        ],
+    );
+    let found = run(
+        at,
+        &[
+            "diagnose",
+            &id,
+            "-m",
+            "declared.toml",
+            "--holdout",
+            &unseen,
+            "-o",
+            "refined.toml",
+        ],
+    );
+    assert_eq!(found["verdict"], "effects-found");
+    let named = effects(&found);
+    // friction that does not jump at rest, and no Stribeck friction of a negative size
+    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
+        assert!(named.contains(&(effect, Some("q1"))), "{named:?}");
+    }
+    assert!((mean(&found, "before", "train") - 0.071).abs() < 0.002);
+    assert!((mean(&found, "before", "holdout") - 0.082).abs() < 0.002);
+    assert!(mean(&found, "after", "train") <= 0.022);
+    assert!(mean(&found, "after", "holdout") <= 0.035);
+    for step in found["steps"].as_array().unwrap() {
+        assert!(step["p_value"].as_f64().unwrap() <= 0.01, "{step}");
+    }
+    // what is left has its signals, the strongest first, each beyond chance
+    let dependence = found["dependence"].as_array().unwrap();
+    let share = |told: &Value| told["share"].as_f64().unwrap();
+    assert!(!dependence.is_empty());
+    assert!(dependence.windows(2).all(|w| share(&w[0]) >= share(&w[1])));
+    for told in dependence {
+        assert_eq!(told["joint"], "q1");
+        assert!(told["p_value"].as_f64().unwrap() <= 0.01, "{told}");
+    }
+    // the model file carries its effects: validate computes the same torque
+    let validated = run(at, &["validate", &unseen, "-m", "refined.toml"]);
+    let error = validated["overall"]["mean_relative_error"]
+        .as_f64()
+        .unwrap();
+    assert!(
+        (error / mean(&found, "after", "holdout") - 1.0).abs() < 0.01,
+        "{error}"
+    );
+    // and what is found once is not found again
+    let again = run(
+        at,
+        &["diagnose", &id, "-m", "refined.toml", "--holdout", &unseen],
+    );
+    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
+        assert!(!effects(&again).contains(&(effect, Some("q1"))), "{effect}");
+    }
+}
+
+#[test]
+fn cogging_is_named_by_its_orders_where_it_is_and_nothing_where_it_is_not() {
+    let Some(log) = measured("bldc-cogging/speed_test1.txt") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let span = |span: &str| format!("{log}@{span}");
+    let (on, unseen) = (span("15.2..23s"), span("23..29.5s"));
+    run(
+        at,
+        &["lsq", &on, "-r", "configs/bldc.toml", "-o", "on.toml"],
+    );
+    let found = run(
+        at,
+        &["diagnose", &on, "-m", "on.toml", "--holdout", &unseen],
+    );
+    let orders: Vec<f64> = found["steps"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|s| s["effect"] == "ripple")
+        .map(|s| number(s, "order").0)
+        .collect();
+    for known in [12.0, 18.0] {
+        assert!(orders.iter().any(|o| (o - known).abs() < 0.1), "{orders:?}");
+    }
+    assert!((mean(&found, "before", "holdout") - 0.30).abs() < 0.03);
+    assert!(mean(&found, "after", "holdout") <= 0.12);
+
+    let off = span("0.5..10s");
+    run(
+        at,
+        &["lsq", &off, "-r", "configs/bldc.toml", "-o", "off.toml"],
+    );
+    let found = run(at, &["diagnose", &off, "-m", "off.toml"]);
+    assert_eq!(effects(&found), []);
+}
+
+#[test]
+fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let ripple = ["ripple:q1:order=20,sin=1.5,cos=0.5"];
+    simulate(at, "log.csv", "25", "2", &ripple);
+    simulate(at, "unseen.csv", "25", "3", &ripple);
+    run(at, &["lsq", "log.csv", "-r", ROBOT, "-o", "declared.toml"]);
+    let diagnose = |threads: &str| {
+        let arguments = "diagnose log.csv -m declared.toml --holdout unseen.csv --threads";
+        let mut arguments: Vec<&str> = arguments.split(' ').collect();
+        arguments.push(threads);
+        run(at, &arguments)
+    };
+    let found = diagnose("2");
+    let at = effects(&found)
+        .iter()
+        .position(|e| *e == ("ripple", Some("q1")))
+        .unwrap();
+    let step = &found["steps"][at];
+    for (key, truth) in [("order", 20.0), ("sin", 1.5), ("cos", 0.5)] {
+        let (value, std) = number(step, key);
+        let off = (value - truth).abs();
+        assert!(off < 4.0 * std, "{key}: {value} +- {std}, {truth}");
+    }
+    let (before, after) = (
+        mean(&found, "before", "holdout"),
+        mean(&found, "after", "holdout"),
+    );
+    assert!(after < 0.9 * before, "{before} {after}");
+    // one joint: its error is the mean, and the interval of the change says that it falls
+    let joint = &step["joints"][0];
+    assert_eq!(joint["joint"], "q1");
+    for (key, mean) in [("before", "holdout_before"), ("after", "holdout_after")] {
+        assert_eq!(joint[key], step[mean]);
+    }
+    assert!(joint["interval_95"][1].as_f64().unwrap() < 0.0, "{joint}");
+    assert_eq!(joint["worsened"], false);
+    assert_eq!(step["holdout_worsened"], false);
+    // without noise something is left above it, whatever is found
+    assert_eq!(step["status"], "tentative", "{step}");
+    assert_eq!(found, diagnose("1"));
+}
+
+/// A torque of position and speed.
+type Torque<'a> = &'a dyn Fn(f64, f64) -> f64;
+
+/// Writes a log anew with a torque of position and speed added, and noise of 0.5 N.
+fn add_torque(from: &Path, to: &Path, torque: Torque) {
+    let mut log = csv::Reader::from_path(from).unwrap();
+    let header = log.headers().unwrap().clone();
+    assert_eq!(header.len(), 3, "{header:?}");
+    let rows: Vec<[f64; 3]> = log.deserialize().map(|row| row.unwrap()).collect();
+    let noise = rand_distr::Normal::new(0.0, 0.5).unwrap();
+    let mut chance = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut out = csv::Writer::from_path(to).unwrap();
+    out.write_record(&header).unwrap();
+    for (i, [t, q, tau]) in rows.iter().enumerate() {
+        let (a, b) = (rows[i.saturating_sub(5)], rows[(i + 5).min(rows.len() - 1)]);
+        let speed = (b[1] - a[1]) / (b[0] - a[0]);
+        let tau = tau + torque(*q, speed) + noise.sample(&mut chance);
+        out.serialize([*t, *q, tau]).unwrap();
+    }
+    out.flush().unwrap();
+}
+
+#[test]
+fn what_the_catalogue_does_not_have_is_unexplained_and_not_its_nearest_neighbour() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "log.csv", "25", "2", &[]);
+    simulate(at, "unseen.csv", "25", "3", &[]);
+    // waves whose order goes with the speed
+    let wave =
+        |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 20.0 * q * (1.0 + 4.0 * v.abs())).sin();
+    let travelling = |q: f64, v: f64| 3.0 * (std::f64::consts::TAU * 30.0 * q + 40.0 * v).sin();
+    let torques: [(&str, Torque); 2] = [("wave", &wave), ("travelling", &travelling)];
+    for (name, torque) in torques {
+        let (log, unseen) = (format!("{name}.csv"), format!("{name}-unseen.csv"));
+        add_torque(&at.join("log.csv"), &at.join(&log), torque);
+        add_torque(&at.join("unseen.csv"), &at.join(&unseen), torque);
+        run(at, &["lsq", &log, "-r", ROBOT, "-o", "declared.toml"]);
+        let found = run(
+            at,
+            &[
+                "diagnose",
+                &log,
+                "-m",
+                "declared.toml",
+                "--holdout",
+                &unseen,
+            ],
+        );
+        assert_eq!(found["verdict"], "unexplained-residual", "{name}");
+        for step in found["steps"].as_array().unwrap() {
+            assert!(step["p_value"].as_f64().unwrap() <= 0.01, "{name}: {step}");
+            assert_eq!(step["assured"], false, "{name}: {}", step["effect"]);
+        }
+        let left = &found["unexplained"][0];
+        assert_eq!(left["joint"], "q1");
+        // 3 N of some 50 N in amplitude, squared and halved
+        let share = left["share"].as_f64().unwrap();
+        assert!((0.0005..0.003).contains(&share), "{name}: {share}");
+        assert!(left["over_floor"].as_f64().unwrap() > 50.0, "{name}");
+    }
+}
+
+/// Robot and model of a slide whose friction is smooth at rest.
+const SMOOTH: &str = r#"
+[robot]
+model = "single-joint"
+joint = "q1"
+kind = "prismatic"
+
+[friction]
+law = "double-tanh"
+
+[filter]
+cutoff_hz = 20.0
+
+[limits.q1]
+position = [0.0, 0.25]
+
+[[parameter]]
+name = "inertia"
+value = 95.0
+unit = "kg"
+
+[[parameter]]
+name = "viscous"
+joint = "q1"
+value = 200.0
+unit = "N s/m"
+
+[[parameter]]
+name = "coulomb_1"
+joint = "q1"
+value = 20.0
+unit = "N"
+
+[[parameter]]
+name = "coulomb_2"
+joint = "q1"
+value = 0.0
+unit = "N"
+
+[[parameter]]
+name = "slope_1"
+joint = "q1"
+value = 60.0
+unit = "s/m"
+
+[[parameter]]
+name = "slope_2"
+joint = "q1"
+value = 10.0
+unit = "s/m"
+"#;
+
+#[test]
+fn friction_that_varies_along_the_travel_of_a_smooth_law_is_one_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("smooth.toml"), SMOOTH).unwrap();
+    let robot = SMOOTH.split("[[parameter]]").next().unwrap();
+    std::fs::write(at.join("robot.toml"), robot).unwrap();
+    for (log, seed) in [("log.csv", "2"), ("unseen.csv", "3")] {
+        let simulate = "simulate -r robot.toml -m smooth.toml --seconds 25 --seed";
+        let mut arguments: Vec<&str> = simulate.split(' ').collect();
+        arguments.extend([seed, "-o", log]);
+        run(at, &arguments);
+        let wave = |q: f64| 3.0 * (std::f64::consts::TAU * 20.0 * q + 0.3).sin();
+        let friction = |q: f64, v: f64| (60.0 * v).tanh() * wave(q);
+        add_torque(&at.join(log), &at.join(format!("with-{log}")), &friction);
+    }
+    let found = run(
+        at,
+        &[
+            "diagnose",
+            "with-log.csv",
+            "-m",
+            "smooth.toml",
+            "--holdout",
+            "with-unseen.csv",
+        ],
+    );
+    let friction = |e: &&(&str, Option<&str>)| e.0 != "delay";
+    let named: Vec<_> = effects(&found)
+        .into_iter()
+        .filter(|e| friction(&e))
+        .collect();
+    assert_eq!(named, [("position-friction", Some("q1"))]);
+}
+
+/// Simulator and estimator draw the same curves, each by an algorithm of its own.
+#[test]
+fn a_curve_of_a_model_file_is_the_torque_that_the_simulator_adds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "plain.csv", "12", "2", &[]);
+    let error = |log: &str, model: &str| {
+        let found = run(at, &["validate", log, "-m", model]);
+        // friction at rest is no curve
+        let error = &found["joints"][0]["relative_error_moving"];
+        error.as_f64().unwrap()
+    };
+    let model = std::fs::read_to_string(at.join("drive.toml")).unwrap();
+    // position, position by direction, speed, way since the last reversal
+    for (signal, from, to) in [
+        (1, 0.0, 0.25),
+        (2, 0.0, 0.25),
+        (3, -0.2, 0.2),
+        (5, 0.0, 0.1),
+    ] {
+        let mut curve = "[[effect]]\nname = \"empirical\"\njoint = \"q1\"\n".to_owned();
+        let knots = [6.0, -18.0, 9.0, 24.0, -12.0, 15.0].into_iter().enumerate();
+        let knots = knots.map(|(i, m)| (format!("m_{}", i + 1), m));
+        let shape = [("signal", f64::from(signal)), ("from", from), ("to", to)];
+        let shape = shape.map(|(key, x)| (key.to_owned(), x));
+        for (key, value) in shape.into_iter().chain(knots) {
+            curve += &format!("[effect.parameters.{key}]\nvalue = {value:?}\n");
+        }
+        std::fs::write(at.join("curve.toml"), format!("{model}\n{curve}")).unwrap();
+        let simulate = "simulate -r robot.toml -m curve.toml --seconds 12 --seed 2 -o curve.csv";
+        run(at, &simulate.split(' ').collect::<Vec<_>>());
+        let (with, without) = (
+            error("curve.csv", "curve.toml"),
+            error("curve.csv", "drive.toml"),
+        );
+        println!("{signal}: {with} {without}");
+        assert!(with < 0.02 && without > 0.1, "{signal}");
+    }
+}
+
+#[test]
+fn effects_that_a_model_file_cannot_mean_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "log.csv", "12", "1", &[]);
+    run(at, &["lsq", "log.csv", "-r", ROBOT, "-o", "model.toml"]);
+    let model = std::fs::read_to_string(at.join("model.toml")).unwrap();
+    for (effect, says) in [
+        ("name = \"riple\"\njoint = \"q1\"", "riple"),
+        ("name = \"ripple\"\njoint = \"q1\"", "order"),
+        ("name = \"payload\"\njoint = \"q1\"", "payload"),
+    ] {
+        std::fs::write(
+            at.join("bad.toml"),
+            format!("{model}\n[[effect]]\n{effect}\n"),
+        )
+        .unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_cft-ident"))
+            .current_dir(at)
+            .args(["validate", "log.csv", "-m", "bad.toml"])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert!(said.contains(says) && said.contains("bad.toml"), "{said}");
+    }
+}
+
+#[test]
+fn a_turned_torque_and_a_dead_one_are_faults_of_the_data_and_no_physics() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    simulate(at, "good.csv", "12", "1", &[]);
+    run(at, &["lsq", "good.csv", "-r", ROBOT, "-o", "model.toml"]);
+    let text = std::fs::read_to_string(at.join("good.csv")).unwrap();
+    let with_torque = |torque: &dyn Fn(f64) -> f64| {
+        let mut lines = text.lines();
+        let mut out = lines.next().unwrap().to_owned() + "\n";
+        for line in lines {
+            let (rest, tau) = line.rsplit_once(',').unwrap();
+            out += &format!("{rest},{}\n", torque(tau.parse().unwrap()));
+        }
+        out
+    };
+    std::fs::write(at.join("turned.csv"), with_torque(&|tau| -tau)).unwrap();
+    let found = run(at, &["diagnose", "turned.csv", "-m", "model.toml"]);
+    assert_eq!(found["verdict"], "data-fault");
+    assert_eq!(found["faults"][0]["kind"], "wrong-sign-or-order");
+    assert_eq!(found["steps"].as_array().unwrap().len(), 0);
+    std::fs::write(at.join("dead.csv"), with_torque(&|_| 3.5)).unwrap();
+    let found = run(at, &["diagnose", "dead.csv", "-m", "model.toml"]);
+    assert_eq!(found["verdict"], "data-fault");
+    assert_eq!(found["faults"][0]["kind"], "stuck-channel");
+}
+
+/// Friction at rest makes pieces that stand out on a drive whose law jumps, and they are no push; a push is.
+#[test]
+fn a_push_on_a_drive_is_cut_out_and_its_reversals_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, effects, wanted) in [
+        ("free.csv", &[][..], 0),
+        ("pushed.csv", &["disturbance:q1:at=8,seconds=0.3,c=40"], 1),
+    ] {
+        simulate(at, name, "25", "4", effects);
+        run(at, &["lsq", name, "-r", ROBOT, "-o", "declared.toml"]);
+        let found = run(at, &["diagnose", name, "-m", "declared.toml"]);
+        let episodes = found["episodes"].as_array().unwrap();
+        assert_eq!(episodes.len(), wanted, "{name}: {episodes:?}");
+        for episode in episodes {
+            let (from, to) = (&episode["from_s"], &episode["to_s"]);
+            let (from, to) = (from.as_f64().unwrap(), to.as_f64().unwrap());
+            assert!(from < 8.05 && to > 8.25 && to - from < 0.6, "{episode}");
+        }
+    }
+}

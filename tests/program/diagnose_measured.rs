@@ -1,0 +1,179 @@
+//! Over all measured logs: what `diagnose` adds does not make the torque of unseen data worse than the
+//! declared model by more than its interval, and its covariance is one. A further set is one line in
+//! [`SETS`].
+
+use crate::measured_support;
+
+use measured_support::{run, shared};
+use serde_json::Value;
+
+/// A measured set: robot file, logs that are fitted, held-out logs; paths below
+/// ../shared/data, with their spans.
+struct Set {
+    robot: &'static str,
+    fitted: &'static [&'static str],
+    unseen: &'static [&'static str],
+}
+
+const SETS: &[Set] = &[
+    set(
+        "configs/emps-symmetric.toml",
+        &["emps/emps_id.csv"],
+        &["emps/emps_pulses_val.csv"],
+    ),
+    set(
+        "configs/emps.toml",
+        &["emps/emps_id.csv"],
+        &["emps/emps_pulses_val.csv"],
+    ),
+    // the other way round: fitted on pulses
+    set(
+        "configs/emps.toml",
+        &["emps/emps_pulses_val.csv"],
+        &["emps/emps_id.csv"],
+    ),
+    set(
+        "configs/bldc.toml",
+        &["bldc-cogging/speed_test1.txt@15.2..23s"],
+        &["bldc-cogging/speed_test1.txt@23..29.5s"],
+    ),
+    set(
+        "configs/bldc.toml",
+        &["bldc-cogging/speed_test1.txt@0.5..10s"],
+        &["bldc-cogging/speed_test1.txt@10..14.5s"],
+    ),
+    set(
+        "configs/panda.toml",
+        &["panda/panda_exciting.csv@0..70%"],
+        &["panda/panda_exciting.csv@70..100%"],
+    ),
+    set(
+        "configs/ur10.toml",
+        &["ur10/ur10_exciting_trajectory.mcap@0..70%"],
+        &["ur10/ur10_exciting_trajectory.mcap@70..100%"],
+    ),
+    set(
+        "configs/tx40.toml",
+        &["tx40/tx40_joint.csv@0..70%"],
+        &["tx40/tx40_joint.csv@70..100%"],
+    ),
+    set(
+        "configs/pendulum.toml",
+        &["pendulum/060143.csv"],
+        &["pendulum/060245.csv"],
+    ),
+];
+
+const fn set(
+    robot: &'static str,
+    fitted: &'static [&'static str],
+    unseen: &'static [&'static str],
+) -> Set {
+    Set {
+        robot,
+        fitted,
+        unseen,
+    }
+}
+
+/// Paths of the logs; none, said aloud, where one is not there.
+fn logs(names: &[&str]) -> Option<Vec<String>> {
+    let path = |name: &&str| Some(shared(name)?.to_string_lossy().into_owned());
+    names.iter().map(path).collect()
+}
+
+/// The covariance of a model is one: no variance below zero, no correlation above one, and what has a
+/// standard deviation stands in it.
+#[track_caller]
+fn assert_covariance(model: &toml::Value) {
+    let matrix = model["covariance"]["matrix"].as_array().unwrap();
+    let at = |i: usize, j: usize| matrix[i].as_array().unwrap()[j].as_float().unwrap();
+    for i in 0..matrix.len() {
+        assert!(at(i, i) > 0.0, "variance {i} is {}", at(i, i));
+        for j in 0..i {
+            let correlation = at(i, j) / (at(i, i) * at(j, j)).sqrt();
+            assert!(correlation.abs() <= 1.0 + 1e-9, "{i} {j}: {correlation}");
+        }
+    }
+    let names = model["covariance"]["names"].as_array().unwrap();
+    for p in model["parameter"].as_array().unwrap() {
+        let name = p["name"].as_str().unwrap();
+        let key = match p.get("joint").and_then(toml::Value::as_str) {
+            Some(joint) => format!("{name}:{joint}"),
+            None => name.to_owned(),
+        };
+        let there = names.iter().any(|n| n.as_str() == Some(&key));
+        assert!(there || p.get("std").is_none(), "{key}");
+    }
+}
+
+/// No effect has a number that no machine has, or a size that its deviation passes half of.
+#[track_caller]
+fn assert_names(found: &Value) {
+    for step in found["steps"].as_array().unwrap() {
+        let value = |key: &str| step["parameters"][key]["value"].as_f64().unwrap();
+        let std = |key: &str| step["parameters"][key]["std"].as_f64();
+        let known = |key: &str| match std(key) {
+            Some(std) => std <= 0.5 * value(key).abs(),
+            None => step["parameters"][key]["bound"] == true,
+        };
+        let turns = step["parameters"]["gap"]["unit"] == "rad";
+        let holds = match step["effect"].as_str().unwrap() {
+            "stribeck" => value("c") >= 0.0 && known("vs"),
+            "smooth-coulomb" => value("fc") >= 0.0 && known("vs"),
+            "load-friction" => value("mu_c") >= 0.0 && known("w"),
+            "drive-efficiency" => (0.0..=0.6).contains(&value("k")),
+            "backlash" => value("gap") <= if turns { 0.03 } else { 2e-3 },
+            "presliding" => value("sigma0") > 0.0 && known("sigma0"),
+            "elasticity" => value("damping") <= 0.5 && value("inertia") > 0.0,
+            "delay" => value("d").abs() <= 0.1 && known("d"),
+            "warm-up" => value("T") >= 5.0 && known("T"),
+            "gain" => known("k"),
+            "rotor-inertia" => value("J") > 0.0 && known("J"),
+            "empirical" => step["status"] == "empirical",
+            _ => true,
+        };
+        assert!(holds, "{step}");
+    }
+}
+
+#[test]
+fn the_final_model_is_no_worse_on_unseen_data_than_the_declared_one() {
+    for set in SETS {
+        let (Some(fitted), Some(unseen)) = (logs(set.fitted), logs(set.unseen)) else {
+            continue;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let lsq = [
+            words("lsq"),
+            fitted.clone(),
+            words("-o model.toml -r"),
+            words(set.robot),
+        ];
+        run(folder.path(), &lsq.concat());
+        let mut diagnose = [words("diagnose"), fitted, words("-m model.toml")].concat();
+        for log in unseen {
+            diagnose.extend(["--holdout".to_owned(), log]);
+        }
+        diagnose.extend(words("-o refined.toml"));
+        let found = run(folder.path(), &diagnose);
+        assert_names(&found);
+        let text = std::fs::read_to_string(folder.path().join("refined.toml")).unwrap();
+        assert_covariance(&toml::from_str(&text).unwrap());
+        let joints = |when: &str| found[when]["holdout"]["joints"].as_array().unwrap().clone();
+        for (before, after) in joints("before").iter().zip(&joints("after")) {
+            let error = |j: &Value| j["relative_error"].as_f64().unwrap();
+            // not worse: the interval of the error after reaches down to the error before
+            let low = after["interval_95"][0].as_f64().unwrap();
+            println!(
+                "{} {:?}: {} -> {}",
+                set.robot,
+                set.fitted,
+                error(before),
+                error(after)
+            );
+            assert!(low <= error(before), "{}: {before} {after}", set.robot);
+        }
+    }
+}

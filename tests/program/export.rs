@@ -1,0 +1,791 @@
+//! Exported models give the torques of the model: the C header as cc compiles it, the Rust module as
+//! rustc does, the URDF as it is read back.
+
+use cft_ident::config::model_file::{LinkBody, ModelProvenance, Parameter};
+use cft_ident::config::{ModelFile, RobotFile};
+use cft_ident::export::{self, Note, Program};
+use cft_ident::robot::Robot;
+use cft_ident::robot::friction::{DoubleTanh, ViscousCoulomb};
+use cft_ident::robot::model::{JointFriction, Model};
+use cft_ident::robot::standard::Body;
+use predicates::prelude::PredicateBooleanExt;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+
+const GANTRY: &str = "[robot]\nmodel = \"serial\"\nurdf = \"gantry.urdf\"\n\
+    coupling = [{ motor = \"elbow\", other = \"shoulder\", ratio = -0.8 }]\n";
+
+fn fixtures(folder: &str) -> std::path::PathBuf {
+    Path::new(cft_ident_support::ROOT)
+        .join("fixtures")
+        .join(folder)
+}
+
+fn gantry() -> RobotFile {
+    RobotFile::parse_in("gantry.toml", GANTRY, Some(&fixtures("urdf"))).unwrap()
+}
+
+fn parsed(text: &str) -> Robot {
+    RobotFile::parse("robot.toml", text).unwrap().robot()
+}
+
+struct Draw(ChaCha8Rng);
+
+impl Draw {
+    fn one(&mut self, size: f64) -> f64 {
+        size * (2.0 * self.0.random::<f64>() - 1.0)
+    }
+
+    fn many(&mut self, n: usize, size: f64) -> Vec<f64> {
+        (0..n).map(|_| self.one(size)).collect()
+    }
+}
+
+/// A model with random numbers; double-tanh friction or viscous and Coulomb.
+fn model(robot: Robot, smooth: bool, seed: u64) -> Model {
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
+    let n = robot.joints();
+    let friction = (0..n).map(|_| match smooth {
+        true => JointFriction::DoubleTanh(DoubleTanh {
+            viscous: draw.one(5.0),
+            coulomb_1: draw.one(3.0),
+            coulomb_2: draw.one(2.0),
+            slope_1: 50.0 + draw.one(20.0),
+            slope_2: 5.0 + draw.one(2.0),
+        }),
+        false => JointFriction::ViscousCoulomb(ViscousCoulomb {
+            viscous: draw.one(5.0),
+            coulomb: draw.one(3.0),
+        }),
+    });
+    let friction = friction.collect();
+    Model {
+        theta: draw.many(robot.parameters().len(), 4.0),
+        friction,
+        offset: draw.many(n, 1.0),
+        robot,
+    }
+}
+
+/// The models that are exported, with a name each.
+fn models() -> Vec<(&'static str, Model)> {
+    let cft = |parameters| {
+        parsed(&format!(
+            "[robot]\nmodel = \"cft\"\nsetup = \"tuedacs\"\nparameters = {parameters}\n"
+        ))
+    };
+    let chain = include_str!("../../fixtures/robots/cft-chain.toml");
+    let mut bare = model(gantry().robot(), false, 5);
+    bare.friction.fill(JointFriction::None);
+    bare.offset.fill(0.0);
+    vec![
+        ("cft_12", model(cft(12), true, 1)),
+        ("cft_22", model(cft(22), true, 2)),
+        ("gantry", model(gantry().robot(), false, 3)),
+        ("chain", model(parsed(chain), true, 4)),
+        ("bare", bare),
+        (
+            "slide",
+            model(
+                parsed("[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"prismatic\"\n"),
+                false,
+                6,
+            ),
+        ),
+    ]
+}
+
+type State = [Vec<f64>; 3];
+
+fn states(n: usize, seed: u64) -> Vec<State> {
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
+    let mut out: Vec<State> = (0..40)
+        .map(|_| [draw.many(n, 2.0), draw.many(n, 2.0), draw.many(n, 8.0)])
+        .collect();
+    // at rest the sign of the velocity is 0
+    out[0][1].fill(0.0);
+    out
+}
+
+/// Torques of the model, and the size of the terms that the largest of them is the sum of.
+fn torque(model: &Model, [q, v, a]: &State) -> (Vec<f64>, f64) {
+    let (n, p) = (model.friction.len(), model.theta.len());
+    let mut tau = vec![0.0; n];
+    model.torque(q, v, a, &mut tau);
+    let mut y = vec![0.0; n * p];
+    model.robot.regressor(q, v, a, &mut y);
+    let load = (0..n).map(|j| {
+        let row = y[j * p..(j + 1) * p].iter().zip(&model.theta);
+        row.map(|(y, t)| (y * t).abs()).sum::<f64>() + model.friction[j].torque(v[j]).abs()
+    });
+    // what is 0 by cancellation is 0 to the rounding of the others
+    (tau, load.fold(1e-3, f64::max))
+}
+
+/// Compares lines of numbers, n of the torque and n of gravity alone, with the model.
+fn compare(name: &str, model: &Model, states: &[State], text: &str) {
+    let n = model.friction.len();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.len(), states.len(), "{name}");
+    let mut still = model.clone();
+    still.friction.fill(JointFriction::None);
+    still.offset.fill(0.0);
+    let mut worst: f64 = 0.0;
+    for (line, state) in lines.iter().zip(states) {
+        let got: Vec<f64> = line
+            .split_whitespace()
+            .map(|x| x.parse().unwrap())
+            .collect();
+        let rest = [state[0].clone(), vec![0.0; n], vec![0.0; n]];
+        let (tau, load) = torque(model, state);
+        let (gravity, gravity_load) = torque(&still, &rest);
+        for j in 0..n {
+            worst = worst.max((got[j] - tau[j]).abs() / load);
+            worst = worst.max((got[n + j] - gravity[j]).abs() / gravity_load);
+        }
+    }
+    eprintln!("{name}: {worst:.1e} of the terms");
+    assert!(worst < 1e-12, "{name}: {worst:e}");
+}
+
+/// Whether a compiler is there; says so where it is not.
+fn there(compiler: &str) -> bool {
+    let found = Command::new(compiler).arg("--version").output();
+    let found = found.is_ok_and(|output| output.status.success());
+    if !found {
+        eprintln!("skipped: there is no `{compiler}` here");
+    }
+    found
+}
+
+fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.is_empty(), "{errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Numbers of C or Rust between the brackets given.
+fn listed(values: &[f64], open: char, close: char) -> String {
+    let all: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
+    format!("{open}{}{close}", all.join(", "))
+}
+
+fn note(model: &Model) -> Note {
+    Note {
+        lines: vec!["of a test; nothing ends this */ comment".to_owned()],
+        torque_units: (0..model.friction.len())
+            .map(|j| model.robot.joint_unit(j).to_owned())
+            .collect(),
+    }
+}
+
+#[test]
+fn the_c_header_gives_the_torques_of_the_model() {
+    if !there("cc") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, model) in models() {
+        let n = model.friction.len();
+        let states = states(n, 11);
+        let header = export::header::header(&Program::of(&model), name, &note(&model));
+        std::fs::write(folder.path().join(format!("{name}.h")), header).unwrap();
+        let rows: Vec<String> = states
+            .iter()
+            .map(|s| {
+                format!(
+                    "{{{}}}",
+                    s.each_ref().map(|x| listed(x, '{', '}')).join(", ")
+                )
+            })
+            .collect();
+        let driver = format!(
+            "#include <stdio.h>\n#include \"{name}.h\"\n\
+             static const double S[][3][{n}] = {{{}}};\n\
+             int main(void) {{\n  size_t i; int j; double t[{n}], g[{n}];\n  \
+             for (i = 0; i < sizeof S / sizeof S[0]; i++) {{\n    \
+             {name}_tau(S[i][0], S[i][1], S[i][2], t);\n    {name}_gravity(S[i][0], g);\n    \
+             for (j = 0; j < {n}; j++) printf(\"%.17g \", t[j]);\n    \
+             for (j = 0; j < {n}; j++) printf(\"%.17g \", g[j]);\n    printf(\"\\n\");\n  }}\n  return 0;\n}}\n",
+            rows.join(",\n")
+        );
+        let source = folder.path().join("driver.c");
+        std::fs::write(&source, driver).unwrap();
+        let program = folder.path().join(name);
+        run(Command::new("cc")
+            .args([
+                "-std=c99",
+                "-pedantic",
+                "-Wall",
+                "-Wextra",
+                "-Werror",
+                "-ffp-contract=off",
+            ])
+            .args(["-O1", "-o"])
+            .arg(&program)
+            .arg(&source)
+            .arg("-lm"));
+        compare(name, &model, &states, &run(&mut Command::new(&program)));
+    }
+}
+
+#[test]
+fn the_rust_module_gives_the_torques_of_the_model() {
+    if !there("rustc") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = String::new();
+    let mut calls = String::new();
+    let models = models();
+    for (name, model) in &models {
+        let n = model.friction.len();
+        let text = export::module::module(&Program::of(model), &note(model));
+        std::fs::write(folder.path().join(format!("{name}.rs")), text).unwrap();
+        let _ = writeln!(driver, "#[allow(dead_code)]\nmod {name};");
+        let rows: Vec<String> = states(n, 11)
+            .iter()
+            .map(|s| format!("[{}]", s.each_ref().map(|x| listed(x, '[', ']')).join(", ")))
+            .collect();
+        let _ = writeln!(
+            calls,
+            "  for [q, v, a] in [{}] {{\n    let t = {name}::tau(&q, &v, &a);\n    let g = {name}::gravity(&q);\n    \
+             for x in t.iter().chain(&g) {{ print!(\"{{x:?}} \"); }}\n    println!();\n  }}",
+            rows.join(",\n")
+        );
+    }
+    let source = folder.path().join("driver.rs");
+    std::fs::write(&source, format!("{driver}fn main() {{\n{calls}}}\n")).unwrap();
+    let program = folder.path().join("driver");
+    run(Command::new("rustc")
+        .args(["--edition", "2021", "-D", "warnings", "-o"])
+        .arg(&program)
+        .arg(&source));
+    let text = run(&mut Command::new(&program));
+    let lines: Vec<&str> = text.lines().collect();
+    for ((name, model), lines) in models.iter().zip(lines.chunks(40)) {
+        let states = states(model.friction.len(), 11);
+        compare(name, model, &states, &lines.join("\n"));
+    }
+}
+
+#[test]
+fn constants_stand_in_the_files_to_the_last_bit() {
+    let model = model(gantry().robot(), false, 3);
+    let program = Program::of(&model);
+    let header = export::header::header(&program, "gantry", &note(&model));
+    let module = export::module::module(&program, &note(&model));
+    let own = program.bodies.iter().flatten().copied();
+    let numbers = own.chain(
+        program
+            .tree
+            .links()
+            .iter()
+            .flat_map(|l| l.rotation)
+            .flatten(),
+    );
+    for x in numbers {
+        let text = format!("{x:?}");
+        assert_eq!(text.parse::<f64>().unwrap().to_bits(), x.to_bits());
+        assert!(header.contains(&text) && module.contains(&text), "{text}");
+    }
+    assert!(header.contains("0  rail: q [m], v [m/s], a [m/s^2], tau [N]"));
+    assert_eq!(header.matches("*/ comment").count(), 0);
+}
+
+/// The model file of a serial model.
+fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
+    let parameter = |name: &str, joint: Option<&String>, value: f64| Parameter {
+        name: name.to_owned(),
+        theta: None,
+        joint: joint.cloned(),
+        value,
+        std: Some(0.1),
+        unit: String::new(),
+        meaning: String::new(),
+        verdict: None,
+    };
+    let mut parameters: Vec<Parameter> = model
+        .robot
+        .parameters()
+        .iter()
+        .zip(&model.theta)
+        .map(|(info, value)| parameter(&info.name, None, *value))
+        .collect();
+    for (j, joint) in model.robot.joint_names().iter().enumerate() {
+        match &model.friction[j] {
+            JointFriction::None => {}
+            JointFriction::ViscousCoulomb(law) => {
+                parameters.push(parameter("viscous", Some(joint), law.viscous));
+                parameters.push(parameter("coulomb", Some(joint), law.coulomb));
+            }
+            JointFriction::DoubleTanh(law) => {
+                for (name, value) in DoubleTanh::NAMES.iter().zip(law.parameters()) {
+                    parameters.push(parameter(name, Some(joint), value));
+                }
+            }
+        }
+        parameters.push(parameter("offset", Some(joint), model.offset[j]));
+    }
+    ModelFile {
+        friction_prior: Vec::new(),
+        held_out: Vec::new(),
+        excesses: None,
+        robot,
+        parameters,
+        covariance: None,
+        residual_std: Default::default(),
+        effects: Vec::new(),
+        links: Vec::new(),
+        drive_inertia: Default::default(),
+        candidates: Vec::new(),
+        provenance: ModelProvenance::default(),
+    }
+}
+
+/// Parameters of links that could be, and of some couplings.
+fn bodies(model: &Model, seed: u64) -> Vec<f64> {
+    let robot = &model.robot;
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
+    let mut standard = Vec::new();
+    for _ in robot.tree().links() {
+        let centre: [f64; 3] = std::array::from_fn(|_| draw.one(0.2));
+        let small: [f64; 3] = std::array::from_fn(|_| draw.one(0.002));
+        let inertia = [0.03, small[0], small[1], 0.04, small[2], 0.05];
+        let body = Body {
+            mass: 3.0 + draw.one(1.0),
+            centre,
+            inertia,
+        };
+        standard.extend(body.standard());
+    }
+    standard.extend((standard.len()..robot.standard_parameters()).map(|_| 0.1 + draw.one(0.05)));
+    let mut theta = robot.base_of(&standard);
+    theta.extend((theta.len()..robot.parameters().len()).map(|_| draw.one(0.2)));
+    theta
+}
+
+/// A model file whose links can exist, with the bodies as `lsq --feasible` writes them.
+fn feasible(robot: RobotFile) -> ModelFile {
+    let mut model = model(robot.robot(), false, 3);
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(41));
+    let robot_model = model.robot.clone();
+    let links = robot_model.tree().links().iter().map(|link| LinkBody {
+        name: link.name.clone(),
+        mass: 2.0 + draw.one(1.0),
+        centre: std::array::from_fn(|_| draw.one(0.1)),
+        inertia: [0.03, draw.one(0.002), 0.0, 0.04, draw.one(0.002), 0.05],
+    });
+    let links: Vec<LinkBody> = links.collect();
+    let mut standard: Vec<f64> = Vec::new();
+    for link in &links {
+        let body = Body {
+            mass: link.mass,
+            centre: link.centre,
+            inertia: link.inertia,
+        };
+        standard.extend(body.standard());
+    }
+    let mut drives = std::collections::BTreeMap::new();
+    if robot_model.drive_inertia() {
+        for name in robot_model.joint_names() {
+            drives.insert(name.clone(), 0.2 + draw.one(0.1));
+            standard.push(drives[name]);
+        }
+    }
+    model.theta = robot_model.base_of(&standard);
+    let couplings = model.theta.len()..robot_model.parameters().len();
+    model.theta.extend(couplings.map(|_| 0.02));
+    ModelFile {
+        links,
+        drive_inertia: drives,
+        candidates: Vec::new(),
+        ..file_of(robot, &model)
+    }
+}
+
+/// Largest difference of the torques of two models, over the size of the terms of the first.
+fn difference(one: &Model, other: &Model) -> f64 {
+    let mut worst: f64 = 0.0;
+    for state in states(one.friction.len(), 21) {
+        let (first, load) = torque(one, &state);
+        let (second, _) = torque(other, &state);
+        for (x, y) in first.iter().zip(&second) {
+            worst = worst.max((x - y).abs() / load);
+        }
+    }
+    worst
+}
+
+#[test]
+fn a_urdf_with_its_side_file_is_the_same_model() {
+    let panda = include_str!("../../configs/panda.toml");
+    let panda = RobotFile::parse("panda.toml", panda).unwrap();
+    for (name, robot, smooth) in [
+        ("gantry", gantry(), false),
+        ("gantry-smooth", gantry(), true),
+        ("panda", panda, false),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut model = model(robot.robot(), smooth, 9);
+        model.theta = bodies(&model, 13);
+        let file = file_of(robot, &model);
+        let made = export::urdf::urdf(
+            &file,
+            &model,
+            "arm.urdf",
+            &["a note -- of a test".to_owned()],
+        )
+        .unwrap();
+        std::fs::write(folder.path().join("arm.urdf"), &made.urdf).unwrap();
+        std::fs::write(folder.path().join("arm.toml"), &made.side).unwrap();
+        let back = ModelFile::load(&folder.path().join("arm.toml")).unwrap();
+        let again = back.model("arm.toml").unwrap();
+        assert_eq!(again.robot.joint_names(), model.robot.joint_names());
+        let worst = difference(&model, &again);
+        eprintln!("{name}: {worst:.1e} of the terms");
+        assert!(worst < 1e-12, "{name}: {worst:e}");
+        // and as a model file of its own, without the URDF
+        let alone = ModelFile::parse("alone.toml", &back.to_toml().unwrap()).unwrap();
+        assert_eq!(alone.model("alone.toml").unwrap(), again);
+    }
+}
+
+/// Writes URDF and side file, and reads the side file back.
+fn there_and_back(file: &ModelFile, model: &Model) -> (String, ModelFile) {
+    let folder = tempfile::tempdir().unwrap();
+    let made = export::urdf::urdf(file, model, "arm.urdf", &[]).unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), &made.urdf).unwrap();
+    std::fs::write(folder.path().join("arm.toml"), &made.side).unwrap();
+    let back = ModelFile::load(&folder.path().join("arm.toml")).unwrap();
+    (made.urdf, back)
+}
+
+#[test]
+fn links_of_a_feasible_fit_go_into_the_urdf_as_they_are() {
+    let panda = include_str!("../../configs/panda.toml");
+    let panda = RobotFile::parse("panda.toml", panda).unwrap();
+    let mut model = model(panda.robot(), false, 9);
+    let robot = &model.robot;
+    let mut draw = Draw(ChaCha8Rng::seed_from_u64(31));
+    let links: Vec<LinkBody> = robot
+        .tree()
+        .links()
+        .iter()
+        .map(|link| LinkBody {
+            name: link.name.clone(),
+            mass: 2.0 + draw.one(1.0),
+            centre: std::array::from_fn(|_| draw.one(0.1)),
+            inertia: [0.03, draw.one(0.002), 0.0, 0.04, draw.one(0.002), 0.05],
+        })
+        .collect();
+    let mut standard: Vec<f64> = links
+        .iter()
+        .flat_map(|l| {
+            let body = Body {
+                mass: l.mass,
+                centre: l.centre,
+                inertia: l.inertia,
+            };
+            body.standard()
+        })
+        .collect();
+    let mut drives = std::collections::BTreeMap::new();
+    if robot.drive_inertia() {
+        for name in robot.joint_names() {
+            drives.insert(name.clone(), 0.2 + draw.one(0.1));
+            standard.push(drives[name]);
+        }
+    }
+    model.theta = robot.base_of(&standard);
+    let mut file = file_of(panda, &model);
+    file.links = links.clone();
+    file.drive_inertia = drives;
+    let (urdf, back) = there_and_back(&file, &model);
+    assert!(
+        urdf.contains("of links that can exist and give the"),
+        "{urdf}"
+    );
+    for (link, found) in links.iter().zip(&back.robot.robot.link) {
+        let found = found.inertial.as_ref().unwrap();
+        assert!((found.mass - link.mass).abs() < 1e-9, "{}", link.name);
+        for (x, y) in found.centre.iter().zip(&link.centre) {
+            assert!((x - y).abs() < 1e-9, "{}", link.name);
+        }
+        for (x, y) in found.inertia.iter().zip(&link.inertia) {
+            assert!((x - y).abs() < 1e-9, "{}", link.name);
+        }
+    }
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+    // parameters that were changed since: the torques are theirs, and the head says so
+    model.theta[0] *= 1.1;
+    let changed = ModelFile {
+        parameters: file_of(file.robot.clone(), &model).parameters,
+        ..file
+    };
+    let (urdf, back) = there_and_back(&changed, &model);
+    assert!(urdf.contains("changed after they were found"), "{urdf}");
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn frames_that_are_fixed_to_links_are_kept() {
+    let mut model = model(gantry().robot(), false, 9);
+    model.theta = bodies(&model, 13);
+    let file = file_of(gantry(), &model);
+    let frame = |file: &ModelFile, name: &str| {
+        let frames = &file.robot.robot.frame;
+        frames.iter().find(|f| f.name == name).cloned().unwrap()
+    };
+    let names: Vec<&str> = file
+        .robot
+        .robot
+        .frame
+        .iter()
+        .map(|f| f.name.as_str())
+        .collect();
+    assert_eq!(names, ["motor", "hand"]);
+    let hand = frame(&file, "hand");
+    assert_eq!(hand.link, "fore");
+    assert_eq!((hand.xyz, hand.rpy), ([0.0, -0.3, 0.01], [0.0, 0.3, 0.0]));
+    let (urdf, back) = there_and_back(&file, &model);
+    assert!(urdf.contains("<link name=\"hand\"/>"), "{urdf}");
+    assert_eq!(back.robot.robot.frame, file.robot.robot.frame);
+    // and the frames of a model file of its own, without the URDF
+    let alone = ModelFile::parse("alone.toml", &file.to_toml().unwrap()).unwrap();
+    assert_eq!(alone.robot.robot.frame, file.robot.robot.frame);
+    let worst = difference(&model, &back.model("arm.toml").unwrap());
+    assert!(worst < 1e-12, "{worst:e}");
+}
+
+#[test]
+fn a_single_joint_is_a_chain_of_one_link_that_can_be() {
+    for kind in ["prismatic", "revolute"] {
+        let text = format!(
+            "[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"{kind}\"\n\
+             [limits.x]\nposition = [-1.0, 2.0]\n"
+        );
+        let robot = RobotFile::parse("robot.toml", &text).unwrap();
+        let mut model = model(robot.robot(), false, 6);
+        model.theta = vec![0.37];
+        let (urdf, back) = there_and_back(&file_of(robot, &model), &model);
+        assert!(
+            urdf.contains(&format!("<joint name=\"x\" type=\"{kind}\">")),
+            "{urdf}"
+        );
+        let body = back.robot.robot.link[0].inertial.clone().unwrap();
+        assert!(body.mass > 0.0 && body.inertia[0] > 0.0, "{body:?}");
+        let again = back.model("arm.toml").unwrap();
+        assert_eq!(again.robot.joint_names(), ["x"]);
+        let worst = difference(&model, &again);
+        assert!(worst < 1e-12, "{kind}: {worst:e}");
+    }
+    let current = "[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"revolute\"\n\
+                   [log.joint.x]\ntorque_unit = \"A\"\n";
+    let robot = RobotFile::parse("robot.toml", current).unwrap();
+    let model = model(robot.robot(), false, 6);
+    let error = export::urdf::urdf(&file_of(robot, &model), &model, "a.urdf", &[]).unwrap_err();
+    assert!(error.to_string().contains("torque_scale"), "{error}");
+}
+
+#[test]
+fn a_urdf_says_what_the_data_determine() {
+    let panda = include_str!("../../configs/panda.toml");
+    let robot = RobotFile::parse("panda.toml", panda).unwrap();
+    let mut model = model(robot.robot(), false, 9);
+    model.theta = bodies(&model, 13);
+    model
+        .friction
+        .fill(JointFriction::ViscousCoulomb(ViscousCoulomb {
+            viscous: 0.3,
+            coulomb: 0.2,
+        }));
+    let made = export::urdf::urdf(&file_of(robot, &model), &model, "arm.urdf", &[]).unwrap();
+    // of the first link only its inertia about z tells, in a sum with what hangs on it
+    assert!(
+        made.urdf.contains(
+            "determined none; only in sums with others Izz; not at all Ixx Ixy Ixz Iyy Iyz mx my mz m"
+        ) || made.urdf.contains("only in sums with others"),
+        "{}",
+        made.urdf
+    );
+    assert!(made.urdf.contains("<dynamics damping="));
+    assert!(!made.urdf.contains("which would drive it"));
+    // a coefficient below zero would drive a simulated joint
+    model.friction[1] = JointFriction::ViscousCoulomb(ViscousCoulomb {
+        viscous: -0.09,
+        coulomb: 0.4,
+    });
+    let robot = RobotFile::parse("panda.toml", panda).unwrap();
+    let made = export::urdf::urdf(&file_of(robot, &model), &model, "arm.urdf", &[]).unwrap();
+    assert!(
+        made.urdf
+            .contains("<dynamics damping=\"0.0\" friction=\"0.4\"/>")
+    );
+    assert!(
+        made.urdf.contains("the viscous friction of q2 is -0.09"),
+        "{}",
+        made.urdf
+    );
+    assert!(
+        made.side.contains("-0.09"),
+        "the side file keeps what was identified"
+    );
+}
+
+#[test]
+fn what_a_urdf_cannot_hold_is_refused_with_a_way_out() {
+    let chain = include_str!("../../fixtures/robots/cft-chain.toml");
+    let robot = RobotFile::parse("chain.toml", chain).unwrap();
+    let model = model(robot.robot(), true, 4);
+    let error = export::urdf::urdf(&file_of(robot, &model), &model, "a.urdf", &[]).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("`link_3`") && text.ends_with("--c or --rust"),
+        "{text}"
+    );
+}
+
+#[test]
+fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = feasible(gantry());
+    let path = folder.path().join("model.toml");
+    std::fs::write(&path, file.to_toml().unwrap()).unwrap();
+    let command = |more: &[&str]| {
+        assert_cmd::Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(folder.path())
+            .arg("export")
+            .args(match more.contains(&"-m") {
+                true => &[][..],
+                false => &["-m", "model.toml"],
+            })
+            .args(more)
+            .assert()
+    };
+    command(&[
+        "--c", "ff.h", "--rust", "ff.rs", "--urdf", "ff.urdf", "--json", "-",
+    ])
+    .success()
+    .stdout(predicates::str::contains("\"cft-ident/export/1\""));
+    for name in ["ff.h", "ff.rs", "ff.urdf", "ff.toml"] {
+        let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        assert!(text.contains("from model.toml (SHA-256 "), "{name}");
+        assert!(text.contains("Nothing of the model is left out."), "{name}");
+    }
+    command(&[]).code(2);
+    command(&["--c", "ff.txt"]).code(2);
+    let mut effect = |name: &str, numbers: &[(&str, f64)]| {
+        let number = |value| cft_ident::config::model_file::EffectParameter {
+            value,
+            std: None,
+            unit: String::new(),
+            bound: false,
+        };
+        let numbers = numbers
+            .iter()
+            .map(|(key, x)| ((*key).to_owned(), number(*x)));
+        file.effects = vec![cft_ident::config::model_file::EffectSection {
+            name: name.to_owned(),
+            joint: Some("elbow".to_owned()),
+            parameters: numbers.collect(),
+        }];
+        std::fs::write(&path, file.to_toml().unwrap()).unwrap();
+    };
+    effect("quantisation", &[]);
+    command(&["--c", "refused.h"])
+        .code(3)
+        .stderr(predicates::str::contains("the grain of a logged channel"))
+        .stderr(predicates::str::contains("--without-effects"));
+    assert!(!folder.path().join("refused.h").exists());
+    effect("ripple", &[("order", 3.0), ("sin", 0.2), ("cos", 0.1)]);
+    command(&[
+        "--c",
+        "ripple.h",
+        "--urdf",
+        "ripple.urdf",
+        "--mjcf",
+        "ripple.xml",
+    ])
+    .success();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(read("ripple.h").contains("Effects: ripple of elbow."));
+    assert!(
+        read("ripple.urdf")
+            .contains("Effects are in the file beside the URDF alone: ripple of elbow.")
+    );
+    assert!(read("ripple.toml").contains("name = \"ripple\""));
+    assert!(read("ripple.xml").contains("no log was given"));
+    assert!(read("ripple.xml.left-out.toml").contains("what = \"ripple of elbow\""));
+    // links that no body can be are for none of these
+    let wild = file_of(gantry(), &model(gantry().robot(), false, 3));
+    std::fs::write(folder.path().join("wild.toml"), wild.to_toml().unwrap()).unwrap();
+    for option in [
+        ["--mjcf", "wild.xml"],
+        ["--sdf", "wild.sdf"],
+        ["--usd", "wild.usda"],
+    ] {
+        command(&[&["-m", "wild.toml"], &option[..]].concat())
+            .code(3)
+            .stderr(
+                predicates::str::contains("can be no body")
+                    .and(predicates::str::contains("--feasible")),
+            );
+    }
+    command(&["--c", "told.h", "--without-effects"]).success();
+    let text = std::fs::read_to_string(folder.path().join("told.h")).unwrap();
+    assert!(text.contains("NOT in here, though the model has it: ripple of elbow."));
+}
+
+#[test]
+fn the_users_urdf_keeps_what_is_not_inertia_or_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = feasible(gantry());
+    let source = std::fs::read_to_string(fixtures("urdf").join("gantry.urdf")).unwrap();
+    let source = source.replace(
+        "<robot name=\"gantry\">",
+        "<robot name=\"gantry\">\n  <!-- of the maker --><gazebo><plugin name=\"x\"/></gazebo>",
+    );
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("gantry.urdf"), &source).unwrap();
+    std::fs::write(path("model.toml"), file.to_toml().unwrap()).unwrap();
+    let command = |more: &[&str]| {
+        assert_cmd::Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(folder.path())
+            .args([
+                "export",
+                "-m",
+                "model.toml",
+                "--urdf",
+                "new.urdf",
+                "--urdf-source",
+            ])
+            .args(more)
+            .assert()
+    };
+    command(&["gantry.urdf"]).success();
+    let text = std::fs::read_to_string(path("new.urdf")).unwrap();
+    assert!(text.contains("<!-- of the maker --><gazebo><plugin name=\"x\"/></gazebo>"));
+    let origins = |text: &str| text.matches("<parent link=").count();
+    assert_eq!(origins(&text), origins(&source));
+    // with the model file beside it, it is the model
+    let back = ModelFile::load(&path("new.toml")).unwrap();
+    let model = file.model("model.toml").unwrap();
+    let worst = difference(&model, &back.model("new.toml").unwrap());
+    assert!(worst < 1e-9, "{worst:e}");
+    // a joint that is not there, and one that sits elsewhere
+    let elsewhere = source.replace("\"elbow\"", "\"knee\"");
+    std::fs::write(path("knee.urdf"), elsewhere).unwrap();
+    command(&["knee.urdf"])
+        .code(3)
+        .stderr(predicates::str::contains("has no joint `elbow`"));
+}

@@ -1,0 +1,296 @@
+//! The plan of the house, read from its sources: imports run one way and in no circle, each large
+//! dependency has one door, rooms do not print, files stay small.
+
+use crate::house_plan;
+
+use house_plan::{Imports, Source, code, shipped, sources};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Rooms in pipeline order, each with the rooms that it may import. A new room gets a line here.
+const ROOMS: &[(&str, &str)] = &[
+    ("math", ""),
+    ("block", ""),
+    ("verdict", ""),
+    ("number", ""),
+    ("robot", "math"),
+    ("log", "math number robot block"),
+    ("config", "number robot log verdict"),
+    ("output", "log"),
+    ("motion", "math robot block"),
+    ("effect", "math number robot motion"),
+    ("export", "number robot config motion effect"),
+    ("band", "math number robot config motion effect"),
+    ("observe", "math robot log config motion effect band export"),
+    ("open_loop", "math number robot motion effect"),
+    ("friction", "math robot block motion verdict"),
+    ("inertia", "math robot block motion verdict"),
+    ("diagnose", "math robot block motion effect"),
+    ("validate", "math robot block motion verdict"),
+    ("inspect", "math number log"),
+    ("setup", "math robot motion inertia"),
+    ("mapping", "robot log inspect"),
+    ("simulate", "math number robot log config effect"),
+    ("excite", "math number robot log config inertia simulate"),
+    ("compare", "math robot config motion effect verdict"),
+    ("track", ""),
+    (
+        "identify",
+        "math verdict number robot log config motion effect friction inertia diagnose validate \
+         inspect setup compare band observe open_loop track export",
+    ),
+    (
+        "replay",
+        "robot log config motion effect friction diagnose identify",
+    ),
+    (
+        "report",
+        "math verdict number robot log config motion effect friction inertia diagnose validate \
+         inspect setup excite compare identify band observe open_loop track replay",
+    ),
+    (
+        "cli",
+        "math verdict number robot log config output motion effect friction inertia diagnose \
+         validate inspect mapping setup simulate excite compare identify report export band \
+         observe open_loop track replay",
+    ),
+];
+
+/// Dependencies that are used behind one door.
+const DOORS: &[(&str, &str)] = &[
+    ("faer", "math/rank.rs"),
+    ("argmin", "math/minimise.rs"),
+    ("clap", "cli/"),
+    ("clap_complete", "cli/completions.rs"),
+    ("clap_mangen", "cli/man.rs"),
+    ("indicatif", "cli/context.rs"),
+    ("ctrlc", "cli/mod.rs"),
+    ("csv", "log/text/csv.rs"),
+    ("exmex", "math/formula.rs"),
+    ("fast_float2", "log/text/number.rs"),
+    // one to read, one to write
+    ("mcap", "log/recording/format/mcap.rs|output/mcap.rs"),
+    ("rusqlite", "log/recording/format/bag.rs"),
+    ("flate2", "log/content.rs|output/log.rs"),
+    ("zstd", "log/content.rs|output/log.rs"),
+    ("resvg", "report/figure/png.rs"),
+    ("sha2", "log/source.rs"),
+    ("roxmltree", "config/urdf/xml.rs"),
+];
+
+#[test]
+fn imports_run_one_way() {
+    let allowed: BTreeMap<&str, Vec<&str>> = (ROOMS.iter())
+        .map(|(room, may)| (*room, may.split_whitespace().collect()))
+        .collect();
+    let sources = sources();
+    let mut wrong = Vec::new();
+    for (from, to) in Imports::read(&sources, code).between_files() {
+        let (file, room) = (&from.file, from.room());
+        // `lib.rs` and `main.rs` name every room
+        let (Some(room), Some(import)) = (room, to.room()) else {
+            continue;
+        };
+        let Some(may) = allowed.get(room) else {
+            wrong.push(format!("{file}: room `{room}` has no line in ROOMS"));
+            continue;
+        };
+        if import != room && !may.contains(&import) {
+            wrong.push(format!("{file}: `{room}` may not import `{import}`"));
+        }
+    }
+    let rooms = sources.iter().filter_map(Source::room);
+    wrong.extend(
+        rooms
+            .filter(|room| !allowed.contains_key(room))
+            .map(|room| format!("room `{room}` has no line in ROOMS")),
+    );
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_imports_go_in_a_circle() {
+    let sources = sources();
+    let circles = Imports::read(&sources, shipped).circles();
+    let told: Vec<String> = circles
+        .iter()
+        .map(|(circle, ties)| format!("{circle}\n  {}", ties.join("\n  ")))
+        .collect();
+    assert!(told.is_empty(), "imports in a circle:\n{}", told.join("\n"));
+}
+
+#[test]
+fn the_plan_itself_has_no_way_back() {
+    for (at, (room, may)) in ROOMS.iter().enumerate() {
+        for import in may.split_whitespace() {
+            let earlier = ROOMS[..at].iter().any(|(name, _)| *name == import);
+            assert!(earlier, "`{room}` imports `{import}`, which comes later");
+        }
+    }
+}
+
+#[test]
+fn estimators_know_nothing_of_the_simulator() {
+    for room in [
+        "motion",
+        "effect",
+        "friction",
+        "inertia",
+        "diagnose",
+        "validate",
+        "inspect",
+        "log",
+        "replay",
+        "report",
+        "band",
+        "observe",
+        "open_loop",
+    ] {
+        let (_, may) = ROOMS.iter().find(|(name, _)| *name == room).unwrap();
+        let simulates = may.split_whitespace().any(|import| import == "simulate");
+        assert!(!simulates, "{room}");
+    }
+}
+
+#[test]
+fn simulator_and_estimator_share_entries_of_effects_and_no_law() {
+    let shared = ["Entry", "Key", "Place", "Places", "Range", "Role", "Unit"];
+    for source in sources() {
+        if source.room() != Some("simulate") {
+            continue;
+        }
+        for path in code(&source.text).split("crate::effect::").skip(1) {
+            let path = path.split(';').next().unwrap();
+            let names = path.split(|c: char| "{},".contains(c)).map(str::trim);
+            for name in names.filter(|name| !name.is_empty()) {
+                let entry = name.ends_with("::ENTRY") || shared.contains(&name);
+                assert!(entry, "{}: {name}", source.file);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_code_asks_for_an_effect_by_its_name() {
+    let sources = sources();
+    let effect = |source: &&Source| source.text.contains("static ENTRY");
+    let files = sources.iter().filter(effect);
+    let names = files.filter_map(|source| source.module.last().map(|name| name.replace('_', "-")));
+    // of one word they name other things too
+    let quoted = names.filter(|name| name.contains('-'));
+    let quoted: Vec<String> = quoted.map(|name| format!("\"{name}\"")).collect();
+    assert!(quoted.len() > 10);
+    for source in &sources {
+        let text = source.text.split("#[cfg(test)]").next().unwrap();
+        let found = quoted.iter().find(|name| text.contains(*name));
+        // the faults of a log, some of which the simulator makes
+        let own = source.room() == Some("effect") || source.file == "inspect/fault.rs";
+        assert!(own || found.is_none(), "{}: {found:?}", source.file);
+    }
+}
+
+#[test]
+fn files_that_a_list_declares_are_formatted_too() {
+    // rustfmt follows `mod`, and not what a macro makes of a list
+    let listed = |source: &Source| {
+        let [folder @ .., _] = source.module.as_slice() else {
+            return false;
+        };
+        let folder = folder.join("/");
+        ["effect", "simulate/effects"].contains(&folder.as_str())
+            && !source.file.ends_with("/mod.rs")
+    };
+    let files = sources().into_iter().filter(listed);
+    let files = files.map(|source| source.path);
+    let mut rustfmt = std::process::Command::new("rustfmt");
+    rustfmt.args(["--edition", "2024", "--check"]).args(files);
+    // where there is no rustfmt nothing is written either
+    if let Ok(done) = rustfmt.output() {
+        let said = String::from_utf8_lossy(&done.stdout);
+        assert!(done.status.success(), "{said}");
+    }
+}
+
+#[test]
+fn each_large_dependency_has_one_door() {
+    let mut wrong = Vec::new();
+    let sources = sources();
+    for Source {
+        file, text, module, ..
+    } in &sources
+    {
+        let code = code(text);
+        for (name, door) in DOORS {
+            // not a module of that name beside the file
+            let inner = [&module[..], &[(*name).to_owned()]].concat();
+            if sources.iter().any(|source| source.module == inner) {
+                continue;
+            }
+            let used = code.match_indices(&format!("{name}::")).any(|(at, _)| {
+                !code[..at].ends_with(|c: char| c.is_alphanumeric() || "_:".contains(c))
+            });
+            if used && !door.split('|').any(|door| file.starts_with(door)) {
+                wrong.push(format!("{file} uses {name}, whose door is {door}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn only_the_command_line_prints() {
+    for Source { file, text, .. } in sources() {
+        let shipped = shipped(&text);
+        let prints = ["println!", "print!", "eprintln!", "eprint!", "dbg!"];
+        let found = prints.iter().find(|name| shipped.contains(*name));
+        assert!(
+            found.is_none() || file.starts_with("cli/"),
+            "{file}: {found:?}"
+        );
+        let streams = shipped.contains("stdout()") || shipped.contains("stderr()");
+        assert!(!streams || file.starts_with("cli/"), "{file}");
+    }
+}
+
+/// Arguments of a command are `Args` of its file: clap names them by the command.
+#[test]
+fn a_type_that_others_see_has_a_name_of_its_own() {
+    let mut places: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let sources = sources();
+    for source in &sources {
+        for line in source.text.lines() {
+            let declared = ["pub struct ", "pub enum ", "pub trait ", "pub type "];
+            let Some(rest) = declared.iter().find_map(|of| line.strip_prefix(of)) else {
+                continue;
+            };
+            let end = rest.find(|c: char| !c.is_alphanumeric());
+            let name = &rest[..end.unwrap_or(rest.len())];
+            if name != "Args" {
+                places.entry(name).or_default().push(&source.file);
+            }
+        }
+    }
+    assert!(places.len() > 300, "{}", places.len());
+    places.retain(|_, files| files.len() > 1);
+    assert_eq!(places, BTreeMap::new());
+}
+
+#[test]
+fn files_stay_below_600_lines() {
+    for Source { file, text, .. } in sources() {
+        let lines = text.lines().count();
+        assert!(lines <= 600, "{file} has {lines} lines: that is two ideas");
+    }
+}
+
+#[test]
+fn no_file_is_a_drawer_for_everything() {
+    for Source { file, .. } in sources() {
+        let stem = Path::new(&file).file_stem().unwrap().to_string_lossy();
+        for name in [
+            "utils", "util", "helpers", "common", "misc", "prelude", "manager",
+        ] {
+            assert_ne!(stem, name, "{file}");
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The schemas hold for the files that come with the tool and for its committed results, and for
+//! nothing that its readers refuse.
+
+use crate::schema_support;
+
+use cft_ident::cli::schema::{Kind, schema};
+use cft_ident::config::EMBEDDED;
+use schema_support::wrong;
+use serde_json::Value;
+use std::path::Path;
+
+fn judged(text: &str, kind: Kind) -> Option<String> {
+    let value: toml::Value = toml::from_str(text).unwrap();
+    let value = serde_json::to_value(value).unwrap();
+    let schema = schema(kind);
+    wrong(&value, &schema, &schema, "")
+}
+
+#[test]
+fn every_file_that_comes_with_the_tool_has_its_schema() {
+    for (name, text) in EMBEDDED {
+        let kind = match text {
+            text if text.contains("[robot]") => Kind::Robot,
+            text if text.contains("kind = ") => Kind::Trajectory,
+            _ => Kind::Campaign,
+        };
+        let found = judged(text, kind);
+        assert_eq!(found, None, "{name} as {kind:?}");
+    }
+}
+
+#[test]
+fn what_the_reader_refuses_the_schema_refuses_too() {
+    let head = "[robot]\nmodel = \"single-joint\"\njoint = \"q1\"\nkind = \"revolute\"\n";
+    assert_eq!(judged(head, Kind::Robot), None);
+    for more in [
+        "colour = 1\n",
+        "[filter]\ncutoff_hz = \"ten\"\n",
+        "[filter]\nkind = \"magic\"\n",
+        "[log.joint.q1]\nposition = true\n",
+    ] {
+        let found = judged(&format!("{head}{more}"), Kind::Robot);
+        assert!(found.is_some(), "{more}");
+    }
+    // a column by its number is right
+    assert_eq!(
+        judged(
+            &format!("{head}[log.joint.q1]\nposition = 2\n"),
+            Kind::Robot
+        ),
+        None
+    );
+}
+
+#[test]
+fn committed_results_have_the_schema_of_their_command() {
+    let folder = Path::new(cft_ident_support::ROOT).join("docs/results");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|end| end != "json") {
+            continue;
+        }
+        let value: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        let kind = match value["schema"].as_str() {
+            Some("cft-ident/friction/1") => Kind::Friction,
+            Some("cft-ident/lsq/1") => Kind::Lsq,
+            Some("cft-ident/validate/1") => Kind::Validate,
+            Some("cft-ident/diagnose/1") => Kind::Diagnose,
+            Some(other) => panic!("{other}"),
+            None => continue,
+        };
+        let schema = schema(kind);
+        assert_eq!(
+            wrong(&value, &schema, &schema, ""),
+            None,
+            "{}",
+            path.display()
+        );
+        seen += 1;
+    }
+    assert!(seen >= 10, "{seen}");
+}
+
+#[test]
+fn documents_of_cheap_commands_have_their_schema() {
+    let folder = tempfile::tempdir().unwrap();
+    for (kind, line) in [
+        (
+            Kind::Simulate,
+            "simulate -r configs/cft.toml --move q4 --seconds 8 --seed 1 -o a.csv",
+        ),
+        (Kind::Inspect, "inspect a.csv"),
+        (Kind::Convert, "convert a.csv a.mcap"),
+        (
+            Kind::Excite,
+            "excite --check configs/cft-excitation.toml -r configs/cft.toml",
+        ),
+        (Kind::New, "new mine --log a.csv"),
+        (
+            Kind::Friction,
+            "friction a.csv -r configs/cft.toml -o one.toml",
+        ),
+    ] {
+        let done = assert_cmd::Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(folder.path())
+            .args(line.split_whitespace())
+            .args(["--json", "-"])
+            .assert()
+            .success();
+        let value: Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+        let schema = schema(kind);
+        assert_eq!(wrong(&value, &schema, &schema, ""), None, "{line}");
+    }
+}

@@ -1,0 +1,361 @@
+//! Faults of a set-up are named, mended and, where the user says so, kept; a right one says nothing.
+
+use crate::measured_support;
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use measured_support::{run, shared};
+use serde_json::Value;
+
+/// A log of columns, altered and written.
+struct Log {
+    names: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Log {
+    fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap();
+        let mut lines = text.lines();
+        let split = |line: &str| -> Vec<String> {
+            line.split(',').map(|cell| cell.trim().to_owned()).collect()
+        };
+        Self {
+            names: split(lines.next().unwrap()),
+            rows: lines
+                .map(|line| {
+                    line.split(',')
+                        .map(|cell| cell.trim().parse().unwrap())
+                        .collect()
+                })
+                .collect(),
+        }
+    }
+
+    fn column(&self, name: &str) -> usize {
+        self.names
+            .iter()
+            .position(|known| known == name)
+            .expect(name)
+    }
+
+    fn map(&mut self, name: &str, f: impl Fn(f64) -> f64) -> &mut Self {
+        let j = self.column(name);
+        self.rows.iter_mut().for_each(|row| row[j] = f(row[j]));
+        self
+    }
+
+    fn swap(&mut self, a: &str, b: &str) -> &mut Self {
+        let (a, b) = (self.column(a), self.column(b));
+        self.rows.iter_mut().for_each(|row| row.swap(a, b));
+        self
+    }
+
+    fn write(&self, path: &Path) {
+        let mut text = self.names.join(",") + "\n";
+        for row in &self.rows {
+            let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
+            text += &(row.join(",") + "\n");
+        }
+        std::fs::write(path, text).unwrap();
+    }
+}
+
+/// A folder with an altered log in it.
+struct Altered {
+    folder: tempfile::TempDir,
+    robot: PathBuf,
+}
+
+impl Altered {
+    fn new(log: &Path, robot: &str, alter: impl Fn(&mut Log)) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut altered = Log::read(log);
+        alter(&mut altered);
+        altered.write(&folder.path().join("log.csv"));
+        let robot = Path::new(cft_ident_support::ROOT).join(robot);
+        Self { folder, robot }
+    }
+
+    fn words<'a>(&'a self, command: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+        let mut words = vec![command, "log.csv", "-r", self.robot.to_str().unwrap()];
+        if command != "inspect" {
+            words.extend(["-o", "m.toml"]);
+        }
+        words.extend(more);
+        words
+    }
+
+    /// The entries of the key `setup`.
+    fn told(&self) -> Vec<Value> {
+        let found = run(self.folder.path(), &self.words("inspect", &[]));
+        found["setup"].as_array().unwrap().clone()
+    }
+
+    /// Standard error of a fit that is refused, which writes nothing.
+    fn refused(&self) -> String {
+        let output = Command::cargo_bin("cft-ident")
+            .unwrap()
+            .current_dir(self.folder.path())
+            .args(self.words("lsq", &["-q"]))
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(3));
+        assert!(!self.folder.path().join("m.toml").exists());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    }
+
+    fn mended(&self) -> Value {
+        run(
+            self.folder.path(),
+            &self.words("lsq", &["--fix-setup", "new.toml"]),
+        )
+    }
+}
+
+fn short(finding: &Value) -> (&str, &str, &str, bool) {
+    let text = |key: &str| finding[key].as_str().unwrap_or("");
+    (
+        text("kind"),
+        text("channel"),
+        text("joint"),
+        finding["sure"].as_bool().unwrap(),
+    )
+}
+
+/// Parameters of two fits, each within a deviation of the other.
+fn assert_alike(a: &Value, b: &Value) {
+    for (a, b) in a["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(b["parameters"].as_array().unwrap())
+    {
+        let (Some(x), Some(y), Some(std)) =
+            (a["value"].as_f64(), b["value"].as_f64(), b["std"].as_f64())
+        else {
+            continue;
+        };
+        assert!((x - y).abs() <= std, "{} {x} {y} +- {std}", a["name"]);
+    }
+}
+
+#[test]
+fn right_set_ups_of_measured_machines_say_nothing() {
+    for (log, robot) in [
+        ("ur10/ur10_exciting.csv", "configs/ur10.toml"),
+        ("ur10/ur10_exciting.csv@0..50%", "configs/ur10.toml"),
+        ("panda/panda_exciting.csv", "configs/panda.toml"),
+        ("tx40/tx40_joint.csv", "configs/tx40.toml"),
+        ("emps/emps_id.csv", "configs/emps.toml"),
+        ("emps/emps_pulses_val.csv", "configs/emps.toml"),
+        ("bldc-cogging/speed_test1.txt", "configs/bldc.toml"),
+        ("bldc-cogging/speed_test1.txt@0..50%", "configs/bldc.toml"),
+        ("kr300/A.csv", "configs/kr300.toml"),
+        ("kr300/C.csv", "configs/kr300.toml"),
+        ("pendulum/061157.csv", "configs/pendulum.toml"),
+    ] {
+        let Some(log) = shared(log) else { continue };
+        let folder = tempfile::tempdir().unwrap();
+        let found = run(
+            folder.path(),
+            &["inspect", log.to_str().unwrap(), "-r", robot],
+        );
+        assert_eq!(found["setup"], Value::Array(Vec::new()), "{log:?}");
+    }
+}
+
+#[test]
+fn a_turned_torque_is_refused_mended_and_kept_where_the_user_says_so() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let turned = Altered::new(&log, "configs/ur10.toml", |log| {
+        log.map("tau3", |x| -x);
+    });
+    let message = turned.refused();
+    assert!(message.contains("torque_sign = -1.0"), "{message}");
+    assert!(
+        message.contains("--fix-setup") && message.contains("--as-declared"),
+        "{message}"
+    );
+    let mended = turned.mended();
+    let right = Altered::new(&log, "configs/ur10.toml", |_| {});
+    let unchanged = run(right.folder.path(), &right.words("lsq", &[]));
+    assert_eq!(unchanged["setup"], Value::Array(Vec::new()));
+    assert_eq!(short(&mended["setup"][0]), ("sign", "torque", "q3", true));
+    assert_alike(&mended, &unchanged);
+    // the user's own text with one key more
+    let text = std::fs::read_to_string(turned.folder.path().join("new.toml")).unwrap();
+    assert!(
+        text.starts_with("# UR10") && text.contains("q3 = { torque_sign = -1.0,"),
+        "{text}"
+    );
+    let kept = run(
+        turned.folder.path(),
+        &turned.words("lsq", &["--as-declared"]),
+    );
+    // the torques are not asked
+    assert_eq!(kept["setup"], Value::Array(Vec::new()));
+    assert!(
+        kept["joints"][2]["relative_error"].as_f64()
+            > unchanged["joints"][2]["relative_error"].as_f64()
+    );
+}
+
+#[test]
+fn one_axis_with_a_turned_torque_is_told_by_physics_with_both_readings() {
+    let Some(log) = shared("emps/emps_id.csv") else {
+        return;
+    };
+    let turned = Altered::new(&log, "configs/emps.toml", |log| {
+        log.map("tau1", |x| -x);
+    });
+    let told = turned.told();
+    assert_eq!(short(&told[0]), ("sign", "torque", "q1", true));
+    assert_eq!(told[0]["tied_with"][0]["channel"], "position");
+    assert_eq!(
+        told[0]["error_before"].as_f64(),
+        told[0]["error_after"].as_f64()
+    );
+    let mended = turned.mended();
+    assert!(mended["parameters"][0]["value"].as_f64().unwrap() > 90.0);
+}
+
+#[test]
+fn all_torques_turned_leave_the_same_residual_and_are_told_by_physics() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let turned = Altered::new(&log, "configs/ur10.toml", |log| {
+        for j in 1..=6 {
+            log.map(&format!("tau{j}"), |x| -x);
+        }
+    });
+    let told = turned.told();
+    assert_eq!(told.len(), 6, "{told:?}");
+    assert!(
+        told.iter()
+            .all(|t| (short(t).0, short(t).1) == ("sign", "torque"))
+    );
+}
+
+#[test]
+fn exchanged_channels_wrong_units_and_zeros_are_named_with_their_joint() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let told = |alter: &dyn Fn(&mut Log)| Altered::new(&log, "configs/ur10.toml", alter).told();
+    let exchanged = told(&|log| {
+        log.swap("tau1", "tau2");
+    });
+    assert_eq!(short(&exchanged[0]), ("order", "torque", "q1", true));
+    assert_eq!(exchanged[0]["with"], "q2");
+    let degrees = told(&|log| {
+        log.map("q2", f64::to_degrees);
+    });
+    assert_eq!(short(&degrees[0]), ("scale", "position", "q2", true));
+    assert!(
+        degrees[0]["remedy"]
+            .as_str()
+            .unwrap()
+            .contains("position_unit = \"deg\"")
+    );
+    let zero = told(&|log| {
+        log.map("q3", |x| x + std::f64::consts::FRAC_PI_2);
+    });
+    assert_eq!(short(&zero[0]), ("zero", "position", "q3", true));
+    let found = zero[0]["found"].as_f64().unwrap();
+    assert!(
+        (found + std::f64::consts::FRAC_PI_2).abs() < 1e-9,
+        "{found}"
+    );
+}
+
+#[test]
+fn an_arm_whose_gravity_is_declared_along_the_wrong_axis_is_told_the_right_one() {
+    let Some(log) = shared("panda/panda_exciting.csv") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string("configs/panda.toml").unwrap();
+    let wrong = text.replace(
+        "drive_inertia",
+        "gravity = [9.81, 0.0, 0.0] # on a wall\ndrive_inertia",
+    );
+    std::fs::write(folder.path().join("wall.toml"), wrong).unwrap();
+    let words = ["inspect", log.to_str().unwrap(), "-r", "wall.toml"];
+    let told = run(folder.path(), &words)["setup"][0].clone();
+    assert_eq!(short(&told), ("gravity", "", "", true));
+    let found: Vec<f64> = told["found"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_f64().unwrap())
+        .collect();
+    assert!(found[2] < -9.7, "{found:?}");
+}
+
+#[test]
+fn a_diagnosis_of_a_log_with_a_turned_torque_is_a_fault_of_the_data() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let right = Altered::new(&log, "configs/ur10.toml", |_| {});
+    run(right.folder.path(), &right.words("lsq", &[]));
+    let turned = Altered::new(&log, "configs/ur10.toml", |log| {
+        log.map("tau2", |x| -x);
+    });
+    let model = right.folder.path().join("m.toml");
+    let words = ["diagnose", "log.csv", "-m", model.to_str().unwrap()];
+    let found = run(turned.folder.path(), &words);
+    assert_eq!(found["verdict"], "data-fault");
+    assert_eq!(short(&found["setup"][0]), ("sign", "torque", "q2", true));
+    assert_eq!(found["faults"][0]["channel"], "q2");
+}
+
+/// Adds to each torque what changes every 25 rows and is half of that torque, by its root mean square.
+fn disturb(log: &mut Log) {
+    let mut seed = 7_u64;
+    for joint in 1..=6 {
+        let j = log.column(&format!("tau{joint}"));
+        let square: f64 = log.rows.iter().map(|row| row[j] * row[j]).sum();
+        let rms = (square / log.rows.len() as f64).sqrt();
+        let mut added = 0.0;
+        for (k, row) in log.rows.iter_mut().enumerate() {
+            if k % 25 == 0 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let chance = (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+                added = 0.5 * rms * 12.0_f64.sqrt() * chance;
+            }
+            row[j] += added;
+        }
+    }
+}
+
+#[test]
+fn what_leaves_more_than_a_third_unexplained_is_a_warning_with_both_readings_and_the_fit_goes_on() {
+    let Some(log) = shared("ur10/ur10_exciting.csv") else {
+        return;
+    };
+    let turned = Altered::new(&log, "configs/ur10.toml", |log| {
+        log.map("tau2", |x| -x);
+        disturb(log);
+    });
+    // status 0, and no robot file that is right by the torques
+    let fit = turned.mended();
+    let told = &fit["setup"];
+    assert_eq!(told.as_array().map(Vec::len), Some(1), "{told}");
+    assert_eq!(short(&told[0]), ("sign", "torque", "q2", false));
+    assert_eq!(told[0]["severity"], "warning");
+    assert!(told[0]["error_after"].as_f64() > Some(0.33), "{told}");
+    assert!(!turned.folder.path().join("new.toml").exists());
+    let warnings = fit["warnings"].to_string();
+    for reading in [
+        "torque_sign = -1.0",
+        "the set-up as declared is possible too",
+    ] {
+        assert!(warnings.contains(reading), "{warnings}");
+    }
+}
