@@ -29,6 +29,7 @@ pub mod judge;
 pub mod lab;
 pub mod machine;
 pub mod model;
+pub mod page;
 pub mod path;
 pub mod plant;
 pub mod planted;

@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use cft_ident_studies::study::{Rows, StudyError, into_page};
+use cft_ident_studies::study::{Rows, StudyError};
 use cft_ident_studies::tool::Tool;
-use cft_ident_studies::{clean, coverage, drive, machine, path, planted, setup};
+use cft_ident_studies::{clean, coverage, drive, files, machine, page, path, planted, setup};
 use serde_json::Value;
 
 struct Asked {
@@ -163,17 +163,7 @@ fn all<'a, C: 'a>(
 
 fn tables(results: &Path) -> Result<(), StudyError> {
     let page = results.join("../independent.md");
-    let one = |name: &str, table: fn(&Rows) -> String| {
-        let rows = Rows::open(results, &format!("independent_{name}"))?;
-        if rows.rows.is_empty() {
-            return Ok(());
-        }
-        into_page(&page, name, &table(&rows))
-    };
-    one("coverage", coverage::table)?;
-    one("clean", clean::table)?;
-    one("planted", planted::table)?;
-    one("setup", setup::table)
+    files::write(&page, &page::rendered(&page, results)?)
 }
 
 /// How long the plants take for 20 s of motion.

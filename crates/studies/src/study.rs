@@ -130,28 +130,3 @@ impl Rows {
         self.rows.iter().filter(move |row| row["tool"] == tool)
     }
 }
-
-/// Puts a text between `<!-- study: NAME -->` and `<!-- end of study -->` in a page.
-pub fn into_page(page: &Path, name: &str, text: &str) -> Result<(), StudyError> {
-    let whole = std::fs::read_to_string(page).map_err(|source| StudyError::File {
-        path: page.to_owned(),
-        source,
-    })?;
-    let mark = format!("<!-- study: {name} -->");
-    let missing = || StudyError::NoPlace {
-        path: page.to_owned(),
-        mark: mark.clone(),
-    };
-    let begin = whole.find(&mark).ok_or_else(missing)? + mark.len();
-    let end = begin
-        + whole[begin..]
-            .find("<!-- end of study -->")
-            .ok_or_else(missing)?;
-    let new = format!(
-        "{}\n\n{}\n\n{}",
-        &whole[..begin],
-        text.trim(),
-        &whole[end..]
-    );
-    crate::files::write(page, &new)
-}
