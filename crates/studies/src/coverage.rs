@@ -167,24 +167,15 @@ fn judged(machine: &Machine, parameters: &[Value]) -> Vec<Value> {
 }
 
 fn truth_of(machine: &Machine, parameter: &Value) -> Option<(&'static str, f64)> {
-    let name = parameter["name"].as_str()?;
-    let joint = parameter["joint"].as_str();
-    let at = joint.and_then(|j| machine.names.iter().position(|n| n == j));
-    let declared = machine.law_declared();
-    match (name, at) {
-        ("viscous", Some(i)) => declared.then(|| ("viscous", machine.plant.friction[i].viscous)),
-        ("coulomb", Some(i)) => declared.then(|| ("coulomb", machine.plant.friction[i].coulomb)),
-        ("offset", Some(i)) => Some(("offset", machine.plant.offset[i])),
-        (theta, _) if theta.starts_with("theta_") => {
-            let number: usize = theta["theta_".len()..].parse().ok()?;
-            let value = files::theta(machine)?
-                .get(number.checked_sub(1)?)
-                .copied()?;
-            Some(("inertial", value))
-        }
-        ("inertia" | "mass", _) => Some(("inertial", machine.inertia[0])),
-        _ => Some(("inertial", files::grouped(machine.chain.as_ref()?, name)?)),
-    }
+    let (name, joint) = (parameter["name"].as_str()?, parameter["joint"].as_str());
+    let class = match name {
+        "viscous" | "coulomb" if !machine.law_declared() => return None,
+        "viscous" => "viscous",
+        "coulomb" => "coulomb",
+        "offset" => "offset",
+        _ => "inertial",
+    };
+    Some((class, files::declared(machine, name, joint)?))
 }
 
 /// By joint whose friction is "identified": at how many of the speeds covered the band holds the plant's curve.

@@ -179,6 +179,56 @@ pub fn theta(machine: &Machine) -> Option<[f64; 12]> {
     }
 }
 
+/// The true value of a parameter of the declared model, by its name or grouping.
+pub fn declared(machine: &Machine, name: &str, joint: Option<&str>) -> Option<f64> {
+    let at = joint.and_then(|joint| machine.names.iter().position(|n| n == joint));
+    match (name, at) {
+        ("viscous", Some(i)) => Some(machine.plant.friction[i].viscous),
+        ("coulomb", Some(i)) => Some(machine.plant.friction[i].coulomb),
+        ("offset", Some(i)) => Some(machine.plant.offset[i]),
+        ("inertia" | "mass", _) => single(machine),
+        _ => match name.strip_prefix("theta_") {
+            Some(number) => {
+                let number: usize = number.parse().ok()?;
+                theta(machine)?.get(number.checked_sub(1)?).copied()
+            }
+            None => grouped(machine.chain.as_ref()?, name),
+        },
+    }
+}
+
+/// A model file with the true values in place of the fitted ones, where a parameter has one.
+pub fn with_truth(machine: &Machine, model: &str) -> String {
+    let parts: Vec<&str> = model.split("[[parameter]]").collect();
+    let put = |part: &str| {
+        let text_of = |key: &str| {
+            let line = part.lines().find_map(|line| line.strip_prefix(key))?;
+            line.trim().strip_prefix("= \"")?.strip_suffix('"')
+        };
+        let truth = text_of("name").and_then(|name| {
+            let by = |name| declared(machine, name, text_of("joint"));
+            by(name).or_else(|| by(text_of("meaning")?))
+        });
+        let Some(truth) = truth else {
+            return part.to_owned();
+        };
+        let line = |line: &str| match line.starts_with("value = ") {
+            true => format!("value = {truth:?}\n"),
+            false => format!("{line}\n"),
+        };
+        // only the parameter's own lines, up to the next table
+        let end = part.find("\n[").unwrap_or(part.len());
+        let own: String = part[..end].lines().map(line).collect();
+        format!("{own}{}", &part[end..])
+    };
+    let whole: Vec<String> = parts[..1]
+        .iter()
+        .map(|part| (*part).to_owned())
+        .chain(parts[1..].iter().map(|part| put(part)))
+        .collect();
+    whole.join("[[parameter]]")
+}
+
 /// Value of a base parameter from its grouping, `Izz1 + Iyy2 - 0.09 m3`, with the true links; None where a name is
 /// no link's.
 pub fn grouped(chain: &Chain, grouping: &str) -> Option<f64> {
@@ -228,5 +278,20 @@ mod tests {
         assert_eq!(grouped(&chain, "Izz1 + Iyy2 - 0.09 m3"), Some(expected));
         assert_eq!(grouped(&chain, "-Ia2"), Some(-0.25));
         assert_eq!(grouped(&chain, "Izz9"), None);
+    }
+
+    #[test]
+    fn a_model_file_takes_the_true_values() {
+        let chance = &mut crate::chance::Chance::of("files", 0);
+        let law = crate::machine::LawKind::Coulomb;
+        let machine = Machine::draw(Kind::Single, Drive::Direct, law, 0.0, chance);
+        let text = "[robot]\nvalue = 1.0\n\n[[parameter]]\nname = \"viscous\"\njoint = \"q1\"\nvalue = 2.0\n\n\
+                    [covariance]\nvalue = 3.0\n";
+        let truth = machine.plant.friction[0].viscous;
+        let expected = text.replace("value = 2.0", &format!("value = {truth:?}"));
+        assert_eq!(
+            with_truth(&machine, text).replace("\n\n", "\n"),
+            expected.replace("\n\n", "\n")
+        );
     }
 }

@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::chance::Chance;
 use crate::drive::{Controller, Course, Run, Sensing};
 use crate::files;
+use crate::friction::Law;
 use crate::machine::Machine;
 use crate::path::{Motion, Path};
 use crate::study::StudyError;
@@ -58,6 +59,32 @@ impl Lab {
         Course::of(&self.machine, &path, self.controller, self.sensing.counts)
     }
 
+    /// Takes out what was planted: the machine has the declared law alone.
+    pub fn take_out(&mut self) {
+        self.machine.plant.added.clear();
+        self.sensing.delay_s = 0.0;
+        for friction in &mut self.machine.plant.friction {
+            friction.law = Law::Coulomb;
+        }
+    }
+
+    /// What the true parameters of the declared model leave of `log`: the least that can be asked for.
+    pub fn errors_of_truth(
+        &self,
+        tool: &Tool,
+        folder: &File,
+        log: &str,
+    ) -> Result<Vec<f64>, StudyError> {
+        let path = folder.join("model.toml");
+        let model =
+            std::fs::read_to_string(&path).map_err(|source| StudyError::File { path, source })?;
+        files::write(
+            &folder.join("true.toml"),
+            &files::with_truth(&self.machine, &model),
+        )?;
+        errors(tool, folder, log, "true.toml")
+    }
+
     /// Drives the machine, and writes its log.
     pub fn record(
         &self,
@@ -73,9 +100,14 @@ impl Lab {
     }
 }
 
-/// Errors by joint of a model on a log: `relative_error` of `validate`.
+/// Errors by joint of a model on a log, where the joint moves: at rest static friction takes any torque.
 pub fn errors(tool: &Tool, folder: &File, log: &str, model: &str) -> Result<Vec<f64>, StudyError> {
     let answer: Answer = tool.run(folder, &["validate", log, "-m", model])?;
-    let of = |joint: &Value| joint["relative_error"].as_f64().unwrap_or(f64::NAN);
+    let of = |joint: &Value| {
+        let error = |key: &str| joint[key].as_f64();
+        error("relative_error_moving")
+            .or_else(|| error("relative_error"))
+            .unwrap_or(f64::NAN)
+    };
     Ok(answer.list("joints").iter().map(of).collect())
 }
