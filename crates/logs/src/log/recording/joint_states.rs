@@ -300,6 +300,12 @@ impl LogRows for JointStates {
         }))
     }
 
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !Instant::from_ns(self.row.key).is_far();
+        (self.unstamped > 0 && near).then_some(0.0)
+    }
+
     fn logged(&self, column: usize) -> Option<f64> {
         self.row.values.get(column).copied()
     }

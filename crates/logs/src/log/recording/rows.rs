@@ -193,6 +193,12 @@ impl LogRows for MessageRows {
         self.reading.choice.velocities
     }
 
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !self.row.stamp.instant().is_far();
+        (self.reading.unstamped > 0 && near).then_some(0.0)
+    }
+
     fn repeats(&self) -> bool {
         let (a, b) = (&self.row, &self.previous);
         a.stamp == b.stamp && a.q == b.q && a.tau == b.tau && a.dq == b.dq
