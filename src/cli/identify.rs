@@ -153,7 +153,7 @@ fn execute(
     let machine = checked.machine;
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
-        consistent: campaign.settings.feasible,
+        consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
         ..IdentifySettings::default()
     };

@@ -20,6 +20,7 @@ pub mod man;
 pub mod new;
 pub mod reduce;
 pub mod schema;
+pub mod show;
 pub mod simulate;
 pub mod torque;
 pub mod track;
@@ -162,6 +163,7 @@ commands! {
     Track: track,
     Compare: compare,
     Diff: diff,
+    Show: show,
     Torque: torque,
     Watch: watch,
     Simulate: simulate,
