@@ -112,17 +112,16 @@ impl Accumulator {
         let mut at = 0;
         for (j, open) in self.open.iter_mut().enumerate() {
             let c = self.columns.row_width(j);
-            let row = &channels[at..at + c];
-            let torque = channels[torques + j];
             match self.columns.rests(channels, j) {
                 false => {
-                    open.fold(row);
-                    self.moving[j].add(torque);
+                    open.fold(&channels[at..at + c]);
+                    self.moving[j].add(channels[torques + j]);
                 }
                 true => {
+                    let plain = &channels[self.columns.unweighted()..];
                     let (rows, factor) = &mut self.resting[j];
-                    factor.fold(row);
-                    rows.add(torque);
+                    factor.fold(&plain[at..at + c]);
+                    rows.add(plain[torques + j]);
                 }
             }
             at += c;

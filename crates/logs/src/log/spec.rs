@@ -3,11 +3,13 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{failed, file_name, shown};
+use super::tape::Kept;
 
 /// The part of a log that is used.
 ///
@@ -112,22 +114,32 @@ impl Span {
 }
 
 /// A log file and the part of it that is used.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct LogSpec {
     /// Path as the user wrote it, without the span: a file, a folder with the parts of one
     /// recording, or several files of one recording joined with `+`.
     pub path: PathBuf,
     /// The part that is used.
     pub span: Span,
+    /// What is kept of it, so that it is read once.
+    pub(super) kept: Arc<Kept>,
+}
+
+impl PartialEq for LogSpec {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.path, self.span) == (&other.path, other.span)
+    }
 }
 
 impl LogSpec {
     /// The whole of one file.
     pub fn whole(path: impl Into<PathBuf>) -> Self {
-        Self {
-            path: path.into(),
-            span: Span::Whole,
-        }
+        Self::new(path.into(), Span::Whole)
+    }
+
+    fn new(path: PathBuf, span: Span) -> Self {
+        let kept = Kept::of(&path);
+        Self { path, span, kept }
     }
 
     /// File name without folders: the only form in which a path enters an output.
@@ -237,10 +249,7 @@ impl FromStr for LogSpec {
             return Ok(Self::whole(text));
         }
         match Span::parse(tail.trim()) {
-            Ok(span) => Ok(Self {
-                path: PathBuf::from(path),
-                span,
-            }),
+            Ok(span) => Ok(Self::new(PathBuf::from(path), span)),
             Err(reason) => Err(LogError::Span {
                 spec: escape_whole(text),
                 reason,

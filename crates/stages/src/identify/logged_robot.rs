@@ -409,6 +409,8 @@ impl LoggedRobot {
             },
             q_trim_s: f.position_trim_s,
             trim_s: f.trim_s,
+            // each log says when its joints rest
+            rest_speed: Vec::new(),
         }
     }
 

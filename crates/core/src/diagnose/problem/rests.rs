@@ -93,9 +93,7 @@ pub(crate) fn resting(
         if model.model.friction[j] == JointFriction::None {
             return Ok(vec![false; rows]);
         }
-        let speeds = stretch.v[j].iter();
-        let moving: Vec<f64> = speeds.map(|v| rest::movement(*v, *speed)).collect();
-        let filtered = parallel.run(&[&moving])?;
+        let filtered = parallel.run(&[&parallel.weights(stretch, j, *speed)])?;
         Ok(filtered[0].iter().map(|m| rest::rests(*m)).collect())
     };
     rest_speed.iter().enumerate().map(of_joint).collect()
