@@ -354,7 +354,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let machine = checked.machine;
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
-        consistent: campaign.settings.feasible,
+        consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
         ..IdentifySettings::default()
     };

@@ -17,6 +17,7 @@ pub mod inspect;
 pub mod lsq;
 pub mod new;
 pub mod reduce;
+pub mod show;
 pub mod simulate;
 pub mod torque;
 pub mod track;
@@ -158,6 +159,7 @@ commands! {
     Diagnose: diagnose,
     Track: track,
     Compare: compare,
+    Show: show,
     Torque: torque,
     Watch: watch,
     Simulate: simulate,

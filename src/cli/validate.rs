@@ -191,7 +191,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let simulated = identify::open_loop(&machine, &model, &logs, window, control)?;
         if simulated.astray > 0 {
             found.warnings.push(format!(
-                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit with `lsq --feasible`",
+                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
                 simulated.astray, simulated.windows
             ));
         }

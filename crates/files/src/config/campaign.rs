@@ -65,7 +65,10 @@ pub struct CampaignSettings {
     /// Estimator of the inertial parameters.
     #[serde(default)]
     pub estimator: EstimatorKind,
-    /// Only physically consistent parameters.
+    /// The parameters of the plain fit alone, without the physically consistent ones beside them.
+    #[serde(default)]
+    pub unconstrained: bool,
+    /// Accepted and without effect: physically consistent parameters are always there.
     #[serde(default)]
     pub feasible: bool,
     /// Limit on every joint's relative validation error, a fraction.

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::consistent::project;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
@@ -127,6 +128,9 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
+    // what is looked for stands beside the plain fit
+    let plain = file.as_fitted();
+    let file = &plain;
     let given = refined(file, name)?;
     check_candidates(&settings.candidates, machine, (name, file))?;
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
@@ -395,6 +399,7 @@ impl Diagnosed {
         }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
+        model.forget_consistent();
         model.friction_prior.clone_from(&self.friction_prior);
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();
@@ -440,6 +445,9 @@ impl Diagnosed {
             }
         }
         self.held.write_into(&mut model);
+        if file.is_consistent() && project(&mut model).is_err() {
+            model.forget_consistent();
+        }
         model
     }
 

@@ -45,6 +45,16 @@ pub enum IdentifyError {
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
     Refused { log: String, fault: Box<LogFault> },
+    /// Positions where a joint of the robot cannot stand.
+    #[error(
+        "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero; give the log of this robot, or correct [log.joint] or [limits] of its file"
+    )]
+    OtherRobotLog {
+        joint: String,
+        positions: String,
+        limits: String,
+        unit: &'static str,
+    },
     /// The motion of a log, or the processing that a robot file asks for.
     #[error("{of}: {error}")]
     Motion { of: String, error: MotionError },
@@ -159,8 +169,9 @@ impl IdentifyError {
             | Self::WithoutGains { .. }
             | Self::Log(_)
             | Self::Config(_)
-            | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
+            | Self::Fit(FitError::Math(_))
             | Self::Refused { .. }
+            | Self::OtherRobotLog { .. }
             | Self::SameRows { .. }
             | Self::Motion { .. }
             | Self::TooManyRows { .. }

@@ -27,7 +27,7 @@ use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{FittedUnknown, columns, unknowns};
 use super::weakest::{WeakestPart, weakest};
 use crate::setup::Finding;
-use cft_ident_core::inertia::columns::RegressorColumns;
+use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::instruments::ReferenceSource;
@@ -51,7 +51,7 @@ use cft_ident_logs::log::Provenance;
 pub struct LsqSettings<'a> {
     /// How parameters are estimated from the rows.
     pub estimator: EstimatorKind,
-    /// Only physically consistent parameters.
+    /// Physically consistent parameters beside those of the plain fit.
     pub consistent: bool,
     /// The model that holds the friction of every joint, and its name for messages; without one,
     /// friction is fitted together with the inertias.
@@ -74,7 +74,7 @@ pub struct IdentifiedDynamics {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gains: Vec<Gain>,
     pub essential: EssentialFit,
-    /// Physically consistent links, where they were asked for.
+    /// Physically consistent links and what they cost, where they were asked for.
     #[serde(rename = "feasible")]
     pub consistent: Option<ConsistentLinks>,
     pub condition: ConditionNumbers,
@@ -161,7 +161,7 @@ pub fn lsq(
         return Err(ReducedError::NeedsLog {
             log: part.name().to_owned(),
             what: format!("what the estimator {} reads", estimator.name()),
-            remedy: "give the log itself, or take `--estimator wls` or `ols`, with `--feasible` if wanted",
+            remedy: "give the log itself, or take `--estimator wls` or `ols`",
         }
         .into());
     }
@@ -193,7 +193,13 @@ pub fn lsq(
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
     let consistent = match settings.consistent {
-        true => Some(consistent(machine, &mut estimated)?),
+        true => {
+            let fastest = match below_zero(&estimated) {
+                true => machine.fastest(logs, control)?,
+                false => Vec::new(),
+            };
+            Some(consistent(machine, &estimated, &fastest)?)
+        },
         false => None,
     };
     let Estimated {
@@ -378,6 +384,18 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
     })
 }
 
+/// Whether some friction of a fit is below zero, so that its sign over the speeds of the logs is to be looked at.
+fn below_zero(estimated: &Estimated) -> bool {
+    let columns = &estimated.basis.sums.columns;
+    let own = columns.own.iter().enumerate();
+    let mut places = own.flat_map(|(j, own)| {
+        let first = columns.first_own(j);
+        let of_friction = |(_, own): &(usize, &Own)| **own != Own::Offset;
+        own.iter().enumerate().filter(of_friction).map(move |(k, _)| first + k)
+    });
+    places.any(|at| estimated.fit.theta[at] < 0.0)
+}
+
 /// Friction and inertias that are below zero by more than two deviations, as a warning.
 fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
     let positive = |u: &&FittedUnknown| is_positive(&u.key, u.joint.is_some());
@@ -386,14 +404,15 @@ fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
         .iter()
         .filter(positive)
         .filter(below)
-        .map(|u| match &u.joint {
-            Some(joint) => format!("{}:{joint}", u.key),
-            None => u.key.clone(),
+        .map(|u| {
+            let (value, std) = number::value_and_std(u.fitted, u.fitted_std);
+            let joint = u.joint.as_ref().map_or(String::new(), |joint| format!(":{joint}"));
+            format!("{}{joint} {value} +- {std} {}", u.key, u.unit)
         })
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not separate these parameters from others",
+            "these data want what no machine has, friction or an inertia below zero: {}; a torque is missing or a gain is wrong (`diagnose` looks for it), or the motion does not separate these parameters from others",
             names.join(", ")
         )
     })
