@@ -34,6 +34,9 @@ pub enum Span {
     },
 }
 
+/// Parts the span from the stretches that are left out, in outputs.
+const WITHOUT: &str = " without ";
+
 impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -56,7 +59,8 @@ impl Span {
 
     /// The span that a label tells; the whole log where it tells none.
     pub(super) fn read(label: &str) -> Self {
-        Self::parse(label).unwrap_or_default()
+        let span = label.split_once(WITHOUT).map_or(label, |(span, _)| span);
+        Self::parse(span).unwrap_or_default()
     }
 
     /// Whether two spans of one log can have rows in common; those in other units can.
@@ -119,6 +123,10 @@ pub struct LogSpec {
     pub path: PathBuf,
     /// The part that is used.
     pub span: Span,
+    /// Stretches of it that are left out, in seconds after the log's first sample.
+    pub leave_out: Vec<[f64; 2]>,
+    /// How long the machine had run when the log began \[s\].
+    pub started_s: f64,
 }
 
 impl LogSpec {
@@ -127,7 +135,29 @@ impl LogSpec {
         Self {
             path: path.into(),
             span: Span::Whole,
+            leave_out: Vec::new(),
+            started_s: 0.0,
         }
+    }
+
+    /// What is read of the file, as it stands in outputs; `None` for the whole of it.
+    pub fn part(&self) -> Option<String> {
+        let without = self.leave_out.iter();
+        let without: Vec<String> = without.map(|[from, to]| format!("{from}..{to}s")).collect();
+        match (self.span.label(), without.is_empty()) {
+            (span, true) => span,
+            (span, false) => Some(format!(
+                "{}{WITHOUT}{}",
+                span.unwrap_or_default(),
+                without.join(", ")
+            )),
+        }
+    }
+
+    /// Whether a row so many seconds after the log's first one is left out.
+    pub(super) fn leaves_out(&self, since: f64) -> bool {
+        let inside = |[from, to]: &[f64; 2]| *from <= since && since < *to;
+        self.leave_out.iter().any(inside)
     }
 
     /// File name without folders: the only form in which a path enters an output.
@@ -213,8 +243,8 @@ fn natural(name: &str) -> Vec<(usize, String)> {
 impl fmt::Display for LogSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.path.display())?;
-        match self.span.label() {
-            Some(span) => write!(f, "@{span}"),
+        match self.part() {
+            Some(part) => write!(f, "@{part}"),
             None => Ok(()),
         }
     }
@@ -238,8 +268,8 @@ impl FromStr for LogSpec {
         }
         match Span::parse(tail.trim()) {
             Ok(span) => Ok(Self {
-                path: PathBuf::from(path),
                 span,
+                ..Self::whole(path)
             }),
             Err(reason) => Err(LogError::Span {
                 spec: escape_whole(text),

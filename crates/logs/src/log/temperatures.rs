@@ -5,7 +5,7 @@ use super::layout::Layout;
 use super::pass::LogPass;
 use super::rows::Strictness;
 use super::time::Instant;
-use super::{Block, LogError, LogSpec, Span};
+use super::{Block, LogError, LogSpec};
 
 /// Courses of the temperatures of joints, as they were logged.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,10 +31,7 @@ impl Temperatures {
         (joints, layout): (&[usize], &Layout),
         origin: Instant,
     ) -> Result<Self, LogError> {
-        let whole = LogSpec {
-            path: spec.path.clone(),
-            span: Span::Whole,
-        };
+        let whole = LogSpec::whole(&spec.path);
         let mut pass = LogPass::open(&whole, layout, Strictness::Refuse)?;
         let mut courses = vec![Course::default(); joints.len()];
         let mut row = Block::default();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use super::first_look::FirstLook;
-use cft_ident_core::motion::{Summary, ZeroOrderHold};
+use cft_ident_core::motion::{Stretch, Summary, ZeroOrderHold};
 use cft_ident_core::number::clock;
 use cft_ident_core::robot::Robot;
 use cft_ident_logs::inspect::Cutter;
@@ -52,6 +52,13 @@ impl OpenLog<'_> {
         self.reader.layout()
     }
 
+    /// Counts stretches from where the machine began to run, as far as that is known: a part of a log begins later.
+    pub(super) fn count_run_time(&self, stretches: &mut [Stretch]) {
+        for stretch in stretches {
+            stretch.began += self.reader.started_s();
+        }
+    }
+
     /// The instant from which the times of the blocks are counted.
     pub fn origin(&self) -> Instant {
         self.look.gate.origin()
@@ -85,6 +92,7 @@ impl OpenLog<'_> {
         let mut out = Vec::new();
         if !costs.is_empty() {
             let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
+            let dropped = dropped + self.reader.not_read();
             let rows = self.reader.samples() + dropped;
             let told = match self.cutter.removed() + dropped + too_short {
                 0 => format!("none of {rows} rows is left out in all"),
