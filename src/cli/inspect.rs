@@ -266,7 +266,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     {
         report = setup::report(machine, &logs_of(&args.logs), None, context)?;
     }
-    let mut text = stages::inspect::inspect(&logs);
+    let mut text = stages::inspect::inspect(&logs, &report.findings);
     stages::setup::section(&mut text.everywhere(), &report);
     for finding in &report.findings {
         text.brief().verdict(&finding.meaning, false);

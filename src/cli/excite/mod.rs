@@ -57,7 +57,8 @@ pub struct Args {
         default_value = "configs/cft.toml"
     )]
     pub robot: PathBuf,
-    /// Model file that torques and volts are foreseen with [default: the robot's nominal numbers]
+    /// Model file that torques and volts are foreseen with, limits kept for the 95 % band of its parameters
+    /// [default: nominal numbers, or the inertials of the robot file; without any, torques are not foreseen]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
     /// Trajectory to judge instead of a design; status 1 when it breaks a limit
@@ -524,6 +525,12 @@ fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
         CriterionName::AOptimal if chosen.is_empty() => Criterion::AOptimal(vec![1.0; names.len()]),
         CriterionName::AOptimal => {
             let values = bench.machine.unknown_values();
+            if !bench.machine.source.known() {
+                return Err(CliError::usage(
+                    "--parameter asks for relative errors, and no value of a parameter is known",
+                )
+                .hint("give a model with -m, or a URDF with inertials"));
+            }
             let mut factors = vec![0.0; names.len()];
             for k in chosen {
                 if values[k] == 0.0 {

@@ -242,9 +242,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             format!("next: {first}cft-ident lsq {spec} -r {place} -o model.toml\n")
         }
     };
-    let checks: String = (mapping.checks.iter())
-        .map(|check| format!("CHECK IT: {check}\n"))
-        .collect();
+    let all: Vec<&String> = mapping.checks.iter().chain(&mapping.torque_check).collect();
+    let checks = checks_in_lines(&all);
     let found = inspected(faults.as_deref());
     let result = Drafted {
         file: target
@@ -257,10 +256,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         rate_hz: seen.as_ref().and_then(|s| s.rate_hz),
         cutoff_hz: draft.cutoff_hz(),
         topic: seen.as_ref().and_then(|s| s.topic.clone()),
-        checks: mapping.checks.clone(),
+        checks: all.iter().map(|check| (*check).clone()).collect(),
         faults,
     };
-    let brief = match mapping.checks.len() {
+    let brief = match all.len() {
         0 => format!("written: {}", target.display()),
         n => format!("written: {}, {n} to look at (CHECK IT)", target.display()),
     };
@@ -269,6 +268,24 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         document: Document::new("new", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })
+}
+
+/// Lines of a terminal that say what is to be looked at.
+const CHECKS: usize = 5;
+
+/// What is to be looked at, in a few lines.
+fn checks_in_lines(checks: &[&String]) -> String {
+    let shown = match checks.len() > CHECKS {
+        true => CHECKS - 1,
+        false => checks.len(),
+    };
+    let lines = checks[..shown].iter();
+    let mut out: String = lines.map(|check| format!("CHECK IT: {check}\n")).collect();
+    if shown < checks.len() {
+        let more = checks.len() - shown;
+        out.push_str(&format!("CHECK IT: {more} more, marked so in the file\n"));
+    }
+    out
 }
 
 /// The collision shapes that no capsule holds, in one sentence.

@@ -21,6 +21,7 @@
 pub mod bodies;
 pub mod cft;
 pub mod double_pendulum;
+pub mod deviation;
 pub mod drive;
 pub mod dynamics;
 pub mod error;

@@ -171,6 +171,7 @@ impl RobotFile {
                 || key("velocity"),
             );
             let gain = given.torque_sign.unwrap_or(1.0) * given.torque_scale.unwrap_or(1.0);
+            let gain = gain * given.torque_unit.map_or(1.0, TorqueUnit::in_si);
             layout.torques[index] = channel(
                 &given.torque,
                 format!("tau_{joint}"),

@@ -72,6 +72,12 @@ pub fn is_time(name: &str) -> bool {
             | "elapsed"
             | "elapsed_time"
             | "rosbagtimestamp"
+            | "ipoc"
+            | "zeit"
+            | "clock"
+            | "simtime"
+            | "sim_time"
+            | "rostime"
             | "header.stamp"
             | "field.header.stamp"
     )

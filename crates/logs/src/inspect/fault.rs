@@ -39,6 +39,8 @@ pub enum FaultKind {
     MalformedRows,
     /// A channel that the robot file names is not there, or is there twice.
     MissingChannel,
+    /// Messages of a second publisher on the same topic, which contradict the others.
+    OtherPublisher,
     /// NaN, infinity or no number.
     Nan,
     /// Two rows at one time.
@@ -96,6 +98,7 @@ impl FaultKind {
             Self::IncompleteFile => "incomplete-file",
             Self::MalformedRows => "malformed-rows",
             Self::MissingChannel => "missing-channel",
+            Self::OtherPublisher => "other-publisher",
             Self::Nan => "nan",
             Self::RepeatedTime => "repeated-time",
             Self::BackwardTime => "backward-time",

@@ -47,7 +47,11 @@ impl Header<'_> {
         // A velocity is optional unless the robot file names its column.
         let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
         let velocities = if layout.velocities.iter().all(wanted) {
-            each(&layout.velocities, "velocity")?
+            // nothing is fitted to velocities: those in another unit are none
+            match each(&layout.velocities, "velocity") {
+                Err(LogError::Unit { .. }) => Vec::new(),
+                found => found?,
+            }
         } else {
             Vec::new()
         };
@@ -185,8 +189,14 @@ fn known_unit(text: &str) -> Option<&'static str> {
         "rad" | "radian" | "radians" => "rad",
         "m" | "meter" | "metre" | "meters" | "metres" => "m",
         "mm" => "mm",
+        "cm" => "cm",
+        "turn" | "turns" | "rev" | "revs" | "revolutions" => "turns",
         "counts" | "count" | "ticks" => "counts",
         "n" | "newton" => "N",
+        "kn" => "kN",
+        "knm" => "kNm",
+        "ncm" => "Ncm",
+        "mnm" | "nmm" => "mNm",
         "nm" | "n m" | "n.m" | "n·m" | "n*m" => "Nm",
         "a" | "ampere" | "amps" => "A",
         "v" | "volt" | "volts" => "V",

@@ -25,6 +25,7 @@ mod source;
 mod spec;
 mod stale;
 mod stream;
+mod tape;
 mod temperatures;
 mod text;
 mod time;
@@ -47,7 +48,7 @@ pub use section::{
     PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
 };
 pub use shared::shares_rows;
-pub use source::{DataRole, Provenance, sha256};
+pub use source::{DataRole, Provenance, begins_with, sha256};
 pub use spec::{LogSpec, Span};
 pub use temperatures::Temperatures;
 pub use time::Instant;

@@ -1,15 +1,17 @@
 //! The one way through a log, strict or not: its rows inside its span, each with its time.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::columns::{choose, position_of, unit_of};
-use super::content::Content;
+use super::content::{Content, RawBytes};
 use super::layout::Layout;
 use super::recording::{JointStates, MessageRows, format_of};
 use super::rows::{LogRows, Strictness};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
 use super::stream::Watch;
+use super::tape::{Tape, TapeRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
 use super::{LogError, LogSpec, Span};
@@ -42,6 +44,8 @@ pub(super) struct LogPass {
     pub(super) samples: u64,
     /// What is known of a stream.
     watch: Option<Watch>,
+    /// What is kept of its rows, where it is read strictly.
+    tape: Option<Arc<Tape>>,
 }
 
 impl LogPass {
@@ -52,12 +56,26 @@ impl LogPass {
         strictness: Strictness,
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
-        let (rows, layout, refused) = open(&files, layout, strictness)?;
-        let mut pass = Self {
-            files,
-            strictness,
-            refused,
-            ..Self::of_rows(spec.clone(), rows, layout)
+        let mut pass = match (strictness, layout.joints.is_empty()) {
+            (Strictness::Refuse, false) => {
+                let tape = spec.kept.tape(&files, layout)?;
+                let found = tape.found.clone().converted_as(layout);
+                let rows = Box::new(TapeRows::new(Arc::clone(&tape)));
+                Self {
+                    files,
+                    tape: Some(tape),
+                    ..Self::of_rows(spec.clone(), rows, found)
+                }
+            }
+            _ => {
+                let opened = open(&files, layout, strictness)?;
+                Self {
+                    files,
+                    strictness,
+                    refused: opened.refused,
+                    ..Self::of_rows(spec.clone(), opened.rows, opened.layout)
+                }
+            }
         };
         // Who names the column later knows its unit then.
         let section = &pass.layout.section;
@@ -77,15 +95,17 @@ impl LogPass {
         if stated || self.rows.is_recording() {
             return Ok(());
         }
-        let (mut rows, ..) = open(&self.files, &self.layout, Strictness::Record)?;
-        let mut times = Vec::with_capacity(LOOKED_AT);
-        while times.len() < LOOKED_AT && rows.next()?.is_some() {
-            // A date is no number, and has no unit.
-            match rows.logged(column) {
-                Some(time) => times.push(time),
+        let kept = self
+            .tape
+            .as_ref()
+            .and_then(|tape| tape.first_times(column, LOOKED_AT));
+        let times = match kept {
+            Some(times) => times,
+            None => match self.first_numbers(column)? {
+                Some(numbers) => numbers,
                 None => return Ok(()),
-            }
-        }
+            },
+        };
         let unit = TimeUnit::of_numbers(&times);
         self.set_time(column, unit.in_seconds().1);
         if unit != TimeUnit::Second {
@@ -93,6 +113,19 @@ impl LogPass {
             self.recognised = Some((unit, name));
         }
         Ok(())
+    }
+
+    /// The first numbers of a column; none where it holds dates, which have no unit.
+    fn first_numbers(&self, column: usize) -> Result<Option<Vec<f64>>, LogError> {
+        let mut rows = open(&self.files, &self.layout, Strictness::Record)?.rows;
+        let mut numbers = Vec::with_capacity(LOOKED_AT);
+        while numbers.len() < LOOKED_AT && rows.next()?.is_some() {
+            match rows.logged(column) {
+                Some(number) => numbers.push(number),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(numbers))
     }
 
     /// What was chosen on the way, one sentence each.
@@ -123,6 +156,7 @@ impl LogPass {
             used: None,
             samples: 0,
             watch: None,
+            tape: None,
         }
     }
 
@@ -206,8 +240,11 @@ impl LogPass {
 
     /// Time of the log's last row [s]: one more pass, in which only times are looked at.
     fn last_time(&self) -> Result<Option<f64>, LogError> {
-        let (mut rows, ..) = open(&self.files, &self.layout, self.strictness)?;
-        if let Some((column, seconds)) = self.time {
+        let mut rows: Box<dyn LogRows> = match &self.tape {
+            Some(tape) => Box::new(TapeRows::new(Arc::clone(tape))),
+            None => open(&self.files, &self.layout, self.strictness)?.rows,
+        };
+        if let (None, Some((column, seconds))) = (&self.tape, self.time) {
             rows.set_time(column, seconds);
         }
         let (mut origin, mut last) = (self.origin, None);
@@ -251,22 +288,46 @@ impl LogPass {
     }
 }
 
-/// Rows of a log, the layout that it turns out to have, and what keeps a strict reader from it.
-type Opened = (Box<dyn LogRows>, Layout, Option<LogError>);
+/// A log that was opened.
+pub(super) struct Opened {
+    pub(super) rows: Box<dyn LogRows>,
+    /// The layout that it turns out to have.
+    pub(super) layout: Layout,
+    /// What keeps a strict reader from it.
+    pub(super) refused: Option<LogError>,
+    /// The bytes of a text log.
+    pub(super) bytes: Option<RawBytes>,
+}
 
-fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
+pub(super) fn open(
+    files: &[PathBuf],
+    layout: &Layout,
+    strictness: Strictness,
+) -> Result<Opened, LogError> {
     if let [path] = files {
         let content = Content::open(path)?;
         if format_of(content.head()).is_none() {
+            let bytes = content.raw.clone();
             let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;
-            return Ok((Box::new(rows), layout, refused));
+            return Ok(Opened {
+                rows: Box::new(rows),
+                layout,
+                refused,
+                bytes,
+            });
         }
     }
+    let recorded = |rows, layout, refused| Opened {
+        rows,
+        layout,
+        refused,
+        bytes: None,
+    };
     let mut refused = None;
     // Without a robot there are no channels to look for.
     if !layout.joints.is_empty() {
         match (MessageRows::open(files, layout), strictness) {
-            (Ok((rows, layout)), _) => return Ok((Box::new(rows), layout, None)),
+            (Ok((rows, layout)), _) => return Ok(recorded(Box::new(rows), layout, None)),
             (Err(error), Strictness::Refuse) => return Err(error),
             (Err(error), Strictness::Record) => refused = Some(error),
         }
@@ -274,7 +335,7 @@ fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Op
     match JointStates::open(files, layout.section.topic.as_deref()) {
         Ok(states) => {
             let layout = choose(states.names(), layout);
-            Ok((Box::new(states), layout, refused))
+            Ok(recorded(Box::new(states), layout, refused))
         }
         Err(error) => Err(refused.unwrap_or(error)),
     }

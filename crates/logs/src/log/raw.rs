@@ -18,13 +18,13 @@ use cft_ident_core::number::is_usable;
 /// A file that cannot be read.
 pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
     let files = spec.files()?;
-    let [first, ..] = files.as_slice() else {
-        return Ok(Vec::new());
-    };
-    match format_of(Content::open(first)?.head()) {
-        Some(_) => state_groups(&files),
-        None => Ok(Vec::new()),
+    // an empty part of a recording that is split is of no format
+    for file in &files {
+        if format_of(Content::open(file)?.head()).is_some() {
+            return state_groups(&files);
+        }
     }
+    Ok(Vec::new())
 }
 
 /// Consecutive rows of all columns.
@@ -221,6 +221,17 @@ impl RawReader {
     /// Where files break off; call it after the last block.
     pub fn breaks(&self) -> Vec<String> {
         self.pass.rows.breaks()
+    }
+
+    /// Messages that contradict the others of their topic and are left out, with how many they are; call it after
+    /// the last block.
+    pub fn contradictions(&self) -> Vec<(u64, String)> {
+        self.pass.rows.contradictions()
+    }
+
+    /// Arrays of messages that cannot be given to joints, with how many; call it after the last block.
+    pub fn uneven(&self) -> Vec<(u64, String)> {
+        self.pass.rows.uneven()
     }
 
     /// Fields of a column that hold words, so far.

@@ -85,6 +85,17 @@ pub(super) trait LogRows: Debug + Send {
         None
     }
 
+    /// Messages that contradict the others of their topic and are left out, with how many they are, once the
+    /// last row is read.
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        Vec::new()
+    }
+
+    /// Arrays of messages that cannot be given to joints, once the last row is read.
+    fn uneven(&self) -> Vec<(u64, String)> {
+        Vec::new()
+    }
+
     /// Where files break off, once the last row is read.
     fn breaks(&self) -> Vec<String> {
         Vec::new()

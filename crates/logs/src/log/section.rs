@@ -14,6 +14,9 @@ pub enum PositionUnit {
     /// Metre.
     #[serde(rename = "m")]
     Metre,
+    /// Centimetre.
+    #[serde(rename = "cm")]
+    Centimetre,
     /// Millimetre.
     #[serde(rename = "mm")]
     Millimetre,
@@ -23,6 +26,9 @@ pub enum PositionUnit {
     /// Degree.
     #[serde(rename = "deg")]
     Degree,
+    /// Whole turns.
+    #[serde(rename = "turns")]
+    Turn,
     /// Encoder counts: those of the CFT robot's actuators by Table 5, of a joint by `position_scale`.
     #[serde(rename = "counts")]
     Counts,
@@ -33,18 +39,32 @@ impl PositionUnit {
     pub const fn label(self) -> &'static str {
         match self {
             Self::Metre => "m",
+            Self::Centimetre => "cm",
             Self::Millimetre => "mm",
+            Self::Turn => "turns",
             Self::Radian => "rad",
             Self::Degree => "deg",
             Self::Counts => "counts",
         }
     }
 
+    /// Whether it is a length.
+    pub const fn is_length(self) -> bool {
+        matches!(self, Self::Metre | Self::Centimetre | Self::Millimetre)
+    }
+
+    /// Whether it is an angle.
+    pub const fn is_angle(self) -> bool {
+        matches!(self, Self::Radian | Self::Degree | Self::Turn)
+    }
+
     /// SI units in one of it; 1 for counts, whose size depends on the coordinate.
     pub const fn in_si(self) -> f64 {
         match self {
             Self::Metre | Self::Radian | Self::Counts => 1.0,
+            Self::Centimetre => 1e-2,
             Self::Millimetre => 1e-3,
+            Self::Turn => std::f64::consts::TAU,
             Self::Degree => std::f64::consts::PI / 180.0,
         }
     }
@@ -59,6 +79,18 @@ pub enum TorqueUnit {
     /// Newton metre.
     #[serde(rename = "Nm")]
     NewtonMetre,
+    /// Kilonewton.
+    #[serde(rename = "kN")]
+    Kilonewton,
+    /// Kilonewton metre.
+    #[serde(rename = "kNm")]
+    KilonewtonMetre,
+    /// Newton centimetre.
+    #[serde(rename = "Ncm")]
+    NewtonCentimetre,
+    /// Millinewton metre.
+    #[serde(rename = "mNm")]
+    MillinewtonMetre,
     /// Ampere of motor current, kept as such: the model is then in A.
     #[serde(rename = "A")]
     Ampere,
@@ -79,6 +111,10 @@ impl TorqueUnit {
         match self {
             Self::Newton => "N",
             Self::NewtonMetre => "Nm",
+            Self::Kilonewton => "kN",
+            Self::KilonewtonMetre => "kNm",
+            Self::NewtonCentimetre => "Ncm",
+            Self::MillinewtonMetre => "mNm",
             Self::Ampere => "A",
             Self::Volt => "V",
             Self::Counts => "counts",
@@ -88,7 +124,33 @@ impl TorqueUnit {
 
     /// Whether it is a unit of force or torque, and not one that a gain takes to them.
     pub const fn is_torque(self) -> bool {
-        matches!(self, Self::Newton | Self::NewtonMetre)
+        self.is_force() || self.is_moment()
+    }
+
+    /// Whether it is a unit of force.
+    pub const fn is_force(self) -> bool {
+        matches!(self, Self::Newton | Self::Kilonewton)
+    }
+
+    /// Whether it is a unit of torque.
+    pub const fn is_moment(self) -> bool {
+        matches!(
+            self,
+            Self::NewtonMetre
+                | Self::KilonewtonMetre
+                | Self::NewtonCentimetre
+                | Self::MillinewtonMetre
+        )
+    }
+
+    /// N or Nm in one of it; 1 where it is no torque.
+    pub const fn in_si(self) -> f64 {
+        match self {
+            Self::Kilonewton | Self::KilonewtonMetre => 1e3,
+            Self::NewtonCentimetre => 1e-2,
+            Self::MillinewtonMetre => 1e-3,
+            _ => 1.0,
+        }
     }
 }
 

@@ -3,11 +3,13 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{failed, file_name, shown};
+use super::tape::Kept;
 
 /// The part of a log that is used.
 ///
@@ -116,7 +118,7 @@ impl Span {
 }
 
 /// A log file and the part of it that is used.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct LogSpec {
     /// Path as the user wrote it, without the span: a file, a folder with the parts of one
     /// recording, or several files of one recording joined with `+`.
@@ -127,16 +129,31 @@ pub struct LogSpec {
     pub leave_out: Vec<[f64; 2]>,
     /// How long the machine had run when the log began \[s\].
     pub started_s: f64,
+    /// What is kept of it, so that it is read once.
+    pub(super) kept: Arc<Kept>,
+}
+
+impl PartialEq for LogSpec {
+    fn eq(&self, other: &Self) -> bool {
+        let parts = (&self.path, self.span, &self.leave_out);
+        parts == (&other.path, other.span, &other.leave_out)
+    }
 }
 
 impl LogSpec {
     /// The whole of one file.
     pub fn whole(path: impl Into<PathBuf>) -> Self {
+        Self::new(path.into(), Span::Whole)
+    }
+
+    fn new(path: PathBuf, span: Span) -> Self {
+        let kept = Kept::of(&path);
         Self {
-            path: path.into(),
-            span: Span::Whole,
+            path,
+            span,
             leave_out: Vec::new(),
             started_s: 0.0,
+            kept,
         }
     }
 
@@ -267,10 +284,7 @@ impl FromStr for LogSpec {
             return Ok(Self::whole(text));
         }
         match Span::parse(tail.trim()) {
-            Ok(span) => Ok(Self {
-                span,
-                ..Self::whole(path)
-            }),
+            Ok(span) => Ok(Self::new(PathBuf::from(path), span)),
             Err(reason) => Err(LogError::Span {
                 spec: escape_whole(text),
                 reason,

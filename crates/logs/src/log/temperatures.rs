@@ -5,7 +5,7 @@ use super::layout::Layout;
 use super::pass::LogPass;
 use super::rows::Strictness;
 use super::time::Instant;
-use super::{Block, LogError, LogSpec};
+use super::{Block, LogError, LogSpec, Span};
 
 /// Courses of the temperatures of joints, as they were logged.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,7 +31,10 @@ impl Temperatures {
         (joints, layout): (&[usize], &Layout),
         origin: Instant,
     ) -> Result<Self, LogError> {
-        let whole = LogSpec::whole(&spec.path);
+        let whole = LogSpec {
+            span: Span::Whole,
+            ..spec.clone()
+        };
         let mut pass = LogPass::open(&whole, layout, Strictness::Refuse)?;
         let mut courses = vec![Course::default(); joints.len()];
         let mut row = Block::default();

@@ -23,6 +23,14 @@ impl Instant {
         }
     }
 
+    pub(super) fn of_femtoseconds(fs: i128) -> Self {
+        Self { fs }
+    }
+
+    pub(super) fn femtoseconds(self) -> i128 {
+        self.fs
+    }
+
     /// An instant from whole seconds and nanoseconds.
     pub(crate) fn from_s_ns(s: i64, ns: i64) -> Self {
         Self {

@@ -136,7 +136,6 @@ impl LogRows for TextRows {
         let parts = [
             (&self.columns.positions, &mut block.q),
             (&self.columns.torques, &mut block.tau),
-            (&self.columns.velocities, &mut block.dq),
         ];
         for (columns, to) in parts {
             for column in columns {
@@ -147,6 +146,13 @@ impl LogRows for TextRows {
                 }
             }
         }
+        // nothing is fitted to velocities: what was not measured is no reason to refuse a row
+        let velocities = self.columns.velocities.iter().map(|column| {
+            let value = self.file.number(column.index).unwrap_or(f64::NAN);
+            value * column.factor + column.offset
+        });
+        let usable = velocities.map(|x| if is_usable(x) { x } else { f64::NAN });
+        block.dq.extend(usable);
         Ok(())
     }
 
