@@ -201,7 +201,7 @@ pub fn lsq(
                 false => Vec::new(),
             };
             Some(consistent(machine, &estimated, &fastest)?)
-        },
+        }
         false => None,
     };
     let Estimated {
@@ -412,7 +412,10 @@ fn below_zero(estimated: &Estimated) -> bool {
     let mut places = own.flat_map(|(j, own)| {
         let first = columns.first_own(j);
         let of_friction = |(_, own): &(usize, &Own)| **own != Own::Offset;
-        own.iter().enumerate().filter(of_friction).map(move |(k, _)| first + k)
+        own.iter()
+            .enumerate()
+            .filter(of_friction)
+            .map(move |(k, _)| first + k)
     });
     places.any(|at| estimated.fit.theta[at] < 0.0)
 }
@@ -427,7 +430,10 @@ fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
         .filter(below)
         .map(|u| {
             let (value, std) = number::value_and_std(u.fitted, u.fitted_std);
-            let joint = u.joint.as_ref().map_or(String::new(), |joint| format!(":{joint}"));
+            let joint = u
+                .joint
+                .as_ref()
+                .map_or(String::new(), |joint| format!(":{joint}"));
             format!("{}{joint} {value} +- {std} {}", u.key, u.unit)
         })
         .collect();

@@ -92,8 +92,8 @@ pub use friction::{
 pub use gain_error::GainError;
 pub use gains::{CurrentGains, FittedGains, Gain, PayloadLog, fit_gains};
 pub use hold_out::Held;
-pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use in_memory::{InMemory, read_whole};
+pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};

@@ -20,8 +20,7 @@ use cft_ident_core::inertia::columns::Own;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::validate::{
-    JointError,
-    HalfWidths, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
+    HalfWidths, JointError, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
 };
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{DataRole, Instant, Provenance};
