@@ -28,7 +28,7 @@ export PYTHONDONTWRITEBYTECODE=1
 tool() { cargo run --locked --quiet -- "$@" < /dev/null; }
 tool simulate -q -r configs/cft.toml --seconds 3 --seed 20 -o "$work/sim.csv" > /dev/null || exit 1
 "$work/venv/bin/python" fixtures/logs/make.py "$work/sim.csv" "$work/logs" || exit 1
-CFT_IDENT_LOGS="$work/logs" cargo test --locked --test log_fixtures || exit 1
+CFT_IDENT_LOGS="$work/logs" cargo test --locked -p cft-ident-logs --test logs log_fixtures || exit 1
 
 # This tool's, read by them.
 if ! tool help convert > /dev/null 2>&1; then

@@ -30,8 +30,7 @@ pub struct CliError {
 impl CliError {
     /// Texts read `what is wrong; what to do; what else helps`: all but the first part become hints.
     fn new(exit: Exit, text: impl fmt::Display) -> Self {
-        let text = text.to_string();
-        let mut parts = text.split("; ").map(str::to_owned);
+        let mut parts = parts(&text.to_string()).into_iter();
         CliError {
             exit,
             message: parts.next().unwrap_or_default(),
@@ -205,6 +204,29 @@ pub(super) fn tell(stderr: &mut dyn Write, text: &str) {
     };
 }
 
+/// The parts of a message between `; `, but for those inside of quotes: names and lines of files stand there.
+fn parts(text: &str) -> Vec<String> {
+    let mut parts = vec![String::new()];
+    let mut open = None;
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        match (c, open) {
+            ('"' | '`', None) => open = Some(c),
+            (c, Some(quote)) if c == quote => open = None,
+            (';', None) if rest.peek() == Some(&' ') => {
+                rest.next();
+                parts.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(part) = parts.last_mut() {
+            part.push(c);
+        }
+    }
+    parts
+}
+
 /// Later lines of a message are indented, and control characters that a file's text may carry into
 /// it (escape sequences, say) are shown instead of being sent to the terminal.
 pub(super) fn indented(text: &str) -> String {
@@ -223,6 +245,15 @@ pub(super) fn indented(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_that_holds_a_semicolon_stays_whole() {
+        let error = CliError::input("\"my; log.csv\": cannot be read; check the path");
+        assert_eq!(
+            error.to_string(),
+            "error: \"my; log.csv\": cannot be read\nhint: check the path"
+        );
+    }
 
     #[test]
     fn an_error_shows_message_place_and_hint_in_that_order() {

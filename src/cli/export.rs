@@ -292,6 +292,21 @@ fn about_effects(program: &Program, left_out: &[String]) -> Vec<String> {
     lines
 }
 
+/// Where the friction of the model would drive a joint, which no code of it does.
+fn never_driving(program: &Program) -> Vec<String> {
+    let each = program.joints.iter().zip(&program.kinds);
+    let each = each.zip(&program.drives_at);
+    let told = each.filter_map(|((joint, kind), speeds)| {
+        let [low, high] = (*speeds)?.map(|v| number::significant(v, 2));
+        Some(format!(
+            "the friction of {} drives it between {low} and {high} {}/s in the model: there it is 0 in the code",
+            escape(joint),
+            kind.position_unit()
+        ))
+    });
+    told.collect()
+}
+
 /// What a URDF says of effects.
 fn beside_urdf(file: &ModelFile, left_out: &[String]) -> Vec<String> {
     let (own, all) = (effects(file), left_out.join(", "));
@@ -383,6 +398,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let base_lines = lines.clone();
     let mut urdf_lines = lines.clone();
     lines.extend(about_effects(&program, &left_out));
+    let never_driving = never_driving(&program);
+    lines.extend(never_driving.iter().cloned());
     let torque_units: Vec<String> = (0..program.joints.len())
         .map(|j| given.value.robot.torque_unit(j).to_owned())
         .collect();
@@ -492,6 +509,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     if args.urdf.is_some() || !formats.is_empty() {
         warnings.extend(below_zero(&given.value, model));
+    }
+    if args.c.is_some() || args.rust.is_some() {
+        warnings.extend(never_driving);
     }
     let written = texts.iter().map(|(path, what, _)| Written {
         file: name(path),

@@ -5,21 +5,19 @@
 
 mod campaign;
 pub mod compare;
-pub mod completions;
 pub mod convert;
 pub mod diagnose;
-pub mod diff;
 pub mod example;
 pub mod excite;
 pub mod export;
 pub mod friction;
+pub mod generate;
 pub mod identify;
 pub mod inspect;
 pub mod lsq;
-pub mod man;
 pub mod new;
 pub mod reduce;
-pub mod schema;
+pub mod show;
 pub mod simulate;
 pub mod torque;
 pub mod track;
@@ -161,7 +159,7 @@ commands! {
     Diagnose: diagnose,
     Track: track,
     Compare: compare,
-    Diff: diff,
+    Show: show,
     Torque: torque,
     Watch: watch,
     Simulate: simulate,
@@ -169,9 +167,7 @@ commands! {
     Export: export,
     New: new,
     Example: example,
-    Schema: schema,
-    Completions: completions,
-    Man: man,
+    Generate: generate,
 }
 
 /// The process: reads its arguments, runs, and returns the status for the shell.
@@ -224,6 +220,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(answer) => {
+            if let Some(error) = removed(&answer) {
+                error::tell(&mut std::io::stderr(), &error.to_string());
+                return error.exit();
+            }
             // Help and version are answers on standard output, the rest are errors.
             let text = answer.render().to_string();
             let long = |line: &str| line.chars().count() > WIDTH;
@@ -245,6 +245,23 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>, interrupted: Arc<Atomi
             error.exit()
         }
     }
+}
+
+/// What stands for a command that an older version had.
+fn removed(answer: &clap::Error) -> Option<CliError> {
+    let named = answer.get(clap::error::ContextKind::InvalidSubcommand)?;
+    let clap::error::ContextValue::String(name) = named else {
+        return None;
+    };
+    let now = match name.as_str() {
+        "schema" => "generate schema KIND",
+        "completions" => "generate completions SHELL",
+        "man" => "generate man DIR",
+        "diff" => "compare A.json B.json",
+        _ => return None,
+    };
+    let error = CliError::usage(format!("there is no command `{name}` any more"));
+    Some(error.hint(format!("write `cft-ident {now}`")))
 }
 
 /// Runs one command line, the program's name first, and gives its result instead of showing it; the files that it
@@ -348,7 +365,7 @@ mod tests {
         let args: super::convert::Args = parse("a.csv b.csv out.mcap").unwrap();
         assert_eq!((args.logs.len(), args.output), (2, "out.mcap".into()));
         let args: super::identify::Args = parse("").unwrap();
-        assert!(args.campaign.is_none());
+        assert!(args.robot.is_none());
         let args: super::simulate::Args = parse(
             "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
         )

@@ -1,4 +1,4 @@
-//! `new`, `schema`, `completions` and `man` at the process boundary.
+//! `new` and `generate` at the process boundary.
 
 use assert_cmd::Command;
 use predicates::str::contains;
@@ -281,7 +281,7 @@ fn completions_and_manual_pages_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let done = command(folder.path())
-            .args(["completions", shell])
+            .args(["generate", "completions", shell])
             .assert()
             .success();
         let text = String::from_utf8(done.get_output().stdout.clone()).unwrap();
@@ -289,14 +289,17 @@ fn completions_and_manual_pages_know_every_command() {
             assert!(text.contains(name), "{shell}: {name}");
         }
     }
-    command(folder.path()).args(["man", "."]).assert().success();
+    command(folder.path())
+        .args(["generate", "man", "."])
+        .assert()
+        .success();
     for page in ["cft-ident.1", "cft-ident-lsq.1", "cft-ident-excite.1"] {
         let text = std::fs::read_to_string(folder.path().join(page)).unwrap();
         assert!(text.contains(".TH "), "{page}");
     }
-    assert!(folder.path().join("cft-ident-man.1").exists());
+    assert!(folder.path().join("cft-ident-generate.1").exists());
     command(folder.path())
-        .args(["man", "nowhere"])
+        .args(["generate", "man", "nowhere"])
         .assert()
         .code(5);
 }
@@ -315,14 +318,31 @@ fn the_schema_command_prints_a_schema_of_every_kind() {
         "new",
     ] {
         let done = command(folder.path())
-            .args(["schema", kind])
+            .args(["generate", "schema", kind])
             .assert()
             .success();
         let schema: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
         assert_eq!(schema["type"], "object", "{kind}");
     }
     command(folder.path())
-        .args(["schema", "nothing"])
+        .args(["generate", "schema", "nothing"])
         .assert()
         .code(2);
+}
+
+#[test]
+fn a_command_that_went_says_which_one_stands_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for (old, new) in [
+        ("schema robot", "generate schema"),
+        ("completions bash", "generate completions"),
+        ("man .", "generate man"),
+        ("diff a.json b.json", "compare A.json B.json"),
+    ] {
+        command(folder.path())
+            .args(old.split(' '))
+            .assert()
+            .code(2)
+            .stderr(predicates::str::contains(new));
+    }
 }

@@ -114,10 +114,7 @@ fn a_json_file_that_cannot_be_written_is_told_before_anything_else_is_written() 
         "export -m no.toml --c a.h",
         "new mine",
         "example ur10",
-        "diff a.json b.json",
-        "schema robot",
-        "completions bash",
-        "man .",
+        "generate schema robot",
     ];
     assert_eq!(
         lines.len(),

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
-use cft_ident::cli::schema::{Kind, schema};
+use cft_ident::cli::generate::schema::{Kind, schema};
 use predicates::str::{contains, is_empty};
 use schema_support::wrong;
 use serde_json::Value;

@@ -17,7 +17,7 @@ fn a_fit_on_half_of_a_log_is_told_from_the_fit_on_all_of_it() {
         let text = serde_json::to_string(&found).unwrap();
         std::fs::write(at.join(format!("{name}.json")), text).unwrap();
     }
-    let found = run(at, &["diff", "a.json", "b.json"]);
+    let found = run(at, &["compare", "a.json", "b.json"]);
     assert_eq!(found["command"], "lsq");
     let parameters = found["parameters"].as_array().unwrap();
     assert!(parameters.len() > 20, "{}", parameters.len());
@@ -33,7 +33,7 @@ fn a_fit_on_half_of_a_log_is_told_from_the_fit_on_all_of_it() {
     let spans = found["changed_inputs"].as_array().unwrap();
     assert!(spans.iter().any(|input| input["span"] == "0..50%"));
 
-    let same = run(at, &["diff", "a.json", "a.json"]);
+    let same = run(at, &["compare", "a.json", "a.json"]);
     assert!(same["verdicts"].as_array().unwrap().is_empty());
     let zero = |p: &serde_json::Value| p["difference"].as_f64() == Some(0.0);
     assert!(same["parameters"].as_array().unwrap().iter().all(zero));
@@ -46,9 +46,9 @@ fn files_that_are_no_documents_are_refused_with_what_to_do() {
     write("text.json", "{\n  no json\n}\n");
     write("other.json", "{\"a\": 1}\n");
     for (line, said) in [
-        ("diff text.json other.json", "text.json:2: no JSON"),
-        ("diff other.json other.json", "--json FILE"),
-        ("diff none.json other.json", "none.json"),
+        ("compare text.json other.json", "text.json:2: no JSON"),
+        ("compare other.json other.json", "--json FILE"),
+        ("compare none.json other.json", "none.json"),
     ] {
         Command::cargo_bin("cft-ident")
             .unwrap()

@@ -10,6 +10,7 @@ use cft_ident::effect::{self, Added, AugmentedModel, FAULTS, LAWS, Law, Place};
 use cft_ident::export::{self, Program};
 use cft_ident::identify::{Control, Log, LoggedRobot, read_whole};
 use cft_ident::robot::Robot;
+use cft_ident::robot::friction::ViscousCoulomb;
 use cft_ident::robot::model::JointFriction;
 use export_support::{Case, by_c, by_rust, compare, model, named, note, run, swing, there};
 use std::path::{Path, PathBuf};
@@ -44,6 +45,17 @@ fn shape(key: &str, i: usize) -> f64 {
         "order" => 3.0,
         _ => 0.3 + 0.17 * i as f64,
     }
+}
+
+/// Curves over every signal at one joint.
+fn curves(robot: &Robot) -> Vec<Added> {
+    let law = effect::law(robot, "empirical").unwrap();
+    let of = |signal: u8| {
+        let mut curve = some(law, Place::Joint(1));
+        curve.shape[0] = f64::from(signal);
+        curve
+    };
+    (1..=5).map(of).collect()
 }
 
 /// An effect of the catalogue with numbers of its own.
@@ -93,6 +105,9 @@ fn catalogue() -> Vec<Case> {
             }
             *tried |= !law.places(&robot, &plain).is_empty();
         }
+        if r == 1 {
+            all.extend(curves(&robot));
+        }
         cases.push(Case {
             name: format!("all of robot {r}"),
             model: AugmentedModel {
@@ -124,6 +139,58 @@ fn every_effect_of_the_catalogue_is_the_tools_own_in_rust() {
         let cases = catalogue();
         compare("Rust", &cases, &by_rust(folder.path(), &cases));
     }
+}
+
+/// Laws that drive: below zero at rest or at speed, or by an effect.
+fn driving() -> Vec<Case> {
+    let robot = parsed("[robot]\nmodel = \"single-joint\"\njoint = \"x\"\nkind = \"prismatic\"\n");
+    let of = |viscous, coulomb, effects: Vec<Added>| {
+        let mut model = model(robot.clone());
+        model.friction = vec![JointFriction::ViscousCoulomb(ViscousCoulomb {
+            viscous,
+            coulomb,
+        })];
+        model.theta = vec![0.0];
+        model.offset = vec![0.0];
+        Case {
+            name: format!("{viscous} {coulomb}"),
+            model: AugmentedModel { model, effects },
+            along: swing(1),
+        }
+    };
+    let stribeck = named(&robot, "stribeck", Some("x"), &[("c", -2.0), ("vs", 0.3)]);
+    vec![
+        of(3.0, -1.65, Vec::new()),
+        of(-2.0, 1.0, Vec::new()),
+        of(1.0, 1.0, vec![stribeck]),
+    ]
+}
+
+#[test]
+fn friction_in_code_takes_power_at_every_speed_and_is_the_models_own_where_that_does() {
+    if !there("cc") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let cases = driving();
+    for (case, found) in cases.iter().zip(by_c(folder.path(), &cases)) {
+        let wanted = case.model.torques(&case.along).hat;
+        let mut cut = 0;
+        for ((x, wanted), v) in found[0].iter().zip(&wanted[0]).zip(&case.along.v[0]) {
+            assert!(x * v >= 0.0, "{}: {x} at {v}", case.name);
+            if wanted * v > 0.0 {
+                assert!((x - wanted).abs() < 1e-12, "{}: {x} {wanted}", case.name);
+            }
+            cut += usize::from(wanted * v < 0.0);
+        }
+        assert!(cut > 20, "{}: the model drives in {cut} samples", case.name);
+        let program = Program::with_effects(&case.model).unwrap();
+        assert!(program.drives_at[0].is_some(), "{}", case.name);
+    }
+    let sound = Program::with_effects(&AugmentedModel::plain(model(
+        cases[0].model.model.robot.clone(),
+    )));
+    assert_eq!(sound.unwrap().drives_at, [None]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::schema_support;
 
-use cft_ident::cli::schema::{Kind, schema};
+use cft_ident::cli::generate::schema::{Kind, schema};
 use cft_ident::config::EMBEDDED;
 use schema_support::wrong;
 use serde_json::Value;

@@ -12,7 +12,7 @@ pub struct Block {
     pub q: Vec<f64>,
     /// Joint torques, k x n [N or Nm]; volts u_1..u_4 where the layout is raw and not converted.
     pub tau: Vec<f64>,
-    /// Logged joint velocities, k x n [m/s or rad/s]; empty when the log has none.
+    /// Logged joint velocities, k x n [m/s or rad/s], NaN where one was not measured; empty when the log has none.
     pub dq: Vec<f64>,
     /// Line (text logs) or message number of the first row, counted from 1.
     pub line0: u64,
@@ -90,7 +90,9 @@ impl Block {
             let Some(last) = x.len().checked_sub(width) else {
                 return false;
             };
-            last >= width && x[last - width..last] == x[last..]
+            // velocities that were not measured are NaN
+            let alike = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
+            last >= width && x[last - width..last].iter().zip(&x[last..]).all(alike)
         };
         self.len() > 1 && same(&self.tau, tau) && same(&self.dq, dq)
     }

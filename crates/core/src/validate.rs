@@ -294,8 +294,9 @@ impl<'a> Reconstruction<'a> {
         row: &mut dyn FnMut(&Reconstructed),
     ) -> Result<Summary, motion::RunError<E>> {
         let n = self.model.robot.joints();
-        let (model, rest_speed, band) = (self.model, self.rest_speed.clone(), self.band);
+        let (model, band) = (self.model, self.band);
         let mut full = settings.clone();
+        full.rest_speed.clone_from(&self.rest_speed);
         // every raw sample counts, so rows are thinned here and not by the pipeline
         full.decimation = Some(1);
         let mut taken = Taken::new(settings);
@@ -304,16 +305,18 @@ impl<'a> Reconstruction<'a> {
             n,
             &full,
             None,
-            4 * n,
+            6 * n,
             &|sample, out| {
                 out[..n].copy_from_slice(sample.tau);
                 model.torque(sample.q, sample.v, sample.a, &mut out[n..2 * n]);
-                for (j, speed) in rest_speed.iter().enumerate() {
-                    out[2 * n + j] = rest::movement(sample.v[j], *speed);
-                }
                 if let Some(band) = band {
                     let (tau, widths) = out[n..].split_at_mut(2 * n);
-                    band([sample.q, sample.v, sample.a], &tau[..n], widths);
+                    band([sample.q, sample.v, sample.a], &tau[..n], &mut widths[..n]);
+                }
+                for (j, weight) in sample.weight[..n].iter().enumerate() {
+                    out[2 * n + j] = *weight;
+                    out[4 * n + j] = weight * out[j];
+                    out[5 * n + j] = weight * out[n + j];
                 }
             },
             &mut |r| {
@@ -344,15 +347,17 @@ impl<'a> Reconstruction<'a> {
         let mut full = settings.clone();
         full.decimation = Some(1);
         let parallel = Parallel::design(&full, stretch.dt)?;
-        let movement = |(v, speed): (&Vec<f64>, &f64)| -> Vec<f64> {
-            v.iter().map(|v| rest::movement(*v, *speed)).collect()
-        };
-        let moving: Vec<Vec<f64>> = stretch
-            .v
-            .iter()
-            .zip(&self.rest_speed)
-            .map(movement)
+        let speeds = self.rest_speed.iter().enumerate();
+        let weights: Vec<Vec<f64>> = speeds
+            .map(|(j, speed)| parallel.weights(stretch, j, *speed))
             .collect();
+        let weighted = |channels: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let pairs = channels.iter().zip(&weights);
+            pairs
+                .map(|(x, w)| x.iter().zip(w).map(|(x, w)| x * w).collect())
+                .collect()
+        };
+        let by_weight = [weighted(&stretch.tau), weighted(reconstructed)].concat();
         let mut widths = vec![vec![0.0; stretch.len()]; n];
         if let Some(band) = self.band {
             let [mut q, mut v, mut a, mut tau, mut width] = [(); 5].map(|()| vec![0.0; n]);
@@ -368,16 +373,16 @@ impl<'a> Reconstruction<'a> {
             }
         }
         let channels = stretch.tau.iter().chain(reconstructed);
-        let channels = channels.chain(&moving).chain(&widths);
+        let channels = channels.chain(&weights).chain(&widths).chain(&by_weight);
         let channels: Vec<&[f64]> = channels.map(Vec::as_slice).collect();
         let rows = parallel.run(&channels)?;
         let mut taken = Taken::new(settings);
-        let (mut raw, mut filtered) = (vec![0.0; 4 * n], vec![0.0; 4 * n]);
+        let (mut raw, mut filtered) = (vec![0.0; 6 * n], vec![0.0; 6 * n]);
         let count = parallel.rows(stretch.len());
         let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; n]);
         for (i, k) in (0..count).map(|i| (i, parallel.sample_of(i))) {
             stretch.at(k, &mut q, &mut v, &mut a);
-            for c in 0..4 * n {
+            for c in 0..6 * n {
                 raw[c] = channels[c][k];
                 filtered[c] = rows[c][i];
             }
@@ -427,15 +432,13 @@ impl<'a> Reconstruction<'a> {
             v,
             measured: &raw[..n],
             reconstructed: &raw[n..2 * n],
-            half_width: &raw[3 * n..],
+            half_width: &raw[3 * n..4 * n],
         });
         if keep {
             for (j, s) in self.sums.iter_mut().enumerate() {
-                s.add(
-                    filtered[j],
-                    filtered[n + j],
-                    rest::rests(filtered[2 * n + j]),
-                );
+                let rests = rest::rests(filtered[2 * n + j]);
+                let first = if rests { 0 } else { 4 * n };
+                s.add(filtered[first + j], filtered[first + n + j], rests);
             }
             append(&mut self.traces, self.zero + t, &filtered[..2 * n], n);
         }

@@ -94,11 +94,16 @@ fn sampled(
 fn notes(bench: &Bench, judged: &Judgement) -> Vec<String> {
     let file = bench.args.robot.file_name().unwrap_or_default();
     vec![
+        judged.torques.clone(),
         escape(&judged.not_checked),
         match &judged.broken()[..] {
             [] => format!(
-                "Checked: the limits of {} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",
+                "Checked: the limits of {}{} along the whole motion{}. {} s at {} Hz, by cft-ident {}.",
                 escape(&file.to_string_lossy()),
+                match judged.torques_foreseen {
+                    true => "",
+                    false => ", but for torques,",
+                },
                 match judged.way {
                     Some(_) => " and on the straight way from the given pose",
                     None => "",

@@ -15,12 +15,18 @@ use cft_ident_stages::identify::{IdentifyError, Log, LoggedRobot};
 /// Share of a joint's usual torque that its noise is taken for, where the robot file does not say.
 const NOISE_SHARE: f64 = 0.01;
 
-/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque.
+/// Noise of every joint: `[noise]` of the robot file, or a share of the usual torque, or 1 where no torque is
+/// foreseen.
 pub(super) fn noise(file: &RobotFile, usual: &[f64], machine: &mut ForeseenRobot) {
+    let known = machine.source.known();
     let names = machine.model.robot.joint_names();
     for ((noise, name), usual) in machine.noise.iter_mut().zip(names).zip(usual) {
         let given = file.noise.joint.get(name).and_then(|n| n.torque_std);
-        let share = NOISE_SHARE * usual;
+        // a share of nothing is no noise: deviations are then for a noise of 1
+        let share = match known {
+            true => NOISE_SHARE * usual,
+            false => 1.0,
+        };
         *noise = given.filter(|std| *std > 0.0).unwrap_or(share);
         if *noise <= 0.0 {
             *noise = 1.0;

@@ -41,9 +41,10 @@ pub(super) fn refuse_broken(judged: &Judgement) -> Result<(), CliError> {
 /// The comment at the head of the trajectory file.
 pub(super) fn head(judged: &Judgement) -> String {
     let version = env!("CARGO_PKG_VERSION");
+    let torques = &judged.torques;
     if let Some(friction) = &judged.friction {
         return format!(
-            "One-joint experiment for the friction of {}, designed by cft-ident {version} for {} s.",
+            "One-joint experiment for the friction of {}, designed by cft-ident {version} for {} s.\n{torques}",
             friction.joint,
             number::significant(judged.seconds, 4)
         );
@@ -51,7 +52,7 @@ pub(super) fn head(judged: &Judgement) -> String {
     let shown = |value: Option<f64>| value.map_or("-".into(), |v| number::significant(v, 4));
     let condition = &judged.condition;
     format!(
-        "Excitation trajectory, designed by cft-ident {version} (criterion {}, seed {}).\n\
+        "Excitation trajectory, designed by cft-ident {version} (criterion {}, seed {}).\n{torques}\n\
          Condition number of the regressor along the period: {} raw, {} with its columns scaled.\n\
          x_i(t) = offset + sum over l of a_l/(l w) sin(l w t) - b_l/(l w) cos(l w t), w = 2 pi fundamental_hz.",
         judged.criterion,

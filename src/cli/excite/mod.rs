@@ -57,7 +57,8 @@ pub struct Args {
         default_value = "configs/cft.toml"
     )]
     pub robot: PathBuf,
-    /// Model file that torques and volts are foreseen with [default: the robot's nominal numbers]
+    /// Model file that torques and volts are foreseen with, limits kept for the 95 % band of its parameters
+    /// [default: nominal numbers, or the inertials of the robot file; without any, torques are not foreseen]
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
     /// Trajectory to judge instead of a design; status 1 when it breaks a limit
@@ -128,7 +129,7 @@ pub struct Args {
     #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
     #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
@@ -150,6 +151,9 @@ pub enum CriterionName {
     /// Sum of the parameters' variances, given each joint's noise
     AOptimal,
 }
+
+/// Duration of a one-joint experiment where nothing says \[s\].
+pub(super) const LADDER_S: f64 = 20.0;
 
 /// A duration of a motion: some hours at most.
 fn seconds(text: &str) -> Result<f64, String> {
@@ -524,6 +528,12 @@ fn criterion(bench: &Bench) -> Result<Criterion, CliError> {
         CriterionName::AOptimal if chosen.is_empty() => Criterion::AOptimal(vec![1.0; names.len()]),
         CriterionName::AOptimal => {
             let values = bench.machine.unknown_values();
+            if !bench.machine.source.known() {
+                return Err(CliError::usage(
+                    "--parameter asks for relative errors, and no value of a parameter is known",
+                )
+                .hint("give a model with -m, or a URDF with inertials"));
+            }
             let mut factors = vec![0.0; names.len()];
             for k in chosen {
                 if values[k] == 0.0 {

@@ -32,7 +32,8 @@ pub(super) fn write(bench: &Bench, motion: &Motion, path: &Path) -> Result<(), C
         }
     }
     let rows = rows(bench, motion, MOST_ROWS)?;
-    let mut writer = LogWriter::create(path, &header)?;
+    let notes: Vec<String> = machine.source.caution().into_iter().collect();
+    let mut writer = LogWriter::with_notes(path, &header, &notes)?;
     for k in 0..rows {
         if k % BLOCK == 0 {
             bench.context.check()?;

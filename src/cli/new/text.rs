@@ -173,7 +173,10 @@ impl Draft<'_> {
                     .first()
                     .map_or("q1", |j| j.joint.as_str());
                 let (kind, why) = match kind {
-                    JointKind::Prismatic => ("prismatic", "its position is in m"),
+                    JointKind::Prismatic => (
+                        "prismatic",
+                        "by its unit or its name; revolute where it turns",
+                    ),
                     JointKind::Revolute => ("revolute", "guessed; prismatic where it slides"),
                 };
                 let _ = writeln!(
@@ -211,9 +214,11 @@ impl Draft<'_> {
             self.clock(seen, out);
         }
         let what = self.mapping.torque_is;
+        let check = self.mapping.torque_check.as_ref();
+        let check = check.map_or(String::new(), |text| format!("CHECK IT: {text}. "));
         let _ = writeln!(
             out,
-            "torque_is = {:<12} # \"joint\", \"motor\", \"current\" or \"commanded\"\n\
+            "torque_is = {:<12} # {check}\"joint\", \"motor\", \"current\" or \"commanded\"\n\
              torque_held = false     # true where a torque was held from its own row to the next",
             quoted(what)
         );
@@ -245,10 +250,14 @@ impl Draft<'_> {
             );
         }
         self.temperatures(out);
-        if lines.is_empty() {
+        self.offered(out);
+        let whole = |j: &JointColumns| j.position.is_some() && j.torque.is_some();
+        if lines.is_empty() && self.mapping.joints.iter().all(whole) {
             out.push_str(
                 "# The log has the tool's own names for its columns: nothing is to be mapped.\n",
             );
+        }
+        if lines.is_empty() {
             return;
         }
         let _ = write!(
@@ -262,6 +271,21 @@ impl Draft<'_> {
             out.push_str(&line);
             out.push('\n');
         }
+    }
+
+    /// Columns that nothing was found for, by the names that they share.
+    fn offered(&self, out: &mut String) {
+        if self.mapping.offered.is_empty() {
+            return;
+        }
+        let families = self.mapping.offered.iter().map(|name| escape(name));
+        let _ = writeln!(
+            out,
+            "# CHECK IT: no names say which columns are the {}. Columns of which there are as many: {}. Write them\n\
+             # as position = .. and torque = .. of each joint in [log.joint].",
+            self.mapping.lacking.join(" and "),
+            families.collect::<Vec<_>>().join(", ")
+        );
     }
 
     /// Columns that may be the temperatures of the drives: a guess by their names, which nothing reads unasked.

@@ -15,7 +15,6 @@ use super::problem::case::Case;
 use super::problem::data_split::{DataSplit, LogRole, Piece};
 use super::problem::fit::{Declared, Fitted, determines_some, fit};
 use super::problem::pass::{Data, Layout, pass};
-use super::problem::rests::rest_weight;
 use super::problem::unknowns::{Unknowns, step};
 use super::search::{Chosen, Field, Looked};
 use super::steps::{Judged, judge};
@@ -116,17 +115,16 @@ impl<'a> Prepared<'a> {
             keep: case.keep,
             ridge: numbers.ridge,
         };
-        let filters = (&case.filters, case.cutoff_hz);
-        let mut data = Data::new(&case.given, &case.stretches, filters, split);
+        let data = Data {
+            stretches: &case.stretches,
+            filters: &case.filters,
+            split,
+            rest_speed: &case.rest_speed,
+        };
         let logs = split.logs(&case.stretches, LogRole::Train);
         let whole = divide(&logs, f64::INFINITY, numbers).list;
-        let mut fitted = fit(&case.given, declared, (&data, &whole), None)?;
-        // friction and noise of the moving rows say what those at rest are worth
+        let fitted = fit(&case.given, declared, (&data, &whole), None)?;
         let train = case.stretches_of(LogRole::Train);
-        data.rest_weight = rest_weight(&fitted.model, &train, &case.filters, &fitted.rms);
-        if data.rest_weight.iter().any(|w| *w > 0.0) {
-            fitted = fit(&case.given, declared, (&data, &whole), None)?;
-        }
         let unknowns = Unknowns::of(&case.given, &case.open, case.keep);
         let mut cover = Cover::of(&case.given.model.robot, &train, case.cutoff_hz);
         let raw = residuals(&fitted.model, &train);

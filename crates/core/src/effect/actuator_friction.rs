@@ -36,6 +36,12 @@ pub static LAW: Law = Law {
         Ok([50.0, 200.0, 1000.0].map(|w| vec![w]).to_vec())
     },
     limits: |_, _| vec![[10.0, 1e5]],
+    code: Some(|to| {
+        let [viscous, coulomb, slope] = [to.x(0), to.x(1), to.s(0)];
+        to.of_screw(|speed, _| {
+            format!("{viscous} * {speed} + {coulomb} * tanh({slope} * {speed})")
+        });
+    }),
     ..Law::linear(
         &ENTRY,
         &["viscous", "coulomb"],

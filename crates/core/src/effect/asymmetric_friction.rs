@@ -42,6 +42,14 @@ pub static LAW: Law = Law {
             Err("the joint moves in one direction only: move it both ways".into())
         }
     },
+    code: Some(|to| {
+        let (v, direction) = (to.v(), to.direction());
+        to.friction(format!(
+            "0.5 * (1.0 + {direction}) * ({} + {} * {v})",
+            to.x(0),
+            to.x(1)
+        ));
+    }),
     ..Law::linear(
         &ENTRY,
         &["coulomb", "viscous"],

@@ -1,6 +1,7 @@
 //! `backlash`: a play of width `gap`. After a reversal the motor crosses the gap and does not feel
 //! what lies behind it: c sgn(v) is missing until the gap is used up, a fixed distance.
 
+use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::{Law, Memory};
 use super::physics::{Limit, Number, Rule};
@@ -60,6 +61,19 @@ pub static LAW: Law = Law {
             }
             out[0] = missing(0.5 * shape[0], q, v, &mut far[0]);
         },
+    }),
+    code: Some(|to| {
+        let (q, v, i) = (to.q(), to.v(), to.number());
+        let own = to.remember("far", None, &q, &q);
+        let (next, half) = (format!("far_side_{i}"), exact(0.5 * to.shape()[0]));
+        to.line(format!(
+            "let {next} = $within({own}, {q} - {half}, {q} + {half});"
+        ));
+        to.step(format!(
+            "{} * ($same({next}, {own}) * -$sign({v}))",
+            to.x(0)
+        ));
+        to.line(format!("{own} = {next};"));
     }),
     ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };

@@ -4,6 +4,7 @@
 //!
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
+use super::as_code::Property;
 use super::law::{KeyValue, Law, Reparametrisation};
 use super::payload::{self, body};
 use crate::robot::standard::Body;
@@ -50,6 +51,18 @@ pub static LAW: Law = Law {
                 .collect()
         },
     }),
+    code: Some(|to| {
+        if let (&[x, y, z], &[mass, ball]) = (to.shape(), to.linear()) {
+            to.bodies(to.robot().tool_links([mass, ball], [x, y, z]));
+        }
+    }),
+    property: |_, centre, linear| {
+        Some(Property::Body(Body {
+            mass: linear[0],
+            centre: [centre[0], centre[1], centre[2]],
+            inertia: [linear[1], 0.0, 0.0, linear[1], 0.0, linear[1]],
+        }))
+    },
     ..Law::linear(
         &payload::ENTRY,
         &["mass", "inertia"],

@@ -1,6 +1,7 @@
 //! `counterbalance`: a smooth moment over position, as of a spring or gas cylinder between two fixed
 //! points, as a cubic B-spline over the travel that was seen; constant beyond it.
 
+use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::{Limit, Number, Rule};
@@ -63,6 +64,17 @@ pub static LAW: Law = Law {
         }
         Ok(vec![joint.position.to_vec()])
     },
+    code: Some(|to| {
+        let width = (to.shape()[1] - to.shape()[0]).max(f64::MIN_POSITIVE);
+        let moments: Vec<String> = to.linear().iter().copied().map(exact).collect();
+        to.added(format!(
+            "$spline(({} - {}) / {}, {})",
+            to.q(),
+            to.s(0),
+            exact(width),
+            moments.join(", ")
+        ));
+    }),
     ..Law::linear(
         &ENTRY,
         &["m_1", "m_2", "m_3", "m_4", "m_5", "m_6"],

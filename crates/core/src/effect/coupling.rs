@@ -5,6 +5,7 @@
 //! joint j too: power is kept, so that both rows have the same three numbers. That place is told by
 //! `both`.
 
+use super::as_code::Site;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::physics::Rule;
@@ -65,6 +66,7 @@ pub static LAW: Law = Law {
         }
         _ => Err("the other joint reverses fewer than two times".into()),
     },
+    code: Some(written),
     ..Law::linear(
         &ENTRY,
         &["viscous", "coulomb", "inertia"],
@@ -90,3 +92,29 @@ pub static LAW: Law = Law {
         },
     )
 };
+
+/// What it adds to generated code.
+fn written(to: &mut Site) {
+    let [viscous, coulomb, inertia, r] = [to.x(0), to.x(1), to.x(2), to.s(0)];
+    match to.place() {
+        Place::Geared { motor, other } => {
+            let name = format!("shared_{}", to.number());
+            to.now(format!(
+                "let {name} = {coulomb} * $sign(v[{motor}] + {r} * v[{other}]);"
+            ));
+            to.now(format!(
+                "tau[{motor}] += {viscous} * ({r} * v[{other}]) + {name} + {inertia} * ({r} * a[{other}]);"
+            ));
+            to.now(format!(
+                "tau[{other}] += {viscous} * ({r} * v[{motor}]) + {r} * {name} + {inertia} * ({r} * a[{motor}]);"
+            ));
+        }
+        Place::Pair { on, of } => {
+            let turning = format!("$sign(v[{on}] + {r} * v[{of}])");
+            to.added(format!(
+                "{viscous} * v[{of}] + {coulomb} * {turning} + {inertia} * a[{of}]"
+            ));
+        }
+        _ => {}
+    }
+}

@@ -12,6 +12,7 @@ pub static ENTRY: Entry = Entry {
         Key::size("c", Unit::Torque),
     ],
     role: Role::Fault,
+    no_torque: Some("it is an episode of one log, and no law tells when the next one comes"),
     separate_by: "cut it out",
     formula: "c from at to at + seconds",
     source: "somebody or something that pushes the arm",

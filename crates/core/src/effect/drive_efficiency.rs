@@ -46,6 +46,10 @@ pub static LAW: Law = Law {
             Err("the joint moves in one direction only: move it both ways".into())
         }
     },
+    code: Some(|to| {
+        let (v, load) = (to.v(), to.load());
+        to.added(format!("{} * ({load} * $positive({load} * {v}))", to.x(0)));
+    }),
     ..Law::linear(&ENTRY, &["k"], |scene, place, _, _, out| {
         let Some(j) = place.joint() else { return };
         for (k, (v, load)) in scene.stretch.v[j].iter().zip(&scene.load[j]).enumerate() {

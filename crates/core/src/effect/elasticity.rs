@@ -5,6 +5,7 @@
 //! the second derivative of the torque, -(inertia/w^2) d2(tau_l/M_jj)/dt2, the first term of the flexible
 //! joint's expansion (Spong 1987).
 
+use super::law_text::exact;
 use nalgebra::Matrix4;
 
 use super::entry::{Entry, Family, Key, Search};
@@ -109,6 +110,17 @@ pub static LAW: Law = Law {
             out[0] = -(pull - 2.0 * shape[1] * w * z[1] - w * w * z[0]);
         },
     }),
+    code: Some(|to| {
+        let (q, load) = (to.q(), to.load());
+        let own = to.remember("elastic", Some(OF_CODE), "0.0", &q);
+        let rate = exact(std::f64::consts::TAU * to.shape()[0]);
+        to.step(format!(
+            "{} * $elastic({rate}, {}, dt, {load}, &{own})",
+            to.x(0),
+            to.s(1)
+        ));
+        to.elastic();
+    }),
     ..Law::linear(&ENTRY, &["inertia"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let inertia = inertia(scene, j);
@@ -212,6 +224,10 @@ fn inertia(scene: &Scene, j: usize) -> f64 {
     a[j] = 1.0;
     torque(&a) - rest
 }
+
+/// Length of its state in generated code: the step, its four and four factors, the inertia, deflection and its
+/// rate, the pull before, and whether it has begun.
+const OF_CODE: usize = 14;
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,8 @@
 //! `empirical`: a torque that the data show and that no named law gives with numbers that a machine can have: a
 //! natural cubic spline of one signal of one joint (de Boor 1978, ch. IV), told by its peak.
 
+use super::as_code::Site;
+use super::law_text::exact;
 use super::added::Added;
 use super::entry::{Entry, Family, Key, Role, Search};
 use super::law::{Law, Memory};
@@ -86,6 +88,7 @@ pub static LAW: Law = Law {
             }
         },
     }),
+    code: Some(written),
     ..Law::linear(&ENTRY, &VALUES, |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let signal = CurveSignal::of(shape[0]);
@@ -222,7 +225,7 @@ fn bends(y: &[f64; KNOTS]) -> [f64; KNOTS] {
 }
 
 /// The spline through values at unit distance as m + s x + sum over k of c_k (x - k)^3 for x > k: m, s, then c_k.
-pub(super) fn cubes(values: &[f64]) -> Vec<f64> {
+fn cubes(values: &[f64]) -> Vec<f64> {
     let y: [f64; KNOTS] = std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let m = bends(&y);
     let third = |k: usize| (m[k + 1] - m[k]) / 6.0;
@@ -243,6 +246,50 @@ impl Added {
         let peak = (0..=100).map(torque).map(f64::abs).fold(0.0, f64::max);
         Some((CurveSignal::of(self.shape[0]), peak))
     }
+}
+
+/// What it adds to generated code.
+fn written(to: &mut Site) {
+    let signal = CurveSignal::of(to.shape()[0]);
+    match signal {
+        CurveSignal::Position | CurveSignal::Speed => {
+            let over = if signal == CurveSignal::Speed { to.v() } else { to.q() };
+            to.added(curve_text(to, &over));
+        }
+        CurveSignal::Friction | CurveSignal::Load => {
+            let over = if signal == CurveSignal::Load { to.load() } else { to.q() };
+            to.added(format!("{} * ({})", to.direction(), curve_text(to, &over)));
+        }
+        CurveSignal::Way => {
+            let (q, least) = (to.q(), TURN * (to.shape()[2] - to.shape()[1]));
+            let own = to.remember("turned", Some(TURNING + 1), "0.0", &q);
+            let way = format!("way_{}", to.number());
+            to.line(format!("let {way} = $way({q}, {}, &{own});", exact(least)));
+            to.step(format!("{} * ({})", to.direction(), curve_text(to, &way)));
+        }
+    }
+}
+
+/// The curve over a signal, as a sum of cubes that begin at its knots.
+fn curve_text(to: &Site, signal: &str) -> String {
+    let above = |x: &str| format!("0.5 * (({x}) + fabs({x}))");
+    let (from, wide) = (to.shape()[1], to.shape()[2] - to.shape()[1]);
+    let cubes = cubes(to.linear());
+    let (steps, terms) = cubes.split_at(2);
+    let per_step = terms.len() as f64 / wide;
+    let x = above(&format!(
+        "({signal} - {}) * {}",
+        exact(from),
+        exact(per_step)
+    ));
+    let beyond = above(&format!("{x} - {}", exact(terms.len() as f64)));
+    let x = format!("({x} - {beyond})");
+    let mut out = format!("{} + {} * {x}", exact(steps[0]), exact(steps[1]));
+    for (k, cube) in terms.iter().enumerate() {
+        let part = above(&format!("{x} - {}", exact(k as f64)));
+        out += &format!(" + {} * pow({part}, 3.0)", exact(*cube));
+    }
+    out
 }
 
 #[cfg(test)]

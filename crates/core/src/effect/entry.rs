@@ -220,6 +220,8 @@ pub struct Entry {
     pub said: fn(&Facts) -> String,
     /// What to do about it.
     pub remedy: &'static str,
+    /// Why it is no torque that a controller could send, where it is none.
+    pub no_torque: Option<&'static str>,
 }
 
 impl Entry {
@@ -242,6 +244,7 @@ impl Entry {
         source: "",
         said: |_| String::new(),
         remedy: "",
+        no_torque: None,
     };
 
     /// The family that results name.

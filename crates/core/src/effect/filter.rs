@@ -12,6 +12,7 @@ pub static ENTRY: Entry = Entry {
         Key::shape("torque", Unit::One),
     ],
     role: Role::Fault,
+    no_torque: Some("it is a lag of a logged channel"),
     separate_by: "log with the drive's filter off",
     formula: "none; first-order lag of the logged torque (1) or position (0)",
     source: "a smoothing filter in the drive or the sensor",

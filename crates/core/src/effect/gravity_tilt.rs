@@ -2,6 +2,9 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
+use super::as_code::Property;
+use super::as_code::Site;
+use super::law_text::exact;
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
 use super::place::{Place, Places};
@@ -34,6 +37,8 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     fits: |robot, _, _| robot.knows_links(),
+    code: Some(|to| to.tilted()),
+    property: |_, _, linear| Some(Property::Gravity([linear[0], linear[1]])),
     ..Law::linear(&ENTRY, &["gx", "gy"], columns)
 };
 
@@ -76,5 +81,31 @@ fn along(scene: &Scene, mut take: impl FnMut(usize, &[[f64; 2]])) {
         scene.stretch.at(k, &mut q[..n], &mut v[..n], &mut a[..n]);
         tilt.torques(&q[..n], &mut torques[..n]);
         take(k, &torques[..n]);
+    }
+}
+
+impl Site<'_> {
+    /// A base that stands askew: the recursion in another gravity, or the first moments of the closed form.
+    fn tilted(&mut self) {
+        let &[gx, gy] = self.linear() else { return };
+        let Some(chain) = self.robot().coefficients(self.theta()) else {
+            self.in_gravity([gx, gy]);
+            return;
+        };
+        let [a, b, c, e] = chain.h.map(exact);
+        let (side, h0) = (exact(chain.o), exact(chain.h0));
+        let [gx, gy, mass] = [gx, gy, -(chain.t1 + chain.mr)].map(exact);
+        let along = format!("({gx} * sin(q[1]) - {gy} * cos(q[1]))");
+        let across = format!("({gx} * cos(q[1]) + {gy} * sin(q[1]))");
+        let by_psi = format!("({b} * cos(q[2] + q[3]) - {e} * sin(q[2] + q[3]))");
+        self.at_rest([
+            format!("tau[0] += {mass} * {gy};"),
+            format!(
+                "tau[1] += {side} * {along} + ({h0} + {a} * sin(q[2]) + {b} * sin(q[2] + q[3]) + \
+                 {c} * cos(q[2]) + {e} * cos(q[2] + q[3])) * {across};"
+            ),
+            format!("tau[2] += ({a} * cos(q[2]) - {c} * sin(q[2]) + {by_psi}) * {along};"),
+            format!("tau[3] += {by_psi} * {along};"),
+        ]);
     }
 }

@@ -1,6 +1,7 @@
 //! How the estimator sees an effect: columns of torque along a recorded motion, linear in some parameters and
 //! shaped by others.
 
+use super::as_code::{Code, PropertyOf};
 use super::cover::Cover;
 use super::entry::{Entry, Family};
 use super::formula::Formulas;
@@ -39,6 +40,10 @@ pub struct Law {
     pub varied: Option<Varied>,
     /// Formulas of a user's own, in place of the functions above.
     pub formula: Option<&'static Formulas>,
+    /// What it adds to generated code; formulas write their own.
+    pub(super) code: Option<Code>,
+    /// The property of links, drives or the base that it is, where it is one: place, shape, coefficients.
+    pub property: PropertyOf,
     /// Between the entry's keys and shape and coefficients, where they are not the same.
     pub reparametrised: Option<Reparametrisation>,
 }
@@ -93,6 +98,8 @@ impl Law {
             direction: None,
             varied: None,
             formula: None,
+            code: None,
+            property: |_, _, _| None,
             reparametrised: None,
         }
     }

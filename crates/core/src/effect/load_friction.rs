@@ -55,6 +55,15 @@ pub static LAW: Law = Law {
         let top = cover.at(place).fastest();
         vec![[4.0 / top, 2000.0 / top]]
     },
+    code: Some(|to| {
+        let (v, load) = (to.v(), to.load());
+        to.added(format!(
+            "({} + {} * fabs({v})) * (fabs({load}) * tanh({} * {v}))",
+            to.x(0),
+            to.x(1),
+            to.s(0)
+        ));
+    }),
     ..Law::linear(&ENTRY, &["mu_c", "mu_v"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (k, (v, load)) in scene.stretch.v[j].iter().zip(&scene.load[j]).enumerate() {

@@ -45,6 +45,14 @@ pub static LAW: Law = Law {
         Ok([0.35, 0.5, 0.7, 1.6, 2.0, 2.5].map(|p| vec![p]).to_vec())
     },
     limits: |_, _| vec![[0.3, 3.0]],
+    code: Some(|to| {
+        let v = to.v();
+        to.friction(format!(
+            "{} * ($sign({v}) * pow(fabs({v}), {}))",
+            to.x(0),
+            to.s(0)
+        ));
+    }),
     ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {

@@ -69,6 +69,11 @@ pub static LAW: Law = Law {
             out
         },
     }),
+    code: Some(|to| {
+        if let &[mass, mx, my, mz, second] = to.linear() {
+            to.bodies(to.robot().level_tool_links([mass, mx, my, mz, second]));
+        }
+    }),
     ..Law::linear(
         &ENTRY,
         &["mass", "mx", "my", "mz", "second"],

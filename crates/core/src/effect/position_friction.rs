@@ -2,6 +2,7 @@
 //! it flips with the direction, a ripple does not (Remark 1 of the report). Where the joint's law is smooth at
 //! rest, so is the sign.
 
+use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::order::{order_limits, orders, wavenumber};
@@ -51,6 +52,12 @@ pub static LAW: Law = Law {
         orders(cover, place, &cover.at(place).friction_orders)
     },
     limits: order_limits,
+    code: Some(|to| {
+        let wave = wavenumber(to.robot(), to.joint(), to.shape()[0]);
+        let angle = format!("{} * {}", exact(wave), to.q());
+        let sum = format!("{} * sin({angle}) + {} * cos({angle})", to.x(0), to.x(1));
+        to.added(format!("{} * ({sum})", to.direction()));
+    }),
     ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let per_unit = wavenumber(scene.robot, j, shape[0]);

@@ -104,6 +104,22 @@ pub static LAW: Law = Law {
             out[0] -= saturating(&scene.laws[j], v);
         },
     }),
+    code: Some(|to| {
+        let (v, i) = (to.v(), to.number());
+        let own = to.remember("bristle", None, "0.0", &v);
+        let (next, ends) = (format!("next_{i}"), to.saturating());
+        to.line(format!(
+            "let {next} = $sign({v}) + ({own} - $sign({v})) * exp(-{} * fabs({v}) * dt);",
+            to.s(0)
+        ));
+        to.step(format!(
+            "{} * (0.5 * ({own} + {next}) - {ends}) + {} * ({next} - {own}) / (dt * {})",
+            to.x(0),
+            to.x(1),
+            to.s(0)
+        ));
+        to.line(format!("{own} = {next};"));
+    }),
     ..Law::linear(&ENTRY, &["fc", "sigma1"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let s = scene.stretch;

@@ -8,6 +8,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Data],
     keys: &[Key::size("step", Unit::Torque).above_zero("must be above 0")],
     role: Role::Fault,
+    no_torque: Some("it is the grain of a logged channel"),
     separate_by: "log the raw current",
     formula: "none; the logged torque is rounded to whole steps",
     source: "a drive that sends per mille of its rated torque, or a log with few digits",

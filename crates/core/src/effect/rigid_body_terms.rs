@@ -34,6 +34,7 @@ pub static ENTRY: Entry = Entry {
 
 pub static LAW: Law = Law {
     fits: |robot, _, _| !robot.dropped_parameters().is_empty(),
+    code: Some(|to| to.bodies(to.robot().dropped_links(to.linear()))),
     ..Law::linear(&ENTRY, &UNPRINTED, |scene, _, _, joint, out| {
         let s = scene.stretch;
         let (mut q, mut v, mut a) = ([0.0; 4], [0.0; 4], [0.0; 4]);

@@ -1,6 +1,7 @@
 //! `ripple`: torque that repeats with position and does not flip with direction. Each harmonic is an
 //! effect of its own order.
 
+use super::law_text::exact;
 use super::entry::{Entry, Family, Key, Ladder, Search};
 use super::law::Law;
 use super::order::{order_limits, orders, wavenumber};
@@ -40,6 +41,12 @@ pub static LAW: Law = Law {
     shape: &["order"],
     starts: |cover, place| orders(cover, place, &cover.at(place).ripple_orders),
     limits: order_limits,
+    code: Some(|to| {
+        let wave = wavenumber(to.robot(), to.joint(), to.shape()[0]);
+        let angle = format!("{} * {}", exact(wave), to.q());
+        let sum = format!("{} * sin({angle}) + {} * cos({angle})", to.x(0), to.x(1));
+        to.added(sum);
+    }),
     ..Law::linear(&ENTRY, &["sin", "cos"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         let per_unit = wavenumber(scene.robot, j, shape[0]);

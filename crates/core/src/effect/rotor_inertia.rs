@@ -2,6 +2,7 @@
 //! actuator coordinates x_r and y_r the screws move with the pantograph's Jacobian:
 //! tau = J' m (J a + Jdot v).
 
+use super::as_code::Property;
 use super::entry::{Entry, Family, Key, Ladder};
 use super::law::Law;
 use super::physics::Rule;
@@ -25,7 +26,20 @@ pub static ENTRY: Entry = Entry {
     ..Entry::USUAL
 };
 
-pub static LAW: Law = Law::linear(&ENTRY, &["J"], |scene, place, _, joint, out| match place {
+pub static LAW: Law = Law {
+    code: Some(|to| match to.place() {
+        Place::Actuator(_) => {
+            let inertia = to.x(0);
+            to.of_screw(|_, acceleration| format!("{inertia} * {acceleration}"));
+        }
+        _ => to.added(format!("{} * {}", to.x(0), to.a())),
+    }),
+    property: |place, _, linear| {
+        let inertia = linear[0];
+        let of = |joint| Property::Drive { joint, inertia };
+        place.joint().map(of)
+    },
+    ..Law::linear(&ENTRY, &["J"], |scene, place, _, joint, out| match place {
     Place::Joint(j) => out[0].copy_from_slice(&scene.stretch.a[j]),
     Place::Actuator(r) => {
         let s = scene.stretch;
@@ -41,4 +55,5 @@ pub static LAW: Law = Law::linear(&ENTRY, &["J"], |scene, place, _, joint, out| 
         }
     }
     _ => {}
-});
+})
+};

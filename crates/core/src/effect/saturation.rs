@@ -8,6 +8,7 @@ pub static ENTRY: Entry = Entry {
     families: &[Family::Data],
     keys: &[Key::size("limit", Unit::Torque).above_zero("must be above 0")],
     role: Role::Fault,
+    no_torque: Some("it is the end of the range of a torque channel"),
     separate_by: "move slower",
     formula: "none; the logged torque stays within the limit",
     source: "the range of a sensor, an amplifier or a bus message",

@@ -59,6 +59,14 @@ pub static LAW: Law = Law {
         vec![[1e-3 * top, 0.5 * top]]
     },
     direction: Some(|shape, v| (v / shape[0]).tanh()),
+    code: Some(|to| {
+        let v = to.v();
+        to.friction(format!(
+            "{} * (tanh({v} / {}) - $sign({v}))",
+            to.x(0),
+            to.s(0)
+        ));
+    }),
     ..Law::linear(&ENTRY, &["fc"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {

@@ -42,6 +42,14 @@ pub static LAW: Law = Law {
         let beyond = 0.25 * (high - low);
         vec![[low - beyond, high + beyond]]
     },
+    code: Some(|to| {
+        let way = format!("({} - {})", to.q(), to.s(0));
+        to.added(format!(
+            "{} * {way} + {} * ({way} * {way} * {way})",
+            to.x(0),
+            to.x(1)
+        ));
+    }),
     ..Law::linear(&ENTRY, &["k", "k3"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (k, q) in scene.stretch.q[j].iter().enumerate() {

@@ -62,6 +62,14 @@ pub static LAW: Law = Law {
         let top = cover.at(place).fastest();
         vec![[0.003 * top, 0.8 * top]]
     },
+    code: Some(|to| {
+        let v = to.v();
+        let share = format!("({v} / {})", to.s(0));
+        to.friction(format!(
+            "{} * ($sign({v}) * exp(-({share} * {share})))",
+            to.x(0)
+        ));
+    }),
     ..Law::linear(&ENTRY, &["c"], |scene, place, shape, _, out| {
         let Some(j) = place.joint() else { return };
         for (x, v) in out[0].iter_mut().zip(&scene.stretch.v[j]) {

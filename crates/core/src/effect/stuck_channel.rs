@@ -13,6 +13,7 @@ pub static ENTRY: Entry = Entry {
         Key::shape("torque", Unit::One),
     ],
     role: Role::Fault,
+    no_torque: Some("it is a channel that repeated its last value"),
     separate_by: "log again",
     formula: "none; torque (1) or position (0) repeats its last value",
     source: "a bus that lost messages, or a logger that fills gaps",

@@ -19,4 +19,7 @@ pub static ENTRY: Entry = Entry {
     ..Entry::USUAL
 };
 
-pub static LAW: Law = Law::linear(&ENTRY, &["c"], |_, _, _, _, out| out[0].fill(1.0));
+pub static LAW: Law = Law {
+    code: Some(|to| to.added(to.x(0))),
+    ..Law::linear(&ENTRY, &["c"], |_, _, _, _, out| out[0].fill(1.0))
+};

@@ -1,7 +1,7 @@
 //! Which columns a joint's rows have: shared inertial parameters, its own linear terms, the
 //! gradient of its known friction, and the target.
 
-use crate::motion::rest;
+use crate::motion::{FilterSettings, rest};
 use crate::robot::Robot;
 use crate::robot::friction::{DoubleTanh, sign};
 
@@ -95,6 +95,14 @@ impl RegressorColumns {
         self.rest_speed = speeds.collect();
     }
 
+    /// The processing of rows in which joints rest as these columns say.
+    pub(super) fn with_rests(&self, settings: &FilterSettings) -> FilterSettings {
+        FilterSettings {
+            rest_speed: self.rest_speed.clone(),
+            ..settings.clone()
+        }
+    }
+
     /// Number of unknowns: shared ones first, then each joint's own in turn.
     pub fn unknowns(&self) -> usize {
         self.shared + self.own.iter().map(Vec::len).sum::<usize>()
@@ -135,17 +143,26 @@ impl RegressorColumns {
         (0..j).map(|i| self.row_width(i)).sum()
     }
 
-    /// Channels per sample over all joints: their rows, measured torques, and for each joint 1 where it
-    /// moves and 0 where it rests, where rests are told.
+    /// Channels per sample over all joints: their rows and measured torques; where joints rest, each times the joint's
+    /// weight, then the weights, and rows and torques without a weight.
     pub fn channels(&self) -> usize {
-        self.offset(self.joints) + self.joints + self.rest_speed.len()
+        let plain = self.offset(self.joints) + self.joints;
+        match self.rest_speed.is_empty() {
+            true => plain,
+            false => 2 * plain + self.joints,
+        }
     }
 
     /// Whether joint j rests in a row of filtered channels.
     #[inline]
     pub(crate) fn rests(&self, channels: &[f64], j: usize) -> bool {
-        let moving = self.offset(self.joints) + self.joints + j;
-        !self.rest_speed.is_empty() && rest::rests(channels[moving])
+        let weight = self.offset(self.joints) + self.joints + j;
+        !self.rest_speed.is_empty() && rest::rests(channels[weight])
+    }
+
+    /// Where rows and torques without a weight begin among the channels.
+    pub(super) fn unweighted(&self) -> usize {
+        self.offset(self.joints) + 2 * self.joints
     }
 
     /// The same columns with the parameters of the known friction among the unknowns, but for those that are
@@ -191,9 +208,6 @@ impl RegressorColumns {
         robot.regressor(q, v, a, &mut out[..n * p]);
         let mut end = self.offset(n);
         out[end..end + n].copy_from_slice(tau);
-        for (j, speed) in self.rest_speed.iter().enumerate() {
-            out[end + n + j] = rest::movement(v[j], *speed);
-        }
         // from the last joint to the first: rows only move up
         for j in (0..n).rev() {
             let first = end - self.row_width(j);
@@ -211,6 +225,28 @@ impl RegressorColumns {
             }
             out[at] = b;
             end = first;
+        }
+    }
+
+    /// Gives every joint's row and torque of one sample its weight. Without it they stay beside, of a joint that
+    /// `rests` near the sample.
+    pub fn weigh(&self, weight: &[f64], rests: &[bool], out: &mut [f64]) {
+        if self.rest_speed.is_empty() {
+            return;
+        }
+        let n = self.joints;
+        let torques = self.offset(n);
+        let (weighted, rest) = out.split_at_mut(torques + n);
+        let (weights, plain) = rest.split_at_mut(n);
+        weights.copy_from_slice(&weight[..n]);
+        let mut from = 0;
+        for j in 0..n {
+            let to = from + self.row_width(j);
+            for place in (from..to).chain([torques + j]) {
+                plain[place] = if rests[j] { weighted[place] } else { 0.0 };
+                weighted[place] *= weight[j];
+            }
+            from = to;
         }
     }
 }

@@ -84,6 +84,7 @@ pub fn accumulate<E: Send>(
 ) -> Result<InstrumentReading, RunError<E>> {
     let n = columns.joints;
     let wide = doubled(columns);
+    let settings = &columns.with_rests(settings);
     let (width, share) = match reference {
         ReferenceSource::Logged => (2 * n, ABOVE),
         ReferenceSource::Smoothed => (n, REFERENCE_SHARE),
@@ -206,7 +207,7 @@ fn fill(
     out: &mut [f64],
 ) {
     let n = columns.joints;
-    let half = columns.channels();
+    let half = columns.offset(n) + n;
     CHANNELS.with_borrow_mut(|buffer| {
         buffer.resize(2 * half, 0.0);
         let (z, x) = buffer.split_at_mut(half);
@@ -219,9 +220,10 @@ fn fill(
             out[at..at + own].copy_from_slice(&z[from..from + own]);
             out[at + own..at + own + whole].copy_from_slice(&x[from..from + whole]);
         }
-        // torques, and which joints move
-        out[wide.offset(n)..].copy_from_slice(&x[columns.offset(n)..]);
+        let torques = columns.offset(n);
+        out[wide.offset(n)..][..n].copy_from_slice(&x[torques..torques + n]);
     });
+    wide.weigh(s.weight, s.rests, out);
 }
 
 thread_local! {

@@ -16,6 +16,7 @@ pub mod essential;
 pub mod feasible;
 pub mod gains;
 pub mod instruments;
+pub mod jumps;
 pub mod law_start;
 pub mod refine;
 pub mod robust;
@@ -62,18 +63,23 @@ pub fn accumulate_weighted<E>(
     source: &mut dyn FnMut(&mut Block) -> Result<bool, E>,
 ) -> Result<(BlockFactors, Summary), RunError<E>> {
     let mut factors = Accumulator::new(columns.clone(), BLOCK_SECONDS);
+    let settings = columns.with_rests(settings);
     let summary = motion::run(
         source,
         columns.joints,
-        settings,
+        &settings,
         None,
         columns.channels(),
-        &|s, out| columns.fill(robot, s.q, s.v, s.a, s.tau, out),
+        &|s, out| {
+            columns.fill(robot, s.q, s.v, s.a, s.tau, out);
+            columns.weigh(s.weight, s.rests, out);
+        },
         &mut |row| {
             let channels = match &mut weigher {
                 Some(weigher) => weigher.weigh(columns, row.filtered),
                 None => row.filtered,
             };
+            factors.at(row.t);
             factors.add(row.segment, row.step, channels);
         },
     )?;

@@ -77,6 +77,9 @@ struct Chain {
     count: usize,
     v: Vec<f64>,
     a: Vec<f64>,
+    /// No row rests before it is filtered.
+    weight: Vec<f64>,
+    rests: Vec<bool>,
 }
 
 /// A sample, and whether a stretch begins with it.
@@ -161,6 +164,8 @@ impl Chain {
             count: 0,
             v: vec![0.0; joints],
             a: vec![0.0; joints],
+            weight: vec![1.0; joints],
+            rests: vec![false; joints],
         })
     }
 
@@ -193,6 +198,8 @@ impl Chain {
         }
         let sample = CausalSample {
             motion: MotionSample {
+                weight: &self.weight,
+                rests: &self.rests,
                 t,
                 q: &self.ring[middle..middle + n],
                 v: &self.v,

@@ -26,7 +26,7 @@
 //! | [`position_cutoff`] | what a position cut-off costs the friction at reversals |
 //! | `run` | the windows of a streamed log |
 //! | `zero_order_hold` | motor forces between two samples, where a linkage turns them |
-//! | `rest` | rows in which a joint rests |
+//! | `rest` | what rows weigh where a joint stands or turns |
 //! | `full_rate` | smooth q, v, a at every sample of one short record |
 //! | `stretch` | whole stretches in memory, for searches |
 //! | `added_noise` | a stretch smoothed twice, or with noise of its own level added (SIMEX) |
@@ -72,6 +72,10 @@ pub struct MotionSample<'a> {
     pub a: &'a [f64],
     /// The log's torque channels, unfiltered, brought to the time of q [N, Nm, or V if so logged].
     pub tau: &'a [f64],
+    /// What each joint's row weighs: 0 where it stands or turns, 1 where it moves, and 1 where no speed of rest is given.
+    pub weight: &'a [f64],
+    /// Whether each joint rests for longer than a row lasts, somewhere in what is filtered with this sample.
+    pub rests: &'a [bool],
 }
 
 /// One row that is kept.
@@ -146,7 +150,7 @@ pub enum MotionError {
 
     /// Every stretch without a gap is too short to filter.
     #[error(
-        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed; raise the cut-off or the gap factor, or record longer"
+        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed; bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
     )]
     NoSegment {
         /// Stretches between gaps.

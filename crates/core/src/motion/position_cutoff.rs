@@ -207,12 +207,9 @@ impl OneJoint<'_> {
     /// Whether the joint moves in each row.
     fn moves(&self, design: &Parallel) -> Result<Vec<bool>, MotionError> {
         let [v, _] = self.smoothed(design)?;
-        let movement: Vec<f64> = self
-            .inner(&v)
-            .iter()
-            .map(|v| rest::movement(*v, self.rest_speed))
-            .collect();
-        let rows = design.run(&[&movement])?;
+        let of_joint = (self.joint, self.stretch.dt);
+        let weights = design.weights_of(self.inner(&v), of_joint, self.rest_speed);
+        let rows = design.run(&[&weights])?;
         Ok(rows[0].iter().map(|m| !rest::rests(*m)).collect())
     }
 

@@ -2,6 +2,7 @@
 
 use super::MotionError;
 use super::position_filter::{HIGHEST_SHARE, PositionFilter};
+use super::rest::response;
 use crate::math::sos::Sos;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -44,6 +45,8 @@ pub struct FilterSettings {
     /// Dropped at each end of a segment after the parallel filter (s); left out, three of that
     /// filter's time constants.
     pub trim_s: Option<f64>,
+    /// Speed up to which each joint rests [m/s or rad/s], below 0 of one that never does; empty where none does.
+    pub rest_speed: Vec<f64>,
 }
 
 impl Default for FilterSettings {
@@ -61,6 +64,7 @@ impl Default for FilterSettings {
             bridge_s: 0.0,
             q_trim_s: None,
             trim_s: None,
+            rest_speed: Vec::new(),
         }
     }
 }
@@ -130,6 +134,10 @@ pub(super) struct FilterChain {
     pub core: usize,
     /// Samples of the shortest segment that is used.
     pub shortest: usize,
+    /// Speed up to which each joint rests, and the response of its position filter in samples.
+    pub rests: Vec<(f64, usize)>,
+    /// Samples over which a row takes most of what it holds.
+    pub row_samples: usize,
 }
 
 impl FilterSettings {
@@ -215,8 +223,21 @@ impl FilterChain {
         let overlap = position_overlap + parallel_overlap.max(trim).max(pad(&parallel));
         let core = WINDOW_CORE.max(2 * overlap);
         let shortest = 2 * (edge + trim) + 3 * position_pad.max(pad(&parallel));
+        let reach = settings.differences.reach();
+        let of_joint = |(j, speed): (usize, &f64)| {
+            let cutoff = position.as_ref().map(|f| f.cutoff_hz(j));
+            (*speed, response(cutoff, dt, reach))
+        };
+        let rests = settings
+            .rest_speed
+            .iter()
+            .enumerate()
+            .map(of_joint)
+            .collect();
         Ok(Self {
             dt,
+            rests,
+            row_samples: (0.5 / (settings.cutoff_hz * dt)) as usize + 1,
             differences: settings.differences,
             position,
             parallel: ZeroPhase::new(parallel),

@@ -1,10 +1,10 @@
 //! Uninterrupted stretches of a log at full rate, for searches that go over the same samples many
 //! times: whole in memory, 8 bytes x 4 channels x joints a sample.
 
-use super::MotionError;
 use super::position_filter::PositionFilter;
 use super::run::{RunError, Summary, run};
 use super::settings::{Differences, FilterChain, FilterSettings};
+use super::{MotionError, rest};
 use crate::block::Block;
 use crate::math::zero_phase::ZeroPhase;
 
@@ -205,6 +205,25 @@ impl Parallel {
             decimation: chain.decimation,
             trim: chain.trim,
         })
+    }
+
+    /// What each sample of a joint weighs that rests up to `rest_speed`, as in [`MotionSample`](super::MotionSample).
+    pub fn weights(&self, stretch: &Stretch, joint: usize, rest_speed: f64) -> Vec<f64> {
+        self.weights_of(&stretch.v[joint], (joint, stretch.dt), rest_speed)
+    }
+
+    /// The same of the speeds of a joint, `dt` apart.
+    pub(super) fn weights_of(
+        &self,
+        v: &[f64],
+        (joint, dt): (usize, f64),
+        rest_speed: f64,
+    ) -> Vec<f64> {
+        let cutoff = self.position.as_ref().map(|f| f.cutoff_hz(joint));
+        let reach = rest::response(cutoff, dt, self.differences.reach());
+        let mut out = vec![0.0; v.len()];
+        rest::weigh(v, (1, 0), rest_speed, reach, &mut out);
+        out
     }
 
     /// Samples by which the filter extends a stretch at each end.

@@ -3,11 +3,13 @@
 use std::cell::RefCell;
 
 use super::settings::FilterChain;
-use super::{FilteredRow, MotionError, MotionSample};
+use super::{FilteredRow, MotionError, MotionSample, rest};
 
 /// Channels filtered together. Each group of channels lies apart, so that a pass over it stays in
 /// a second-level cache.
 const GROUP: usize = 8;
+/// Share of movement in what a row is mostly made of, above which it is none of rest for sure.
+const MAY_REST: f64 = 0.6;
 
 /// Computed channels of a window.
 #[derive(Debug, Default)]
@@ -43,6 +45,8 @@ pub(super) struct FilterWindow {
     pub tau: Vec<f64>,
     v: Vec<f64>,
     a: Vec<f64>,
+    weight: Vec<f64>,
+    rests: Vec<bool>,
     /// Samples of the rows, as indices within the window.
     kept: Vec<usize>,
     /// Channels of the rows before and after the filter, row-major.
@@ -71,6 +75,8 @@ impl FilterWindow {
             .differences
             .apply(&self.q, joints, dt, &mut self.v, &mut self.a);
 
+        self.weigh(chain, joints);
+
         // At a segment's end the parallel filter starts where the whole segment's would; at an
         // artificial end, where the position filter has settled.
         let lost = |at_end: bool| {
@@ -90,6 +96,27 @@ impl FilterWindow {
         match self.filtered.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => Err(self.offending(from..to, joints, channels, fill)),
+        }
+    }
+
+    /// Weighs the samples of every joint, and sees which of them rest.
+    fn weigh(&mut self, chain: &FilterChain, joints: usize) {
+        self.weight.clear();
+        self.weight.resize(self.t.len() * joints, 1.0);
+        self.rests.clear();
+        self.rests.resize(joints, false);
+        for (j, (speed, reach)) in chain.rests.iter().enumerate().take(joints) {
+            rest::weigh(&self.v, (joints, j), *speed, *reach, &mut self.weight);
+            // of as many samples as a row takes, about, so many weigh nothing
+            let mut sum = 0.0;
+            for k in 0..self.t.len() {
+                sum += self.weight[k * joints + j];
+                if k >= chain.row_samples {
+                    sum -= self.weight[(k - chain.row_samples) * joints + j];
+                }
+                self.rests[j] |=
+                    k >= chain.row_samples && sum < MAY_REST * chain.row_samples as f64;
+            }
         }
     }
 
@@ -229,7 +256,9 @@ impl FilterWindow {
             q: &self.q[row.clone()],
             v: &self.v[row.clone()],
             a: &self.a[row.clone()],
-            tau: &self.tau[row],
+            tau: &self.tau[row.clone()],
+            weight: &self.weight[row],
+            rests: &self.rests,
         }
     }
 }

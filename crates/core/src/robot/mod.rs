@@ -20,6 +20,7 @@
 
 pub mod bodies;
 pub mod cft;
+pub mod deviation;
 pub mod double_pendulum;
 pub mod drive;
 pub mod dynamics;

@@ -144,6 +144,8 @@ fn whole(log: &Log, stretches: &[usize], settings: &FilterSettings, dt: f64) -> 
                 v: &v[row.clone()],
                 a: &a[row.clone()],
                 tau: &tau[row],
+                weight: &[1.0; JOINTS],
+                rests: &[false; JOINTS],
             };
             fill(&sample, &mut channels);
             raw.extend(channels);

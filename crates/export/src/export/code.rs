@@ -234,7 +234,10 @@ fn warm(lines: &[String]) -> bool {
 pub(super) fn friction(program: &Program) -> Vec<String> {
     let each = program.friction.iter().enumerate();
     let each = each.map(|(j, own)| format!("tau[{j}] = {};", law(own, &format!("v[{j}]"))));
+    let drives = program.drives_at.iter().enumerate();
+    let drives = drives.filter(|(_, speeds)| speeds.is_some());
     each.chain(program.effects.friction.iter().cloned())
+        .chain(drives.map(|(j, _)| format!("tau[{j}] = $taking(tau[{j}], v[{j}]);")))
         .collect()
 }
 

@@ -3,6 +3,8 @@
 //! A coefficient of a fitted law may be negative where its terms together take power over the speeds of
 //! the logs; damping below zero alone drives a simulated joint away, and formats do not allow it.
 
+use cft_ident_core::effect::{AugmentedModel, Scene};
+use cft_ident_core::motion::Stretch;
 use cft_ident_core::number;
 use cft_ident_core::robot::friction::ViscousCoulomb;
 use cft_ident_core::robot::model::{JointFriction, Model};
@@ -23,6 +25,60 @@ pub(super) fn dissipative(model: &Model, j: usize) -> Option<[f64; 2]> {
         JointFriction::ViscousCoulomb(law) => Some([law.viscous, law.coulomb].map(|x| x.max(0.0))),
         _ => None,
     }
+}
+
+/// Speeds at which friction is looked at: so many in each decade of these \[m/s or rad/s\].
+const PER_DECADE: i32 = 20;
+const DECADES: [i32; 2] = [-6, 2];
+
+/// Speeds from and to which the friction of each joint drives it, its effects among those of a speed alone
+/// (`of_friction`, by their place in the model) included.
+pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Option<[f64; 2]>> {
+    let n = refined.model.robot.joints();
+    let [first, last] = DECADES.map(|decade| decade * PER_DECADE);
+    let speeds = (first..=last).map(|k| 10f64.powf(f64::from(k) / f64::from(PER_DECADE)));
+    let speeds: Vec<f64> = speeds.flat_map(|v| [v, -v]).collect();
+    let rest = || vec![vec![0.0; speeds.len()]; n];
+    let along = Stretch {
+        dt: 1.0,
+        t: (0..speeds.len()).map(|k| k as f64).collect(),
+        q: rest(),
+        v: vec![speeds.clone(); n],
+        a: rest(),
+        tau: rest(),
+        ..Stretch::default()
+    };
+    let torques = refined.torques(&along);
+    let scene = Scene {
+        robot: &refined.model.robot,
+        theta: &refined.model.theta,
+        laws: &refined.model.friction,
+        stretch: &along,
+        hat: &torques.hat,
+        load: &torques.load,
+        direction: &torques.direction,
+        tilt: None,
+    };
+    let mut of_effect = vec![0.0; speeds.len()];
+    let each = refined.model.friction.iter().enumerate();
+    each.map(|(j, law)| {
+        let mut friction: Vec<f64> = speeds.iter().map(|v| law.torque(*v)).collect();
+        for effect in of_friction.iter().filter_map(|i| refined.effects.get(*i)) {
+            effect.torque(&scene, j, &mut of_effect);
+            for (sum, x) in friction.iter_mut().zip(&of_effect) {
+                *sum += x;
+            }
+        }
+        let drives = friction
+            .iter()
+            .zip(&speeds)
+            .filter(|(f, v)| **f * **v < 0.0);
+        drives.map(|(_, v)| v.abs()).fold(None, |range, v| {
+            let [low, high] = range.unwrap_or([v, v]);
+            Some([f64::min(low, v), f64::max(high, v)])
+        })
+    })
+    .collect()
 }
 
 /// What a file of links cannot say truly, as sentences: friction and drive inertias below zero.
@@ -51,10 +107,10 @@ pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
     }
     for j in model.robot.standard_map().drives {
         let name = format!("Ia{}", j + 1);
-        let found = file.find(&name, None).filter(|p| p.value < 0.0);
+        let found = file.find(&name, None).filter(|p| p.in_use() < 0.0);
         if let (Some(p), Some(joint)) = (found, names.get(j)) {
             out.push(format!(
-                "the drive inertia of {joint} is {}, and no drive has one below zero: fit with `lsq --feasible`",
+                "the drive inertia of {joint} is {}, and no drive has one below zero: fit without --unconstrained",
                 told(&name, None, p.value)
             ));
         }

@@ -59,7 +59,7 @@ const METHODS: [(&str, &str); 30] = [
     ("fmod(", "fn fmod(x: f64, y: f64) -> f64 {\n    x % y\n}\n"),
 ];
 
-const FUNCTIONS: [Function; 6] = [
+const FUNCTIONS: [Function; 8] = [
     Function {
         name: "sign(",
         c: "\
@@ -119,6 +119,65 @@ fn within(x: f64, low: f64, high: f64) -> f64 {
     } else {
         x
     }
+}
+",
+    },
+    Function {
+        name: "taking(",
+        c: "\
+/* The friction x at the speed v, or none where it would drive. */
+static inline double @name@_taking(double x, double v)
+{
+    return x * v > 0.0 ? x : 0.0;
+}
+",
+        rust: "\
+/// The friction x at the speed v, or none where it would drive.
+fn taking(x: f64, v: f64) -> f64 {
+    if x * v > 0.0 { x } else { 0.0 }
+}
+",
+    },
+    Function {
+        name: "way(",
+        c: "\
+/* Way since the joint last turned; a way back of `least` is a turn. s: where it began, turned and came
+ * farthest, its direction, begun. */
+static inline double @name@_way(double q, double least, double *s)
+{
+    if (s[4] == 0.0) {
+        s[0] = s[1] = s[2] = q;
+        s[4] = 1.0;
+    }
+    if (s[3] == 0.0 && fabs(q - s[0]) > least) s[3] = q > s[0] ? 1.0 : -1.0;
+    if (s[3] * (q - s[2]) >= 0.0) {
+        s[2] = q;
+    } else if (fabs(q - s[2]) > least) {
+        s[1] = s[2];
+        s[2] = q;
+        s[3] = -s[3];
+    }
+    return fabs(q - s[1]);
+}
+",
+        rust: "\
+/// Way since the joint last turned; a way back of `least` is a turn. s: where it began, turned and came
+/// farthest, its direction, begun.
+fn way(q: f64, least: f64, s: &mut [f64; 5]) -> f64 {
+    if s[4] == 0.0 {
+        *s = [q, q, q, 0.0, 1.0];
+    }
+    if s[3] == 0.0 && (q - s[0]).abs() > least {
+        s[3] = if q > s[0] { 1.0 } else { -1.0 };
+    }
+    if s[3] * (q - s[2]) >= 0.0 {
+        s[2] = q;
+    } else if (q - s[2]).abs() > least {
+        s[1] = s[2];
+        s[2] = q;
+        s[3] = -s[3];
+    }
+    (q - s[1]).abs()
 }
 ",
     },

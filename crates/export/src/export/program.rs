@@ -1,5 +1,6 @@
 //! A model as the numbers of a recursion: what generated code is written from.
 
+use super::dissipative::driving;
 use super::error::ExportError;
 use super::recipe::Recipe;
 use cft_ident_core::effect::AugmentedModel;
@@ -33,6 +34,8 @@ pub struct Program {
     pub effects: EffectsCode,
     /// The observer of external torques, where one is asked for.
     pub observer: Option<Recipe>,
+    /// Speeds from and to which the friction of a joint would drive it; none where it always takes power.
+    pub drives_at: Vec<Option<[f64; 2]>>,
     /// Speed of each joint below which it may be at rest [m/s or rad/s].
     pub rest: Vec<f64>,
 }
@@ -51,8 +54,10 @@ impl Program {
     /// # Errors
     /// [`ExportError::Effect`] for an effect that no code is known of.
     pub fn with_effects(refined: &AugmentedModel) -> Result<Self, ExportError> {
+        let effects = EffectsCode::of(refined)?;
         Ok(Self {
-            effects: EffectsCode::of(refined)?,
+            drives_at: driving(refined, &effects.of_friction),
+            effects,
             ..Self::of(&refined.model)
         })
     }
@@ -77,6 +82,7 @@ impl Program {
                 ..EffectsCode::default()
             },
             observer: None,
+            drives_at: driving(&AugmentedModel::plain(model.clone()), &[]),
             rest: (0..robot.joints())
                 .map(|j| slow(robot.joint_kind(j)))
                 .collect(),

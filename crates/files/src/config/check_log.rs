@@ -168,28 +168,27 @@ fn joint_channels(
     let at = |key| ["log", "joint", joint, key];
     let position_fits = match channels.position_unit {
         None => true,
-        Some(PositionUnit::Metre | PositionUnit::Millimetre) => kind == JointKind::Prismatic,
-        Some(PositionUnit::Radian | PositionUnit::Degree) => kind == JointKind::Revolute,
         Some(PositionUnit::Counts) => channels.position_scale.is_some(),
+        Some(unit) => match kind {
+            JointKind::Prismatic => unit.is_length(),
+            JointKind::Revolute => unit.is_angle(),
+        },
     };
     if !position_fits {
         let remedy = match kind {
             _ if channels.position_unit == Some(PositionUnit::Counts) => {
                 "give `position_scale`, metres or radians per count"
             }
-            JointKind::Prismatic => "a prismatic joint is logged in \"m\" or \"mm\"",
-            JointKind::Revolute => "a revolute joint is logged in \"rad\" or \"deg\"",
+            JointKind::Prismatic => "a prismatic joint is logged in \"m\", \"cm\" or \"mm\"",
+            JointKind::Revolute => "a revolute joint is logged in \"rad\", \"deg\" or \"turns\"",
         };
         return Err(document.value(&at("position_unit"), "does not fit the joint", remedy));
     }
     let scaled = channels.torque_scale.is_some();
     let torque_fits = match channels.torque_unit {
-        Some(TorqueUnit::Newton) => kind == JointKind::Prismatic || scaled,
-        Some(TorqueUnit::NewtonMetre) => kind == JointKind::Revolute || scaled,
-        None
-        | Some(TorqueUnit::Ampere | TorqueUnit::Volt | TorqueUnit::Counts | TorqueUnit::Percent) => {
-            true
-        }
+        Some(unit) if unit.is_force() => kind == JointKind::Prismatic || scaled,
+        Some(unit) if unit.is_moment() => kind == JointKind::Revolute || scaled,
+        _ => true,
     };
     if !torque_fits {
         return Err(document.value(
@@ -233,8 +232,8 @@ fn actuator_channels(
     let turns = name == COORDINATES[2];
     let fits = match channels.position_unit {
         None | Some(PositionUnit::Counts) => true,
-        Some(PositionUnit::Metre | PositionUnit::Millimetre) => !turns,
-        Some(PositionUnit::Radian | PositionUnit::Degree) => turns,
+        Some(unit) if unit.is_length() => !turns,
+        Some(_) => turns,
     };
     if !fits {
         let remedy = "x_c3 is logged in \"rad\", \"deg\" or \"counts\", the others in \"m\", \"mm\" or \"counts\"";

@@ -154,6 +154,18 @@ pub fn look(
         );
         findings.faults.insert(0, LogFault { rows, ..fault });
     }
+    for (rows, effect) in log.contradictions() {
+        let remedy = "stop the other publisher, or remap its topic, and record again; what is left is the machine that was recorded most";
+        let (severity, kind) = (Severity::Warning, FaultKind::OtherPublisher);
+        let fault = LogFault::whole(severity, kind, findings.duration_s, effect, remedy);
+        findings.faults.insert(0, LogFault { rows, ..fault });
+    }
+    for (rows, effect) in log.uneven() {
+        let remedy = "where it is known whose they are, say so by their places, `torque = \"effort[0]\"`, .. in [log.joint] of the robot file; else record again with one number for each name";
+        let (severity, kind) = (Severity::Error, FaultKind::MissingChannel);
+        let fault = LogFault::whole(severity, kind, findings.duration_s, effect, remedy);
+        findings.faults.insert(0, LogFault { rows, ..fault });
+    }
     for effect in log.breaks() {
         let remedy = "copy it again from where it was recorded; a recorder that is killed loses its last chunk";
         let at_s = findings.duration_s;

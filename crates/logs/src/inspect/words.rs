@@ -42,8 +42,18 @@ impl Word {
     }
 }
 
-/// The words of a name: they end where letters and digits meet, at every other sign, and before a
-/// capital behind two small letters.
+/// Whether a capital with what follows it begins a word of its own: `Pos` in `AIPos`, `In` in `qIn`; not `Nm`
+/// in `mNm`.
+fn begins_word(rest: &str) -> bool {
+    let mut letters = rest.chars();
+    let first = letters.next().is_some_and(char::is_uppercase);
+    let unit = rest.strip_prefix("Nm").or(rest.strip_prefix("Hz"));
+    let unit = unit.is_some_and(|rest| !rest.starts_with(char::is_alphabetic));
+    first && letters.next().is_some_and(char::is_lowercase) && !unit
+}
+
+/// The words of a name: they end where letters and digits meet, at every other sign, before a capital behind
+/// two small letters, and before a capital that a small letter follows.
 pub fn words(name: &str) -> Vec<Word> {
     let mut out: Vec<Word> = Vec::new();
     let (mut before, mut small) = (None::<char>, 0);
@@ -55,7 +65,8 @@ pub fn words(name: &str) -> Vec<Word> {
         }
         let goes_on = before.is_some_and(|b| {
             let both_digits = b.is_ascii_digit() == c.is_ascii_digit();
-            both_digits && !(c.is_uppercase() && small >= 2)
+            let capital = c.is_uppercase() && (small >= 2 || begins_word(&name[at..]));
+            both_digits && !capital
         });
         let end = at + c.len_utf8();
         match out.last_mut().filter(|_| goes_on) {
@@ -82,7 +93,7 @@ pub fn words(name: &str) -> Vec<Word> {
 
 /// Words that make a command of whatever they stand in; the arm that leads another one is no measurement
 /// of the arm that follows.
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 25] = [
     "ref",
     "refs",
     "reference",
@@ -103,6 +114,11 @@ const COMMANDS: [&str; 20] = [
     "operator",
     "teleop",
     "action",
+    "ctrl",
+    "soll",
+    "sollwert",
+    "setp",
+    "demand",
 ];
 
 /// Words of what is about a channel and no channel itself.
@@ -136,7 +152,7 @@ const ASIDE: [&str; 27] = [
     "stiffness",
 ];
 
-const ACCELERATIONS: [&str; 8] = [
+const ACCELERATIONS: [&str; 9] = [
     "acceleration",
     "accelerations",
     "accel",
@@ -145,8 +161,9 @@ const ACCELERATIONS: [&str; 8] = [
     "qdd",
     "qddot",
     "ddtheta",
+    "qacc",
 ];
-const VELOCITIES: [&str; 15] = [
+const VELOCITIES: [&str; 18] = [
     "velocity",
     "velocities",
     "vel",
@@ -162,8 +179,11 @@ const VELOCITIES: [&str; 15] = [
     "thetad",
     "jvel",
     "rpm",
+    "qvel",
+    "spd",
+    "geschwindigkeit",
 ];
-const POSITIONS: [&str; 15] = [
+const POSITIONS: [&str; 27] = [
     "position",
     "positions",
     "pos",
@@ -179,15 +199,100 @@ const POSITIONS: [&str; 15] = [
     "posn",
     "winkel",
     "poz",
+    "qpos",
+    "stroke",
+    "strokes",
+    "extension",
+    "extensions",
+    "travel",
+    "displacement",
+    "elongation",
+    "hub",
+    "weg",
+    "lage",
+    "fbpos",
 ];
-const TORQUES: [&str; 14] = [
-    "torque", "torques", "effort", "efforts", "force", "forces", "tau", "taus", "moment",
-    "moments", "trq", "tq", "mom", "jtau",
+const TORQUES: [&str; 20] = [
+    "torque",
+    "torques",
+    "effort",
+    "efforts",
+    "force",
+    "forces",
+    "tau",
+    "taus",
+    "moment",
+    "moments",
+    "trq",
+    "tq",
+    "mom",
+    "jtau",
+    "qfrc",
+    "frc",
+    "kraft",
+    "drehmoment",
+    "jnttrq",
+    "trqs",
 ];
 /// What makes torques; `current` is an adjective where another of these words stands beside it.
-const CURRENTS: [&str; 9] = [
-    "current", "currents", "curr", "cur", "iq", "amps", "voltage", "voltages", "volts",
+const CURRENTS: [&str; 14] = [
+    "current", "currents", "curr", "cur", "iq", "amps", "amp", "ampere", "strom", "voltage",
+    "voltages", "volts", "volt", "spannung",
 ];
+const VOLTAGES: [&str; 5] = ["voltage", "voltages", "volts", "volt", "spannung"];
+/// Words of what slides.
+const SLIDING: [&str; 14] = [
+    "stroke",
+    "strokes",
+    "extension",
+    "extensions",
+    "travel",
+    "displacement",
+    "elongation",
+    "hub",
+    "weg",
+    "force",
+    "forces",
+    "kraft",
+    "slide",
+    "rail",
+];
+
+/// What makes a torque, as words name it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drive {
+    /// A force or torque by name.
+    Torque,
+    Current,
+    Voltage,
+    /// No word says it.
+    Unsaid,
+}
+
+/// What words call a torque channel. `current` before a torque is an adjective, behind it a noun.
+pub fn drive(words: &[Word]) -> Drive {
+    let last = |known: &[&str]| words.iter().rposition(|word| known.contains(&&*word.text));
+    let (torque, current) = (last(&TORQUES), last(&CURRENTS));
+    match (torque, current) {
+        (torque, Some(current)) if torque.is_none_or(|torque| torque < current) => {
+            match VOLTAGES.contains(&&*words[current].text) {
+                true => Drive::Voltage,
+                false => Drive::Current,
+            }
+        }
+        (Some(_), _) => Drive::Torque,
+        _ => match words.first().map(|word| &*word.text) {
+            Some("i") => Drive::Current,
+            Some("u") => Drive::Voltage,
+            _ => Drive::Unsaid,
+        },
+    }
+}
+
+/// Whether words are of a joint that slides.
+pub fn slides(words: &[Word]) -> bool {
+    has(words, &SLIDING) && !has(words, &["actuator"])
+}
 
 fn has(words: &[Word], known: &[&str]) -> bool {
     words.iter().any(|word| known.contains(&word.text.as_str()))
@@ -200,7 +305,13 @@ pub fn is_command(words: &[Word]) -> bool {
         let short = [&POSITIONS[..], &VELOCITIES, &TORQUES].concat();
         pair[1].text == "d" && (short.contains(&of.as_str()) || of == "j")
     };
-    has(words, &COMMANDS) || words.windows(2).any(desired)
+    // mc_rtc has qIn and qOut, KUKA's sensor interface AIPos and ASPos
+    let out = |pair: &[Word]| match &*pair[1].text {
+        "out" => ["q", "alpha", "tau", "pos", "vel"].contains(&&*pair[0].text),
+        "pos" => pair[0].text == "as",
+        _ => false,
+    };
+    has(words, &COMMANDS) || words.windows(2).any(|pair| desired(pair) || out(pair))
 }
 
 /// What words say a channel holds, whether or not it was commanded; `None` where nothing.
@@ -211,7 +322,8 @@ pub fn role(words: &[Word]) -> Option<ChannelRole> {
     if has(words, &ACCELERATIONS) || has(words, &["ddot"]) {
         return Some(ChannelRole::Acceleration);
     }
-    if has(words, &VELOCITIES) || has(words, &["dot"]) {
+    let alpha = |pair: &[Word]| pair[0].text == "alpha" && ["in", "out"].contains(&&*pair[1].text);
+    if has(words, &VELOCITIES) || has(words, &["dot"]) || words.windows(2).any(alpha) {
         return Some(ChannelRole::Velocity);
     }
     // tau_q1 is the torque of q1
@@ -229,11 +341,90 @@ pub fn role(words: &[Word]) -> Option<ChannelRole> {
 }
 
 /// Words that tell no joint from another: how it was measured, in which unit.
-const NOISE: [&str; 29] = [
-    "act", "actual", "meas", "measured", "state", "states", "deg", "degs", "degree", "degrees",
-    "rad", "rads", "nm", "mnm", "n", "mm", "m", "per", "s", "percent", "pct", "feedback", "fbk",
-    "current", "the", "of", "value", "data", "sensor",
+const NOISE: [&str; 55] = [
+    "act",
+    "actual",
+    "meas",
+    "measured",
+    "msr",
+    "state",
+    "states",
+    "deg",
+    "degs",
+    "degree",
+    "degrees",
+    "rad",
+    "rads",
+    "nm",
+    "mnm",
+    "knm",
+    "ncm",
+    "kn",
+    "n",
+    "mm",
+    "cm",
+    "m",
+    "per",
+    "s",
+    "percent",
+    "pct",
+    "feedback",
+    "fbk",
+    "fb",
+    "current",
+    "the",
+    "of",
+    "value",
+    "data",
+    "sensor",
+    "ist",
+    "in",
+    "out",
+    "alpha",
+    "ai",
+    "ma",
+    "jnt",
+    "actuator",
+    "counts",
+    "count",
+    "ticks",
+    "turn",
+    "turns",
+    "rev",
+    "revs",
+    "revolutions",
+    "mrad",
+    "milliamps",
+    "newton",
+    "amperes",
 ];
+
+/// A name without the words of a joint, where it has them in a row.
+pub fn without_joint(name: &str, joint: &str) -> String {
+    let (spoken, joint) = (words(name), words(joint));
+    let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
+    match spoken.windows(joint.len().max(1)).find(same) {
+        Some([first, .., last]) => format!("{}#{}", &name[..first.at.start], &name[last.at.end..]),
+        Some([only]) => format!("{}#{}", &name[..only.at.start], &name[only.at.end..]),
+        _ => name.to_owned(),
+    }
+}
+
+/// The signs of a name without the words of units, `#` kept: columns that differ in their units alone look the
+/// same.
+pub fn without_units(name: &str) -> String {
+    const UNITS: [&str; 26] = [
+        "deg", "degs", "degree", "degrees", "rad", "rads", "mrad", "m", "mm", "cm", "nm", "mnm",
+        "knm", "ncm", "n", "kn", "a", "v", "ma", "rpm", "per", "s", "turns", "counts", "percent",
+        "pct",
+    ];
+    let part = |part: &str| -> Vec<String> {
+        let spoken = words(part).into_iter().map(|word| word.text);
+        spoken.filter(|word| !UNITS.contains(&&**word)).collect()
+    };
+    let parts: Vec<String> = name.split('#').map(|one| part(one).join("_")).collect();
+    parts.join("#")
+}
 
 /// What is left of a name when the words of its role and of its unit are taken out: the joint.
 pub fn joint(words: &[Word]) -> String {
@@ -272,7 +463,29 @@ mod tests {
         assert_eq!(of("dQ1"), ["dq", "1"]);
         assert_eq!(of("tau_J_d[3]"), ["tau", "j", "d", "3"]);
         assert_eq!(of(" /joint_states.q10 "), ["joint", "states", "q", "10"]);
+        assert_eq!(of("AIPos.A1"), ["ai", "pos", "a", "1"]);
+        assert_eq!(of("tauIn_0"), ["tau", "in", "0"]);
+        assert_eq!(of("MsrJntTrq_A1"), ["msr", "jnt", "trq", "a", "1"]);
+        assert_eq!(of("tau_mNm"), ["tau", "mnm"]);
         assert!(of("--").is_empty());
+    }
+
+    #[test]
+    fn a_word_for_torque_is_no_current_and_letters_of_axes_are_no_units() {
+        for (name, found) in [
+            ("Torque_A1", Drive::Torque),
+            ("A1_torque", Drive::Torque),
+            ("Ist-Moment A1", Drive::Torque),
+            ("actual_current_torque_1", Drive::Torque),
+            ("torque_current_1", Drive::Current),
+            ("MACur.A1", Drive::Current),
+            ("I_1", Drive::Current),
+            ("motor_voltage_2", Drive::Voltage),
+            ("force_kN", Drive::Torque),
+        ] {
+            assert_eq!(drive(&words(name)), found, "{name}");
+        }
+        assert_eq!(without_units("#_pos_deg"), without_units("- #_pos_mm"));
     }
 
     #[test]
@@ -305,6 +518,17 @@ mod tests {
                 "motor_temperature_1",
             ),
             ("gripper", None, false, "gripper"),
+            ("qpos_0", Some(Position), false, "0"),
+            ("qfrc_actuator_0", Some(Torque), false, "0"),
+            ("ctrl_torque_0", Some(Torque), true, "ctrl_0"),
+            ("qIn_1", Some(Position), false, "1"),
+            ("qOut_1", Some(Position), true, "1"),
+            ("alphaIn_1", Some(Velocity), false, "1"),
+            ("tauIn_1", Some(Torque), false, "1"),
+            ("AIPos.A1", Some(Position), false, "a_1"),
+            ("ASPos.A1", Some(Position), true, "as_a_1"),
+            ("MACur.A1", Some(Torque), false, "a_1"),
+            ("stroke_mm", Some(Position), false, ""),
         ] {
             let words = words(name);
             let found = (role(&words), is_command(&words), joint(&words));

@@ -40,14 +40,18 @@ impl Header<'_> {
         };
         let time = match layout.section.rate_hz {
             Some(_) => None,
-            None => Some(self.find(&layout.time, "time")?),
+            None => Some(self.find(&of_one_column(self.names, &layout.time), "time")?),
         };
         let positions = each(&layout.positions, layout.what())?;
         let torques = each(&layout.torques, "torque")?;
         // A velocity is optional unless the robot file names its column.
         let wanted = |c: &Channel| c.key.is_some() || position_of(self.names, c).is_some();
         let velocities = if layout.velocities.iter().all(wanted) {
-            each(&layout.velocities, "velocity")?
+            // nothing is fitted to velocities: those in another unit are none
+            match each(&layout.velocities, "velocity") {
+                Err(LogError::Unit { .. }) => Vec::new(),
+                found => found?,
+            }
         } else {
             Vec::new()
         };
@@ -125,6 +129,22 @@ impl Header<'_> {
     }
 }
 
+/// A clock of two columns, `sec+nanosec`, by the first of them; its name finds the other.
+fn of_one_column(names: &[String], time: &Channel) -> Channel {
+    let mut first = time.clone();
+    if position_of(names, time).is_none()
+        && let Some((seconds, _)) = time.column.split_once('+')
+    {
+        first.column = seconds.to_owned();
+    }
+    first
+}
+
+/// The place of a channel; of a clock of two columns that of the first.
+pub(super) fn time_of(names: &[String], time: &Channel) -> Option<usize> {
+    position_of(names, &of_one_column(names, time))
+}
+
 /// Places of the columns that a channel may be.
 fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<Item = usize> + 'n {
     let number = column_number(&channel.column);
@@ -153,7 +173,7 @@ pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
 }
 
 /// `q1 [deg]` and `q1 (deg)` are q1 in deg.
-fn name_and_unit(name: &str) -> (&str, Option<&str>) {
+pub(super) fn name_and_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((base, unit)) = name
             .strip_suffix(close)
@@ -176,6 +196,17 @@ fn suffix_unit(name: &str) -> Option<&str> {
     ["deg", "degrees", "mm"].contains(&unit).then_some(unit)
 }
 
+/// Units of quantities that no channel is of.
+const OTHERS: [&str; 18] = [
+    "%", "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "ma", "mrad", "kg", "bar", "pa", "um",
+    "min", "h", "date",
+];
+
+/// Whether a text is a unit.
+pub(super) fn is_unit(text: &str) -> bool {
+    known_unit(text).is_some() || OTHERS.contains(&&*text.to_lowercase())
+}
+
 /// One spelling for the units that headers state; a rate is known by its numerator.
 fn known_unit(text: &str) -> Option<&'static str> {
     let lower = text.to_lowercase();
@@ -185,8 +216,14 @@ fn known_unit(text: &str) -> Option<&'static str> {
         "rad" | "radian" | "radians" => "rad",
         "m" | "meter" | "metre" | "meters" | "metres" => "m",
         "mm" => "mm",
+        "cm" => "cm",
+        "turn" | "turns" | "rev" | "revs" | "revolutions" => "turns",
         "counts" | "count" | "ticks" => "counts",
         "n" | "newton" => "N",
+        "kn" => "kN",
+        "knm" => "kNm",
+        "ncm" => "Ncm",
+        "mnm" | "nmm" => "mNm",
         "nm" | "n m" | "n.m" | "n·m" | "n*m" => "Nm",
         "a" | "ampere" | "amps" => "A",
         "v" | "volt" | "volts" => "V",

@@ -1,9 +1,10 @@
 //! Files opened for what they hold: decompressed on the way, and known by their first bytes.
 
-use std::fs::File;
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use super::source::{Checksum, OpenFile};
 use super::stream::{Stream, Watch};
 use super::{LogError, source};
 
@@ -33,6 +34,36 @@ pub(super) struct Content {
     rest: Box<dyn Read + Send>,
     /// What is known of a stream while it arrives; none of a file.
     pub(super) watch: Option<Watch>,
+    /// The bytes of the file as they lie on the disk; none of a stream.
+    pub(super) raw: Option<RawBytes>,
+}
+
+/// The bytes of an open file, hashed as they are read.
+#[derive(Clone)]
+pub(super) struct RawBytes(Arc<Mutex<(OpenFile, Checksum)>>);
+
+impl RawBytes {
+    fn new(file: OpenFile) -> Self {
+        Self(Arc::new(Mutex::new((file, Checksum::default()))))
+    }
+
+    /// SHA-256 of the whole file, hexadecimal; what was not read yet is read.
+    pub(super) fn sha256(&self) -> io::Result<String> {
+        let mut rest = self.clone();
+        io::copy(&mut rest, &mut io::sink())?;
+        let inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        Ok(inner.1.clone().hexadecimal())
+    }
+}
+
+impl Read for RawBytes {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut inner = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let (file, checksum) = &mut *inner;
+        let count = file.read(buffer)?;
+        checksum.update(&buffer[..count]);
+        Ok(count)
+    }
 }
 
 impl Content {
@@ -42,8 +73,10 @@ impl Content {
     /// A file that cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let fail = |error| source::failed(path, error);
-        let mut file = source::open(path)?;
+        let file = source::open(path)?;
         let size = file.metadata().map_err(fail)?.len();
+        let raw = RawBytes::new(file);
+        let mut file = raw.clone();
         let mut magic = Vec::new();
         Read::by_ref(&mut file)
             .take(4)
@@ -79,6 +112,7 @@ impl Content {
             head,
             rest,
             watch: None,
+            raw: Some(raw),
         })
     }
 
@@ -105,6 +139,7 @@ impl Content {
             head,
             rest: Box::new(rest),
             watch: Some(watch),
+            raw: None,
         })
     }
 
@@ -180,7 +215,7 @@ impl Read for CutOff {
 }
 
 fn plain(
-    file: Chain<Cursor<Vec<u8>>, File>,
+    file: Chain<Cursor<Vec<u8>>, RawBytes>,
     compression: Compression,
 ) -> io::Result<Box<dyn Read + Send>> {
     Ok(match compression {

@@ -192,6 +192,38 @@ impl Layout {
         channels.any(|channel| column_number(&channel.column).is_some())
     }
 
+    /// Whether both take the same numbers from a log, whatever becomes of them.
+    pub(super) fn reads_like(&self, other: &Self) -> bool {
+        let channels = |of: &Self| {
+            let all = of.positions.iter().chain(&of.torques).chain(&of.velocities);
+            (all.cloned().collect::<Vec<_>>(), of.time.clone())
+        };
+        let counts = |of: &Self| [of.positions.len(), of.torques.len(), of.velocities.len()];
+        let otherwise = match (&self.otherwise, &other.otherwise) {
+            (None, None) => true,
+            (Some(a), Some(b)) => a.reads_like(b),
+            _ => false,
+        };
+        otherwise
+            && self.joints == other.joints
+            && counts(self) == counts(other)
+            && channels(self) == channels(other)
+            && (self.channels, self.zero_order_hold, self.temperatures)
+                == (other.channels, other.zero_order_hold, other.temperatures)
+            && self.section == other.section
+    }
+
+    /// The same layout with the conversions that `declared` has for these channels.
+    pub(super) fn converted_as(mut self, declared: &Self) -> Self {
+        let other = declared.otherwise.as_deref();
+        let of = [Some(declared), other].into_iter().flatten();
+        if let Some(of) = of.into_iter().find(|of| of.channels == self.channels) {
+            self.conversion = of.conversion.clone();
+            self.otherwise = of.otherwise.clone();
+        }
+        self
+    }
+
     /// The same layout without its conversions: blocks hold what was logged, in SI units.
     pub fn as_logged(mut self) -> Self {
         self.conversion = None;

@@ -25,10 +25,12 @@ mod source;
 mod spec;
 mod stale;
 mod stream;
+mod tape;
 mod temperatures;
 mod text;
 mod time;
 mod time_unit;
+mod two_clocks;
 
 pub use arrays::Arrays;
 pub use cft_ident_core::block::Block;
@@ -37,17 +39,18 @@ pub use error::LogError;
 pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
 pub use mend::{Bridge, Mending, Unwrap};
 pub use names::{escape, escape_whole, nearest};
-pub use raw::{RawBlock, RawReader, topics};
+pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use recording::{
-    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup, Value,
+    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup,
+    TopicFacts, Value,
 };
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,
     PositionUnit, RowFault, Stamp, TimeUnit, TorqueIs, TorqueUnit,
 };
 pub use shared::shares_rows;
-pub use source::{DataRole, Provenance, sha256};
+pub use source::{DataRole, Provenance, begins_with, sha256};
 pub use spec::{LogSpec, Span};
 pub use temperatures::Temperatures;
 pub use time::Instant;

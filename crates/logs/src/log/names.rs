@@ -3,11 +3,20 @@
 /// Characters of a name that are shown before it is cut.
 const SHOWN: usize = 120;
 
-/// A name from a file made safe to print: control and invisible format characters as escapes, cut to 120 characters.
+/// A name from a file made safe to print: control and invisible format characters as escapes, cut to 120 characters,
+/// in quotes where it would be read as two parts of a message.
 pub fn escape(name: &str) -> String {
-    match name.char_indices().nth(SHOWN) {
+    quoted(match name.char_indices().nth(SHOWN) {
         None => escape_whole(name),
         Some((end, _)) => escape_whole(&name[..end]) + "…",
+    })
+}
+
+/// A name in quotes where it holds what parts a message: what is wrong; what to do.
+pub(super) fn quoted(name: String) -> String {
+    match name.contains("; ") {
+        true => format!("\"{}\"", name.replace('"', "'")),
+        false => name,
     }
 }
 

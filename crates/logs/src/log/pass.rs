@@ -1,17 +1,20 @@
 //! The one way through a log, strict or not: its rows inside its span, each with its time.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use super::columns::{choose, position_of, unit_of};
-use super::content::Content;
+use super::columns::{choose, time_of, unit_of};
+use super::content::{Content, RawBytes};
 use super::layout::Layout;
 use super::recording::{JointStates, MessageRows, format_of};
 use super::rows::{LogRows, Strictness};
 use super::section::TimeUnit;
 use super::source::{self, Provenance};
 use super::stream::Watch;
+use super::tape::{Tape, TapeRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
+use super::two_clocks::rest_of;
 use super::{LogError, LogSpec, Span};
 
 /// Rows by whose times a unit is recognised.
@@ -42,6 +45,8 @@ pub(super) struct LogPass {
     pub(super) samples: u64,
     /// What is known of a stream.
     watch: Option<Watch>,
+    /// What is kept of its rows, where it is read strictly.
+    tape: Option<Arc<Tape>>,
 }
 
 impl LogPass {
@@ -52,19 +57,33 @@ impl LogPass {
         strictness: Strictness,
     ) -> Result<Self, LogError> {
         let files = spec.files()?;
-        let (rows, layout, refused) = open(&files, layout, strictness)?;
-        let mut pass = Self {
-            files,
-            strictness,
-            refused,
-            ..Self::of_rows(spec.clone(), rows, layout)
+        let mut pass = match (strictness, layout.joints.is_empty()) {
+            (Strictness::Refuse, false) => {
+                let tape = spec.kept.tape(&files, layout)?;
+                let found = tape.found.clone().converted_as(layout);
+                let rows = Box::new(TapeRows::new(Arc::clone(&tape)));
+                Self {
+                    files,
+                    tape: Some(tape),
+                    ..Self::of_rows(spec.clone(), rows, found)
+                }
+            }
+            _ => {
+                let opened = open(&files, layout, strictness)?;
+                Self {
+                    files,
+                    strictness,
+                    refused: opened.refused,
+                    ..Self::of_rows(spec.clone(), opened.rows, opened.layout)
+                }
+            }
         };
         // Who names the column later knows its unit then.
         let section = &pass.layout.section;
         let stated = section.time_unit.is_some()
             || section.rate_hz.is_some()
             || pass.layout.joints.is_empty();
-        if !stated && let Some(column) = position_of(pass.rows.names(), &pass.layout.time) {
+        if !stated && let Some(column) = time_of(pass.rows.names(), &pass.layout.time) {
             pass.recognise(column)?;
         }
         Ok(pass)
@@ -73,19 +92,23 @@ impl LogPass {
     /// Takes the unit of a column of times from its numbers, where its name states none.
     pub(super) fn recognise(&mut self, column: usize) -> Result<(), LogError> {
         let name = &self.rows.names()[column];
-        let stated = unit_of(name).is_some() || TimeUnit::of_suffix(name).is_some();
+        let stated = unit_of(name).is_some()
+            || TimeUnit::of_suffix(name).is_some()
+            || rest_of(self.rows.names(), column).is_some();
         if stated || self.rows.is_recording() {
             return Ok(());
         }
-        let (mut rows, ..) = open(&self.files, &self.layout, Strictness::Record)?;
-        let mut times = Vec::with_capacity(LOOKED_AT);
-        while times.len() < LOOKED_AT && rows.next()?.is_some() {
-            // A date is no number, and has no unit.
-            match rows.logged(column) {
-                Some(time) => times.push(time),
+        let kept = self
+            .tape
+            .as_ref()
+            .and_then(|tape| tape.first_times(column, LOOKED_AT));
+        let times = match kept {
+            Some(times) => times,
+            None => match self.first_numbers(column)? {
+                Some(numbers) => numbers,
                 None => return Ok(()),
-            }
-        }
+            },
+        };
         let unit = TimeUnit::of_numbers(&times);
         self.set_time(column, unit.in_seconds().1);
         if unit != TimeUnit::Second {
@@ -93,6 +116,19 @@ impl LogPass {
             self.recognised = Some((unit, name));
         }
         Ok(())
+    }
+
+    /// The first numbers of a column; none where it holds dates, which have no unit.
+    fn first_numbers(&self, column: usize) -> Result<Option<Vec<f64>>, LogError> {
+        let mut rows = open(&self.files, &self.layout, Strictness::Record)?.rows;
+        let mut numbers = Vec::with_capacity(LOOKED_AT);
+        while numbers.len() < LOOKED_AT && rows.next()?.is_some() {
+            match rows.logged(column) {
+                Some(number) => numbers.push(number),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(numbers))
     }
 
     /// What was chosen on the way, one sentence each.
@@ -123,6 +159,7 @@ impl LogPass {
             used: None,
             samples: 0,
             watch: None,
+            tape: None,
         }
     }
 
@@ -192,7 +229,10 @@ impl LogPass {
         }
         let span = match self.spec.span {
             Span::Whole => (f64::NEG_INFINITY, f64::INFINITY),
-            Span::Seconds { from, to } => (first + from, first + to),
+            Span::Seconds { from, to } => {
+                let zero = self.rows.begins().unwrap_or(first);
+                (zero + from, zero + to)
+            }
             Span::Percent { from, to } => {
                 let last = self.last_time()?.unwrap_or(first);
                 let at = |percent: f64| first + (last - first) * percent / 100.0;
@@ -206,8 +246,11 @@ impl LogPass {
 
     /// Time of the log's last row [s]: one more pass, in which only times are looked at.
     fn last_time(&self) -> Result<Option<f64>, LogError> {
-        let (mut rows, ..) = open(&self.files, &self.layout, self.strictness)?;
-        if let Some((column, seconds)) = self.time {
+        let mut rows: Box<dyn LogRows> = match &self.tape {
+            Some(tape) => Box::new(TapeRows::new(Arc::clone(tape))),
+            None => open(&self.files, &self.layout, self.strictness)?.rows,
+        };
+        if let (None, Some((column, seconds))) = (&self.tape, self.time) {
             rows.set_time(column, seconds);
         }
         let (mut origin, mut last) = (self.origin, None);
@@ -218,10 +261,42 @@ impl LogPass {
         Ok(last)
     }
 
+    /// The least step of a clock that stands still from row to row, and the rate of the rows: `None` where they are
+    /// no rows of a clock that is only too coarse.
+    pub(super) fn coarse_clock(&self) -> Option<(f64, f64)> {
+        let mut rows = open(&self.files, &self.layout, self.strictness).ok()?.rows;
+        if let Some((column, seconds)) = self.time {
+            rows.set_time(column, seconds);
+        }
+        let (mut origin, mut first, mut last) = (self.origin, None, f64::NAN);
+        let (mut count, mut still, mut least) = (0_u64, 0_u64, f64::INFINITY);
+        while let Some(stamp) = rows.next().ok()? {
+            let t = stamp.seconds(&mut origin);
+            let step = t - last;
+            if step < 0.0 || t.is_nan() {
+                return None;
+            }
+            still += u64::from(step == 0.0);
+            least = if step > 0.0 { least.min(step) } else { least };
+            (count, last) = (count + 1, t);
+            first.get_or_insert(t);
+        }
+        let duration = last - first?;
+        let rate = count.saturating_sub(1) as f64 / duration;
+        // a clock that stands still now and then is another fault
+        let coarse = 4 * still > count && duration > 10.0 * least;
+        coarse.then(|| (least, round_within(rate, rate * 2.0 * least / duration)))
+    }
+
     /// Counts rows that are handed out, by the times of the first and the last of them.
     pub(super) fn count(&mut self, rows: usize, first: f64, last: f64) {
         self.used = Some((self.used.map_or(first, |(first, _)| first), last));
         self.samples += rows as u64;
+    }
+
+    /// Time of the first row handed out [s].
+    pub(super) fn began(&self) -> Option<f64> {
+        self.used.map(|(first, _)| first)
     }
 
     /// Time from the first to the last row handed out so far [s].
@@ -233,7 +308,7 @@ impl LogPass {
     pub(super) fn provenance(&self) -> Result<Provenance, LogError> {
         Ok(Provenance {
             name: self.spec.name(),
-            span: self.spec.span.label(),
+            span: self.spec.part(),
             sha256: match (self.rows.sha256(), &self.watch) {
                 (Some(known), _) => known.to_owned(),
                 (None, Some(watch)) => watch.sha256(),
@@ -246,22 +321,56 @@ impl LogPass {
     }
 }
 
-/// Rows of a log, the layout that it turns out to have, and what keeps a strict reader from it.
-type Opened = (Box<dyn LogRows>, Layout, Option<LogError>);
+/// The shortest number that is as near to `x` as `within`.
+fn round_within(x: f64, within: f64) -> f64 {
+    let shorter = (1..=6).map(|digits| {
+        let place = 10_f64.powi(digits - 1 - x.abs().log10().floor() as i32);
+        (x * place).round() / place
+    });
+    let mut near = shorter.filter(|short| (short - x).abs() <= within);
+    near.next().unwrap_or(x)
+}
 
-fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Opened, LogError> {
+/// A log that was opened.
+pub(super) struct Opened {
+    pub(super) rows: Box<dyn LogRows>,
+    /// The layout that it turns out to have.
+    pub(super) layout: Layout,
+    /// What keeps a strict reader from it.
+    pub(super) refused: Option<LogError>,
+    /// The bytes of a text log.
+    pub(super) bytes: Option<RawBytes>,
+}
+
+pub(super) fn open(
+    files: &[PathBuf],
+    layout: &Layout,
+    strictness: Strictness,
+) -> Result<Opened, LogError> {
     if let [path] = files {
         let content = Content::open(path)?;
         if format_of(content.head()).is_none() {
+            let bytes = content.raw.clone();
             let (rows, layout, refused) = TextRows::open(path, content, layout, strictness)?;
-            return Ok((Box::new(rows), layout, refused));
+            return Ok(Opened {
+                rows: Box::new(rows),
+                layout,
+                refused,
+                bytes,
+            });
         }
     }
+    let recorded = |rows, layout, refused| Opened {
+        rows,
+        layout,
+        refused,
+        bytes: None,
+    };
     let mut refused = None;
     // Without a robot there are no channels to look for.
     if !layout.joints.is_empty() {
         match (MessageRows::open(files, layout), strictness) {
-            (Ok((rows, layout)), _) => return Ok((Box::new(rows), layout, None)),
+            (Ok((rows, layout)), _) => return Ok(recorded(Box::new(rows), layout, None)),
             (Err(error), Strictness::Refuse) => return Err(error),
             (Err(error), Strictness::Record) => refused = Some(error),
         }
@@ -269,7 +378,7 @@ fn open(files: &[PathBuf], layout: &Layout, strictness: Strictness) -> Result<Op
     match JointStates::open(files, layout.section.topic.as_deref()) {
         Ok(states) => {
             let layout = choose(states.names(), layout);
-            Ok((Box::new(states), layout, refused))
+            Ok(recorded(Box::new(states), layout, refused))
         }
         Err(error) => Err(refused.unwrap_or(error)),
     }

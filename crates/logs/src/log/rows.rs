@@ -41,6 +41,11 @@ pub(super) trait LogRows: Debug + Send {
         false
     }
 
+    /// The time from which spans in seconds count, where that is not the first row's [s].
+    fn begins(&self) -> Option<f64> {
+        None
+    }
+
     /// Says which column is the time, and how many seconds its unit has, where rows carry none.
     fn set_time(&mut self, _column: usize, _seconds: f64) {}
 
@@ -83,6 +88,17 @@ pub(super) trait LogRows: Debug + Send {
     /// SHA-256 of what holds the rows, where that is no file.
     fn sha256(&self) -> Option<&str> {
         None
+    }
+
+    /// Messages that contradict the others of their topic and are left out, with how many they are, once the
+    /// last row is read.
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        Vec::new()
+    }
+
+    /// Arrays of messages that cannot be given to joints, once the last row is read.
+    fn uneven(&self) -> Vec<(u64, String)> {
+        Vec::new()
     }
 
     /// Where files break off, once the last row is read.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserializer, Error, Visitor};
+use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
 /// Unit of a logged position.
@@ -14,6 +14,9 @@ pub enum PositionUnit {
     /// Metre.
     #[serde(rename = "m")]
     Metre,
+    /// Centimetre.
+    #[serde(rename = "cm")]
+    Centimetre,
     /// Millimetre.
     #[serde(rename = "mm")]
     Millimetre,
@@ -23,6 +26,9 @@ pub enum PositionUnit {
     /// Degree.
     #[serde(rename = "deg")]
     Degree,
+    /// Whole turns.
+    #[serde(rename = "turns")]
+    Turn,
     /// Encoder counts: those of the CFT robot's actuators by Table 5, of a joint by `position_scale`.
     #[serde(rename = "counts")]
     Counts,
@@ -33,18 +39,32 @@ impl PositionUnit {
     pub const fn label(self) -> &'static str {
         match self {
             Self::Metre => "m",
+            Self::Centimetre => "cm",
             Self::Millimetre => "mm",
+            Self::Turn => "turns",
             Self::Radian => "rad",
             Self::Degree => "deg",
             Self::Counts => "counts",
         }
     }
 
+    /// Whether it is a length.
+    pub const fn is_length(self) -> bool {
+        matches!(self, Self::Metre | Self::Centimetre | Self::Millimetre)
+    }
+
+    /// Whether it is an angle.
+    pub const fn is_angle(self) -> bool {
+        matches!(self, Self::Radian | Self::Degree | Self::Turn)
+    }
+
     /// SI units in one of it; 1 for counts, whose size depends on the coordinate.
     pub const fn in_si(self) -> f64 {
         match self {
             Self::Metre | Self::Radian | Self::Counts => 1.0,
+            Self::Centimetre => 1e-2,
             Self::Millimetre => 1e-3,
+            Self::Turn => std::f64::consts::TAU,
             Self::Degree => std::f64::consts::PI / 180.0,
         }
     }
@@ -59,6 +79,18 @@ pub enum TorqueUnit {
     /// Newton metre.
     #[serde(rename = "Nm")]
     NewtonMetre,
+    /// Kilonewton.
+    #[serde(rename = "kN")]
+    Kilonewton,
+    /// Kilonewton metre.
+    #[serde(rename = "kNm")]
+    KilonewtonMetre,
+    /// Newton centimetre.
+    #[serde(rename = "Ncm")]
+    NewtonCentimetre,
+    /// Millinewton metre.
+    #[serde(rename = "mNm")]
+    MillinewtonMetre,
     /// Ampere of motor current, kept as such: the model is then in A.
     #[serde(rename = "A")]
     Ampere,
@@ -79,6 +111,10 @@ impl TorqueUnit {
         match self {
             Self::Newton => "N",
             Self::NewtonMetre => "Nm",
+            Self::Kilonewton => "kN",
+            Self::KilonewtonMetre => "kNm",
+            Self::NewtonCentimetre => "Ncm",
+            Self::MillinewtonMetre => "mNm",
             Self::Ampere => "A",
             Self::Volt => "V",
             Self::Counts => "counts",
@@ -88,7 +124,33 @@ impl TorqueUnit {
 
     /// Whether it is a unit of force or torque, and not one that a gain takes to them.
     pub const fn is_torque(self) -> bool {
-        matches!(self, Self::Newton | Self::NewtonMetre)
+        self.is_force() || self.is_moment()
+    }
+
+    /// Whether it is a unit of force.
+    pub const fn is_force(self) -> bool {
+        matches!(self, Self::Newton | Self::Kilonewton)
+    }
+
+    /// Whether it is a unit of torque.
+    pub const fn is_moment(self) -> bool {
+        matches!(
+            self,
+            Self::NewtonMetre
+                | Self::KilonewtonMetre
+                | Self::NewtonCentimetre
+                | Self::MillinewtonMetre
+        )
+    }
+
+    /// N or Nm in one of it; 1 where it is no torque.
+    pub const fn in_si(self) -> f64 {
+        match self {
+            Self::Kilonewton | Self::KilonewtonMetre => 1e3,
+            Self::NewtonCentimetre => 1e-2,
+            Self::MillinewtonMetre => 1e-3,
+            _ => 1.0,
+        }
     }
 }
 
@@ -308,7 +370,8 @@ pub struct ActuatorChannels {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
-    /// Column of the time, or field of a message; `t` where absent.
+    /// Column of the time, or field of a message; `t` where absent. A column of whole seconds with one of their
+    /// nanoseconds, milli- or microseconds beside it, `["sec", "nanosec"]`, is one clock.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnName>,
     /// Unit of the time column; where absent the header's, else by the size of the numbers and of
@@ -325,6 +388,9 @@ pub struct LogSection {
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
     pub delimiter: Delimiter,
+    /// Line of a text log that names its columns, from 1; found where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub header_line: Option<u64>,
     /// Topic of a recording that holds the positions; found where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
@@ -384,13 +450,14 @@ impl JsonSchema for ColumnName {
         json_schema!({"anyOf": [
             {"type": "string"},
             {"type": "integer", "format": "uint32", "minimum": 0},
+            {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
         ]})
     }
 }
 
 struct NameOrNumber;
 
-impl Visitor<'_> for NameOrNumber {
+impl<'de> Visitor<'de> for NameOrNumber {
     type Value = ColumnName;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -399,6 +466,19 @@ impl Visitor<'_> for NameOrNumber {
 
     fn visit_str<E: Error>(self, name: &str) -> Result<ColumnName, E> {
         Ok(ColumnName(name.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<ColumnName, A::Error> {
+        let mut names: Vec<String> = Vec::new();
+        while let Some(name) = seq.next_element()? {
+            names.push(name);
+        }
+        match names.len() {
+            2 => Ok(ColumnName(names.join("+"))),
+            n => Err(A::Error::custom(format!(
+                "{n} columns; a clock has two at most: seconds and their nanoseconds"
+            ))),
+        }
     }
 
     fn visit_i64<E: Error>(self, number: i64) -> Result<ColumnName, E> {

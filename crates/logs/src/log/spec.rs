@@ -3,11 +3,13 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use super::LogError;
 use super::names::escape_whole;
 use super::recording::FORMATS;
 use super::source::{failed, file_name, shown};
+use super::tape::Kept;
 
 /// The part of a log that is used.
 ///
@@ -34,6 +36,9 @@ pub enum Span {
     },
 }
 
+/// Parts the span from the stretches that are left out, in outputs.
+const WITHOUT: &str = " without ";
+
 impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -56,7 +61,8 @@ impl Span {
 
     /// The span that a label tells; the whole log where it tells none.
     pub(super) fn read(label: &str) -> Self {
-        Self::parse(label).unwrap_or_default()
+        let span = label.split_once(WITHOUT).map_or(label, |(span, _)| span);
+        Self::parse(span).unwrap_or_default()
     }
 
     /// Whether two spans of one log can have rows in common; those in other units can.
@@ -112,22 +118,71 @@ impl Span {
 }
 
 /// A log file and the part of it that is used.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct LogSpec {
     /// Path as the user wrote it, without the span: a file, a folder with the parts of one
     /// recording, or several files of one recording joined with `+`.
     pub path: PathBuf,
     /// The part that is used.
     pub span: Span,
+    /// Stretches of it that are left out, in seconds after the log's first sample.
+    pub leave_out: Vec<[f64; 2]>,
+    /// How long the machine had run when the log began \[s\].
+    pub started_s: f64,
+    /// What is kept of it, so that it is read once.
+    pub(super) kept: Arc<Kept>,
+}
+
+impl PartialEq for LogSpec {
+    fn eq(&self, other: &Self) -> bool {
+        let parts = (&self.path, self.span, &self.leave_out);
+        parts == (&other.path, other.span, &other.leave_out)
+    }
 }
 
 impl LogSpec {
     /// The whole of one file.
     pub fn whole(path: impl Into<PathBuf>) -> Self {
+        Self::new(path.into(), Span::Whole)
+    }
+
+    /// Another part of the same log.
+    pub fn of_span(&self, span: Span) -> Self {
         Self {
-            path: path.into(),
-            span: Span::Whole,
+            span,
+            ..self.clone()
         }
+    }
+
+    fn new(path: PathBuf, span: Span) -> Self {
+        let kept = Kept::of(&path);
+        Self {
+            path,
+            span,
+            leave_out: Vec::new(),
+            started_s: 0.0,
+            kept,
+        }
+    }
+
+    /// What is read of the file, as it stands in outputs; `None` for the whole of it.
+    pub fn part(&self) -> Option<String> {
+        let without = self.leave_out.iter();
+        let without: Vec<String> = without.map(|[from, to]| format!("{from}..{to}s")).collect();
+        match (self.span.label(), without.is_empty()) {
+            (span, true) => span,
+            (span, false) => Some(format!(
+                "{}{WITHOUT}{}",
+                span.unwrap_or_default(),
+                without.join(", ")
+            )),
+        }
+    }
+
+    /// Whether a row so many seconds after the log's first one is left out.
+    pub(super) fn leaves_out(&self, since: f64) -> bool {
+        let inside = |[from, to]: &[f64; 2]| *from <= since && since < *to;
+        self.leave_out.iter().any(inside)
     }
 
     /// File name without folders: the only form in which a path enters an output.
@@ -213,8 +268,8 @@ fn natural(name: &str) -> Vec<(usize, String)> {
 impl fmt::Display for LogSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.path.display())?;
-        match self.span.label() {
-            Some(span) => write!(f, "@{span}"),
+        match self.part() {
+            Some(part) => write!(f, "@{part}"),
             None => Ok(()),
         }
     }
@@ -237,10 +292,7 @@ impl FromStr for LogSpec {
             return Ok(Self::whole(text));
         }
         match Span::parse(tail.trim()) {
-            Ok(span) => Ok(Self {
-                path: PathBuf::from(path),
-                span,
-            }),
+            Ok(span) => Ok(Self::new(PathBuf::from(path), span)),
             Err(reason) => Err(LogError::Span {
                 spec: escape_whole(text),
                 reason,

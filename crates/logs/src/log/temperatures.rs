@@ -32,8 +32,8 @@ impl Temperatures {
         origin: Instant,
     ) -> Result<Self, LogError> {
         let whole = LogSpec {
-            path: spec.path.clone(),
             span: Span::Whole,
+            ..spec.clone()
         };
         let mut pass = LogPass::open(&whole, layout, Strictness::Refuse)?;
         let mut courses = vec![Course::default(); joints.len()];

@@ -23,6 +23,14 @@ impl Instant {
         }
     }
 
+    pub(super) fn of_femtoseconds(fs: i128) -> Self {
+        Self { fs }
+    }
+
+    pub(super) fn femtoseconds(self) -> i128 {
+        self.fs
+    }
+
     /// An instant from whole seconds and nanoseconds.
     pub(crate) fn from_s_ns(s: i64, ns: i64) -> Self {
         Self {
@@ -56,6 +64,13 @@ impl Instant {
     /// Whether seconds from the zero of the clock would lose resolution.
     pub(super) fn is_far(self) -> bool {
         self.fs.unsigned_abs() >= (FAR_S as u128) * SECOND as u128
+    }
+
+    /// The sum with an instant that counts from it.
+    pub(super) fn and(self, rest: Self) -> Self {
+        Self {
+            fs: self.fs.saturating_add(rest.fs),
+        }
     }
 
     /// Later by `s` seconds, rounded to the femtosecond.

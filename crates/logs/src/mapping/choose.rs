@@ -4,11 +4,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::column::LogColumn;
-use super::family::{Family, How, Key, families, fit};
+use super::family::{Family, How, Key, families, fit, penalty};
 use super::look::{ClockSource, SeenColumns};
-use super::units::{Unit, of_positions, of_torques};
+use super::units::{of_positions, of_torques, other_velocity, stated_position, stated_torque};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, joint, words};
+use crate::inspect::words::{Word, joint, slides, without_joint, words};
 use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
@@ -62,10 +62,14 @@ pub struct Mapping {
     pub checks: Vec<String>,
     /// Families of columns of the same kind that were not taken.
     pub others: Vec<String>,
-    /// `torque_is` of the robot file.
+    /// `torque_is` of the robot file, and what to look at there where it is a guess.
     pub torque_is: &'static str,
+    pub torque_check: Option<String>,
     /// Columns that the robot lacks, one sentence each.
     pub warnings: Vec<String>,
+    /// Quantities that no column was found for, and families of columns that may be them.
+    pub lacking: Vec<&'static str>,
+    pub offered: Vec<String>,
 }
 
 /// A family that was taken.
@@ -99,7 +103,10 @@ impl Mapping {
             checks: Vec::new(),
             others: Vec::new(),
             torque_is: "joint",
+            torque_check: None,
             warnings: Vec::new(),
+            lacking: Vec::new(),
+            offered: Vec::new(),
         };
         let Some(seen) = seen else {
             return out;
@@ -125,27 +132,46 @@ impl Mapping {
             match taken {
                 Some(taken) => out.tell(taken, what, names.len(), seen.headerless),
                 None if what == "velocities" => {}
-                None => out.warnings.push(format!(
-                    "no columns look like the {what} of {} joint(s): complete [log.joint]",
-                    names.len()
-                )),
+                None => {
+                    out.lacking.push(what);
+                    out.warnings.push(format!(
+                        "no columns look like the {what} of {} joint(s): complete [log.joint]",
+                        names.len()
+                    ));
+                }
             }
+        }
+        if !out.lacking.is_empty() {
+            out.offered = offered(columns, names.len());
         }
         if seen.headerless {
             out.how = "by what they hold, for they have no names: CHECK IT";
         }
         let [position, velocity, torque] = all;
+        // words of a joint's name are no units
+        let beside = |columns: &[Option<LogColumn>]| -> Vec<Option<LogColumn>> {
+            let pairs = columns.iter().zip(&names);
+            pairs
+                .map(|(column, joint)| {
+                    let mut column = column.clone()?;
+                    column.name = without_joint(&column.name, joint);
+                    Some(column)
+                })
+                .collect()
+        };
         let columns_of = |taken: &Option<Taken>| -> Vec<Option<LogColumn>> {
             let none = vec![None; names.len()];
             let cloned = |t: &Taken| t.columns.iter().map(|c| c.cloned()).collect();
             taken.as_ref().map_or(none, cloned)
         };
-        let (q, dq, tau) = (
+        let (q, mut dq, tau) = (
             columns_of(&position),
             columns_of(&velocity),
             columns_of(&torque),
         );
-        out.units(&joints, &q, &tau);
+        if out.units(&joints, [&beside(&q), &beside(&dq), &beside(&tau)]) {
+            dq.iter_mut().for_each(|column| *column = None);
+        }
         let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
             joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
@@ -160,6 +186,7 @@ impl Mapping {
                     .map(str::to_owned);
             }
         }
+        out.check_torque(seen);
         out
     }
 
@@ -194,8 +221,8 @@ impl Mapping {
         self.others.extend(others);
     }
 
-    /// Units of positions and torques.
-    fn units(&mut self, known: &[Known], q: &[Option<LogColumn>], tau: &[Option<LogColumn>]) {
+    /// Units of positions and torques; whether velocities are in units that do not go with those of the positions.
+    fn units(&mut self, known: &[Known], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
         let paired = |columns: &[Option<LogColumn>]| -> Vec<usize> {
             (0..columns.len())
                 .filter(|k| columns[*k].is_some())
@@ -204,39 +231,61 @@ impl Mapping {
         let found = paired(q);
         let columns: Vec<&LogColumn> = found.iter().filter_map(|k| q[*k].as_ref()).collect();
         let kinds: Vec<JointKind> = found.iter().map(|k| known[*k].kind).collect();
-        let Unit {
-            unit, scale, check, ..
-        } = of_positions(&columns, &kinds);
-        for joint in &mut self.joints {
-            let fits = match joint.kind {
-                JointKind::Revolute => unit != Some("mm"),
-                JointKind::Prismatic => unit != Some("deg"),
-            };
-            if fits {
-                (joint.position_unit, joint.position_scale) = (unit, scale);
-            }
+        for (k, unit) in found.iter().zip(of_positions(&columns, &kinds)) {
+            let joint = &mut self.joints[*k];
+            (joint.position_unit, joint.position_scale) = (unit.unit, unit.scale);
+            self.check(unit.check.map(|text| format!("positions: {text}")));
         }
-        self.checks
-            .extend(check.map(|text| format!("positions: {text}")));
+        let position = |k: &usize| q[*k].as_ref().and_then(stated_position);
+        let other = |k: &usize| {
+            let velocity = dq[*k].as_ref();
+            velocity.is_some_and(|velocity| other_velocity(velocity, position(k)))
+        };
+        let apart = paired(dq).iter().any(other);
         let found = paired(tau);
         let columns: Vec<&LogColumn> = found.iter().filter_map(|k| tau[*k].as_ref()).collect();
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
-        let Unit {
-            unit,
-            scale,
-            check,
-            drive,
-        } = of_torques(&columns, &limits);
-        for joint in &mut self.joints {
-            (joint.torque_unit, joint.torque_scale) = (unit, scale);
+        let units = of_torques(&columns, &limits);
+        let current = units
+            .iter()
+            .any(|unit| unit.drive && unit.unit == Some("A"));
+        for (k, unit) in found.iter().zip(units) {
+            let joint = &mut self.joints[*k];
+            (joint.torque_unit, joint.torque_scale) = (unit.unit, unit.scale);
+            self.check(unit.check.map(|text| format!("torques: {text}")));
         }
-        self.checks
-            .extend(check.map(|text| format!("torques: {text}")));
-        if drive && unit == Some("A") && self.torque_is == "joint" {
+        if current && self.torque_is == "joint" {
             self.torque_is = "current";
             if self.joints.len() > 1 {
                 self.checks.push("torques: motor currents; give torque_scale of each joint, torque constant times gear ratio".to_owned());
             }
+        }
+        apart
+    }
+
+    /// Notes what is to be looked at, once.
+    fn check(&mut self, text: Option<String>) {
+        if let Some(text) = text.filter(|text| !self.checks.contains(text)) {
+            self.checks.push(text);
+        }
+    }
+
+    /// Says that nothing in a log tells where torques were measured, or that efforts are none.
+    fn check_torque(&mut self, seen: &SeenColumns) {
+        let contract = |joint: &JointColumns| {
+            let name = joint.torque.as_deref();
+            name.is_none_or(|name| name == format!("tau_{}", joint.joint))
+        };
+        let any = self.joints.iter().any(|joint| joint.torque.is_some());
+        let own = !seen.is_recording() && self.joints.iter().all(contract);
+        if any && !own && self.torque_is == "joint" {
+            let effort = match seen.is_recording() {
+                true => "many drivers publish motor currents as effort",
+                false => "no name says it",
+            };
+            self.torque_check = Some(format!(
+                "torques at the joints? {effort}; else torque_is = \"motor\" or \"current\", with torque_scale"
+            ));
         }
     }
 
@@ -244,7 +293,7 @@ impl Mapping {
     pub fn is_sure(&self, seen: Option<&SeenColumns>) -> bool {
         let clock = seen.map(|seen| &seen.clock);
         let guessed = matches!(clock, Some(ClockSource::Column { guessed: true, .. }));
-        self.checks.is_empty() && !guessed
+        self.checks.is_empty() && self.torque_check.is_none() && !guessed
     }
 
     /// Kind of the only joint.
@@ -287,6 +336,45 @@ struct Fitting<'a> {
     columns: Vec<Option<&'a LogColumn>>,
 }
 
+/// For every joint the column that has its name, whatever else the names say: a joint that slides has a force where
+/// others have torques.
+fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a>> {
+    let mut worst = 0;
+    let mut own = |joint: &&str| {
+        let has = |column: &&LogColumn| {
+            let longer = |other: &&str| {
+                other.len() > joint.len() && without_joint(&column.name, other) != column.name
+            };
+            without_joint(&column.name, joint) != column.name && !joints.iter().any(longer)
+        };
+        let of = columns.iter().copied().filter(has);
+        let with = of.map(|column| {
+            let bare = without_joint(&column.name, joint);
+            (penalty(&words(&bare), column.role), column)
+        });
+        let mut all: Vec<(i32, &LogColumn)> = with.collect();
+        all.sort_by_key(|(penalty, _)| *penalty);
+        let (first, column) = *all.first()?;
+        // two that are as good are no answer
+        let sure = all.get(1).is_none_or(|(second, _)| *second > first);
+        worst = worst.max(first);
+        sure.then_some(Some(column))
+    };
+    let columns = joints.iter().map(&mut own).collect::<Option<Vec<_>>>()?;
+    let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
+    let apart = names
+        .iter()
+        .collect::<std::collections::BTreeSet<_>>()
+        .len()
+        == names.len();
+    (apart && joints.len() > 1).then(|| Fitting {
+        rank: (worst, i32::MAX),
+        pattern: names.join(", "),
+        how: How::Fits,
+        columns,
+    })
+}
+
 /// The family of a role that fits the joints best.
 fn best<'a>(
     columns: &'a [LogColumn],
@@ -317,6 +405,9 @@ fn best<'a>(
             });
         }
     }
+    if let Some(named) = by_names(&of_role, joints) {
+        found.push(named);
+    }
     // the first of equals
     found.sort_by_key(|fitting| fitting.rank);
     let mut found = found.into_iter();
@@ -328,11 +419,19 @@ fn best<'a>(
     } = found.next()?;
     let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
     let (mut others, mut tie) = (Vec::new(), false);
+    let mut told: Vec<Vec<&str>> = Vec::new();
     for other in found {
         // another reading of the same columns is no other family
         let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
+        let mut known = |columns: &[Option<&'a LogColumn>]| {
+            let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
+            let known = told.contains(&names);
+            told.push(names);
+            known
+        };
         if other.columns.iter().flatten().all(same)
             || other.how == How::InPart
+            || known(&other.columns)
             || others.contains(&other.pattern)
         {
             continue;
@@ -347,6 +446,21 @@ fn best<'a>(
         others,
         tie,
     })
+}
+
+/// Families that are offered where no name says what they are.
+const OFFERED: usize = 6;
+
+/// Families of as many columns as joints whose names say nothing.
+fn offered(columns: &[LogColumn], joints: usize) -> Vec<String> {
+    let unsaid = |c: &&LogColumn| matches!(c.role, ChannelRole::Other | ChannelRole::Command);
+    let unsaid: Vec<&LogColumn> = columns.iter().filter(unsaid).collect();
+    let found = families(&unsaid, &[]);
+    let fitting = found.iter().filter(|family| family.members.len() == joints);
+    fitting
+        .take(OFFERED)
+        .map(|family| family.pattern.clone())
+        .collect()
 }
 
 /// A column of temperatures for every joint, where a family of them fits.
@@ -438,7 +552,11 @@ fn shown(columns: &[LogColumn]) -> Vec<Known> {
                 joint_name(&left.collect::<Vec<_>>().join("_"))
             }
         };
-        one(&name, kind_of(column))
+        let torque = torques.iter().find_map(|family| {
+            let own = family.members.iter().find(|(other, _)| other == key);
+            own.map(|(_, column)| *column)
+        });
+        one(&name, kind_of(column, torque))
     };
     let joints: Vec<Known> = members.iter().map(of_member).collect();
     joints
@@ -453,11 +571,26 @@ fn own_name(column: &str) -> Option<&str> {
     (whole && named).then_some(rest)
 }
 
-/// Metres slide, everything else turns.
-fn kind_of(column: &LogColumn) -> JointKind {
-    match column.unit.as_deref() {
-        Some("m" | "mm" | "cm") => JointKind::Prismatic,
-        _ => JointKind::Revolute,
+/// Metres slide, and so does what a force moves; everything else turns.
+fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
+    let force = torque.and_then(stated_torque);
+    let pushed = torque.is_some_and(|torque| slides(&words(&torque.name)));
+    // the joint of `q_base_turn` is not in turns
+    let bare = |column: &LogColumn| LogColumn {
+        name: own_name(&column.name).map_or_else(|| column.name.clone(), |_| "q_#".to_owned()),
+        ..column.clone()
+    };
+    let position = &bare(position);
+    let slid = match (stated_position(position), force) {
+        (Some("m" | "mm" | "cm"), _) => true,
+        (Some(_), _) => false,
+        (None, Some("N" | "kN")) => true,
+        (None, Some("Nm" | "mNm" | "kNm" | "Ncm")) => false,
+        _ => pushed || slides(&words(&position.name)),
+    };
+    match slid {
+        true => JointKind::Prismatic,
+        false => JointKind::Revolute,
     }
 }
 

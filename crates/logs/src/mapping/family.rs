@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::column::LogColumn;
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, words};
+use crate::inspect::words::{Word, without_units, words};
 use crate::log::nearest;
 
 /// What tells a member of a family from the others.
@@ -95,7 +95,7 @@ const PENALTIES: [(&[&str], i32); 4] = [
     ),
 ];
 
-fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
+pub(super) fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
     let of = |known: &[&str]| {
         pattern
             .iter()
@@ -152,8 +152,25 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
             .filter_map(|joint| Some((*joint, part(joint)?)));
         let longest = named.max_by_key(|(joint, _)| joint.len());
         if let Some((joint, at)) = longest {
-            add(without(at), Key::Name(joint.to_owned()), column);
-        } else if column.joint.is_empty() {
+            let pattern = without(at);
+            // `J1_pos_deg` and `Z_pos_mm` are of one kind
+            let plain = without_units(&pattern);
+            if plain != pattern {
+                add(plain, Key::Name(joint.to_owned()), column);
+            }
+            add(pattern, Key::Name(joint.to_owned()), column);
+            continue;
+        }
+        // axes may be called S, L, U or X, Y, Z
+        let numbered = |k: usize| spoken.get(k).is_some_and(|word| word.number().is_some());
+        for (k, word) in spoken.iter().enumerate() {
+            let alone = !numbered(k + 1) && !k.checked_sub(1).is_some_and(numbered);
+            if word.text.len() == 1 && word.number().is_none() && alone {
+                let key = Key::Name(word.text.clone());
+                add(without(word.at.clone()), key, column);
+            }
+        }
+        if column.joint.is_empty() {
             add(name.clone(), Key::Name(String::new()), column);
         } else if column.joint.parse::<u32>().is_err()
             && let Some(at) = part(&column.joint)
@@ -165,7 +182,11 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
         let members = found.remove(&pattern)?;
         let keys: BTreeSet<&Key> = members.iter().map(|(key, _)| key).collect();
         let role = members.first()?.1.role;
-        (keys.len() == members.len()).then(|| Family {
+        let letters =
+            |(key, _): &(Key, &LogColumn)| matches!(key, Key::Name(name) if name.len() == 1);
+        // a letter that all names share is no axis
+        let shared = members.len() == 1 && members.iter().all(letters) && joints.len() != 1;
+        (keys.len() == members.len() && !shared).then(|| Family {
             penalty: penalty(&words(&pattern), role),
             pattern,
             members,

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::column::LogColumn;
-use crate::inspect::words::words;
+use crate::inspect::words::{Drive, drive, words};
+use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
 /// Largest position that a joint in radians has where it does not turn on and on.
@@ -26,119 +27,205 @@ pub(super) struct Unit {
     pub drive: bool,
 }
 
-fn says(column: &LogColumn, known: &[&str]) -> bool {
-    let unit = column.unit.as_deref().unwrap_or_default().to_lowercase();
-    known.contains(&unit.as_str())
-        || words(&column.name)
-            .iter()
-            .any(|word| known.contains(&word.text.as_str()))
+/// Words that name a unit of positions and nothing else, and the unit; `m` and `rad` are the tool's own.
+const POSITIONS: [(&str, &[&str]); 7] = [
+    ("deg", &["deg", "degs", "degree", "degrees", "°"]),
+    ("mm", &["mm", "millimeter", "millimetre"]),
+    ("cm", &["cm", "centimeter", "centimetre"]),
+    ("turns", &["turn", "turns", "rev", "revs", "revolutions"]),
+    (
+        "counts",
+        &[
+            "counts",
+            "count",
+            "ticks",
+            "tick",
+            "inc",
+            "increments",
+            "pulses",
+        ],
+    ),
+    ("rad", &["rad", "rads", "radian", "radians"]),
+    ("m", &["meter", "meters", "metre", "metres"]),
+];
+/// The same of torques, currents and voltages.
+const TORQUES: [(&str, &[&str]); 10] = [
+    ("mNm", &["mnm", "nmm"]),
+    ("kNm", &["knm"]),
+    ("Ncm", &["ncm"]),
+    ("kN", &["kn"]),
+    ("%", &["percent", "pct", "%", "load", "utilization"]),
+    ("Nm", &["nm", "n·m", "n*m", "n.m"]),
+    ("N", &["newton", "newtons"]),
+    ("mA", &["milliamps"]),
+    ("A", &["amp", "amps", "ampere", "amperes"]),
+    ("V", &["volt", "volts"]),
+];
+/// Units of one letter, or of two that mean something else too: in brackets they are units, in a name labels of
+/// axes.
+const SHORT: [(&str, &str); 5] = [("m", "m"), ("n", "N"), ("a", "A"), ("v", "V"), ("ma", "mA")];
+
+/// The unit that the name of a column states: in brackets, or in a word that means nothing else.
+fn stated(column: &LogColumn, known: &[(&'static str, &[&str])]) -> Option<&'static str> {
+    let of = |word: &str| {
+        let mut all = known.iter();
+        Some(all.find(|(_, words)| words.contains(&word))?.0)
+    };
+    let bracket = column.unit.as_deref().unwrap_or_default().to_lowercase();
+    let short = SHORT.iter().find(|(short, _)| *short == bracket);
+    let short = short.filter(|(_, unit)| known.iter().any(|(own, _)| own == unit));
+    let spoken = words(&column.name);
+    // `current_mA` ends with it; in `MACur` it is the motor's actual one
+    let last = spoken.iter().rfind(|word| word.number().is_none());
+    let milli = last.filter(|word| word.text == "ma" && spoken.len() > 1);
+    of(&bracket)
+        .or(short.map(|(_, unit)| *unit))
+        .or_else(|| spoken.iter().find_map(|word| of(&word.text)))
+        .or_else(|| milli.and_then(|_| of("milliamps")))
 }
 
-/// The unit of the positions of all joints.
-pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Unit {
-    let Some(first) = columns.first() else {
-        return Unit::default();
-    };
-    let unit = |unit| Unit {
-        unit: Some(unit),
-        ..Unit::default()
-    };
-    if says(first, &["deg", "degs", "degree", "degrees", "°"]) {
-        return unit("deg");
-    }
-    if says(first, &["mm"]) {
-        return unit("mm");
-    }
-    if says(
-        first,
-        &["counts", "count", "ticks", "tick", "inc", "increments"],
-    ) {
-        return Unit {
-            check: Some("counts: give position_scale, rad or m per count".to_owned()),
-            ..unit("counts")
-        };
-    }
-    if says(first, &["rad", "rads", "radian", "radians", "m"]) {
-        return Unit::default();
-    }
+/// The unit that the name of a position states.
+pub(super) fn stated_position(column: &LogColumn) -> Option<&'static str> {
+    stated(column, &POSITIONS)
+}
+
+/// The unit that the name of a torque states.
+pub(super) fn stated_torque(column: &LogColumn) -> Option<&'static str> {
+    stated(column, &TORQUES)
+}
+
+/// Whether a velocity is said to be in a unit that the position's does not go with.
+pub(super) fn other_velocity(velocity: &LogColumn, position: Option<&'static str>) -> bool {
+    let rpm = words(&velocity.name).iter().any(|word| word.text == "rpm");
+    let stated = stated_position(velocity).filter(|unit| *unit != "rad" && *unit != "m");
+    rpm || stated != position.filter(|unit| *unit != "rad" && *unit != "m")
+}
+
+/// The units of the positions of all joints.
+pub(super) fn of_positions(columns: &[&LogColumn], kinds: &[JointKind]) -> Vec<Unit> {
     let of = |kind: JointKind| {
         let all = columns.iter().zip(kinds).filter(move |(_, k)| **k == kind);
-        all.map(|(column, _)| column.largest()).fold(0.0, f64::max)
+        let plain = all.filter(|(column, _)| stated_position(column).is_none());
+        plain
+            .map(|(column, _)| column.largest())
+            .fold(0.0, f64::max)
     };
     let (turned, slid) = (of(JointKind::Revolute), of(JointKind::Prismatic));
-    let whole = columns.iter().all(|c| c.whole) && turned.max(slid) > 400.0;
-    if whole {
-        return Unit {
-            check: Some(format!(
-                "whole numbers up to {}: counts? then give position_scale, rad or m per count",
-                turned.max(slid)
-            )),
-            ..unit("counts")
+    let plain = columns.iter().filter(|c| stated_position(c).is_none());
+    let whole = plain.clone().all(|c| c.whole) && turned.max(slid) > 400.0;
+    let first = plain.clone().next().map(|column| &column.name);
+    let guessed = |kind: JointKind, column: &LogColumn| {
+        // one sentence for all of them
+        let told = |text: String| Some(text).filter(|_| first == Some(&column.name));
+        let (unit, check) = match kind {
+            _ if whole => (
+                Some("counts"),
+                format!(
+                    "whole numbers up to {}: counts? then give position_scale, rad or m per count",
+                    turned.max(slid)
+                ),
+            ),
+            JointKind::Revolute if turned > TURN => (
+                Some("deg"),
+                format!(
+                    "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
+                ),
+            ),
+            JointKind::Prismatic if slid > TRAVEL_M => (
+                Some("mm"),
+                format!(
+                    "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
+                ),
+            ),
+            _ => return Unit::default(),
         };
-    }
-    if turned > TURN {
-        return Unit {
-            check: Some(format!(
-                "deg is guessed: positions go to {turned:.0}, and no joint turns that far in rad"
-            )),
-            ..unit("deg")
-        };
-    }
-    if slid > TRAVEL_M {
-        return Unit {
-            check: Some(format!(
-                "mm is guessed: positions go to {slid:.0}, and no joint slides that far in m"
-            )),
-            ..unit("mm")
-        };
-    }
-    Unit::default()
+        Unit {
+            unit,
+            check: told(check),
+            ..Unit::default()
+        }
+    };
+    let each = columns.iter().zip(kinds);
+    each.map(|(column, kind)| match stated_position(column) {
+        None => guessed(*kind, column),
+        Some("rad" | "m") => Unit::default(),
+        Some("counts") => Unit {
+            unit: Some("counts"),
+            check: Some("counts: give position_scale, rad or m per count".to_owned()),
+            ..Unit::default()
+        },
+        Some(unit) => {
+            let length = matches!(unit, "mm" | "cm");
+            match length == (*kind == JointKind::Prismatic) {
+                true => Unit {
+                    unit: Some(unit),
+                    ..Unit::default()
+                },
+                false => Unit {
+                    check: Some(format!(
+                        "`{}` is in {unit}, which does not go with the kind of its joint",
+                        escape(&column.name)
+                    )),
+                    ..Unit::default()
+                },
+            }
+        }
+    })
+    .collect()
 }
 
-/// The unit of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
-pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
-    let Some(first) = columns.first() else {
-        return Unit::default();
+/// The units of the torques of all joints; `limits` are those of the robot [Nm or N], where known.
+pub(super) fn of_torques(columns: &[&LogColumn], limits: &[Option<f64>]) -> Vec<Unit> {
+    let guessed = guessed_torque(columns, limits);
+    let of = |(k, column): (usize, &&LogColumn)| {
+        match (
+        stated_torque(column),
+        drive(&words(&column.name)),
+    ) {
+        (Some("A"), Drive::Unsaid | Drive::Current)
+        | (None, Drive::Current) => driving("A"),
+        (Some("mA"), _) => Unit {
+            scale: Some(1e-3),
+            check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
+            ..driving("A")
+        },
+        (Some("A"), _) => driving("A"),
+        (Some("V"), _) | (None, Drive::Voltage) => driving("V"),
+        (Some("%"), _) => rated("percent of a rated torque", "100"),
+        (Some("Nm" | "N"), _) => Unit::default(),
+        (Some(unit), _) => Unit {
+            unit: Some(unit),
+            ..Unit::default()
+        },
+        // one sentence for all of them
+        (None, _) => Unit {
+            check: guessed.check.clone().filter(|_| k == 0),
+            ..guessed.clone()
+        },
+    }
     };
-    let drive = |unit| Unit {
+    columns.iter().enumerate().map(of).collect()
+}
+
+fn driving(unit: &'static str) -> Unit {
+    Unit {
         unit: Some(unit),
         drive: true,
         ..Unit::default()
-    };
-    if says(first, &["mnm", "nmm"]) {
-        return Unit {
-            scale: Some(1e-3),
-            ..Unit::default()
-        };
     }
-    let rated = |what: &str, part: &str| Unit {
+}
+
+fn rated(what: &str, part: &str) -> Unit {
+    Unit {
         check: Some(format!(
             "{what}: give torque_scale, the rated torque of the joint over {part}"
         )),
         ..Unit::default()
-    };
-    if says(first, &["percent", "pct", "%", "load", "utilization"]) {
-        return rated("percent of a rated torque", "100");
     }
-    if says(first, &["nm", "n"]) {
-        return Unit::default();
-    }
-    if says(first, &["ma"]) {
-        return Unit {
-            scale: Some(1e-3),
-            check: Some("currents in mA, which the scale makes A: give torque constant times gear ratio times 0.001 for Nm".to_owned()),
-            ..drive("A")
-        };
-    }
-    let currents = [
-        "a", "amp", "amps", "ampere", "current", "currents", "curr", "cur", "iq", "i",
-    ];
-    if says(first, &currents) {
-        return drive("A");
-    }
-    if says(first, &["v", "volt", "volts", "voltage", "voltages", "u"]) {
-        return drive("V");
-    }
+}
+
+/// What the sizes of torques suggest, where no name says a unit.
+fn guessed_torque(columns: &[&LogColumn], limits: &[Option<f64>]) -> Unit {
     let largest: Vec<f64> = columns.iter().map(|c| c.largest()).collect();
     let most = largest.iter().copied().fold(0.0, f64::max);
     let known: Vec<f64> = (largest.iter().zip(limits))
@@ -206,22 +293,33 @@ mod tests {
         }
     }
 
+    fn one(all: Vec<Unit>) -> Unit {
+        all.into_iter().next().unwrap()
+    }
+
     #[test]
     fn names_state_units_and_else_sizes_suggest_them() {
         let turn = [JointKind::Revolute];
-        let position = |name: &str, largest| of_positions(&[&column(name, largest, false)], &turn);
+        let position =
+            |name: &str, largest| one(of_positions(&[&column(name, largest, false)], &turn));
         assert_eq!(position("act_pos_mot_deg_1", 2.0).unit, Some("deg"));
         assert_eq!(position("act_pos_mot_deg_1", 2.0).check, None);
         assert_eq!(position("q1", 3.1), Unit::default());
         assert_eq!(position("q1", 170.0).unit, Some("deg"));
         assert!(position("q1", 170.0).check.is_some());
-        let slide = of_positions(&[&column("q1", 400.5, false)], &[JointKind::Prismatic]);
+        let slide = one(of_positions(
+            &[&column("q1", 400.5, false)],
+            &[JointKind::Prismatic],
+        ));
         assert_eq!(slide.unit, Some("mm"));
-        let counts = of_positions(&[&column("q1", 90_000.0, true)], &turn);
+        let counts = one(of_positions(&[&column("q1", 90_000.0, true)], &turn));
         assert_eq!(counts.unit, Some("counts"));
         let torque =
-            |name: &str, largest, whole| of_torques(&[&column(name, largest, whole)], &[None]);
-        assert_eq!(torque("tau_mnm_1", 2e3, false).scale, Some(1e-3));
+            |name: &str, largest, whole| one(of_torques(&[&column(name, largest, whole)], &[None]));
+        assert_eq!(torque("tau_mnm_1", 2e3, false).unit, Some("mNm"));
+        assert_eq!(torque("force_kN", 2.5, false).unit, Some("kN"));
+        assert_eq!(torque("Torque_A1", 2.5, false), Unit::default());
+        assert_eq!(torque("torque_V1", 2.5, false), Unit::default());
         assert_eq!(torque("torque_nm_1", 2e3, true), Unit::default());
         assert_eq!(torque("tau_1", 150.3, false), Unit::default());
         assert!(
@@ -239,7 +337,10 @@ mod tests {
         assert_eq!(torque("tau_1", 150_300.5, false).scale, Some(1e-3));
         assert!(torque("actual_current_0", 4.0, false).drive);
         // beside the limits of the robot
-        let small = of_torques(&[&column("tau_1", 9000.5, false)], &[Some(12.0)]);
+        let small = one(of_torques(
+            &[&column("tau_1", 9000.5, false)],
+            &[Some(12.0)],
+        ));
         assert_eq!(small.scale, Some(1e-3));
     }
 

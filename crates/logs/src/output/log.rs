@@ -130,6 +130,18 @@ impl LogWriter {
     /// # Errors
     /// A place that cannot be written.
     pub fn create(path: &Path, columns: &[impl AsRef<str>]) -> Result<Self, OutputError> {
+        Self::with_notes(path, columns, &[])
+    }
+
+    /// The same with lines that a reader should know: comments over the header, or metadata of a recording.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn with_notes(
+        path: &Path,
+        columns: &[impl AsRef<str>],
+        notes: &[String],
+    ) -> Result<Self, OutputError> {
         let columns: Vec<String> = columns.iter().map(|c| c.as_ref().to_owned()).collect();
         let form = LogForm::of(path).unwrap_or(LogForm {
             messages: false,
@@ -138,10 +150,10 @@ impl LogWriter {
         let file = AtomicFile::create(path)?;
         let begun = Packed::new(file, form.packing).and_then(|packed| {
             Ok(if form.messages {
-                Sink::Messages(Box::new(McapLog::new(packed, &columns)?))
+                Sink::Messages(Box::new(McapLog::new(packed, &columns, notes)?))
             } else {
                 let buffered = io::BufWriter::with_capacity(1 << 16, packed);
-                Sink::Text(Box::new(Text::new(buffered, &columns)?))
+                Sink::Text(Box::new(Text::new(buffered, &columns, notes)?))
             })
         });
         Ok(Self {

@@ -48,7 +48,7 @@ pub(super) struct McapLog<W: Write> {
 
 impl<W: Write> McapLog<W> {
     /// Begins a recording of these columns, of which the first is the time.
-    pub(super) fn new(out: W, columns: &[String]) -> io::Result<Self> {
+    pub(super) fn new(out: W, columns: &[String], notes: &[String]) -> io::Result<Self> {
         let mut writer = options().create(NoSeek::new(out)).map_err(plain)?;
         let schema = writer
             .add_schema(
@@ -64,6 +64,9 @@ impl<W: Write> McapLog<W> {
                 .map_err(plain)?;
             let names = cdr_names(&topic.names);
             topics.push((channel, topic, names));
+        }
+        if !notes.is_empty() {
+            writer.write_metadata(&metadata(notes)).map_err(plain)?;
         }
         Ok(Self {
             writer,
@@ -121,6 +124,17 @@ impl<W: Write> McapLog<W> {
     }
 }
 
+/// Notes, numbered.
+fn metadata(notes: &[String]) -> Metadata {
+    let numbered = notes.iter().enumerate();
+    Metadata {
+        name: "notes".to_owned(),
+        metadata: numbered
+            .map(|(i, note)| (format!("{:02}", i + 1), note.clone()))
+            .collect(),
+    }
+}
+
 /// A recording of one message at the time 0, with notes as metadata.
 pub(super) fn single_message(
     topic: &str,
@@ -145,14 +159,7 @@ pub(super) fn single_message(
     writer
         .write_to_known_channel(&header, body)
         .map_err(plain)?;
-    let numbered = notes.iter().enumerate();
-    let metadata = Metadata {
-        name: "notes".to_owned(),
-        metadata: numbered
-            .map(|(i, note)| (format!("{:02}", i + 1), note.clone()))
-            .collect(),
-    };
-    writer.write_metadata(&metadata).map_err(plain)?;
+    writer.write_metadata(&metadata(notes)).map_err(plain)?;
     writer.finish().map_err(plain)?;
     Ok(writer.into_inner().into_inner())
 }

@@ -11,8 +11,11 @@ pub(super) struct Text<W> {
 }
 
 impl<W: Write> Text<W> {
-    /// Writes the header.
-    pub(super) fn new(mut out: W, columns: &[String]) -> io::Result<Self> {
+    /// Writes the notes and the header.
+    pub(super) fn new(mut out: W, columns: &[String], notes: &[String]) -> io::Result<Self> {
+        for note in notes {
+            writeln!(out, "# {note}")?;
+        }
         let names: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
         writeln!(out, "{}", names.join(","))?;
         Ok(Self { out })

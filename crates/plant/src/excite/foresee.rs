@@ -34,12 +34,25 @@ pub struct Condition {
 pub struct Expected {
     pub name: String,
     pub unit: String,
-    /// Value in the model that the motion was judged with.
-    pub value: f64,
+    /// Value in the model that the motion was judged with; null where torques are not foreseen.
+    pub value: Option<f64>,
     /// Expected standard deviation; null where the motion does not excite it.
     pub std: Option<f64>,
     /// Over the value's modulus.
     pub relative_std: Option<f64>,
+}
+
+impl Expected {
+    pub(super) fn new(name: &str, unit: String, value: Option<f64>, std: Option<f64>) -> Self {
+        let size = value.map(f64::abs).filter(|size| *size > 0.0);
+        Self {
+            name: name.to_owned(),
+            unit,
+            value,
+            std,
+            relative_std: std.zip(size).map(|(std, size)| std / size),
+        }
+    }
 }
 
 /// Part of an unknown in a direction; columns are scaled to norm 1.
@@ -157,20 +170,12 @@ pub fn foresee(
     }
     let (covariance, determined) = inverse(&g)?;
     let values = machine.unknown_values();
-    let parameters = (0..p)
-        .map(|i| {
-            let std = determined[i].then(|| covariance[(i, i)].sqrt());
-            Expected {
-                name: names[i].clone(),
-                unit: unit(machine, i),
-                value: values[i],
-                std,
-                relative_std: std
-                    .filter(|_| values[i] != 0.0)
-                    .map(|s| s / values[i].abs()),
-            }
-        })
-        .collect();
+    let parameters = (0..p).map(|i| {
+        let std = determined[i].then(|| covariance[(i, i)].sqrt());
+        let value = machine.source.known().then_some(values[i]);
+        Expected::new(&names[i], unit(machine, i), value, std)
+    });
+    let parameters = parameters.collect();
     Ok(Foresight {
         condition: Condition {
             raw: full.then(|| rank::condition(&singular)),

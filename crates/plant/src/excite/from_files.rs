@@ -4,14 +4,13 @@ use std::f64::consts::TAU;
 
 use crate::simulate::Mechanism;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
-use cft_ident_core::robot::friction::ViscousCoulomb;
-use cft_ident_core::robot::model::{JointFriction, Model};
-use cft_ident_core::robot::{JointKind, Robot};
+use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::robot_file::CoordinateLimits;
 use cft_ident_files::config::trajectory::{FourierCoordinate, FourierSection};
 use cft_ident_files::config::{ModelFile, RobotFile};
 
 use super::ExciteError;
+use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
 use super::machine::ForeseenRobot;
 use super::series::{MOST, Series};
@@ -20,7 +19,8 @@ use super::space::DesignSpace;
 /// Share of the speed limit within which the sign of a Coulomb column is smoothed in a search.
 const SIGN: f64 = 0.005;
 
-/// The machine of a robot file, with the torques of a model, or of the numbers that stand for the robot.
+/// The machine of a robot file, with the torques of a model, or of what else is known of its masses; where
+/// nothing is, limits of torque are none of its channels.
 ///
 /// Limits are those of `[limits]` and `[control] saturation_v`, and where these say nothing what is known of
 /// the robot: of the CFT robot Table 5, 4000 revolutions per minute of every motor and 10 V. `noise` is left 1.
@@ -34,13 +34,7 @@ pub fn machine(
 ) -> Result<ForeseenRobot, ExciteError> {
     let robot = file.robot();
     let n = robot.joints();
-    let model = match model {
-        Some((name, given)) => {
-            given.belongs_to(name, file)?;
-            given.model(name)?
-        }
-        None => nominal(file, &robot),
-    };
+    let (model, source) = TorqueSource::of(file, &robot, model)?;
     let mut own = vec![Vec::new(); n];
     if file.friction.fitted_with_inertias {
         for own in &mut own {
@@ -59,6 +53,7 @@ pub fn machine(
             rest_speed: Vec::new(),
         },
         model,
+        source,
         mechanism: Mechanism::of(file)?,
         space: DesignSpace::default(),
         channels: Vec::new(),
@@ -66,6 +61,9 @@ pub fn machine(
         coulomb_speed: vec![1.0; n],
     };
     machine.channels = channels(file, &machine.mechanism)?;
+    if !machine.source.known() {
+        machine.channels.retain(|c| !c.quantity.is_of_torque());
+    }
     let (space, of_places) = DesignSpace::of(file, &machine.model.robot);
     machine.space = space;
     machine.channels.extend(of_places);
@@ -79,37 +77,6 @@ pub fn machine(
         machine.coulomb_speed[i] = SIGN * speed.or(travel).unwrap_or(1.0);
     }
     Ok(machine)
-}
-
-/// Numbers of a robot that no model was given for: those that stand for it, else inertias of 1 with the
-/// friction that its file starts from.
-fn nominal(file: &RobotFile, robot: &Robot) -> Model {
-    let (theta, friction) = match robot.nominal() {
-        Some(nominal) => {
-            let laws = nominal.friction.into_iter();
-            let laws = laws.map(JointFriction::DoubleTanh).collect();
-            (nominal.theta, laws)
-        }
-        None => {
-            let friction = robot.joint_names().iter().map(|joint| {
-                let start = file.friction.joint.get(joint).cloned().unwrap_or_default();
-                match (start.viscous, start.coulomb) {
-                    (None, None) => JointFriction::None,
-                    (viscous, coulomb) => JointFriction::ViscousCoulomb(ViscousCoulomb {
-                        viscous: viscous.unwrap_or(0.0),
-                        coulomb: coulomb.unwrap_or(0.0),
-                    }),
-                }
-            });
-            (vec![1.0; robot.parameters().len()], friction.collect())
-        }
-    };
-    Model {
-        theta,
-        friction,
-        offset: vec![0.0; robot.joints()],
-        robot: robot.clone(),
-    }
 }
 
 /// What a motion must keep: limits of the motors' coordinates, of joints that are none of these, and where the

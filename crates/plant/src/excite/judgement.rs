@@ -35,6 +35,10 @@ pub struct Judgement {
     /// Every limit on the straight way from the given pose to the first point, `t` as a share of the way; null
     /// where no pose is given.
     pub way: Option<Vec<LimitUse>>,
+    /// With what torques are foreseen, in one sentence.
+    pub torques: String,
+    /// Whether they are foreseen at all; where not, no limit of torque was checked.
+    pub torques_foreseen: bool,
     /// What nobody looked at, in one sentence.
     pub not_checked: String,
     /// Expected deviations, friction known.
@@ -54,7 +58,7 @@ pub struct Judgement {
     pub rate_hz: f64,
     /// Of a series alone.
     pub spectrum: Option<Vec<Amplitudes>>,
-    /// Of a series alone.
+    /// Of a series alone, where torques are foreseen.
     pub band: Option<Vec<PowerBand>>,
     /// Duration of the motion \[s\].
     pub seconds: f64,
@@ -233,9 +237,12 @@ pub fn judge(
                 joint: joint.clone(),
                 torque_power_99_below_hz,
             };
-            let band = torque_band(machine, series, BAND)?;
-            let band = joints.iter().zip(band).map(of).collect();
-            (Some(spectrum), Some(band), blend.periods)
+            let band = match machine.source.known() {
+                true => Some(torque_band(machine, series, BAND)?),
+                false => None,
+            };
+            let band = band.map(|band| joints.iter().zip(band).map(of).collect());
+            (Some(spectrum), band, blend.periods)
         }
         Motion::Path { .. } => (None, None, None),
     };
@@ -252,6 +259,8 @@ pub fn judge(
         samples_per_period: foresight.samples,
         limits_used: limits_used(&names, &uses),
         limits: uses.iter().map(LimitUse::of).collect(),
+        torques: machine.source.sentence(),
+        torques_foreseen: machine.source.known(),
         not_checked: machine.space.not_checked(way.is_some()),
         way: way.map(|way| way.iter().map(LimitUse::of).collect()),
         parameters: foresight.parameters,

@@ -300,14 +300,8 @@ fn expected(
     let torque = model.robot.joint_unit(joint);
     let rows = names.iter().zip(values).zip(variances);
     let expected = rows.map(|((name, value), variance)| {
-        let std = variance.map(f64::sqrt);
-        Expected {
-            name: (*name).to_owned(),
-            unit: friction_unit(&model.robot, joint, name, torque),
-            value,
-            std,
-            relative_std: std.filter(|_| value != 0.0).map(|s| s / value.abs()),
-        }
+        let unit = friction_unit(&model.robot, joint, name, torque);
+        Expected::new(name, unit, Some(value), variance.map(f64::sqrt))
     });
     Ok((expected.collect(), used))
 }

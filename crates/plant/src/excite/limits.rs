@@ -39,6 +39,11 @@ impl Quantity {
         matches!(self, Self::Position | Self::Speed | Self::Acceleration)
     }
 
+    /// Whether it takes the masses of the links to foresee it.
+    pub(super) fn is_of_torque(self) -> bool {
+        matches!(self, Self::Drive | Self::Torque)
+    }
+
     /// Whether it tells where links are, and so bounds no coordinate alone.
     pub(super) fn is_of_places(self) -> bool {
         matches!(

@@ -10,6 +10,7 @@ use cft_ident_core::robot::model::{JointFriction, Model};
 use cft_ident_core::robot::tree::pose::{Frame, frames};
 use cft_ident_files::config::trajectory::Coordinates;
 
+use super::foreseen::TorqueSource;
 use super::limits::{BoundedQuantity, Quantity};
 use super::series::{Kinematics, MOST};
 use super::space::DesignSpace;
@@ -18,6 +19,8 @@ use super::space::DesignSpace;
 #[derive(Debug, Clone)]
 pub struct ForeseenRobot {
     pub model: Model,
+    /// Where the model's numbers come from, and how far its torques may be off.
+    pub source: TorqueSource,
     /// What a fit would estimate: inertial parameters, and linear friction where it is fitted too.
     pub columns: RegressorColumns,
     /// Motors and limits, as the simulator knows them.
@@ -296,6 +299,7 @@ impl ForeseenRobot {
             machine: self,
             state,
             frames: OnceCell::new(),
+            half_widths: OnceCell::new(),
         }
     }
 }
@@ -307,9 +311,42 @@ pub struct Quantities<'a> {
     state: &'a State,
     /// Of the links, for the first channel that asks where they are and all after it.
     frames: OnceCell<Vec<Frame>>,
+    /// How far the torques may be off, and the drives.
+    half_widths: OnceCell<[[f64; MOST]; 2]>,
 }
 
 impl Quantities<'_> {
+    /// How far the quantity of a channel may be off, 95 % of the time.
+    #[inline]
+    pub fn half_width(&self, channel: &BoundedQuantity) -> f64 {
+        if !channel.quantity.is_of_torque() {
+            return 0.0;
+        }
+        let [torques, drives] = self.half_widths.get_or_init(|| self.widths());
+        match channel.quantity {
+            Quantity::Torque => torques[channel.index],
+            _ => drives[channel.index],
+        }
+    }
+
+    fn widths(&self) -> [[f64; MOST]; 2] {
+        let (machine, n) = (self.machine, self.machine.coordinates());
+        let [q, v, a] = [&self.state.q, &self.state.v, &self.state.a].map(|x| &x[..n]);
+        let (mut torques, mut drives) = ([0.0; MOST], [0.0; MOST]);
+        machine.source.half_widths([q, v, a], &mut torques);
+        // a drive carries a share of each torque; as if all were off at once
+        for j in (0..n).filter(|j| torques[*j] > 0.0) {
+            let mut one = [0.0; MOST];
+            one[j] = torques[j];
+            if let Ok(of_one) = machine.drives(q, &one[..n]) {
+                for (sum, x) in drives.iter_mut().zip(of_one) {
+                    *sum += x.abs();
+                }
+            }
+        }
+        [torques, drives]
+    }
+
     /// The quantity of a channel.
     #[inline]
     pub fn of(&self, channel: &BoundedQuantity) -> f64 {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`series`], [`blend`] | finite Fourier series (43); rest at both ends |
 //! | [`machine`], [`limits`] | coordinates to joints, torques and volts; what is bounded |
+//! | [`foreseen`] | the numbers that torques are foreseen with |
 //! | [`criterion`], [`information`] | J_k, J_d, traces, and their slopes |
 //! | [`search`] | many starts, an augmented Lagrangian around L-BFGS, repair |
 //! | [`usage`], [`peak`] | how near each limit a motion comes, between samples too |
@@ -14,6 +15,7 @@
 pub mod blend;
 pub mod criterion;
 pub mod foresee;
+pub mod foreseen;
 mod from_files;
 pub mod given;
 pub mod information;
@@ -34,6 +36,7 @@ pub mod usage;
 mod variables;
 
 pub use criterion::Criterion;
+pub use foreseen::TorqueSource;
 pub use from_files::{machine, series_of, trajectory};
 pub use given::GivenInformation;
 pub use judgement::{Judgement, Judgements, LawForeseen, Terms, judge};
@@ -52,7 +55,7 @@ pub enum ExciteError {
     )]
     NoTravel { coordinate: String },
     #[error(
-        "nothing bounds the speed of {coordinate}; write `[limits.{coordinate}] speed = ...` (or acceleration, or torque) into the robot file"
+        "nothing bounds the speed of {coordinate}; write `[limits.{coordinate}] speed = ...` (or acceleration; or torque, and give a model with -m) into the robot file"
     )]
     NoSpeed { coordinate: String },
     #[error(

@@ -24,7 +24,7 @@ const ROUGH: f64 = 1e-3;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Use {
     pub channel: BoundedQuantity,
-    /// Least and most of the quantity.
+    /// Least and most of the quantity, of a torque with its 95 % band.
     pub range: [f64; 2],
     /// Share of the limit: 1 at it, above 1 beyond it; infinite where the machine cannot follow.
     pub share: f64,
@@ -336,27 +336,31 @@ fn of_path(
         let quantities = machine.quantities(&state);
         for (channel, values) in channels.iter().zip(&mut grid) {
             values.push(match (channel.quantity.is_linear(), reached) {
-                (true, _) => of_kinematics(channel, &k),
-                (false, true) => quantities.of(channel),
-                (false, false) => f64::NAN,
+                (true, _) => (of_kinematics(channel, &k), 0.0),
+                (false, true) => (quantities.of(channel), quantities.half_width(channel)),
+                (false, false) => (f64::NAN, 0.0),
             });
         }
     }
     let mut value = |channel: &BoundedQuantity, t: f64| {
         let k = (path.at)(t);
         if channel.quantity.is_linear() {
-            return of_kinematics(channel, &k);
+            return (of_kinematics(channel, &k), 0.0);
         }
-        let reached = machine.fill(&k, &mut state);
-        reached.map_or(f64::NAN, |()| machine.quantities(&state).of(channel))
+        if machine.fill(&k, &mut state).is_err() {
+            return (f64::NAN, 0.0);
+        }
+        let quantities = machine.quantities(&state);
+        (quantities.of(channel), quantities.half_width(channel))
     };
     channels
         .iter()
         .zip(grid)
         .map(|(channel, values)| {
             let mut peak = |sign: f64| {
-                let samples: Vec<f64> = values.iter().map(|value| sign * value).collect();
-                let mut f = |t| sign * value(channel, t);
+                let beyond = |(value, half): (f64, f64)| sign * value + half;
+                let samples: Vec<f64> = values.iter().copied().map(beyond).collect();
+                let mut f = |t| beyond(value(channel, t));
                 let tolerance = tolerance * room(channel);
                 highest_from(&mut f, path.span, &samples, None, tolerance)
             };

@@ -250,6 +250,13 @@ fn add(
         .map(|(j, theta)| OfJoint::new(model, layout, &scene, (j, theta)))
         .collect();
     let p = layout.theta;
+    let speeds = rest_speed.iter().enumerate();
+    let weights: Vec<Vec<f64>> = speeds
+        .map(|(j, speed)| match model.model.friction[j].jumps() {
+            true => filter.weights(stretch, j, *speed),
+            false => vec![1.0; stretch.len()],
+        })
+        .collect();
     let mut regressor = vec![0.0; n * p];
     let mut channels: Vec<Vec<Vec<f64>>> = joints
         .iter()
@@ -273,22 +280,22 @@ fn add(
                 let friction = entries[..of.friction].iter().copied();
                 let offset = of.offset.then_some(1.0);
                 let added = of.added.iter().map(|column| column[k]);
-                let last = [residual[j][k], rest::movement(v[j], rest_speed[j])];
+                let weight = weights[j][k];
+                let last = [residual[j][k], 1.0];
                 let all = theta.chain(friction).chain(offset).chain(added).chain(last);
                 channels
                     .iter_mut()
                     .zip(all)
-                    .for_each(|(channel, x)| channel.push(x));
+                    .for_each(|(channel, x)| channel.push(weight * x));
             }
         }
         for (j, (of, channels)) in joints.iter().zip(&channels).enumerate() {
             let u = of.places.len();
             let channels: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
             let rows = filter.run(&channels)?;
-            let jumps = model.model.friction[j].jumps();
             let mut columns = vec![0.0; u];
             for i in 0..filter.rows(piece.len()) {
-                if jumps && rest::rests(rows[u + 1][i]) {
+                if rest::rests(rows[u + 1][i]) {
                     continue;
                 }
                 for (x, row) in columns.iter_mut().zip(&rows) {

@@ -198,6 +198,7 @@ impl<'a> Trial<'a> {
                 Ok(more)
             })
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            open.count_run_time(&mut found);
             if self.model.takes_temperatures() {
                 let temperatures =
                     (self.machine).temperatures_for(self.model, log, open.origin())?;
@@ -220,7 +221,8 @@ impl<'a> Trial<'a> {
         let n = self.machine.robot.joints();
         let samples: usize = stretches.iter().map(Stretch::len).sum();
         let every = samples.div_ceil(MOST_ERRORS).max(1);
-        let deviation = Deviation::new(self.file, &self.model.model);
+        let model = &self.model.model;
+        let deviation = Deviation::new(&self.file.model_covariance(model), model);
         let mut errors: Vec<Vec<Error>> = vec![Vec::with_capacity(samples / every + 1); n];
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut variances = vec![0.0; n];

@@ -62,6 +62,7 @@ pub(super) fn read_each(
         averaged |= open.is_centred();
         let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&name, e))?;
+        open.count_run_time(&mut found);
         for stretch in &mut found {
             stretch.zero = open.origin().seconds();
         }

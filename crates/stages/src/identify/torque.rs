@@ -169,7 +169,7 @@ impl<'a> Deviations<'a> {
         let joints = machine.robot.joint_names().iter();
         let residual = joints.map(|j| file.residual_std.get(j).copied().unwrap_or(0.0));
         Deviations {
-            of_parameters: Deviation::new(file, model),
+            of_parameters: Deviation::new(&file.model_covariance(model), model),
             residual: residual.collect(),
         }
     }

@@ -26,8 +26,6 @@ pub struct Fitted {
     pub model: AugmentedModel,
     /// 1 / variance of each joint's residual.
     pub weights: Vec<f64>,
-    /// Root mean square of it.
-    pub rms: Vec<f64>,
 }
 
 /// Most passes: a law that bends takes some.
@@ -73,7 +71,6 @@ pub fn fit(
         found = Some(Fitted {
             model: model.clone(),
             weights: weights.map_or_else(|| weights_of(&here, &rows), <[f64]>::to_vec),
-            rms: rms(&here, &rows),
         });
         if settled {
             break;
@@ -81,11 +78,6 @@ pub fn fit(
         step(&mut model, &unknowns, delta.as_slice());
     }
     found.ok_or(MotionError::TooFewSamples { samples: 0 })
-}
-
-fn rms(squares: &[f64], rows: &[f64]) -> Vec<f64> {
-    let pairs = squares.iter().zip(rows);
-    pairs.map(|(s, n)| (s / n.max(1.0)).sqrt()).collect()
 }
 
 /// 1 / variance of each joint's residual; nothing of a joint without rows.

@@ -1,5 +1,5 @@
 //! The one pass over all rows: columns of the declared unknowns and of candidates, with the measured torque and the
-//! residual, through the parallel filter, folded into sums per block and joint.
+//! residual, weighed where a joint stands or turns, through the parallel filter, folded into sums per block and joint.
 //!
 //! Long stretches are walked in windows, so that memory does not grow with them. A window begins a lead early, in which
 //! what remembers finds its state. Of very long logs every m-th row is summed: neighbours in the kept band repeat
@@ -11,11 +11,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::data_split::DataSplit;
-use super::rests::standing;
 use super::unknowns::{Unknown, Unknowns};
 use crate::effect::{Added, AugmentedModel, Scene, Torques, shifted};
 use crate::judge::{Block, BlockSums, Bound, Term};
-use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch};
+use crate::motion::{MotionError, ParallelFilters, Stretch};
 use crate::robot::model::JointFriction;
 
 /// Samples of a window besides its lead.
@@ -32,67 +31,8 @@ pub struct Data<'a> {
     pub stretches: &'a [Stretch],
     pub filters: &'a ParallelFilters,
     pub split: &'a DataSplit,
-    /// What each row says, `[stretch][joint][row]`; empty where all rows are of a moving joint.
-    pub rests: Vec<Vec<Vec<RowKind>>>,
-    /// Weight of each joint's rows at rest.
-    pub rest_weight: Vec<f64>,
-}
-
-/// What a row says of a joint whose friction law jumps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowKind {
-    Moving,
-    /// It rests: static friction takes any torque.
-    Resting,
-    /// The filter mixes a rest into it: it says nothing.
-    Mixed,
-}
-
-impl<'a> Data<'a> {
-    /// Rows of stretches by the model's friction laws; those at rest count nothing.
-    pub fn new(
-        model: &AugmentedModel,
-        stretches: &'a [Stretch],
-        (filters, cutoff_hz): (&'a ParallelFilters, f64),
-        split: &'a DataSplit,
-    ) -> Self {
-        let joints = model.model.robot.joints();
-        let of_stretch = |stretch: &Stretch| {
-            let parallel = filters.of(stretch);
-            let reach = 1.0 / (cutoff_hz * stretch.dt * parallel.decimation as f64);
-            let of_joint = |j| kinds(model, stretch, parallel, (j, reach.ceil() as usize));
-            (0..joints).map(of_joint).collect()
-        };
-        Data {
-            rests: stretches.par_iter().map(of_stretch).collect(),
-            rest_weight: vec![0.0; joints],
-            stretches,
-            filters,
-            split,
-        }
-    }
-}
-
-fn kinds(
-    model: &AugmentedModel,
-    stretch: &Stretch,
-    parallel: &Parallel,
-    (j, reach): (usize, usize),
-) -> Vec<RowKind> {
-    let still = standing(model, stretch, parallel, j);
-    if still.is_empty() {
-        return Vec::new();
-    }
-    let rows = parallel.rows(stretch.len());
-    let mut out = vec![RowKind::Moving; rows];
-    for i in &still {
-        let near = i.saturating_sub(reach)..(i + reach + 1).min(rows);
-        out[near].fill(RowKind::Mixed);
-    }
-    for i in still {
-        out[i] = RowKind::Resting;
-    }
-    out
+    /// Speed up to which each joint rests [m/s or rad/s].
+    pub rest_speed: &'a [f64],
 }
 
 /// Where the columns of unknowns and candidates stand in the rows of each joint.
@@ -216,8 +156,8 @@ fn fold(
                 if first >= to {
                     continue;
                 }
-                let (begin, count) = (first - window.start, (to - first).div_ceil(every));
-                let part = rows.rows_with_step(begin, count, every - 1).into_owned();
+                let (begin, kept) = (first - window.start, (to - first).div_ceil(every));
+                let part = rows.rows_with_step(begin, kept, every - 1).into_owned();
                 total.gemm(1.0, &part.transpose(), &part, 1.0);
                 *count += part.nrows() as f64;
             }
@@ -300,21 +240,15 @@ impl<'a> Window<'a> {
         let late = model.shift(j) / part.dt;
         let mut friction = friction_columns(&model.model.friction[j], &part.v[j]);
         let mut raw: Vec<Vec<f64>> = Vec::new();
-        let mut at_rest: Vec<bool> = Vec::new();
         for i in &unknowns.columns[j] {
-            let (column, rests) = match unknowns.list[*i] {
-                Unknown::Theta(c) => (std::mem::take(&mut regressor[c]), true),
-                Unknown::Friction { k, .. } => (std::mem::take(&mut friction[k]), false),
-                Unknown::Offset(_) => (vec![1.0; part.len()], true),
-            };
-            raw.push(column);
-            at_rest.push(rests);
+            raw.push(match unknowns.list[*i] {
+                Unknown::Theta(c) => std::mem::take(&mut regressor[c]),
+                Unknown::Friction { k, .. } => std::mem::take(&mut friction[k]),
+                Unknown::Offset(_) => vec![1.0; part.len()],
+            });
         }
         for (effect, _) in candidates.iter().filter(|(e, _)| e.place.touches(j)) {
-            for column in effect.columns(&scene, j) {
-                raw.push(column);
-                at_rest.push(effect.at_rest());
-            }
+            raw.extend(effect.columns(&scene, j));
         }
         let mut hat = self.torques.hat[j].clone();
         raw.iter_mut().for_each(|column| shifted(column, late));
@@ -322,8 +256,14 @@ impl<'a> Window<'a> {
         let tau = &part.tau[j];
         raw.push(tau.clone());
         raw.push(tau.iter().zip(&hat).map(|(tau, hat)| tau - hat).collect());
-        at_rest.extend([true, true]);
         let parallel = self.data.filters.of(&self.data.stretches[self.stretch]);
+        if model.model.friction[j] != JointFriction::None {
+            // both sides of the model, where the joint stands or turns, weigh nothing before any filter
+            let weights = parallel.weights(part, j, self.data.rest_speed[j]);
+            for column in &mut raw {
+                column.iter_mut().zip(&weights).for_each(|(x, w)| *x *= w);
+            }
+        }
         let (skip, count) = (self.range.start - self.begin, self.range.len());
         let mut out = DMatrix::zeros(count, raw.len());
         for (first, group) in raw.chunks(8).enumerate().map(|(g, group)| (8 * g, group)) {
@@ -334,24 +274,7 @@ impl<'a> Window<'a> {
                 column.into_iter().zip(kept).for_each(|(out, x)| *out = *x);
             }
         }
-        self.weigh(j, &mut out, &at_rest);
         Ok(out)
-    }
-
-    /// Rows at rest say nothing of friction, and little else.
-    fn weigh(&self, j: usize, rows: &mut DMatrix<f64>, at_rest: &[bool]) {
-        let kinds = &self.data.rests[self.stretch][j];
-        let kinds = kinds.get(self.range.clone()).unwrap_or_default();
-        for (i, kind) in kinds.iter().enumerate() {
-            let weight = match kind {
-                RowKind::Moving => continue,
-                RowKind::Resting => self.data.rest_weight[j],
-                RowKind::Mixed => 0.0,
-            };
-            for (x, at_rest) in rows.row_mut(i).iter_mut().zip(at_rest) {
-                *x *= if *at_rest { weight } else { 0.0 };
-            }
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Where a joint with a jump in its friction law stands or turns: static friction takes any torque there.
 
 use crate::effect::AugmentedModel;
-use crate::motion::{MotionError, Parallel, ParallelFilters, Stretch, rest};
+use crate::motion::{MotionError, Parallel, Stretch, rest};
 use crate::robot::model::JointFriction;
 
 /// Speed below which a joint counts as standing, over its rms speed.
@@ -58,44 +58,8 @@ pub(crate) fn resting(
         if model.model.friction[j] == JointFriction::None {
             return Ok(vec![false; rows]);
         }
-        let speeds = stretch.v[j].iter();
-        let moving: Vec<f64> = speeds.map(|v| rest::movement(*v, *speed)).collect();
-        let filtered = parallel.run(&[&moving])?;
+        let filtered = parallel.run(&[&parallel.weights(stretch, j, *speed)])?;
         Ok(filtered[0].iter().map(|m| rest::rests(*m)).collect())
     };
     rest_speed.iter().enumerate().map(of_joint).collect()
-}
-
-/// Weight of each joint's rows at rest, whose residual has the standard deviation `noise` otherwise [N or Nm].
-/// Friction at rest is anything up to its Coulomb level, evenly, and one number through a rest: all rows of a
-/// rest together tell as much as one number with that error.
-pub(crate) fn rest_weight(
-    model: &AugmentedModel,
-    stretches: &[Stretch],
-    filters: &ParallelFilters,
-    noise: &[f64],
-) -> Vec<f64> {
-    let of_joint = |(j, noise): (usize, &f64)| {
-        let level = match model.model.friction[j] {
-            JointFriction::ViscousCoulomb(law) => law.coulomb.abs(),
-            _ => return 0.0,
-        };
-        let (mut rows, mut rests) = (0usize, 0usize);
-        for stretch in stretches {
-            let still = standing(model, stretch, filters.of(stretch), j);
-            rows += still.len();
-            rests += usize::from(!still.is_empty());
-            rests += still.windows(2).filter(|w| w[1] > w[0] + 1).count();
-        }
-        if rests == 0 {
-            return 0.0;
-        }
-        let friction = rows as f64 / rests as f64 * level * level / 3.0;
-        let noise = noise * noise;
-        match noise > 0.0 {
-            true => (noise / (noise + friction)).sqrt(),
-            false => 0.0,
-        }
-    };
-    noise.iter().enumerate().map(of_joint).collect()
 }

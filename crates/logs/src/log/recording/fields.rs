@@ -102,13 +102,22 @@ impl RobotFields {
         values[self.time] != Value::Absent
     }
 
+    /// The stamp of a message's header \[ns\].
+    pub(super) fn header_ns(&self, values: &[Value]) -> Option<i128> {
+        let part = |index: usize| values[index].integer();
+        let (s, ns) = (part(self.header[0])?, part(self.header[1])?);
+        s.checked_mul(1_000_000_000)?.checked_add(ns)
+    }
+
     /// Whether a message has a header with a stamp other than 0.
     pub(super) fn has_header(&self, values: &[Value]) -> bool {
-        let part = |index: usize| values[index].integer();
-        match (part(self.header[0]), part(self.header[1])) {
-            (Some(s), Some(ns)) => (s, ns) != (0, 0),
-            _ => false,
-        }
+        self.header_ns(values).is_some_and(|ns| ns != 0)
+    }
+
+    /// Whether a message that is one with others of its instant lacks some of their fields: positions, torques
+    /// and velocities of other joints.
+    pub(super) fn channels(&self) -> Range<usize> {
+        0..self.time
     }
 
     /// Time of a message; `None` where it has none of this kind.

@@ -7,9 +7,10 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::encoding::reader_of;
-use super::message::{MessageHead, MessageReader, Schema, Wanted};
+use super::message::{MessageHead, MessageReader, Schema, Uneven, Wanted};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
+use super::sources::{Publisher, Publishers};
 use super::state_topics::{ARRAYS, COLUMNS, FoundTopic, Survey, TIMES, Times, groups, survey};
 use super::value::Value;
 use crate::log::names::{escape, list, nearest};
@@ -26,6 +27,12 @@ struct StateTopic {
     /// Place of its first column.
     first: usize,
     stamped: bool,
+    zero_is_time: bool,
+    fields: Vec<Vec<FieldPath>>,
+    publishers: Publishers,
+    /// Messages with an array that cannot be given to joints, and the first of them.
+    uneven: u64,
+    first_uneven: Option<Uneven>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -52,6 +59,12 @@ pub(in crate::log) struct JointStates {
     other_topics: Vec<String>,
     unreadable: u64,
     incomplete: u64,
+    /// Messages that were stamped 0 before the clock was known.
+    unstamped: u64,
+    /// Whether a message with a stamp was read, and whether one without came before it.
+    begun: bool,
+    begins_unstamped: bool,
+    paths: Vec<PathBuf>,
 }
 
 impl fmt::Debug for JointStates {
@@ -167,6 +180,11 @@ impl JointStates {
                 reader,
                 first,
                 stamped: one.stamped,
+                zero_is_time: one.zero_is_time,
+                fields,
+                publishers: Publishers::default(),
+                uneven: 0,
+                first_uneven: None,
             });
         }
         let mut names: Vec<String> = sources.iter().map(|s| s.topic.clone()).collect();
@@ -175,6 +193,10 @@ impl JointStates {
         }
         let mut states = Self {
             recording: MessageFiles::open(paths, Wanted { names })?,
+            paths: paths.to_vec(),
+            unstamped: 0,
+            begun: false,
+            begins_unstamped: false,
             row: StateRow::new(columns.len(), sources.len()),
             ahead: StateRow::new(columns.len(), sources.len()),
             sources,
@@ -218,19 +240,42 @@ impl JointStates {
                 self.unreadable += 1;
                 continue;
             }
-            let key = one.key(&head);
-            let same = self.row.full && self.row.key == key && !self.row.sources[at];
+            let publisher = Publisher::of(&head, &*one.reader);
+            let place = (&*self.paths, &*one.topic);
+            let numbers = &one.values[2..];
+            if !one
+                .publishers
+                .take(publisher, place, &one.fields[2..], numbers)?
+            {
+                continue;
+            }
+            if let Some(uneven) = one.reader.uneven() {
+                one.uneven += 1;
+                one.first_uneven.get_or_insert(uneven);
+            }
+            let Some(key) = one.key(&head) else {
+                self.unstamped += 1;
+                self.begins_unstamped |= !self.begun;
+                continue;
+            };
+            let own = one.first..one.first + one.values.len() - 2;
+            // messages of one instant may each hold some of the joints
+            let apart = |row: &StateRow| {
+                let taken = row.values[own.clone()].iter().zip(&one.values[2..]);
+                taken
+                    .into_iter()
+                    .all(|(known, new)| known.is_nan() || *new == Value::Absent)
+            };
+            let same = self.row.full && self.row.key == key && apart(&self.row);
             let row = match same {
                 true => &mut self.row,
                 false => &mut self.ahead,
             };
-            let numbers = one.values[2..]
-                .iter()
-                .map(|v| v.number().unwrap_or(f64::NAN));
-            for (to, number) in row.values[one.first..].iter_mut().zip(numbers) {
-                *to = number;
+            for (to, value) in row.values[own].iter_mut().zip(&one.values[2..]) {
+                *to = value.number().unwrap_or(*to);
             }
             row.sources[at] = true;
+            self.begun = true;
             if !same {
                 row.full = true;
                 row.key = key;
@@ -262,6 +307,12 @@ impl LogRows for JointStates {
         }))
     }
 
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !Instant::from_ns(self.row.key).is_far();
+        (self.begins_unstamped && near).then_some(0.0)
+    }
+
     fn logged(&self, column: usize) -> Option<f64> {
         self.row.values.get(column).copied()
     }
@@ -278,6 +329,14 @@ impl LogRows for JointStates {
                 self.unreadable
             ));
         }
+        if self.unstamped > 0 {
+            out.push(format!(
+                "{} messages are stamped 0, before their clock was set, and are left out",
+                self.unstamped
+            ));
+        }
+        out.extend(self.contradictions().into_iter().map(|(_, text)| text));
+        out.extend(self.uneven().into_iter().map(|(_, text)| text));
         if self.incomplete > 0 && self.sources.len() > 1 {
             out.push(format!(
                 "{} rows have no message of one of the topics at their time, and no numbers there",
@@ -288,27 +347,32 @@ impl LogRows for JointStates {
     }
 
     fn breaks(&self) -> Vec<String> {
-        let broken = self.recording.broken.iter();
-        broken
-            .map(|(path, broken)| {
-                format!(
-                    "{} breaks off {} ({}): everything before is used",
-                    escape(&source::file_name(path)),
-                    broken.place,
-                    escape(&broken.reason)
-                )
-            })
-            .collect()
+        self.recording.breaks("")
+    }
+
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        let left_out = |one: &StateTopic| one.publishers.left_out(&escape(&one.topic));
+        self.sources.iter().filter_map(left_out).collect()
+    }
+
+    fn uneven(&self) -> Vec<(u64, String)> {
+        let of = |one: &StateTopic| {
+            let first = one.first_uneven.as_ref()?;
+            let (topic, count) = (escape(&one.topic), one.uneven);
+            Some((count, format!("in {count} messages of {topic}, {first}")))
+        };
+        self.sources.iter().filter_map(of).collect()
     }
 }
 
 impl StateTopic {
-    /// Instant of a message [ns].
-    fn key(&self, head: &MessageHead) -> i128 {
+    /// Instant of a message [ns]; `None` where its clock was not set yet.
+    fn key(&self, head: &MessageHead) -> Option<i128> {
         let part = |index: usize| self.values.get(index).and_then(|v| v.integer());
         match (self.stamped, part(0), part(1)) {
-            (true, Some(s), Some(ns)) => s * 1_000_000_000 + ns,
-            _ => i128::from(head.log_ns),
+            (true, Some(0), Some(0)) if !self.zero_is_time => None,
+            (true, Some(s), Some(ns)) => Some(s * 1_000_000_000 + ns),
+            _ => Some(i128::from(head.log_ns)),
         }
     }
 }

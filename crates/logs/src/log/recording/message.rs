@@ -1,9 +1,11 @@
 //! What recordings are made of: messages on topics, and what they are written in.
 
+use std::collections::BTreeSet;
+use std::fmt;
 use std::sync::Arc;
 
 use super::value::Value;
-use crate::log::LogError;
+use crate::log::{LogError, escape};
 
 /// How the messages of a topic are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -43,6 +45,8 @@ impl Wanted {
 pub(super) struct MessageHead {
     /// Index of its topic in the file.
     pub(super) topic: usize,
+    /// Channel of the file that it is on: one of each publisher, where the recorder keeps them apart.
+    pub(super) channel: u16,
     /// When it was recorded [ns].
     pub(super) log_ns: u64,
     /// When it was published [ns].
@@ -84,6 +88,64 @@ pub(super) trait MessageReader: Send {
 
     /// Names that the message which was read last lists: those of its joints, or of its fields.
     fn names(&self, data: &[u8]) -> Vec<String>;
+
+    /// Which names the message that was read last lists, and in which order, as a number.
+    fn order(&self) -> u64 {
+        0
+    }
+
+    /// An array of the message that was read last which holds another number of elements than the list
+    /// of names has, so that none can be given to a name.
+    fn uneven(&self) -> Option<Uneven> {
+        None
+    }
+
+    /// Every number that a message holds, with the path that leads to it.
+    fn leaves(&self, data: &[u8]) -> Vec<Leaf>;
+}
+
+/// An array that does not fit its list of names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Uneven {
+    /// Name of the array.
+    pub(super) array: String,
+    /// Elements of it.
+    pub(super) numbers: usize,
+    /// Names in the list.
+    pub(super) names: usize,
+}
+
+impl fmt::Display for Uneven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            array,
+            numbers,
+            names,
+        } = self;
+        write!(
+            f,
+            "`{}` holds {numbers} numbers for {names} names, so that none can be given to a joint",
+            escape(array)
+        )
+    }
+}
+
+/// A number in a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Leaf {
+    /// The path that leads to it.
+    pub(super) path: String,
+    /// The same with the names that lists of the message give to elements.
+    pub(super) label: String,
+}
+
+/// Numbers of one message that are listed at most.
+pub(super) const MOST_LEAVES: usize = 512;
+
+/// Whether names can stand for the elements of an array beside them: one each, and no two alike.
+pub(super) fn name_elements(names: &[String], elements: usize) -> bool {
+    let apart = names.iter().collect::<BTreeSet<_>>().len() == names.len();
+    !names.is_empty() && names.len() == elements && apart
 }
 
 /// A reader of some fields, or why messages of their schema cannot be read, for the user.

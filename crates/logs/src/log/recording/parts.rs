@@ -1,27 +1,76 @@
-//! Files of messages, several of them read as one recording.
+//! Files of messages, several of them read as one recording, its messages in the order of their times.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::path::{Path, PathBuf};
 
 use super::format::format_of;
 use super::message::{Break, MessageFile, MessageHead, Topic, Wanted};
 use crate::log::content::{Content, Unpacker};
-use crate::log::{LogError, source};
+use crate::log::{LogError, escape, list, source};
 
 /// Files of one recording that are open at a time.
 const OPEN: usize = 16;
+/// Messages of one file that are held back until none of an earlier time can come, and their bytes: some
+/// chunks of the usual size, whose messages may lie there in any order.
+const HELD: usize = 4096;
+const HELD_BYTES: usize = 4 << 20;
 
-/// One file of a recording, one message ahead.
+/// A message that was read ahead, ordered by its time, then by its place in the file.
+struct Held {
+    head: MessageHead,
+    data: Vec<u8>,
+}
+
+impl Held {
+    fn key(&self) -> (u64, u64) {
+        (self.head.log_ns, self.head.number)
+    }
+}
+
+impl PartialEq for Held {
+    fn eq(&self, other: &Self) -> bool {
+        self.key() == other.key()
+    }
+}
+
+impl Eq for Held {}
+
+impl PartialOrd for Held {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Held {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.key().cmp(&other.key())
+    }
+}
+
+/// One file of a recording, some messages ahead.
 struct OpenFile {
     path: PathBuf,
     file: Box<dyn MessageFile>,
+    held: BinaryHeap<Reverse<Held>>,
+    held_bytes: usize,
+    /// Memory that is used again.
+    spare: Vec<Vec<u8>>,
+    ended: bool,
+    /// What ended it, told once the messages before it are handed out.
+    failed: Option<LogError>,
     head: Option<MessageHead>,
     data: Vec<u8>,
     unpacker: Unpacker,
 }
 
 impl OpenFile {
-    fn open(path: &Path, wanted: &Wanted) -> Result<Self, LogError> {
+    /// Opens a file; `None` for one of no bytes, which a recorder that lost its power leaves behind.
+    fn open(path: &Path, wanted: &Wanted) -> Result<Option<Self>, LogError> {
         let content = Content::open(path)?;
+        if content.head().is_empty() {
+            return Ok(None);
+        }
         let Some(format) = format_of(content.head()) else {
             return Err(LogError::Format {
                 file: source::shown(path),
@@ -32,16 +81,40 @@ impl OpenFile {
         let mut part = Self {
             path: path.to_owned(),
             file: (format.open)(path, content, wanted)?,
+            held: BinaryHeap::new(),
+            held_bytes: 0,
+            spare: Vec::new(),
+            ended: false,
+            failed: None,
             head: None,
             data: Vec::new(),
             unpacker: Unpacker::default(),
         };
         part.advance()?;
-        Ok(part)
+        Ok(Some(part))
     }
 
+    /// Goes on to the message of the earliest time among those that are held.
     fn advance(&mut self) -> Result<(), LogError> {
-        self.head = self.file.next(&mut self.data)?;
+        while !self.ended && self.held.len() < HELD && self.held_bytes < HELD_BYTES {
+            let mut data = self.spare.pop().unwrap_or_default();
+            match self.file.next(&mut data) {
+                Err(error) => (self.failed, self.ended) = (Some(error), true),
+                Ok(None) => self.ended = true,
+                Ok(Some(head)) => {
+                    self.held_bytes += data.len();
+                    self.held.push(Reverse(Held { head, data }));
+                }
+            }
+        }
+        self.head = None;
+        let Some(Reverse(next)) = self.held.pop() else {
+            return self.failed.take().map_or(Ok(()), Err);
+        };
+        self.held_bytes -= next.data.len();
+        self.head = Some(next.head);
+        self.spare
+            .push(std::mem::replace(&mut self.data, next.data));
         // A recorder of ROS 2 may compress each message by itself.
         let topic = self
             .head
@@ -65,6 +138,8 @@ pub(super) struct MessageFiles {
     pub(super) broken: Vec<(PathBuf, Break)>,
     /// Every topic seen so far, wanted or not.
     pub(super) seen: Vec<Topic>,
+    /// Parts that the recording is said to have and that are not there.
+    missing: Vec<String>,
 }
 
 /// A message of a recording.
@@ -85,6 +160,7 @@ impl MessageFiles {
             current: None,
             broken: Vec::new(),
             seen: Vec::new(),
+            missing: missing_parts(paths),
         };
         recording.open_more()?;
         Ok(recording)
@@ -95,8 +171,17 @@ impl MessageFiles {
             let Some(path) = self.waiting.pop() else {
                 return Ok(());
             };
-            let part = OpenFile::open(&path, &self.wanted)?;
-            self.parts.push(part);
+            match OpenFile::open(&path, &self.wanted)? {
+                Some(part) => self.parts.push(part),
+                None => {
+                    let nothing = Break {
+                        reason: "it is empty: the recorder ended before it wrote anything"
+                            .to_owned(),
+                        place: "at its first byte".to_owned(),
+                    };
+                    self.broken.push((path, nothing));
+                }
+            }
             self.retire()?;
         }
         Ok(())
@@ -157,4 +242,64 @@ impl MessageFiles {
             })
         }))
     }
+
+    /// Where files break off, and parts that are not there, once the last message is read; `of` says how much
+    /// is used of what breaks off.
+    pub(super) fn breaks(&self, of: &str) -> Vec<String> {
+        let broken = self.broken.iter().map(|(path, broken)| {
+            format!(
+                "{} breaks off {} ({}): everything before is used{of}",
+                escape(&source::file_name(path)),
+                broken.place,
+                escape(&broken.reason)
+            )
+        });
+        let missing = self.missing.first().map(|_| {
+            format!(
+                "metadata.yaml lists {}, which are not in the folder: what they hold is lost",
+                list(self.missing.iter().map(String::as_str))
+            )
+        });
+        broken.chain(missing).collect()
+    }
+}
+
+/// Largest description of a recording that is looked at [bytes].
+const LARGEST_METADATA: u64 = 1 << 20;
+
+/// Files that the description beside a rosbag2 recording lists and its folder lacks.
+fn missing_parts(paths: &[PathBuf]) -> Vec<String> {
+    let folder = paths.first().and_then(|path| path.parent());
+    let Some(folder) = folder else {
+        return Vec::new();
+    };
+    let place = folder.join("metadata.yaml");
+    let small = std::fs::metadata(&place).is_ok_and(|m| m.len() <= LARGEST_METADATA);
+    let text = match small {
+        true => std::fs::read_to_string(&place).unwrap_or_default(),
+        false => String::new(),
+    };
+    let lines = text.lines().map(str::trim);
+    let listed = lines.skip_while(|line| *line != "relative_file_paths:");
+    let listed = listed
+        .skip(1)
+        .map_while(|line| Some(line.strip_prefix("- ")?.trim().trim_matches(['"', '\''])));
+    let listed: Vec<&str> = listed.collect();
+    // a description of another recording says nothing of these files
+    let own = paths.iter().any(|path| {
+        let name = source::file_name(path);
+        listed
+            .iter()
+            .any(|one| Path::new(one).file_name() == Some(name.as_ref()))
+    });
+    let gone = |one: &&str| {
+        let plain = one.trim_end_matches(".zstd").trim_end_matches(".zst");
+        let names = [(*one).to_owned(), plain.to_owned(), format!("{one}.zstd")];
+        !names
+            .iter()
+            .filter_map(|name| Path::new(name).file_name())
+            .any(|name| folder.join(name).exists())
+    };
+    let gone = listed.iter().filter(|one| own && gone(one));
+    gone.map(|one| (*one).to_owned()).collect()
 }

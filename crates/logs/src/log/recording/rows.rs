@@ -9,7 +9,9 @@ use super::encoding::reader_of;
 use super::fields::{RobotFields, TimeSource};
 use super::message::{OpenedReader, Schema, Wanted};
 use super::pairing::{Pairing, Sample};
+use super::partial::Parts;
 use super::parts::{Message, MessageFiles};
+use super::sources::{Publisher, Publishers};
 use super::survey::{self, Choice};
 use super::value::Value;
 use crate::log::layout::{Channel, Layout};
@@ -40,6 +42,15 @@ struct SampleReader {
     /// Messages that lack a joint or a time, and those that cannot be decoded, with the first reason.
     incomplete: LeftOut,
     unreadable: LeftOut,
+    /// Messages that were stamped 0 before the clock was known.
+    unstamped: u64,
+    /// Whether a message with a stamp was read, and whether one without came before it.
+    begun: bool,
+    begins_unstamped: bool,
+    /// Files of the recording, and who publishes on the topics of positions and of torques.
+    paths: Vec<PathBuf>,
+    publishers: [Publishers; 2],
+    parts: [Parts; 2],
 }
 
 #[derive(Default)]
@@ -107,6 +118,12 @@ impl MessageRows {
                 readers: Vec::new(),
                 incomplete: LeftOut::default(),
                 unreadable: LeftOut::default(),
+                unstamped: 0,
+                begun: false,
+                begins_unstamped: false,
+                paths: paths.to_vec(),
+                publishers: Default::default(),
+                parts: Default::default(),
             },
         };
         Ok((rows, layout))
@@ -151,7 +168,7 @@ impl LogRows for MessageRows {
                 return Ok(None);
             };
             self.messages += 1;
-            let Some(part) = self.reading.read(&message, &mut self.row) else {
+            let Some(part) = self.reading.read(&message, &mut self.row)? else {
                 continue;
             };
             match (&mut self.pairing, part) {
@@ -167,13 +184,24 @@ impl LogRows for MessageRows {
         self.append_part(&layout.positions, &self.row.q, &mut block.q)?;
         self.append_part(&layout.torques, &self.row.tau, &mut block.tau)?;
         if self.has_velocities() {
-            self.append_part(&layout.velocities, &self.row.dq, &mut block.dq)?;
+            // nothing is fitted to velocities: what was not measured is no reason to refuse a row
+            let scaled = layout.velocities.iter().zip(&self.row.dq);
+            let scaled = scaled.map(|(channel, x)| x * channel.factor + channel.offset);
+            block
+                .dq
+                .extend(scaled.map(|x| if is_usable(x) { x } else { f64::NAN }));
         }
         Ok(())
     }
 
     fn has_velocities(&self) -> bool {
         self.reading.choice.velocities
+    }
+
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !self.row.stamp.instant().is_far();
+        (self.reading.begins_unstamped && near).then_some(0.0)
     }
 
     fn repeats(&self) -> bool {
@@ -195,7 +223,9 @@ impl LogRows for MessageRows {
     fn clock_remedy(&self, t: f64) -> Option<String> {
         let part = format!("use the part before it: FILE@0..{t}s");
         Some(match self.reading.choice.time {
-            TimeSource::Log => part,
+            TimeSource::Log => format!(
+                "its messages lie in another order than that of their times: sort it first, `mcap sort IN.mcap -o OUT.mcap`, or {part}"
+            ),
             _ => format!(
                 "take the times of recording, `stamp = \"log\"` in [log] of the robot file, or {part}"
             ),
@@ -212,17 +242,16 @@ impl LogRows for MessageRows {
     }
 
     fn breaks(&self) -> Vec<String> {
-        let broken = self.recording.broken.iter();
-        broken
-            .map(|(path, broken)| {
-                format!(
-                    "{} breaks off {} ({}): everything before is used, {} messages of the robot's topics",
-                    escape(&source::file_name(path)),
-                    broken.place,
-                    escape(&broken.reason),
-                    self.messages
-                )
-            })
+        let messages = self.messages;
+        self.recording
+            .breaks(&format!(", {messages} messages of the robot's topics"))
+    }
+
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        let choice = &self.reading.choice;
+        let topics = [Some(&choice.topic), choice.torque_topic.as_ref()];
+        let each = self.reading.publishers.iter().zip(topics);
+        each.filter_map(|(publishers, topic)| publishers.left_out(&escape(topic?)))
             .collect()
     }
 
@@ -243,6 +272,13 @@ impl LogRows for MessageRows {
                 reading.unreadable.count, self.messages, reading.unreadable.first
             ));
         }
+        if reading.unstamped > 0 {
+            out.push(format!(
+                "{} messages of {topic} are stamped 0, before their clock was set, and are left out",
+                reading.unstamped
+            ));
+        }
+        out.extend(self.contradictions().into_iter().map(|(_, text)| text));
         if let (Some(pairing), Some(torques)) = (&self.pairing, &reading.choice.torque_topic) {
             out.extend(pairing.warnings(&topic, &escape(torques)));
         }
@@ -252,7 +288,14 @@ impl LogRows for MessageRows {
 
 impl SampleReader {
     /// Reads one message into a sample; `None` where it is left out.
-    fn read(&mut self, message: &Message<'_>, sample: &mut Sample) -> Option<Holds> {
+    ///
+    /// # Errors
+    /// A file that can no longer be read.
+    fn read(
+        &mut self,
+        message: &Message<'_>,
+        sample: &mut Sample,
+    ) -> Result<Option<Holds>, LogError> {
         let Message {
             path,
             topic,
@@ -262,29 +305,53 @@ impl SampleReader {
         let (schema, topic) = (&topic.schema, &topic.name);
         let place = || format!("message {} of {}", head.number, escape(topic));
         let known = self.readers.iter().position(|(s, _)| s == schema);
-        let index = known.unwrap_or_else(|| {
+        let reader_at = known.unwrap_or_else(|| {
             let reader = reader_of(schema, &self.fields.paths);
             self.readers.push((schema.clone(), reader));
             self.readers.len() - 1
         });
-        let read = match &mut self.readers[index].1 {
+        let read = match &mut self.readers[reader_at].1 {
             Ok(reader) => reader.read(data, &mut self.values),
             Err(reason) => Err(reason.clone()),
         };
         if let Err(reason) = read {
             self.unreadable
                 .add(|| format!("{}: {}", place(), escape(&reason)));
-            return None;
+            return Ok(None);
         }
-        let (fields, values) = (&self.fields, &self.values);
-        let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
-            self.incomplete.add(|| format!("{}: no time", place()));
-            return None;
-        };
+        let unset = self.choice.time == TimeSource::Header && !self.choice.zero_is_time;
+        if unset && self.fields.header_ns(&self.values) == Some(0) {
+            self.unstamped += 1;
+            self.begins_unstamped |= !self.begun;
+            return Ok(None);
+        }
         let part = match &self.choice.torque_topic {
             None => Holds::Whole,
             Some(torques) if torques == topic => Holds::Torques,
             Some(_) => Holds::Positions,
+        };
+        let of = usize::from(part == Holds::Torques);
+        let needed = match part {
+            Holds::Whole => self.fields.positions.start..self.fields.torques.end,
+            Holds::Positions => self.fields.positions.clone(),
+            Holds::Torques => self.fields.torques.clone(),
+        };
+        if let Ok(reader) = &self.readers[reader_at].1 {
+            let publisher = Publisher::of(head, &**reader);
+            let paths = &self.fields.paths[needed.clone()];
+            let numbers = &self.values[needed.clone()];
+            let at = (&*self.paths, &**topic);
+            if !self.publishers[of].take(publisher, at, paths, numbers)? {
+                return Ok(None);
+            }
+        }
+        if self.values[needed].contains(&Value::Absent) {
+            self.parts[of].join(&self.fields, head, &mut self.values);
+        }
+        let (fields, values) = (&self.fields, &self.values);
+        let Some(stamp) = fields.stamp(values, head, self.choice.time) else {
+            self.incomplete.add(|| format!("{}: no time", place()));
+            return Ok(None);
         };
         let none = || 0..0;
         let (q, tau, dq): (Range<usize>, Range<usize>, Range<usize>) = match part {
@@ -306,22 +373,28 @@ impl SampleReader {
             to.clear();
             for index in range {
                 let Some(number) = values[index].number() else {
+                    let reader = self.readers[reader_at].1.as_ref().ok();
+                    let uneven = reader.and_then(|reader| reader.uneven());
                     self.incomplete.add(|| {
                         let path = fields.paths[index].last();
                         let path = path.map_or("", |path| path.text());
-                        format!("{} has no `{}`", place(), escape(path))
+                        match uneven {
+                            Some(uneven) => format!("in {} {uneven}", place()),
+                            None => format!("{} has no `{}`", place(), escape(path)),
+                        }
                     });
-                    return None;
+                    return Ok(None);
                 };
                 to.push(number);
             }
         }
         sample.stamp = stamp;
+        self.begun = true;
         sample.number = head.number;
         if sample.path != *path {
             sample.path = (*path).to_owned();
             sample.file = source::shown(path);
         }
-        Some(part)
+        Ok(Some(part))
     }
 }

@@ -8,6 +8,7 @@ use super::encoding::reader_of;
 use super::message::{MessageHead, MessageReader, Schema, Wanted};
 use super::parts::MessageFiles;
 use super::path::FieldPath;
+use super::sources::ZeroStamps;
 use super::value::Value;
 use crate::log::{LogError, escape};
 
@@ -41,7 +42,10 @@ pub(super) struct FoundTopic {
     /// Which arrays are filled.
     pub arrays: [bool; 3],
     pub stamped: bool,
+    /// Whether a stamp of 0 is a time.
+    pub zero_is_time: bool,
     looked_at: u32,
+    zeros: ZeroStamps,
     /// Instants of its messages [ns], by the header's stamp where that is set.
     instants: HashSet<i128>,
 }
@@ -96,7 +100,9 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
                     names: Vec::new(),
                     arrays: [false; 3],
                     stamped: false,
+                    zero_is_time: true,
                     looked_at: 0,
+                    zeros: ZeroStamps::default(),
                     instants: HashSet::new(),
                 });
                 found.len() - 1
@@ -112,6 +118,9 @@ pub(super) fn survey(paths: &[PathBuf]) -> Result<Survey, LogError> {
         if let Err(reason) = found[at].look(&message.head, message.data) {
             unreadable.get_or_insert((found[at].topic.clone(), reason));
         }
+    }
+    for one in &mut found {
+        one.zero_is_time = one.zeros.are_times();
     }
     let cause = cause(&recording, &found, unreadable);
     found.retain(|one| !one.names.is_empty() && one.arrays.contains(&true));
@@ -138,8 +147,11 @@ fn cause(
     if let Some((topic, reason)) = unreadable {
         let (topic, reason) = (escape(&topic), escape(&reason));
         return Some(Cause {
+            remedy: match reason.contains("definition") || reason.contains("encoding") {
+                true => "record with its message definitions, as `ros2 bag record` does",
+                false => AGAIN,
+            },
             problem: format!("messages of {topic} cannot be read: {reason}"),
-            remedy: AGAIN,
         });
     }
     let mut declared = recording.seen.iter();
@@ -184,7 +196,10 @@ fn probes() -> Vec<Vec<FieldPath>> {
         FieldPath::parse("header.stamp.nanosec"),
         FieldPath::parse("header.stamp.nsecs"),
     ]);
-    fields.push(vec![FieldPath::named("position", "name", "")]);
+    let named = ARRAYS
+        .iter()
+        .map(|(array, _)| FieldPath::named(array, "name", ""));
+    fields.extend(named.map(|path| vec![path]));
     fields
 }
 
@@ -192,12 +207,16 @@ impl FoundTopic {
     /// # Errors
     /// What is wrong with the message.
     fn look(&mut self, head: &MessageHead, data: &[u8]) -> Result<(), String> {
-        let mut values = [Value::Absent; 6];
+        let mut values = [Value::Absent; 8];
         self.probe.read(data, &mut values)?;
         let stamp = match (values[3].integer(), values[4].integer()) {
-            (Some(s), Some(ns)) if (s, ns) != (0, 0) => Some(s * 1_000_000_000 + ns),
+            (Some(s), Some(ns)) => Some(s * 1_000_000_000 + ns),
             _ => None,
         };
+        if let Some(ns) = stamp {
+            self.zeros.take(ns);
+        }
+        let stamp = stamp.filter(|ns| *ns != 0);
         self.instants
             .insert(stamp.unwrap_or(i128::from(head.log_ns)));
         if self.looked_at >= OF_TOPIC {

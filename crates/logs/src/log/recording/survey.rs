@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use super::encoding::reader_of;
 use super::fields::{RobotFields, TimeSource};
-use super::message::{MessageReader, Wanted};
+use super::message::{MessageHead, MessageReader, Uneven, Wanted};
+use super::partial::Parts;
 use super::parts::MessageFiles;
+use super::sources::ZeroStamps;
 use super::value::Value;
 use crate::log::layout::Layout;
 use crate::log::names::{escape, list, nearest};
@@ -27,6 +29,8 @@ pub(super) struct Choice {
     pub(super) time: TimeSource,
     /// Whether messages hold velocities of all joints.
     pub(super) velocities: bool,
+    /// Whether a stamp of 0 in a header is a time.
+    pub(super) zero_is_time: bool,
     /// What was decided and the user should know.
     pub(super) notes: Vec<String>,
 }
@@ -43,8 +47,16 @@ struct TopicCandidate {
     both: bool,
     /// No message with the positions was without the velocities.
     velocities: bool,
+    /// Which velocities were a number at least once.
+    measured: Vec<bool>,
     header: bool,
     time: bool,
+    /// Stamps of the headers.
+    stamps: ZeroStamps,
+    /// Fields of messages of one instant, each of which holds some of the joints.
+    parts: Parts,
+    /// An array that no name can be given to the elements of.
+    uneven: Option<Uneven>,
     /// Fields that no message had so far.
     missing: Vec<bool>,
     names: Vec<String>,
@@ -52,7 +64,12 @@ struct TopicCandidate {
 
 impl TopicCandidate {
     /// Looks at one message; whether it shows anything new.
-    fn look(&mut self, data: &[u8], fields: &RobotFields, values: &mut [Value]) -> bool {
+    fn look(
+        &mut self,
+        (head, data): (&MessageHead, &[u8]),
+        fields: &RobotFields,
+        values: &mut [Value],
+    ) -> bool {
         let before = self.shown();
         self.tries += 1;
         let Ok(reader) = &mut self.reader else {
@@ -67,22 +84,36 @@ impl TopicCandidate {
         if self.names.is_empty() {
             self.names = reader.names(data);
         }
+        if self.uneven.is_none() {
+            self.uneven = reader.uneven();
+        }
         for (missing, value) in self.missing.iter_mut().zip(&*values) {
             *missing &= *value == Value::Absent;
         }
+        if let Some(ns) = fields.header_ns(values) {
+            self.stamps.take(ns);
+        }
+        let (header, time) = (fields.has_header(values), fields.has_time(values));
+        self.parts.join(fields, head, values);
         // A robot without positions (or torques) to read finds them everywhere.
         let all = |range| RobotFields::all(values, range) || range.is_empty();
         let (q, tau) = (all(&fields.positions), all(&fields.torques));
         if q {
             let first = !self.positions;
+            // one that is NaN is no measurement, as a driver without velocities publishes them
+            let own = &values[fields.velocities.clone()];
+            self.measured.resize(own.len(), false);
+            for (measured, value) in self.measured.iter_mut().zip(own) {
+                *measured |= value.number().is_some_and(f64::is_finite);
+            }
             self.velocities =
                 (self.velocities || first) && RobotFields::all(values, &fields.velocities);
         }
         self.positions |= q && !fields.positions.is_empty();
         self.torques |= tau && !fields.torques.is_empty();
         self.both |= q && tau;
-        self.header |= fields.has_header(values);
-        self.time |= fields.has_time(values);
+        self.header |= header;
+        self.time |= time;
         before != self.shown()
     }
 
@@ -141,8 +172,12 @@ fn survey(
                     torques: false,
                     both: false,
                     velocities: false,
+                    measured: Vec::new(),
                     header: false,
                     time: false,
+                    stamps: ZeroStamps::default(),
+                    parts: Parts::default(),
+                    uneven: None,
                     missing: vec![true; fields.paths.len()],
                     names: Vec::new(),
                 });
@@ -150,7 +185,9 @@ fn survey(
             }
         };
         let candidate = &mut found[index];
-        if candidate.tries < TRIES && candidate.look(message.data, fields, &mut values) {
+        if candidate.tries < TRIES
+            && candidate.look((&message.head, message.data), fields, &mut values)
+        {
             complete = pick(&found, layout, fields).is_ok();
         }
         if complete {
@@ -247,7 +284,8 @@ fn pick(
         topic: first.name.clone(),
         torque_topic: second.map(|c| c.name.clone()),
         time,
-        velocities: first.velocities,
+        velocities: first.velocities && !first.measured.contains(&false),
+        zero_is_time: first.stamps.are_times() && second.is_none_or(|c| c.stamps.are_times()),
         notes,
     })
 }
@@ -333,6 +371,17 @@ fn missing(
                 escape(reason)
             ),
             format!("the topics are {}", list(topics())),
+        );
+    }
+    if let Some(uneven) = &best.uneven
+        && range.clone().any(|index| best.missing[index])
+    {
+        return (
+            format!("in messages of {}, {uneven}", escape(&best.name)),
+            format!(
+                "where it is known whose they are, say so by their places, `{what} = \"{}[0]\"`, .. in [log.joint] of the robot file; else record again with one number for each name",
+                escape(&uneven.array)
+            ),
         );
     }
     let lacking = range.clone().find(|index| best.missing[*index]);

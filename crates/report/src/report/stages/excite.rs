@@ -19,6 +19,7 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
+    report.everywhere().paragraph(&judged.torques);
     report.terminal().paragraph(&judged.not_checked);
     report.brief().verdict(&judged.not_checked, false);
     report.brief().verdict(&text, good);
@@ -40,7 +41,10 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     }
     report
         .page()
-        .paragraph("Friction is taken as known; the noise is that of the robot file.");
+        .paragraph(match judged.torques_foreseen {
+            true => "Friction is taken as known; the noise is that of the robot file.",
+            false => "Friction is taken as known; the noise is that of the robot file, or 1 N or N m in every sample where it gives none.",
+        });
     let together = judged.together.as_ref().map(|together| {
         let stds = together.parameters.iter().map(|p| p.relative_std);
         ("with given", stds.collect())
@@ -70,7 +74,8 @@ pub fn course(page: &mut Writer, judged: &Judgement, figure: &MotionFigure) {
 fn words(judged: &Judgement) -> (String, bool) {
     let broken = judged.broken().len();
     let mut text = match broken {
-        0 => "The motion keeps every limit.".to_owned(),
+        0 if judged.torques_foreseen => "The motion keeps every limit.".to_owned(),
+        0 => "The motion keeps every limit that was checked; none of torque was.".to_owned(),
         1 => "The motion breaks a limit.".to_owned(),
         n => format!("The motion breaks {n} limits."),
     };
@@ -169,7 +174,8 @@ fn expected(
         let std = p.std.map(|s| number::significant(s, 2));
         let mut row = vec![
             p.name.clone(),
-            number::significant(p.value, 5),
+            p.value
+                .map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
             std.unwrap_or(number::ABSENT.into()),
             relative(p.relative_std),
         ];
@@ -325,16 +331,22 @@ pub fn figure(
         .enumerate()
         .map(|(i, name)| {
             let (unit, of) = (machine.coordinate_unit(i), (i, name.as_str()));
-            let panels = vec![
+            let mut panels = vec![
                 panel(Quantity::Position, of, unit.to_owned()),
                 panel(Quantity::Speed, of, format!("{unit}/s")),
-                panel(Quantity::Drive, of, machine.drive_unit(i).to_owned()),
             ];
+            if judged.torques_foreseen {
+                panels.push(panel(Quantity::Drive, of, machine.drive_unit(i).to_owned()));
+            }
             (name, panels)
         })
         .collect();
+    let unforeseen = match judged.torques_foreseen {
+        true => "",
+        false => " (torques are not foreseen)",
+    };
     MotionFigure {
-        title: title.to_owned(),
+        title: format!("{title}{unforeseen}"),
         t,
         rows,
     }

@@ -5,13 +5,17 @@ use crate::report::{Report, Writer};
 use cft_ident_core::number;
 use cft_ident_logs::inspect::{Findings, LogFault, RowCost, Severity};
 use cft_ident_logs::log::escape;
+use cft_ident_stages::setup::{Finding, FindingSeverity};
 
-/// The findings of logs, by their names.
-pub fn inspect(logs: &[(String, Findings)]) -> Report {
+/// The findings of logs, by their names, and of the set-up of the robot file that reads them.
+pub fn inspect(logs: &[(String, Findings)], setup: &[Finding]) -> Report {
     let mut report = Report::new("Logs");
     for (name, found) in logs {
         let mut out = report.everywhere();
-        out.verdict(&head(name, found), found.faults.is_empty());
+        out.verdict(
+            &head(name, found, setup),
+            found.faults.is_empty() && setup.is_empty(),
+        );
         out.line("");
         if !found.faults.is_empty() {
             faults(&mut out, found);
@@ -27,8 +31,16 @@ pub fn inspect(logs: &[(String, Findings)]) -> Report {
     report
 }
 
-fn head(name: &str, found: &Findings) -> String {
-    let count = |severity, one: &str| match found.of(severity).count() {
+fn head(name: &str, found: &Findings, setup: &[Finding]) -> String {
+    let of_setup = |severity: Severity| {
+        let alike = |finding: &&Finding| match finding.severity {
+            FindingSeverity::Error => severity == Severity::Error,
+            FindingSeverity::Warning => severity == Severity::Warning,
+            FindingSeverity::Hint => severity == Severity::Info,
+        };
+        setup.iter().filter(alike).count()
+    };
+    let count = |severity, one: &str| match found.of(severity).count() + of_setup(severity) {
         0 => format!("no {one}s"),
         1 => format!("1 {one}"),
         many => format!("{many} {one}s"),
@@ -41,7 +53,7 @@ fn head(name: &str, found: &Findings) -> String {
     let mut head = format!(
         "{}: {}. {} rows in {} s",
         escape(name),
-        match found.faults.is_empty() {
+        match found.faults.is_empty() && setup.is_empty() {
             true => "no faults found".to_owned(),
             false => faults.join(", "),
         },

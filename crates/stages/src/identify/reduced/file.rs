@@ -4,8 +4,6 @@
 //! and of the matrices in bytes (`u64` each); the head as JSON, the matrices, and the SHA-256 of all before it as 64
 //! hexadecimal digits. One set of reduced logs gives the same bytes on every machine.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -16,7 +14,7 @@ use super::factors::{Factors, Head};
 use super::reduced_log::{FrictionGiven, MadeWith, Readings, ReducedLog, ReducedLogs};
 use crate::identify::own_settings::{CutoffCosts, OwnSettings};
 use cft_ident_core::motion::{Skipped, Summary};
-use cft_ident_logs::log::{Provenance, REDUCED, escape, sha256_of_bytes};
+use cft_ident_logs::log::{Provenance, REDUCED, begins_with, escape, sha256_of_bytes};
 
 /// Number of the format.
 pub const FORMAT: u32 = 2;
@@ -106,9 +104,7 @@ impl SummaryHead {
 
 /// Whether a file says that it holds reduced logs.
 pub fn is_reduced(path: &Path) -> bool {
-    let mut first = [0; REDUCED.len()];
-    let read = File::open(path).and_then(|mut file| file.read_exact(&mut first));
-    read.is_ok() && first == *REDUCED
+    begins_with(path, REDUCED)
 }
 
 impl ReducedLogs {

@@ -4,10 +4,11 @@
 //! that is asked for.
 
 use super::cursor::{ByteSpan, Cursor, Encoding, MalformedMessage};
+use super::leaves;
 use super::msg::{Definition, DefinitionError, ElementType, Field};
 use super::plan::{By, Node, Slot, Walkthrough};
-use crate::log::recording::message::{MessageReader, Schema};
-use crate::log::recording::path::FieldPath;
+use crate::log::recording::message::{Leaf, MessageReader, Schema, Uneven};
+use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Messages in CDR, and in the packed form of ROS 1, by their `.msg` definitions.
@@ -16,17 +17,25 @@ pub(super) fn open(
     fields: &[Vec<FieldPath>],
 ) -> Option<Result<Box<dyn MessageReader>, String>> {
     let encoding = match (schema.encoding.as_str(), schema.language.as_str()) {
-        ("cdr", "ros2msg" | "") => Encoding::Cdr,
+        ("cdr", _) => Encoding::Cdr,
         ("ros1", "ros1msg" | "") => Encoding::Ros1,
         _ => return None,
     };
     let reader = || -> Result<Box<dyn MessageReader>, String> {
         let text = std::str::from_utf8(&schema.text)
             .map_err(|_| "its definition is no text".to_owned())?;
-        if text.contains("\nIDL:") || text.starts_with("IDL:") {
-            return Err("its definition is IDL, which is not read".to_owned());
-        }
-        let definition = Definition::parse(&schema.name, text).map_err(|e| e.to_string())?;
+        let other = !matches!(&*schema.language, "ros2msg" | "ros1msg" | "")
+            || text.contains("\nIDL:")
+            || text.starts_with("IDL:");
+        // what the type is called says how it is laid out, where it is one that is known here
+        let text = if other { "" } else { text };
+        let definition = Definition::parse(&schema.name, text).map_err(|error| match other {
+            true => format!(
+                "its definition is `{}`, which is read for sensor_msgs/msg/JointState alone",
+                schema.language
+            ),
+            false => error.to_string(),
+        })?;
         Ok(Box::new(CdrReader::new(&definition, encoding, fields).0))
     };
     Some(reader())
@@ -43,6 +52,10 @@ pub struct CdrReader {
     /// Places of the texts in each list of names.
     lists: Vec<Vec<ByteSpan>>,
     outputs: usize,
+    /// Names of the arrays that are asked for by names, by the outputs.
+    labels: Vec<String>,
+    uneven: Option<Uneven>,
+    order: u64,
 }
 
 impl CdrReader {
@@ -94,6 +107,9 @@ impl CdrReader {
             lists: vec![Vec::new(); plan.lists],
             plan,
             outputs: fields.len(),
+            labels: fields.iter().map(|paths| label(paths)).collect(),
+            uneven: None,
+            order: 0,
         };
         (reader, found)
     }
@@ -109,6 +125,7 @@ impl CdrReader {
         }
         self.arrays.fill(None);
         self.lists.iter_mut().for_each(Vec::clear);
+        self.uneven = None;
         let mut cursor = Cursor::new(data, self.encoding)?;
         let mut walk = Walk {
             messages: &self.messages,
@@ -117,6 +134,7 @@ impl CdrReader {
             out,
         };
         walk.message(&mut cursor, 0, Some(&self.plan.root))?;
+        self.order = order(cursor.data, &self.lists);
         for pick in &mut self.plan.picks {
             let Some(Some(array)) = self.arrays.get(pick.array) else {
                 continue;
@@ -125,6 +143,16 @@ impl CdrReader {
                 By::Index(index) => *index,
                 By::Name { list, name, last } => {
                     let names = self.lists.get(*list).map_or(&[][..], Vec::as_slice);
+                    if names.len() != array.count {
+                        if array.count > 0 && self.uneven.is_none() {
+                            self.uneven = Some(Uneven {
+                                array: self.labels[pick.output].clone(),
+                                numbers: array.count,
+                                names: names.len(),
+                            });
+                        }
+                        continue;
+                    }
                     match find(cursor.data, names, name, *last) {
                         Some(index) => {
                             *last = index;
@@ -165,6 +193,42 @@ impl MessageReader for CdrReader {
     fn names(&self, data: &[u8]) -> Vec<String> {
         self.names(data)
     }
+
+    fn order(&self) -> u64 {
+        self.order
+    }
+
+    fn uneven(&self) -> Option<Uneven> {
+        self.uneven.clone()
+    }
+
+    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+        leaves::leaves(&self.messages, self.encoding, data)
+    }
+}
+
+/// Name of the array that a path takes an element of by its name.
+fn label(paths: &[FieldPath]) -> String {
+    let of = |path: &FieldPath| {
+        let pairs = path.steps.windows(2);
+        pairs.into_iter().find_map(|pair| match pair {
+            [PathStep::Field(name), PathStep::Named { .. }] => Some(name.clone()),
+            _ => None,
+        })
+    };
+    paths.iter().find_map(of).unwrap_or_default()
+}
+
+/// The names of lists and their order as one number (FNV-1a).
+fn order(data: &[u8], lists: &[Vec<ByteSpan>]) -> u64 {
+    let spans = lists.iter().flatten();
+    let names = spans.filter_map(|span| data.get(span.start..span.start + span.count));
+    names.fold(0xcbf2_9ce4_8422_2325, |hash, name| {
+        let ended = name.iter().chain(&[0]);
+        ended.fold(hash, |hash, byte| {
+            (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    })
 }
 
 /// Index of a name, where it stood before or anywhere else.

@@ -1,14 +1,18 @@
 //! Numbers out of JSON messages by field path or JSON pointer.
 
+use std::borrow::Cow;
+
 use serde_json::Value as Json;
 
-use crate::log::recording::message::{MessageReader, Schema};
+use super::leaves::{Tree, of_tree};
+use crate::log::recording::message::{Leaf, MessageReader, Schema, Uneven};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
 /// Reads some fields of JSON messages.
 struct JsonReader {
     fields: Vec<Vec<FieldPath>>,
+    uneven: Option<Uneven>,
 }
 
 /// Messages in JSON, whatever their schema.
@@ -16,17 +20,86 @@ pub(super) fn open(
     schema: &Schema,
     fields: &[Vec<FieldPath>],
 ) -> Option<Result<Box<dyn MessageReader>, String>> {
-    let fields = fields.to_vec();
-    (schema.encoding == "json").then(|| Ok(Box::new(JsonReader { fields }) as Box<_>))
+    let reader = || JsonReader {
+        fields: fields.to_vec(),
+        uneven: None,
+    };
+    (schema.encoding == "json").then(|| Ok(Box::new(reader()) as Box<_>))
 }
 
 impl MessageReader for JsonReader {
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
-        read(data, &self.fields, out).map_err(|error| error.to_string())
+        self.uneven = None;
+        read(data, &self.fields, out, &mut self.uneven).map_err(|error| error.to_string())
     }
 
     fn names(&self, data: &[u8]) -> Vec<String> {
         names(data)
+    }
+
+    fn uneven(&self) -> Option<Uneven> {
+        self.uneven.clone()
+    }
+
+    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+        parsed(data).map_or_else(|_| Vec::new(), |root| of_tree(&tree(&root)))
+    }
+}
+
+/// A message as JSON. Numbers that JSON does not have, `NaN` and `Infinity` as Python writes them, are
+/// taken for none.
+fn parsed(data: &[u8]) -> Result<Json, serde_json::Error> {
+    serde_json::from_slice(data).or_else(|error| match without_words(data) {
+        Cow::Borrowed(_) => Err(error),
+        Cow::Owned(plain) => serde_json::from_slice(&plain),
+    })
+}
+
+/// The text with `null` for `NaN`, `Infinity` and `-Infinity` outside of quotes.
+fn without_words(data: &[u8]) -> Cow<'_, [u8]> {
+    const WORDS: [&[u8]; 6] = [b"-Infinity", b"Infinity", b"-NaN", b"NaN", b"nan", b"-nan"];
+    let mut out: Option<Vec<u8>> = None;
+    let (mut at, mut quoted) = (0, false);
+    while let Some(byte) = data.get(at) {
+        let word = WORDS
+            .iter()
+            .find(|word| !quoted && data[at..].starts_with(word));
+        if let Some(word) = word {
+            let kept = out.get_or_insert_with(|| data[..at].to_vec());
+            kept.extend(b"null");
+            at += word.len();
+            continue;
+        }
+        // what follows a backslash closes no quotes
+        let taken = if quoted && *byte == b'\\' { 2 } else { 1 };
+        quoted ^= *byte == b'"';
+        if let Some(kept) = &mut out {
+            kept.extend(data[at..].iter().take(taken));
+        }
+        at += taken;
+    }
+    out.map_or(Cow::Borrowed(data), Cow::Owned)
+}
+
+/// What a JSON value holds.
+fn tree(value: &Json) -> Tree {
+    match value {
+        Json::Null | Json::Bool(_) | Json::Number(_) => Tree::Number,
+        Json::String(text) => Tree::Text(text.clone()),
+        Json::Object(fields) => {
+            let fields = fields
+                .iter()
+                .map(|(name, value)| (name.clone(), tree(value)));
+            Tree::Fields(fields.collect())
+        }
+        Json::Array(all) => {
+            let texts = all.iter().map(|x| x.as_str().map(str::to_owned));
+            match texts.collect::<Option<Vec<String>>>() {
+                Some(texts) if !texts.is_empty() => Tree::Texts(texts),
+                _ if all.iter().all(|x| x.is_number() || x.is_null()) => Tree::Numbers(all.len()),
+                _ => Tree::Elements(all.iter().map(tree).collect()),
+            }
+        }
     }
 }
 
@@ -35,11 +108,15 @@ fn read(
     data: &[u8],
     fields: &[Vec<FieldPath>],
     out: &mut [Value],
+    uneven: &mut Option<Uneven>,
 ) -> Result<(), serde_json::Error> {
-    let root: Json = serde_json::from_slice(data)?;
+    let root = parsed(data)?;
     for (paths, out) in fields.iter().zip(out) {
-        let numbers = paths.iter().filter_map(|path| find(&root, &path.steps));
-        *out = numbers.map(number).find(is_there).unwrap_or_default();
+        let numbers = paths
+            .iter()
+            .filter_map(|path| find(&root, &path.steps, uneven));
+        let mut numbers = numbers.map(number);
+        *out = numbers.find(is_there).unwrap_or_default();
     }
     Ok(())
 }
@@ -65,10 +142,10 @@ fn number(value: &Json) -> Value {
 }
 
 /// Follows a path; elements that are named are looked up beside their array, then further out.
-fn find<'j>(root: &'j Json, steps: &[PathStep]) -> Option<&'j Json> {
+fn find<'j>(root: &'j Json, steps: &[PathStep], uneven: &mut Option<Uneven>) -> Option<&'j Json> {
     let mut at = root;
     let mut outer = vec![root];
-    for step in steps {
+    for (place, step) in steps.iter().enumerate() {
         at = match step {
             PathStep::Field(name) => match at {
                 Json::Object(fields) => fields.get(name)?,
@@ -83,6 +160,19 @@ fn find<'j>(root: &'j Json, steps: &[PathStep]) -> Option<&'j Json> {
                     Some(element) => element,
                     None => {
                         let names = outer.iter().rev().find_map(|o| o.get(list)?.as_array())?;
+                        if names.len() != elements.len() {
+                            let field = place.checked_sub(1).and_then(|before| steps.get(before));
+                            if let (Some(PathStep::Field(array)), false) =
+                                (field, elements.is_empty())
+                            {
+                                *uneven = Some(Uneven {
+                                    array: array.clone(),
+                                    numbers: elements.len(),
+                                    names: names.len(),
+                                });
+                            }
+                            return None;
+                        }
                         elements.get(names.iter().position(|name| is(Some(name)))?)?
                     }
                 }
@@ -95,7 +185,7 @@ fn find<'j>(root: &'j Json, steps: &[PathStep]) -> Option<&'j Json> {
 
 /// Names under which a message lists its parts, for messages to the user.
 fn names(data: &[u8]) -> Vec<String> {
-    let Ok(Json::Object(fields)) = serde_json::from_slice::<Json>(data) else {
+    let Ok(Json::Object(fields)) = parsed(data) else {
         return Vec::new();
     };
     match fields.get("name").and_then(Json::as_array) {
@@ -118,8 +208,41 @@ mod tests {
     fn value(paths: &[&str]) -> Value {
         let fields = [paths.iter().map(|path| FieldPath::parse(path)).collect()];
         let mut out = [Value::Absent];
-        read(MESSAGE, &fields, &mut out).unwrap();
+        read(MESSAGE, &fields, &mut out, &mut None).unwrap();
         out[0]
+    }
+
+    #[test]
+    fn numbers_that_json_does_not_have_are_no_numbers() {
+        let text = br#"{"name": ["NaN", "b\""], "position": [NaN, -Infinity], "x": 2}"#;
+        let fields = ["position[0]", "position[name=NaN]", "x"];
+        let fields = fields.map(|path| vec![FieldPath::parse(path)]);
+        let mut out = [Value::Absent; 3];
+        read(text, &fields, &mut out, &mut None).unwrap();
+        assert_eq!(out, [Value::Absent, Value::Absent, Value::Int(2)]);
+        assert!(parsed(br#"{"a": None}"#).is_err());
+    }
+
+    #[test]
+    fn an_array_of_another_length_than_its_names_is_given_to_no_name() {
+        let text = br#"{"name": ["a", "b"], "effort": [1.0]}"#;
+        let fields = [vec![FieldPath::named("effort", "name", "a")]];
+        let (mut out, mut uneven) = ([Value::Absent], None);
+        read(text, &fields, &mut out, &mut uneven).unwrap();
+        let said = uneven.unwrap();
+        assert_eq!(out, [Value::Absent]);
+        assert_eq!((&*said.array, said.numbers, said.names), ("effort", 1, 2));
+    }
+
+    #[test]
+    fn every_number_is_listed_with_its_path_and_the_names_beside_it() {
+        let listed: Vec<(String, String)> = of_tree(&tree(&parsed(MESSAGE).unwrap()))
+            .into_iter()
+            .map(|leaf| (leaf.path, leaf.label))
+            .collect();
+        let has = |path: &str, label: &str| listed.contains(&(path.into(), label.into()));
+        assert!(has("arm.position[name=b]", "arm.position.b"), "{listed:?}");
+        assert!(has("joints[1].q", "joints.y.q"), "{listed:?}");
     }
 
     #[test]

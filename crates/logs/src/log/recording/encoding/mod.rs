@@ -5,6 +5,7 @@ mod cdr;
 mod cursor;
 mod descriptor;
 mod json;
+mod leaves;
 mod msg;
 mod plan;
 mod proto;

@@ -3,9 +3,12 @@
 //! Each path is followed through the bytes of the message as they are; nothing is decoded that no path
 //! leads to, and nothing is allocated. Of a field that stands there twice the last one counts.
 
+use std::cell::RefCell;
+
 use super::descriptor::{FieldType, Kind, MessageType, Number, Types};
+use super::leaves::{Tree, of_tree};
 use super::wire::{Broken, Fields, Item, fixed, varint};
-use crate::log::recording::message::{MessageReader, Schema};
+use crate::log::recording::message::{Leaf, MOST_LEAVES, MessageReader, Schema, Uneven};
 use crate::log::recording::path::{FieldPath, PathStep};
 use crate::log::recording::value::Value;
 
@@ -33,11 +36,21 @@ struct FieldReader {
 
 impl MessageReader for FieldReader {
     fn read(&mut self, data: &[u8], out: &mut [Value]) -> Result<(), String> {
+        self.reader.uneven.replace(None);
         self.reader.read(data, &self.fields, out)
     }
 
     fn names(&self, _: &[u8]) -> Vec<String> {
         self.reader.names()
+    }
+
+    fn uneven(&self) -> Option<Uneven> {
+        self.reader.uneven.borrow().clone()
+    }
+
+    fn leaves(&self, data: &[u8]) -> Vec<Leaf> {
+        let root = self.reader.types.root;
+        of_tree(&self.reader.tree(data, root, 0))
     }
 }
 
@@ -45,6 +58,8 @@ impl MessageReader for FieldReader {
 #[derive(Debug, Clone)]
 pub(super) struct ProtoReader {
     types: Types,
+    /// An array of the last message that does not fit its list of names.
+    uneven: RefCell<Option<Uneven>>,
 }
 
 /// Where a path has come to.
@@ -64,7 +79,10 @@ impl ProtoReader {
     /// What is wrong with the set, or that it lacks the type.
     pub(super) fn new(name: &str, set: &[u8]) -> Result<Self, String> {
         let types = Types::parse(name, set)?;
-        Ok(Self { types })
+        Ok(Self {
+            types,
+            uneven: RefCell::default(),
+        })
     }
 
     /// Reads `fields` of one message into `out`: for each the first of its paths that leads to a number.
@@ -162,7 +180,16 @@ impl ProtoReader {
                     }
                 }
                 for place in way.iter().rev() {
-                    if let Some(index) = named(place, list, value)? {
+                    if let Some((index, names)) = named(place, list, value)? {
+                        let numbers = count(data, field)?;
+                        if numbers != names {
+                            self.uneven.replace((numbers > 0).then(|| Uneven {
+                                array: field.name.clone(),
+                                numbers,
+                                names,
+                            }));
+                            return Ok(Place::Nothing);
+                        }
                         return match index {
                             Some(index) => self.element(data, field, index),
                             None => Ok(Place::Nothing),
@@ -230,6 +257,45 @@ impl ProtoReader {
         Ok(Place::Nothing)
     }
 
+    /// What a message of a type holds, as far as it can be read.
+    fn tree(&self, data: &[u8], number: usize, depth: usize) -> Tree {
+        let Some(kind) = self.types.messages.get(number).filter(|_| depth < LONGEST) else {
+            return Tree::Nothing;
+        };
+        let of_field = |field: &FieldType| {
+            let items = || elements(data, field.number).map_while(Result::ok);
+            match (field.kind, field.repeated) {
+                (Kind::Number(_), false) => Tree::Number,
+                (Kind::Number(_), true) => Tree::Numbers(count(data, field).unwrap_or(0)),
+                (Kind::Text, repeated) => {
+                    let text = |item| match item {
+                        Item::Bytes(text) => String::from_utf8_lossy(text).into_owned(),
+                        _ => String::new(),
+                    };
+                    let texts: Vec<String> = items().map(text).collect();
+                    match repeated {
+                        true => Tree::Texts(texts),
+                        false => Tree::Text(texts.into_iter().next().unwrap_or_default()),
+                    }
+                }
+                (Kind::Message(inner), repeated) => {
+                    let message = |item| match item {
+                        Item::Bytes(data) => self.tree(data, inner, depth + 1),
+                        _ => Tree::Nothing,
+                    };
+                    let mut all: Vec<Tree> = items().take(MOST_LEAVES).map(message).collect();
+                    match repeated {
+                        true => Tree::Elements(all),
+                        false => all.pop().unwrap_or(Tree::Nothing),
+                    }
+                }
+                (Kind::Other, _) => Tree::Nothing,
+            }
+        };
+        let fields = kind.fields.iter();
+        Tree::Fields(fields.map(|f| (f.name.clone(), of_field(f))).collect())
+    }
+
     /// The type of a map's entries; `None` for a field that is no map.
     fn map_entry(&self, field: &FieldType) -> Option<&MessageType> {
         match field.kind {
@@ -289,21 +355,43 @@ fn text_is(data: &[u8], kind: &MessageType, name: &str, value: &str) -> Result<b
     Ok(is)
 }
 
-/// Where `value` stands in the list of texts `list` of a message: the outer option tells whether there
-/// is such a list.
-fn named(place: &Place<'_>, list: &str, value: &str) -> Result<Option<Option<usize>>, Broken> {
+/// Elements of a field, those that lie packed one after the other counted one by one.
+fn count(data: &[u8], field: &FieldType) -> Result<usize, Broken> {
+    let mut count = 0;
+    for item in elements(data, field.number) {
+        count += match (field.kind, item?) {
+            (Kind::Number(kind), Item::Bytes(packed)) => {
+                let mut left = usize::MAX;
+                packed_number(kind, packed, &mut left)?;
+                usize::MAX - left
+            }
+            _ => 1,
+        };
+    }
+    Ok(count)
+}
+
+/// Where `value` stands in the list of texts `list` of a message, and how many texts that has; the outer
+/// option tells whether there is such a list.
+fn named(
+    place: &Place<'_>,
+    list: &str,
+    value: &str,
+) -> Result<Option<(Option<usize>, usize)>, Broken> {
     let Place::Message(data, kind) = place else {
         return Ok(None);
     };
     let Some(field) = field(kind, list).filter(|f| f.kind == Kind::Text && f.repeated) else {
         return Ok(None);
     };
-    for (index, item) in elements(data, field.number).enumerate() {
-        if item? == Item::Bytes(value.as_bytes()) {
-            return Ok(Some(Some(index)));
+    let (mut found, mut names) = (None, 0);
+    for item in elements(data, field.number) {
+        if item? == Item::Bytes(value.as_bytes()) && found.is_none() {
+            found = Some(names);
         }
+        names += 1;
     }
-    Ok(Some(None))
+    Ok(Some((found, names)))
 }
 
 /// A number as an item of its own; `None` for an item of another form.

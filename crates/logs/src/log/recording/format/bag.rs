@@ -196,6 +196,7 @@ impl MessageFile for BagFile {
         let ns = u64::try_from(message.ns).unwrap_or_default();
         Ok(Some(MessageHead {
             topic: message.topic,
+            channel: 0,
             log_ns: ns,
             publish_ns: ns,
             number: self.messages,

@@ -192,6 +192,7 @@ impl Contents {
                     data.extend_from_slice(message.data);
                     return Ok(Some(MessageHead {
                         topic: *topic,
+                        channel: message.channel,
                         log_ns: message.log_ns,
                         publish_ns: message.publish_ns,
                         number: self.messages,

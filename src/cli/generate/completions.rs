@@ -1,22 +1,14 @@
-//! `cft-ident completions`: completion of the command line for a shell.
+//! Completion of the command line for a shell.
 
 use clap::CommandFactory;
 use clap_complete::Shell;
 use serde_json::json;
 
-use super::{Cli, CliError, Context, Outcome};
+use crate::cli::{Cli, CliError, Outcome};
 use cft_ident_report::report::json::Document;
-
-const EXAMPLE: &str = "\
-Example:
-  cft-ident completions bash \\
-    > ~/.local/share/bash-completion/completions/cft-ident
-  cft-ident completions zsh > ~/.zfunc/_cft-ident
-  cft-ident completions fish > ~/.config/fish/completions/cft-ident.fish";
 
 /// Write the completion script of a shell to standard output.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
 pub struct Args {
     /// Shell
     #[arg(value_name = "SHELL")]
@@ -27,13 +19,13 @@ pub struct Args {
 ///
 /// # Errors
 /// None but those of the output.
-pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
+pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "cft-ident", &mut script);
     let text = String::from_utf8_lossy(&script).into_owned();
     let result = json!({"shell": args.shell.to_string(), "script": text});
     Ok(Outcome {
-        document: Document::new("completions", &[], &[], &result)?,
+        document: Document::new("generate", &[], &[], &result)?,
         text,
         missed: Vec::new(),
     })

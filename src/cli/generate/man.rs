@@ -1,4 +1,4 @@
-//! `cft-ident man`: the manual pages, for those who package the tool.
+//! The manual pages, for those who package the tool.
 
 use std::path::PathBuf;
 
@@ -6,16 +6,11 @@ use clap::CommandFactory;
 use clap_mangen::Man;
 use serde_json::json;
 
-use super::{Cli, CliError, Context, Outcome};
+use crate::cli::{Cli, CliError, Context, Outcome};
 use cft_ident_report::report::json::Document;
-
-const EXAMPLE: &str = "\
-Example:
-  cft-ident man ~/.local/share/man/man1";
 
 /// Write the manual pages, cft-ident.1 and one for each command, into a folder.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
 pub struct Args {
     /// Folder, which must be there
     #[arg(value_name = "DIR")]
@@ -59,7 +54,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = json!({"files": written});
     Ok(Outcome {
         text,
-        document: Document::new("man", &[], &[], &result)?,
+        document: Document::new("generate", &[], &[], &result)?,
         missed: Vec::new(),
     })
 }

@@ -1,4 +1,6 @@
-//! `cft-ident compare`: two models of one robot beside each other, and on the same logs.
+//! `cft-ident compare`: two models of one robot beside each other, and on the same logs; or two runs.
+
+mod documents;
 
 use std::path::{Path, PathBuf};
 
@@ -12,20 +14,24 @@ use cft_ident_stages::replay::ReplayedPair;
 const EXAMPLE: &str = "\
 Example:
   cft-ident compare model.toml refined.toml
-  cft-ident compare model.toml refined.toml unseen.csv --report compare.html";
+  cft-ident compare model.toml refined.toml unseen.csv --report compare.html
+  cft-ident compare before.json after.json";
 
-/// Set two models of one robot side by side, and on the same logs.
+/// Set two models of one robot, or two runs of one command, side by side.
 ///
-/// Differences of parameters are given in standard deviations; errors on the logs with an interval of
+/// Models: differences of parameters are given in standard deviations; errors on the logs with an interval of
 /// their difference. Both models are judged with the log mapping and the filter of the first.
+///
+/// Runs: the JSON documents of `friction`, `lsq`, `validate`, `diagnose` or `identify`. Parameters are compared in
+/// standard deviations of their difference, errors stand beside each other, changed verdicts are listed.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// First model file
-    #[arg(value_name = "A.toml")]
+    /// First model file, or first JSON document
+    #[arg(value_name = "A.toml|A.json")]
     pub a: PathBuf,
-    /// Second model file
-    #[arg(value_name = "B.toml")]
+    /// Second model file, or second JSON document
+    #[arg(value_name = "B.toml|B.json")]
     pub b: PathBuf,
     /// Logs that both models are tried on; a span is chosen by LOG@0..70%
     #[arg(value_name = "LOG")]
@@ -47,6 +53,28 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let inputs: Vec<&Path> = logs.chain([args.a.as_path(), args.b.as_path()]).collect();
     let outputs = outputs::listed(None, &args.plot, args.report.as_deref());
     context.check_outputs(&inputs, &outputs)?;
+    let is_document = |path: &&PathBuf| path.extension().is_some_and(|end| end == "json");
+    match [&args.a, &args.b]
+        .iter()
+        .filter(|path| is_document(path))
+        .count()
+    {
+        0 => {}
+        1 => {
+            return Err(
+                CliError::usage("a model and a JSON document cannot be compared").hint(
+                    "give two model files (.toml), or two documents that --json wrote (.json)",
+                ),
+            );
+        }
+        _ if !args.logs.is_empty() || !outputs.is_empty() => {
+            return Err(CliError::usage(
+                "documents are compared without logs, --plot and --report",
+            )
+            .hint("give the model files (.toml) to compare models on logs"));
+        }
+        _ => return documents::run([&args.a, &args.b], context),
+    }
     let given = |path: &Path| {
         let given = files::model(path, context)?;
         Ok::<_, CliError>(GivenModel {

@@ -1,10 +1,11 @@
-//! `cft-ident schema`: the JSON schema of every file that is read or written.
+//! The JSON schema of every file that is read or written.
 
 use clap::ValueEnum;
 use serde_json::Value;
 
-use super::{CliError, Context, Outcome};
-use crate::cli::{convert, example, export, identify, inspect, new, reduce, simulate};
+use crate::cli::{
+    CliError, Outcome, convert, example, export, identify, inspect, new, reduce, show, simulate,
+};
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
 use cft_ident_plant::excite::Judgements;
 use cft_ident_plant::simulate::truth::TruthFile;
@@ -14,11 +15,6 @@ use cft_ident_stages::identify::{
     ComparisonResult, DiagnosisResult, IdentifiedDynamics, IdentifiedFriction, TorqueAlong,
     Tracked, Validated, Watched,
 };
-
-const EXAMPLE: &str = "\
-Example:
-  cft-ident schema robot > robot.schema.json
-  cft-ident schema validate";
 
 /// What a schema is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -47,7 +43,7 @@ pub enum Kind {
     Diagnose,
     /// JSON document of `compare`
     Compare,
-    /// JSON document of `diff`
+    /// JSON document of `compare A.json B.json`
     Diff,
     /// JSON document of `identify`
     Identify,
@@ -57,6 +53,8 @@ pub enum Kind {
     Simulate,
     /// JSON document of `inspect`
     Inspect,
+    /// JSON document of `show`
+    Show,
     /// JSON document of `torque`
     Torque,
     /// JSON document of `watch`
@@ -76,7 +74,6 @@ pub enum Kind {
 /// A schema of a TOML file is that of its tables as JSON; editors check and complete TOML by it.
 /// Documents may hold more fields than their schema names: those that it names are the contract.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE)]
 pub struct Args {
     /// File, or command whose document
     #[arg(value_name = "KIND")]
@@ -103,6 +100,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
         Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
+        Kind::Show => json::schema::<show::ShownModel>("show"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Watch => json::schema::<Watched>("watch"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),
@@ -116,13 +114,13 @@ pub fn schema(kind: Kind) -> Value {
 ///
 /// # Errors
 /// None but those of the output.
-pub fn run(args: &Args, _context: &Context) -> Result<Outcome, CliError> {
+pub fn run(args: &Args) -> Result<Outcome, CliError> {
     let found = schema(args.kind);
     let text = format!("{found:#}\n");
     let name = args.kind.to_possible_value();
     let result = serde_json::json!({"kind": name.as_ref().map(|n| n.get_name()), "of": found});
     Ok(Outcome {
-        document: Document::new("schema", &[], &[], &result)?,
+        document: Document::new("generate", &[], &[], &result)?,
         text,
         missed: Vec::new(),
     })

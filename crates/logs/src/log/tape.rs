@@ -1,0 +1,602 @@
+//! The rows of a log as they were read once: whoever reads the log again goes along them.
+//!
+//! Rows are taken from the file when the first reader asks for them, and kept: in memory up to
+//! [`IN_MEMORY`], beyond that in one temporary file, of which a reader holds a chunk at a time.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::time::SystemTime;
+
+use super::columns::position_of;
+use super::content::RawBytes;
+use super::layout::Layout;
+use super::pass::{Opened, open};
+use super::rows::{LogRows, Strictness};
+use super::source::{self, OpenFile};
+use super::time::{Instant, Stamped};
+use super::{Block, LogError};
+
+/// Rows of a chunk.
+const ROWS: usize = 1024;
+/// Bytes of a log that are kept in memory.
+const IN_MEMORY: usize = 16 << 20;
+
+/// What is kept of a log while somebody holds its [`super::LogSpec`].
+#[derive(Default)]
+pub(super) struct Kept {
+    path: PathBuf,
+    files: Mutex<Vec<(PathBuf, Arc<File>)>>,
+    tapes: Mutex<Vec<(Layout, Arc<Tape>)>>,
+}
+
+impl fmt::Debug for Kept {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Kept")
+    }
+}
+
+/// What is kept of logs that somebody holds now.
+static HELD: Mutex<Vec<Weak<Kept>>> = Mutex::new(Vec::new());
+
+/// Files of one log that are kept open.
+const OPEN: usize = 16;
+
+/// A file, opened anew unless it is one of a log that somebody holds.
+///
+/// # Errors
+/// What the system says; a folder.
+pub(super) fn opened(path: &Path) -> io::Result<OpenFile> {
+    let held: Vec<Arc<Kept>> = lock(&HELD).iter().filter_map(Weak::upgrade).collect();
+    let kept = held.iter().find(|kept| kept.has(path));
+    let mut files = kept.map(|kept| lock(&kept.files));
+    let now = path.metadata()?;
+    let same = |file: &File| {
+        let then = file.metadata()?;
+        Ok::<bool, io::Error>(then.len() == now.len() && then.modified()? == now.modified()?)
+    };
+    if let Some(files) = &mut files {
+        files.retain(|(of, file)| of != path || same(file).unwrap_or(false));
+        if let Some((_, file)) = files.iter().find(|(of, _)| of == path) {
+            return Ok(OpenFile::new(Arc::clone(file), true));
+        }
+    }
+    if now.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    let file = Arc::new(File::open(path)?);
+    let regular = now.is_file();
+    if let Some(files) = files.as_mut().filter(|files| regular && files.len() < OPEN) {
+        files.push((path.to_owned(), Arc::clone(&file)));
+    }
+    Ok(OpenFile::new(file, regular))
+}
+
+impl Kept {
+    /// What is kept of the log of this path: all who hold it share its rows, whatever their spans.
+    pub(super) fn of(path: &Path) -> Arc<Self> {
+        let mut held = lock(&HELD);
+        held.retain(|kept| kept.strong_count() > 0);
+        let mut alive = held.iter().filter_map(Weak::upgrade);
+        if let Some(kept) = alive.find(|kept| kept.path == path) {
+            return kept;
+        }
+        let kept = Arc::new(Self {
+            path: path.to_owned(),
+            ..Self::default()
+        });
+        held.push(Arc::downgrade(&kept));
+        kept
+    }
+
+    /// Whether a file is one of the log: itself, in its folder, or one of those that `+` joins.
+    fn has(&self, path: &Path) -> bool {
+        let joined = || self.path.to_str().zip(path.to_str());
+        self.path == path
+            || path.parent() == Some(&self.path)
+            || joined().is_some_and(|(all, one)| all.split('+').any(|part| part == one))
+    }
+
+    /// The tape of these files by this layout, its conversion aside; what the log turned out to be.
+    pub(super) fn tape(&self, files: &[PathBuf], layout: &Layout) -> Result<Arc<Tape>, LogError> {
+        let layout = layout.clone().as_logged();
+        let state = states(files);
+        let mut tapes = lock(&self.tapes);
+        tapes.retain(|(_, tape)| tape.state == state);
+        if let Some((_, tape)) = tapes.iter().find(|(of, _)| of.reads_like(&layout)) {
+            return Ok(Arc::clone(tape));
+        }
+        let tape = Arc::new(Tape::open(files, &layout, state)?);
+        tapes.push((layout, Arc::clone(&tape)));
+        Ok(tape)
+    }
+}
+
+/// Length and last change of each file: a file that was written anew is read anew.
+type States = Vec<Option<(u64, SystemTime)>>;
+
+fn states(files: &[PathBuf]) -> States {
+    let state = |file: &PathBuf| {
+        let about = file.metadata().ok()?;
+        Some((about.len(), about.modified().ok()?))
+    };
+    files.iter().map(state).collect()
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Some consecutive rows.
+#[derive(Debug, Default, Clone, PartialEq)]
+struct Chunk {
+    stamps: Vec<Stamped>,
+    /// Line or message number of each row.
+    numbers: Vec<u64>,
+    /// Whether a row equals the one before it, and whether one of its channels cannot be used.
+    flags: Vec<(bool, bool)>,
+    /// Positions, torques and velocities of each row [SI].
+    values: Vec<f64>,
+}
+
+/// Rows that are kept, whose source hands out more.
+pub(super) struct Tape {
+    files: Vec<PathBuf>,
+    layout: Layout,
+    state: States,
+    /// The layout that the log turned out to have.
+    pub(super) found: Layout,
+    names: Vec<String>,
+    recording: bool,
+    velocities: bool,
+    widths: [usize; 3],
+    /// The column of times, where its numbers are taken as seconds.
+    time_column: Option<usize>,
+    inner: Mutex<Inner>,
+    /// The first times, as they were read before their unit was known.
+    first: OnceLock<Option<Vec<f64>>>,
+    sha256: OnceLock<String>,
+}
+
+impl fmt::Debug for Tape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tape")
+            .field("files", &self.files)
+            .finish_non_exhaustive()
+    }
+}
+
+struct Inner {
+    source: Box<dyn LogRows>,
+    bytes: Option<RawBytes>,
+    time: Option<(usize, f64)>,
+    chunks: Vec<Place>,
+    /// Bytes of the chunks that are in memory.
+    size: usize,
+    spilled: Option<File>,
+    ended: bool,
+    /// An error ended the log; the error itself until it is handed out.
+    failed: bool,
+    error: Option<LogError>,
+}
+
+/// Where a chunk is.
+enum Place {
+    Memory(Arc<Chunk>),
+    /// At this byte of the temporary file, with so many rows.
+    File(u64, usize),
+}
+
+impl Tape {
+    fn open(files: &[PathBuf], layout: &Layout, state: States) -> Result<Self, LogError> {
+        let Opened {
+            rows,
+            layout: found,
+            bytes,
+            ..
+        } = open(files, layout, Strictness::Refuse)?;
+        let velocities = rows.has_velocities();
+        let plain = found.time.factor == 1.0 && found.section.rate_hz.is_none();
+        let dq = if velocities {
+            found.velocities.len()
+        } else {
+            0
+        };
+        Ok(Self {
+            files: files.to_vec(),
+            layout: layout.clone(),
+            state,
+            names: rows.names().to_vec(),
+            recording: rows.is_recording(),
+            velocities,
+            widths: [found.positions.len(), found.torques.len(), dq],
+            time_column: plain
+                .then(|| position_of(rows.names(), &found.time))
+                .flatten(),
+            found,
+            first: OnceLock::new(),
+            sha256: OnceLock::new(),
+            inner: Mutex::new(Inner {
+                source: rows,
+                bytes,
+                time: None,
+                chunks: Vec::new(),
+                size: 0,
+                spilled: None,
+                ended: false,
+                failed: false,
+                error: None,
+            }),
+        })
+    }
+
+    /// The chunk of this number; `None` behind the last one.
+    fn chunk(&self, index: usize) -> Result<Option<Arc<Chunk>>, LogError> {
+        let mut inner = lock(&self.inner);
+        while index >= inner.chunks.len() && !inner.ended {
+            let chunk = inner.produce(self.widths);
+            inner.keep(chunk).map_err(|error| self.no_room(error))?;
+        }
+        match inner.chunks.get(index) {
+            Some(Place::Memory(chunk)) => Ok(Some(Arc::clone(chunk))),
+            Some(Place::File(at, rows)) => {
+                let (at, rows) = (*at, *rows);
+                let width = self.widths.iter().sum();
+                let read = inner.restored(at, rows, width);
+                Ok(Some(Arc::new(read.map_err(|error| self.no_room(error))?)))
+            }
+            None if inner.failed => Err(match inner.error.take() {
+                Some(error) => error,
+                None => {
+                    let rows = inner.rows();
+                    drop(inner);
+                    return self.fresh_at(rows + 1).map(|_| None);
+                }
+            }),
+            None => Ok(None),
+        }
+    }
+
+    /// Goes to the end of the log, or to what ends it.
+    fn to_the_end(&self) {
+        loop {
+            let mut inner = lock(&self.inner);
+            if inner.ended {
+                return;
+            }
+            let chunk = inner.produce(self.widths);
+            if inner.keep(chunk).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// The rows anew from the files, the first `rows` of them passed: for what a tape does not keep.
+    fn fresh_at(&self, rows: usize) -> Result<Box<dyn LogRows>, LogError> {
+        let Opened { rows: mut anew, .. } = open(&self.files, &self.layout, Strictness::Refuse)?;
+        if let Some((column, seconds)) = lock(&self.inner).time {
+            anew.set_time(column, seconds);
+        }
+        for _ in 0..rows {
+            anew.next()?;
+        }
+        Ok(anew)
+    }
+
+    fn no_room(&self, error: io::Error) -> LogError {
+        LogError::Read {
+            file: source::shown_all(&self.files),
+            remedy: "its rows are kept in a temporary file: free some room on the disk, or name a folder with room in TMPDIR".to_owned(),
+            source: error,
+        }
+    }
+
+    /// The first numbers of the column of times, where all of them were read as plain seconds.
+    pub(super) fn first_times(&self, column: usize, most: usize) -> Option<Vec<f64>> {
+        if self.time_column != Some(column) {
+            return None;
+        }
+        let first = || {
+            let chunk = self.chunk(0).ok()??;
+            let number = |stamp: &Stamped| match stamp {
+                Stamped::Seconds(t) if !t.is_nan() => Some(*t),
+                _ => None,
+            };
+            let whole = chunk.stamps.len() >= most.min(ROWS) || !lock(&self.inner).failed;
+            let times = chunk.stamps.iter().take(most).map(number).collect();
+            whole.then_some(times).flatten()
+        };
+        self.first.get_or_init(first).clone()
+    }
+
+    /// Says how many seconds the unit of a column of times has: the first reader of a log does, before its rows.
+    fn set_time(&self, column: usize, seconds: f64) {
+        let mut inner = lock(&self.inner);
+        let as_opened = self.time_column == Some(column) && seconds == 1.0;
+        let before = inner.time.replace((column, seconds));
+        if before == Some((column, seconds)) || (before.is_none() && as_opened) {
+            return;
+        }
+        if !inner.chunks.is_empty() || inner.ended {
+            match open(&self.files, &self.layout, Strictness::Refuse) {
+                Ok(opened) => inner.begin(opened.rows, opened.bytes),
+                Err(error) => {
+                    inner.chunks.clear();
+                    (inner.ended, inner.failed, inner.error) = (true, true, Some(error));
+                    return;
+                }
+            }
+        }
+        inner.source.set_time(column, seconds);
+    }
+
+    fn checksum(&self) -> Option<&str> {
+        if self.sha256.get().is_none() {
+            self.to_the_end();
+            let bytes = lock(&self.inner).bytes.clone();
+            let sum = match bytes {
+                Some(bytes) => bytes.sha256().ok(),
+                None => source::sha256_of(&self.files).ok(),
+            };
+            let _ = self.sha256.set(sum?);
+        }
+        self.sha256.get().map(String::as_str)
+    }
+}
+
+impl Inner {
+    fn begin(&mut self, source: Box<dyn LogRows>, bytes: Option<RawBytes>) {
+        (self.source, self.bytes) = (source, bytes);
+        self.chunks.clear();
+        self.size = 0;
+        (self.ended, self.failed, self.error) = (false, false, None);
+    }
+
+    fn rows(&self) -> usize {
+        let rows = |place: &Place| match place {
+            Place::Memory(chunk) => chunk.stamps.len(),
+            Place::File(_, rows) => *rows,
+        };
+        self.chunks.iter().map(rows).sum()
+    }
+
+    /// The next rows of the source.
+    fn produce(&mut self, widths: [usize; 3]) -> Chunk {
+        let width: usize = widths.iter().sum();
+        let mut chunk = Chunk::default();
+        let mut row = Block::default();
+        while chunk.stamps.len() < ROWS {
+            match self.source.next() {
+                Ok(Some(stamp)) => chunk.stamps.push(stamp),
+                Ok(None) => {
+                    self.ended = true;
+                    break;
+                }
+                Err(error) => {
+                    self.ended = true;
+                    self.failed = true;
+                    self.error = Some(error);
+                    break;
+                }
+            }
+            row.clear();
+            let bad = self.source.append(&mut row).is_err();
+            let parts = [&row.q, &row.tau, &row.dq];
+            let whole = parts.iter().zip(widths).all(|(part, n)| part.len() == n);
+            if bad || !whole {
+                chunk.values.resize(chunk.values.len() + width, f64::NAN);
+            } else {
+                parts.iter().for_each(|part| chunk.values.extend(*part));
+            }
+            chunk.numbers.push(self.source.number());
+            chunk.flags.push((self.source.repeats(), bad || !whole));
+        }
+        chunk
+    }
+
+    fn keep(&mut self, chunk: Chunk) -> io::Result<()> {
+        if chunk.stamps.is_empty() {
+            return Ok(());
+        }
+        let bytes = chunk.bytes();
+        if self.size + bytes <= IN_MEMORY {
+            self.size += bytes;
+            self.chunks.push(Place::Memory(Arc::new(chunk)));
+            return Ok(());
+        }
+        let file = match &mut self.spilled {
+            Some(file) => file,
+            none => none.insert(tempfile::tempfile()?),
+        };
+        let at = file.seek(SeekFrom::End(0))?;
+        file.write_all(&chunk.written())?;
+        self.chunks.push(Place::File(at, chunk.stamps.len()));
+        Ok(())
+    }
+
+    fn restored(&mut self, at: u64, rows: usize, width: usize) -> io::Result<Chunk> {
+        let Some(file) = &mut self.spilled else {
+            return Err(io::ErrorKind::NotFound.into());
+        };
+        let mut bytes = vec![0; rows * (ROW_BYTES + 8 * width)];
+        file.seek(SeekFrom::Start(at))?;
+        file.read_exact(&mut bytes)?;
+        Ok(Chunk::of(&bytes, width))
+    }
+}
+
+/// Bytes of a row beside its values: kind and number of its stamp, its own number, its flags.
+const ROW_BYTES: usize = 1 + 16 + 8 + 1;
+
+impl Chunk {
+    fn bytes(&self) -> usize {
+        let row = size_of::<Stamped>() + size_of::<u64>() + size_of::<(bool, bool)>();
+        self.stamps.len() * row + 8 * self.values.len()
+    }
+
+    fn written(&self) -> Vec<u8> {
+        let rows = self.stamps.len();
+        let width = self.values.len() / rows.max(1);
+        let mut out = Vec::with_capacity(rows * (ROW_BYTES + 8 * width));
+        for row in 0..rows {
+            let (kind, stamp) = match self.stamps[row] {
+                Stamped::Seconds(t) => (0, i128::from(t.to_bits())),
+                Stamped::Exact(instant) => (1, instant.femtoseconds()),
+            };
+            out.push(kind);
+            out.extend(stamp.to_le_bytes());
+            out.extend(self.numbers[row].to_le_bytes());
+            let (repeats, bad) = self.flags[row];
+            out.push(u8::from(repeats) | u8::from(bad) << 1);
+            for value in &self.values[row * width..(row + 1) * width] {
+                out.extend(value.to_le_bytes());
+            }
+        }
+        out
+    }
+
+    fn of(bytes: &[u8], width: usize) -> Self {
+        let mut chunk = Self::default();
+        let number = |bytes: &[u8]| u64::from_le_bytes(std::array::from_fn(|k| bytes[k]));
+        for row in bytes.chunks_exact(ROW_BYTES + 8 * width) {
+            let stamp = i128::from_le_bytes(std::array::from_fn(|k| row[1 + k]));
+            chunk.stamps.push(match row[0] {
+                0 => Stamped::Seconds(f64::from_bits(stamp as u64)),
+                _ => Stamped::Exact(Instant::of_femtoseconds(stamp)),
+            });
+            chunk.numbers.push(number(&row[17..]));
+            chunk.flags.push((row[25] & 1 != 0, row[25] & 2 != 0));
+            let values = row[ROW_BYTES..].chunks_exact(8);
+            (chunk.values).extend(values.map(|value| f64::from_bits(number(value))));
+        }
+        chunk
+    }
+}
+
+/// One way along a tape.
+#[derive(Debug)]
+pub(super) struct TapeRows {
+    tape: Arc<Tape>,
+    chunk: Arc<Chunk>,
+    /// Number of the next chunk, rows of this one that were begun, rows before it.
+    next: usize,
+    begun: usize,
+    before: usize,
+}
+
+impl TapeRows {
+    pub(super) fn new(tape: Arc<Tape>) -> Self {
+        Self {
+            tape,
+            chunk: Arc::default(),
+            next: 0,
+            begun: 0,
+            before: 0,
+        }
+    }
+
+    /// The current row in the files: for messages.
+    fn anew(&self) -> Result<Box<dyn LogRows>, LogError> {
+        self.tape.fresh_at(self.before + self.begun)
+    }
+}
+
+impl LogRows for TapeRows {
+    fn names(&self) -> &[String] {
+        &self.tape.names
+    }
+
+    fn next(&mut self) -> Result<Option<Stamped>, LogError> {
+        if self.begun == self.chunk.stamps.len() {
+            let Some(chunk) = self.tape.chunk(self.next)? else {
+                return Ok(None);
+            };
+            self.before += self.chunk.stamps.len();
+            (self.chunk, self.begun) = (chunk, 0);
+            self.next += 1;
+        }
+        self.begun += 1;
+        Ok(Some(self.chunk.stamps[self.begun - 1]))
+    }
+
+    /// A tape keeps channels alone.
+    fn logged(&self, _: usize) -> Option<f64> {
+        None
+    }
+
+    fn append(&self, block: &mut Block) -> Result<(), LogError> {
+        let row = self.begun - 1;
+        if self.chunk.flags[row].1 {
+            return self.anew()?.append(block);
+        }
+        let [q, tau, dq] = self.tape.widths;
+        let values = &self.chunk.values[row * (q + tau + dq)..(row + 1) * (q + tau + dq)];
+        block.q.extend_from_slice(&values[..q]);
+        block.tau.extend_from_slice(&values[q..q + tau]);
+        block.dq.extend_from_slice(&values[q + tau..]);
+        Ok(())
+    }
+
+    fn has_velocities(&self) -> bool {
+        self.tape.velocities
+    }
+
+    fn set_time(&mut self, column: usize, seconds: f64) {
+        self.tape.set_time(column, seconds);
+    }
+
+    fn is_recording(&self) -> bool {
+        self.tape.recording
+    }
+
+    fn repeats(&self) -> bool {
+        self.chunk.flags[self.begun - 1].0
+    }
+
+    fn number(&self) -> u64 {
+        self.chunk.numbers[self.begun - 1]
+    }
+
+    fn place(&self) -> String {
+        let anew = self.anew();
+        anew.map_or_else(|_| source::shown_all(&self.tape.files), |rows| rows.place())
+    }
+
+    fn clock_remedy(&self, t: f64) -> Option<String> {
+        lock(&self.tape.inner).source.clock_remedy(t)
+    }
+
+    fn malformed(&self) -> u64 {
+        lock(&self.tape.inner).source.malformed()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.warnings()
+    }
+
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.contradictions()
+    }
+
+    fn uneven(&self) -> Vec<(u64, String)> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.uneven()
+    }
+
+    fn begins(&self) -> Option<f64> {
+        lock(&self.tape.inner).source.begins()
+    }
+
+    fn breaks(&self) -> Vec<String> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.breaks()
+    }
+
+    fn sha256(&self) -> Option<&str> {
+        self.tape.checksum()
+    }
+}

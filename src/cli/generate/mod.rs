@@ -1,0 +1,42 @@
+//! `cft-ident generate`: schemas, completions and manual pages, for editors, shells and packagers.
+
+pub mod completions;
+pub mod man;
+pub mod schema;
+
+use super::{CliError, Context, Outcome};
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident generate schema robot > robot.schema.json
+  cft-ident generate completions bash \\
+    > ~/.local/share/bash-completion/completions/cft-ident
+  cft-ident generate man ~/.local/share/man/man1";
+
+/// Write schemas of files and documents, completions of a shell, or manual pages.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    #[command(subcommand)]
+    pub what: What,
+}
+
+/// The texts that can be generated.
+#[derive(Debug, Clone, clap::Subcommand)]
+pub enum What {
+    Schema(schema::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder that is not there, or an output that cannot be written.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    match &args.what {
+        What::Schema(args) => schema::run(args),
+        What::Completions(args) => completions::run(args),
+        What::Man(args) => man::run(args, context),
+    }
+}
