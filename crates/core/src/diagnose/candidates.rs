@@ -9,12 +9,21 @@ use crate::judge::Bound;
 /// An effect at a place in one shape, with bounds of its coefficients.
 pub type Candidate = (Added, Vec<Bound>);
 
-/// What two effects may not both be: one shape per family and place.
-pub type Slot = (Family, Place);
+/// Whether two effects may not both be added: one shape per family and place, and one wave per order.
+pub fn exclude(a: &Added, b: &Added) -> bool {
+    let waves = |e: &Added| e.law.entry.search == Search::Orders;
+    match a.place == b.place && a.family() == b.family() {
+        true if waves(a) && waves(b) => a.name() == b.name() && close(&a.shape, &b.shape),
+        same => same,
+    }
+}
 
-/// The slot of an effect.
-pub fn slot(effect: &Added) -> Slot {
-    (effect.family(), effect.place)
+/// Part by which two orders differ at least.
+const APART: f64 = 0.02;
+
+fn close(a: &[f64], b: &[f64]) -> bool {
+    let mut pairs = a.iter().zip(b);
+    pairs.all(|(a, b)| (a - b).abs() < APART * b.abs())
 }
 
 /// Whether an effect is the shape of a joint's declared friction law, which is fitted before all else.

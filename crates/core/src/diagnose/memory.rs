@@ -6,8 +6,8 @@ use crate::judge::LogRows;
 /// Least rows over which a time is looked for, in lags.
 const ROWS: usize = 4;
 
-/// The longest 1/e time of the joints' residuals, each about its mean over a log \[s\]; `residual` is filtered,
-/// `[stretch][joint][row]`.
+/// The 1/e time of the residual of the joint in the middle, about its mean over a log \[s\]: on a joint that lacks an
+/// effect the residual remembers as long as the motion does. `residual` is filtered, `[stretch][joint][row]`.
 pub fn memory_s(residual: &[Vec<Vec<f64>>], logs: &[LogRows], split: &DataSplit) -> f64 {
     let joints = residual.first().map_or(0, Vec::len);
     let of_joint = |j: usize| {
@@ -20,7 +20,9 @@ pub fn memory_s(residual: &[Vec<Vec<f64>>], logs: &[LogRows], split: &DataSplit)
             .collect();
         step * lag(&own) as f64
     };
-    (0..joints).map(of_joint).fold(0.0, f64::max)
+    let mut times: Vec<f64> = (0..joints).map(of_joint).filter(|t| *t > 0.0).collect();
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn centred(x: &[f64]) -> Vec<f64> {

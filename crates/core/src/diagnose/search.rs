@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Slot, slot};
+use super::candidates::{Candidate, exclude};
 use super::watch::Watch;
 use crate::effect::{Added, Place};
 use crate::judge::{BlockSums, Gain, LeftOut, Numbers, Term, Terms};
@@ -56,10 +56,10 @@ impl Field<'_> {
         loop {
             let terms = declared.with(&self.terms_of(chosen));
             let left_out = LeftOut::new(self.sums, self.judging, &terms)?;
-            let taken: Vec<Slot> = self.taken(chosen);
+            let taken: Vec<&Added> = self.taken(chosen);
             let open: Vec<usize> = (0..self.candidates.len())
                 .filter(|i| wanted(&self.candidates[*i].0))
-                .filter(|i| !taken.contains(&slot(&self.candidates[*i].0)))
+                .filter(|i| !taken.iter().any(|t| exclude(t, &self.candidates[*i].0)))
                 .collect();
             let part = self.watch.part("candidates", open.len());
             let looked: Vec<Looked> = open
@@ -91,8 +91,8 @@ impl Field<'_> {
         all.cloned().collect()
     }
 
-    fn taken(&self, chosen: &[Chosen]) -> Vec<Slot> {
-        let all = chosen.iter().map(|c| slot(&self.candidates[c.candidate].0));
+    fn taken(&self, chosen: &[Chosen]) -> Vec<&Added> {
+        let all = chosen.iter().map(|c| &self.candidates[c.candidate].0);
         all.collect()
     }
 
