@@ -262,11 +262,9 @@ fn held_out(logs: &[LogSpec]) -> CampaignLogs {
             Span::Seconds { .. } => None,
         };
         let part = |span: Span| {
-            LogSpec {
-                span,
-                ..log.clone()
-            }
-            .to_string()
+            let mut part = log.clone();
+            part.span = span;
+            part.to_string()
         };
         match parted {
             Some((fitted, rest)) => {
