@@ -50,6 +50,9 @@ pub struct JointColumns {
     /// Name of the joint in the messages of a recording, where it is another one.
     #[serde(skip)]
     pub in_messages: Option<String>,
+    /// Columns are named by paths in messages.
+    #[serde(skip)]
+    pub by_path: bool,
 }
 
 /// The joints, each with its columns, and what is to be looked at.
@@ -175,7 +178,11 @@ impl Mapping {
         let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
             joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
-            let name = |column: &Option<LogColumn>| column.as_ref().map(|c| c.name.clone());
+            let name = |column: &Option<LogColumn>| {
+                let column = column.as_ref()?;
+                Some(column.path.as_ref().unwrap_or(&column.name).clone())
+            };
+            joint.by_path = q[k].as_ref().is_some_and(|column| column.path.is_some());
             (joint.position, joint.velocity, joint.torque) =
                 (name(&q[k]), name(&dq[k]), name(&tau[k]));
             joint.wrap = q[k].as_ref().and_then(|c| c.wrap);
@@ -316,6 +323,7 @@ fn plain(known: &Known) -> JointColumns {
         torque_unit: None,
         torque_scale: None,
         in_messages: None,
+        by_path: false,
     }
 }
 
