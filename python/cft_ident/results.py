@@ -54,9 +54,24 @@ class Fit(Result):
         super().__init__(document, page, text)
         self.model = model
 
+    @property
     def parameters(self) -> Any:
         """A pandas frame of the model's parameters."""
-        return self.model.parameters()
+        return self.model.parameters
+
+
+class Identification(Result):
+    """A robot identified from a URDF and logs: ``folder`` holds models, pages and the robot file."""
+
+    def __init__(self, document: str, page: str | None, text: str, model: Model, folder: str):
+        super().__init__(document, page, text)
+        self.model = model
+        self.folder = folder
+
+    @property
+    def parameters(self) -> Any:
+        """A pandas frame of the model's parameters."""
+        return self.model.parameters
 
 
 class Diagnosis(Result):

@@ -72,8 +72,10 @@ impl People {
         self.rows += 1;
         if self.rows % STATUS == 1 {
             let plural = if self.alarms == 1 { "" } else { "s" };
-            self.status
-                .label(&format!("watching, {t:.1} s, {} alarm{plural}", self.alarms));
+            self.status.label(&format!(
+                "watching, {t:.1} s, {} alarm{plural}",
+                self.alarms
+            ));
         }
         match line.alarm {
             Some(alarm) if !self.on => {

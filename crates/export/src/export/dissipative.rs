@@ -69,7 +69,10 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
                 *sum += x;
             }
         }
-        let drives = friction.iter().zip(&speeds).filter(|(f, v)| **f * **v < 0.0);
+        let drives = friction
+            .iter()
+            .zip(&speeds)
+            .filter(|(f, v)| **f * **v < 0.0);
         drives.map(|(_, v)| v.abs()).fold(None, |range, v| {
             let [low, high] = range.unwrap_or([v, v]);
             Some([f64::min(low, v), f64::max(high, v)])

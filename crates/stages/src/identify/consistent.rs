@@ -207,7 +207,10 @@ impl ConsistentLinks {
             ));
         }
         if self.status == Ending::IterationLimit {
-            out.push("the search for physically consistent links did not settle; its last result stands".into());
+            out.push(
+                "the search for physically consistent links did not settle; its last result stands"
+                    .into(),
+            );
         }
         out
     }
@@ -250,7 +253,10 @@ pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
         return Ok(());
     }
     let others = covariance.names.iter();
-    let others: Vec<String> = others.filter(|name| !keys.contains(name)).cloned().collect();
+    let others: Vec<String> = others
+        .filter(|name| !keys.contains(name))
+        .cloned()
+        .collect();
     keys.extend(others);
     let value = |key: &String| {
         let p = model.parameters.iter().find(|p| p.key() == *key);
@@ -267,7 +273,10 @@ pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
         Some(FrictionColumns {
             viscous: place("viscous", joint)?,
             coulomb: place("coulomb", joint)?,
-            speed: model.held_out.get(j).map_or(f64::INFINITY, |held| held.speed_seen),
+            speed: model
+                .held_out
+                .get(j)
+                .map_or(f64::INFINITY, |held| held.speed_seen),
         })
     });
     let friction: Vec<FrictionColumns> = friction.filter(|of| of.viscous >= shared).collect();
@@ -296,7 +305,13 @@ fn information(covariance: &[f64], theta: &DVector<f64>) -> DMatrix<f64> {
     let u = theta.len();
     let variance = |i: usize| covariance[i * u + i].max(0.0).sqrt();
     let scale: Vec<f64> = (0..u)
-        .map(|i| if variance(i) > 0.0 { 1.0 / variance(i) } else { 0.0 })
+        .map(|i| {
+            if variance(i) > 0.0 {
+                1.0 / variance(i)
+            } else {
+                0.0
+            }
+        })
         .collect();
     let correlation = DMatrix::from_fn(u, u, |i, j| covariance[i * u + j] * scale[i] * scale[j]);
     let parts = SymmetricEigen::new(correlation);

@@ -50,7 +50,10 @@ fn tool(file: &RobotFile, machine: &LoggedRobot, q: &[f64]) -> (Vector, String) 
     let named = file.robot.frame.first().and_then(|frame| {
         let link = links.iter().position(|link| link.name == frame.link)?;
         let (rotation, origin) = frames[link];
-        Some((add(&origin, &turn(&rotation, &frame.xyz)), frame.name.clone()))
+        Some((
+            add(&origin, &turn(&rotation, &frame.xyz)),
+            frame.name.clone(),
+        ))
     });
     named.unwrap_or_else(|| {
         let last = frames.last().map_or([0.0; 3], |(_, origin)| *origin);
@@ -74,7 +77,11 @@ pub fn levers(machine: &LoggedRobot, q: &[f64]) -> (Vec<Option<f64>>, String) {
         let (rotation, origin) = frames.get(link)?;
         let axis = turn(rotation, &tree.links()[link].axis);
         let away: Vector = std::array::from_fn(|i| point[i] - origin[i]);
-        let lever = cross(&axis, &away).iter().map(|x| x * x).sum::<f64>().sqrt();
+        let lever = cross(&axis, &away)
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt();
         (lever >= LEVER).then_some(lever)
     };
     (links.map(lever).collect(), name)
@@ -101,7 +108,9 @@ pub fn in_use(
     let (levers, point) = levers(machine, &q);
     let still = vec![0.0; n];
     let (mut weight, mut tau) = (vec![0.0; n], vec![0.0; n]);
-    model.robot.torque(&model.theta, &q, &still, &still, &mut weight);
+    model
+        .robot
+        .torque(&model.theta, &q, &still, &still, &mut weight);
     let mut inertia = |j: usize| {
         let mut a = still.clone();
         a[j] = 1.0;

@@ -199,7 +199,7 @@ pub fn lsq(
                 false => Vec::new(),
             };
             Some(consistent(machine, &estimated, &fastest)?)
-        },
+        }
         false => None,
     };
     let Estimated {
@@ -391,7 +391,10 @@ fn below_zero(estimated: &Estimated) -> bool {
     let mut places = own.flat_map(|(j, own)| {
         let first = columns.first_own(j);
         let of_friction = |(_, own): &(usize, &Own)| **own != Own::Offset;
-        own.iter().enumerate().filter(of_friction).map(move |(k, _)| first + k)
+        own.iter()
+            .enumerate()
+            .filter(of_friction)
+            .map(move |(k, _)| first + k)
     });
     places.any(|at| estimated.fit.theta[at] < 0.0)
 }
@@ -406,7 +409,10 @@ fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
         .filter(below)
         .map(|u| {
             let (value, std) = number::value_and_std(u.fitted, u.fitted_std);
-            let joint = u.joint.as_ref().map_or(String::new(), |joint| format!(":{joint}"));
+            let joint = u
+                .joint
+                .as_ref()
+                .map_or(String::new(), |joint| format!(":{joint}"));
             format!("{}{joint} {value} +- {std} {}", u.key, u.unit)
         })
         .collect();

@@ -49,6 +49,7 @@ mod open_log;
 mod open_loop;
 mod own_settings;
 mod passes;
+mod payload;
 mod position_cutoff;
 mod prior;
 mod reduce;
@@ -91,8 +92,8 @@ pub use friction::{
 pub use gain_error::GainError;
 pub use gains::{CurrentGains, FittedGains, Gain, PayloadLog, fit_gains};
 pub use hold_out::Held;
-pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use in_memory::{InMemory, read_whole};
+pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
@@ -102,6 +103,7 @@ pub use motion_fit::MotionFit;
 pub use open_log::OpenLog;
 pub use open_loop::open_loop;
 pub use passes::SimulatedLoop;
+pub use payload::{GainOff, Interval, LeftOfJoint, Payload, PayloadReading, payload};
 pub use position_cutoff::PositionCutoff;
 pub use reduce::reduce;
 pub use reduced::{

@@ -56,7 +56,9 @@ fn verdict(of: &Show) -> (String, bool) {
         false => " It holds the plain fit alone.",
     };
     let hidden = of.in_use.and_then(|(joints, point)| {
-        let forces = joints.iter().filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
+        let forces = joints
+            .iter()
+            .filter_map(|j| Some((j.hidden_force_n?, &j.joint)));
         let (force, joint) = forces.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(format!(
             " The smallest force at the {} that it can show is {} N, by {joint}.",
@@ -88,7 +90,9 @@ fn uses(joints: &[JointInUse], point: &str) -> Table {
     ])
     .caption(&caption);
     let shown = |x: Option<f64>, digits| {
-        x.map_or(number::ABSENT.to_owned(), |x| number::significant(x, digits))
+        x.map_or(number::ABSENT.to_owned(), |x| {
+            number::significant(x, digits)
+        })
     };
     for j in joints {
         table.row([
@@ -218,10 +222,17 @@ fn made_from(to: &mut Writer, file: &ModelFile) {
     let inputs: Vec<String> = inputs.collect();
     let command = match made.command.as_str() {
         "" => "by hand".to_owned(),
-        command => format!("by `{}` of cft-ident {}", escape(command), escape(&made.version)),
+        command => format!(
+            "by `{}` of cft-ident {}",
+            escape(command),
+            escape(&made.version)
+        ),
     };
-    to.paragraph(&format!("Made {command} from {}.", match inputs.is_empty() {
-        true => "no log".to_owned(),
-        false => inputs.join(", "),
-    }));
+    to.paragraph(&format!(
+        "Made {command} from {}.",
+        match inputs.is_empty() {
+            true => "no log".to_owned(),
+            false => inputs.join(", "),
+        }
+    ));
 }

@@ -10,9 +10,7 @@ use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{
-    ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for,
-};
+use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
 use cft_ident_stages::replay::Replayed;
 
 /// What the report is made from.
