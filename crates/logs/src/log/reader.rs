@@ -11,6 +11,7 @@ use super::source::{self, Provenance};
 use super::stale::Stale;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
+use cft_ident_core::number::significant;
 
 /// A log that is being read, and refused where anything is wrong with it.
 #[derive(Debug)]
@@ -283,7 +284,15 @@ impl Reader {
         } else {
             let remedy = remedy.unwrap_or_else(|| {
                 let column = super::escape(&self.pass.layout.time.column);
-                format!("check the clock of the recorder or the time column `{column}`")
+                match self.pass.coarse_clock() {
+                    Some((step, rate)) => format!(
+                        "the clock of `{column}` moves in steps of {} s, too coarse for rows at {rate} Hz: set `rate_hz = {rate}` in [log] of the robot file, in place of `time`",
+                        significant(step, 3)
+                    ),
+                    None => format!(
+                        "check the clock of the recorder or the time column `{column}`; where rows lie evenly, `rate_hz = ..` in [log] of the robot file says so, in place of `time`"
+                    ),
+                }
             });
             LogError::TimeStandsStill { at, t, remedy }
         })
