@@ -27,6 +27,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _native
 from ._native import (
@@ -47,6 +48,7 @@ __all__ = [
 ]
 
 PathLike = Union[str, "os.PathLike[str]"]
+Array = NDArray[np.float64]
 
 
 class Robot:
@@ -122,9 +124,9 @@ class Log:
         """
         flat = np.ascontiguousarray(t, dtype=np.float64)
 
-        def matrix(values: Any) -> np.ndarray:
-            values = np.ascontiguousarray(values, dtype=np.float64)
-            return values.reshape(len(flat), -1) if values.ndim == 1 and len(flat) else values
+        def matrix(values: Any) -> Array:
+            found: Array = np.ascontiguousarray(values, dtype=np.float64)
+            return found.reshape(len(flat), -1) if found.ndim == 1 and len(flat) else found
 
         other = None if reference is None else matrix(reference)
         warm = None if temperature is None else matrix(temperature)
@@ -134,7 +136,7 @@ class Log:
     def frame(cls, frame: Any, joints: Sequence[str], *, t: str = "t", q: str = "q_{}", tau: str = "tau_{}",
               name: str = "frame") -> Log:
         """A pandas or polars frame; ``q`` and ``tau`` are patterns of its columns with ``{}`` for the joint."""
-        def columns(pattern: str) -> np.ndarray:
+        def columns(pattern: str) -> Array:
             return np.column_stack([np.asarray(frame[pattern.format(joint)], dtype=np.float64) for joint in joints])
 
         return cls.arrays(np.asarray(frame[t], dtype=np.float64), columns(q), columns(tau), name=name)
@@ -225,7 +227,7 @@ class Model:
         names, matrix = found
         return pandas.DataFrame(matrix, index=names, columns=names)
 
-    def torque(self, q: Any, v: Any, a: Any, *, dt: float | None = None) -> np.ndarray:
+    def torque(self, q: Any, v: Any, a: Any, *, dt: float | None = None) -> Array:
         """Torques along a motion, with friction, offsets and effects.
 
         ``q``, ``v``, ``a``: arrays of shape (N, n) or (n,), in m or rad and per s. Returns the same shape, in N or
@@ -235,33 +237,33 @@ class Model:
         tau = _native.torque(self._native, q, v, a, dt)
         return tau[0] if one else tau
 
-    def gravity(self, q: Any) -> np.ndarray:
+    def gravity(self, q: Any) -> Array:
         """Torques that carry the links at rest, without friction: (N, n) or (n,), in N or N m."""
         (q,), one = _motion(q)
         still = np.zeros_like(q)
         rows = _native.regressor(self._native, q, still, still)
-        weight = rows @ self._theta()
+        weight: Array = rows @ self._theta()
         return weight[0] if one else weight
 
-    def friction(self, v: Any) -> np.ndarray:
+    def friction(self, v: Any) -> Array:
         """Friction of each joint by its declared law at the velocities ``v``: (N, n) or (n,), in N or N m."""
         (v,), one = _motion(v)
         found = _native.joint_friction(self._native, v)
         return found[0] if one else found
 
-    def regressor(self, q: Any, v: Any, a: Any) -> np.ndarray:
+    def regressor(self, q: Any, v: Any, a: Any) -> Array:
         """The matrix Y of the inertial parameters: (N, n, p), or (n, p) for one row."""
         (q, v, a), one = _motion(q, v, a)
         rows = _native.regressor(self._native, q, v, a)
         return rows[0] if one else rows
 
-    def mass_matrix(self, q: Any) -> np.ndarray:
+    def mass_matrix(self, q: Any) -> Array:
         """The mass matrix: (N, n, n), or (n, n) for one row, in kg, kg m or kg m^2."""
         (q,), one = _motion(q)
         mass = _native.mass_matrix(self._native, q)
         return mass[0] if one else mass
 
-    def _theta(self) -> np.ndarray:
+    def _theta(self) -> Array:
         """Inertial parameters in use, in the order of the regressor's columns."""
         rows = self._native.parameters
         return np.array([in_use for _, joint, _, _, in_use, _ in rows if joint is None])
@@ -294,7 +296,7 @@ class Model:
         return f"Model({self._native.name!r}, {len(self._native.parameters)} parameters)"
 
 
-def _motion(*arrays: Any) -> tuple[list[np.ndarray], bool]:
+def _motion(*arrays: Any) -> tuple[list[Array], bool]:
     """Arrays of one motion, row after row, and whether they are of one row."""
     found = [np.ascontiguousarray(x, dtype=np.float64) for x in arrays]
     one = all(x.ndim == 1 for x in found)
@@ -302,8 +304,10 @@ def _motion(*arrays: Any) -> tuple[list[np.ndarray], bool]:
 
 
 def _model(model: Model | PathLike | None) -> _Model | None:
-    if model is None:
-        return None
+    return None if model is None else _given(model)
+
+
+def _given(model: Model | PathLike) -> _Model:
     return (model if isinstance(model, Model) else Model.load(model))._native
 
 
@@ -338,7 +342,7 @@ class Part:
         keys = ["name", "sha256", "samples", "duration_s", "bounds_s", "blocks"]
         return [dict(zip(keys, log)) for log in self._native.logs]
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return (Part.from_bytes, (self.to_bytes(),))
 
     def __repr__(self) -> str:
@@ -348,7 +352,7 @@ class Part:
 def inspect(logs: PathLike | Iterable[PathLike], robot: Robot | PathLike | None = None) -> Result:
     """What log files hold and what is wrong with them."""
     files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
-    line = ["inspect", *map(os.fspath, files)]
+    line = ["inspect", *[os.fspath(file) for file in files]]
     if robot is not None:
         line += ["-r", robot.path if isinstance(robot, Robot) else os.fspath(robot)]
     return Result(*_command(line))
@@ -377,14 +381,14 @@ def lsq(robot: Robot | PathLike, logs: LogLike | Iterable[LogLike], *, model: Mo
 
 def validate(model: Model | PathLike, logs: LogLike | Iterable[LogLike]) -> Result:
     """How far the torques of logs are off that were not used."""
-    return Result(*_native.validate(_model(model), _logs(logs)))
+    return Result(*_native.validate(_given(model), _logs(logs)))
 
 
 def diagnose(model: Model | PathLike, logs: LogLike | Iterable[LogLike], *,
              veto: LogLike | Iterable[LogLike] = (), holdout: LogLike | Iterable[LogLike] = (),
              keep: bool = False) -> Diagnosis:
     """Effects that the model lacks; ``.model`` is the refined one, ``None`` where the data are at fault."""
-    told, found = _native.diagnose(_model(model), _logs(logs), _logs(veto), _logs(holdout), keep)
+    told, found = _native.diagnose(_given(model), _logs(logs), _logs(veto), _logs(holdout), keep)
     return Diagnosis(*told, None if found is None else Model(found))
 
 
@@ -405,12 +409,16 @@ def track(robots: dict[str, Sequence[Part | Model | PathLike]] | Sequence[Part |
         robots = {"robot": robots}
     given = []
     for name, sources in robots.items():
-        parts, models = [], []
+        parts: list[_native.Part] = []
+        models: list[_Model] = []
         for source in sources:
             if isinstance(source, (str, os.PathLike)):
                 end = os.fspath(source).endswith(".cfi")
                 source = Part.load(source) if end else Model.load(source)
-            (parts if isinstance(source, Part) else models).append(source._native)
+            if isinstance(source, Part):
+                parts.append(source._native)
+            else:
+                models.append(source._native)
         given.append((name, parts, models))
     return Track(*_native.track(given))
 
@@ -468,7 +476,7 @@ def identify(urdf: PathLike, logs: PathLike | Iterable[PathLike], output: PathLi
     """
     files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
     folder = os.fspath(output)
-    document, _, text = _command(["identify", os.fspath(urdf), *map(os.fspath, files), "-o", folder])
+    document, _, text = _command(["identify", os.fspath(urdf), *[os.fspath(file) for file in files], "-o", folder])
     kept = [name for name in ("refined.toml", "model.toml") if os.path.exists(os.path.join(folder, name))]
     page = os.path.join(folder, "report.html")
     html = None
@@ -518,7 +526,7 @@ def export(model: Model | PathLike, *, urdf: PathLike | None = None, c: PathLike
     outputs = [("--urdf", urdf), ("--c", c), ("--rust", rust), ("--mjcf", mjcf), ("--sdf", sdf), ("--usd", usd)]
     files = [logs] if isinstance(logs, (str, os.PathLike)) else list(logs)
     with _as_file(model) as path:
-        line = ["export", "-m", str(path), *map(os.fspath, files)]
+        line = ["export", "-m", str(path), *[os.fspath(file) for file in files]]
         for option, output in outputs:
             line += [option, os.fspath(output)] if output is not None else []
         return Result(*_command(line))

@@ -20,12 +20,14 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """The document; undetermined numbers are ``None``."""
-        return json.loads(self.json)
+        document: dict[str, Any] = json.loads(self.json)
+        return document
 
     @property
     def warnings(self) -> list[str]:
         """What did not come as it should."""
-        return self.to_dict()["warnings"]
+        warnings: list[str] = self.to_dict()["warnings"]
+        return warnings
 
     def save_html(self, path: Any) -> None:
         """Write the report as one page."""
