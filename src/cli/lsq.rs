@@ -26,6 +26,8 @@ pub struct Args {
     /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
+    #[command(flatten)]
+    pub leave_out: arguments::LeaveOut,
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: String,
@@ -98,7 +100,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = friction
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
-    let logs = logs(&args.logs)?;
+    let logs = logs(&args.leave_out.of(&args.logs))?;
     let fitted = match &args.fit_gains {
         None => None,
         Some(payload) => {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::consistent::project;
+use super::contact::contacts;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
@@ -133,6 +134,13 @@ pub fn diagnose(
     let file = &plain;
     let given = refined(file, name)?;
     check_candidates(&settings.candidates, machine, (name, file))?;
+    let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
+    let mut judged = file.parameters.iter().filter(judged).peekable();
+    if judged.peek().is_some() && !judged.any(|p| p.verdict == Some(Verdict::Identified)) {
+        return Err(IdentifyError::NothingIdentified {
+            model: name.to_owned(),
+        });
+    }
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
@@ -157,6 +165,8 @@ pub fn diagnose(
     let each = machine.settings_of_each(&all, &laws, &together, control)?;
     let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
+    let contact = contacts(machine, logs.train, control)?;
+    in_memory.warnings.splice(0..0, contact);
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,

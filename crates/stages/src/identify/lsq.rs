@@ -5,9 +5,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::consistent::{ConsistentLinks, consistent};
+use super::contact::hangs_on_bridged;
 use super::control::Control;
 use super::error::IdentifyError;
-use super::estimate::{Account, Estimated, estimate};
+use super::estimate::{Account, Basis, Estimated, estimate};
 use super::gain_error::GainError;
 use super::gains::{CurrentGains, Gain};
 use super::geometry::geometry;
@@ -27,6 +28,7 @@ use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{FittedUnknown, columns, unknowns};
 use super::weakest::{WeakestPart, weakest};
 use crate::setup::Finding;
+use cft_ident_core::inertia::accumulate::RelativeResidual;
 use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
@@ -186,7 +188,7 @@ pub fn lsq(
     let own = machine.own_settings(logs, &laws, control)?;
     let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
     let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
-    let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    let mut estimated = estimate(&mut passes, linear.clone(), estimator, law)?;
     if let Some(gains) = settings.gains {
         share_uncertainty(&mut estimated, gains)?;
     }
@@ -207,7 +209,7 @@ pub fn lsq(
         fit,
         mut covariance,
         account,
-        ..
+        basis: Basis { sums, .. },
     } = estimated;
     let u = fit.theta.len();
     covariance
@@ -222,6 +224,7 @@ pub fn lsq(
     warnings.extend(account.warnings());
     warnings.extend(held_by_parts(settings, &reduced));
     warnings.append(&mut passes.warnings);
+    warnings.splice(0..0, passes.contacts()?);
     warnings.extend(rests(machine, &resting));
     let mut friction_of_fit = Vec::new();
     let mut friction_prior = Vec::new();
@@ -238,6 +241,11 @@ pub fn lsq(
     let mut inputs = std::mem::take(&mut passes.inputs);
     inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
     let unknowns = unknowns(machine, &columns, &fit, &essential);
+    let plain = matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls) && !law;
+    if plain && before.is_none() && reduced.is_empty() {
+        let rows = (&linear, &sums);
+        warnings.extend(hangs_on_bridged(machine, logs, rows, &unknowns, control)?);
+    }
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
     let costs: Vec<&CutoffCosts> = costs.iter().collect();
@@ -248,6 +256,16 @@ pub fn lsq(
         .all(|u| u.verdict == Verdict::NotIdentifiable)
     {
         return Err(IdentifyError::NothingDetermined);
+    }
+    let known = |u: &&FittedUnknown| u.verdict == Verdict::Identified && !u.negligible;
+    let left = |e: &RelativeResidual| e.moving.unwrap_or(e.all);
+    let least = fit
+        .relative_error
+        .iter()
+        .map(left)
+        .fold(f64::INFINITY, f64::min);
+    if !unknowns.iter().any(|u| known(&u)) && least > NOISE {
+        return Err(IdentifyError::OnlyNoise { left: least });
     }
     let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
     let told = of_geometry.iter().map(|finding| &finding.meaning);
@@ -366,6 +384,9 @@ impl Account {
     }
 }
 
+/// Share of the torque that a fit leaves of every joint where noise is as large as the torque: noise alone leaves 0.7 of
+/// the sum of two that are equal.
+const NOISE: f64 = 0.7;
 /// Share of a joint's rows at rest from which on they are told.
 const TOLD: f64 = 0.01;
 
@@ -378,7 +399,7 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
         .collect();
     (!told.is_empty()).then(|| {
         format!(
-            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted",
+            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted; where a joint turns its samples weigh nothing",
             told.join(", ")
         )
     })

@@ -22,6 +22,7 @@ mod by_motion;
 mod campaign;
 mod compare;
 mod consistent;
+mod contact;
 mod control;
 mod curve;
 mod diagnose;

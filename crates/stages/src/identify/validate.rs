@@ -115,8 +115,10 @@ pub fn validate(
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
     let mut places = Places::new(&machine);
+    let mut beyond = Beyond::new(machine.robot.joints());
     let mut seen = |r: &Reconstructed, origin: Instant| {
         places.take(r.q);
+        beyond.take(r, origin);
         if let Some(reach) = &mut reach {
             reach.take(r.q, r.v, r.reconstructed);
         }
@@ -139,6 +141,9 @@ pub fn validate(
     };
     if let Some(other) = places.refused(&machine) {
         return Err(other);
+    }
+    if let Some(error) = beyond.impossible(&machine, logs) {
+        return Err(error);
     }
     if let Some(text) = not_a_validation(found.judged()) {
         found.warnings.insert(0, text);
@@ -204,6 +209,51 @@ impl Places {
             positions: shown(self.seen[j]),
             limits: shown(machine.file.limits.get(joint)?.position?),
             unit: machine.robot.joint_kind(j).position_unit(),
+        })
+    }
+}
+
+/// A torque of so many times the largest that was measured is of a model that does not hold.
+const IMPOSSIBLE: f64 = 10.0;
+
+/// The largest torques of every joint, measured and reconstructed, and when.
+struct Beyond {
+    measured: Vec<f64>,
+    reconstructed: Vec<(f64, f64)>,
+}
+
+impl Beyond {
+    fn new(joints: usize) -> Self {
+        Beyond {
+            measured: vec![0.0; joints],
+            reconstructed: vec![(0.0, 0.0); joints],
+        }
+    }
+
+    fn take(&mut self, row: &Reconstructed, origin: Instant) {
+        for (most, x) in self.measured.iter_mut().zip(row.measured) {
+            *most = most.max(x.abs());
+        }
+        for (most, x) in self.reconstructed.iter_mut().zip(row.reconstructed) {
+            if x.abs() > most.0 {
+                *most = (x.abs(), origin.seconds() + row.t);
+            }
+        }
+    }
+
+    /// The joint whose torque the model makes impossibly large.
+    fn impossible(&self, machine: &LoggedRobot, logs: &[Log]) -> Option<IdentifyError> {
+        let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
+        let mut off = pairs.filter(|(_, (m, r))| **m > 0.0 && r.0 > IMPOSSIBLE * **m);
+        let (j, (measured, (torque, t))) = off.next()?;
+        let names: Vec<String> = logs.iter().map(Log::name).collect();
+        Some(IdentifyError::Impossible {
+            joint: machine.robot.joint_names()[j].clone(),
+            log: names.join(", "),
+            t: *t,
+            torque: *torque,
+            measured: *measured,
+            unit: machine.file.torque_unit(j),
         })
     }
 }
