@@ -7,7 +7,7 @@ use cft_ident_core::number;
 use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
-use cft_ident_stages::identify::{self, Interval, LoggedRobot, Payload, PayloadReading, refined};
+use cft_ident_stages::identify::{self, LoggedRobot, Number95, Payload, PayloadReading, refined};
 
 const EXAMPLE: &str = "\
 Example:
@@ -63,7 +63,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 }
 
 /// A number with its interval.
-fn shown(x: &Interval) -> String {
+fn shown(x: &Number95) -> String {
     match (x.value, x.interval_95) {
         (Some(value), Some([low, high])) => {
             let [value, low, high] = [value, low, high].map(|x| number::significant(x, 4));
@@ -103,7 +103,7 @@ fn told(found: &Payload, logs: &str) -> String {
     ])
     .caption(&caption);
     if let [as_given, free] = &found.readings[..] {
-        let mut row = |name: &str, a: &Interval, b: &Interval| {
+        let mut row = |name: &str, a: &Number95, b: &Number95| {
             table.row([name, &shown(a), &shown(b), &a.unit]);
         };
         row("mass", &as_given.mass, &free.mass);

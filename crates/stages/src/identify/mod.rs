@@ -104,7 +104,7 @@ pub use motion_fit::MotionFit;
 pub use open_log::OpenLog;
 pub use open_loop::open_loop;
 pub use passes::SimulatedLoop;
-pub use payload::{GainOff, Interval, LeftOfJoint, Payload, PayloadReading, payload};
+pub use payload::{GainOff, LeftOfJoint, Number95, Payload, PayloadReading, payload};
 pub use position_cutoff::PositionCutoff;
 pub use reduce::reduce;
 pub use reduced::{

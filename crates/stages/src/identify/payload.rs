@@ -46,7 +46,7 @@ const PART: f64 = 1e-3;
 
 /// A number with its 95 % confidence interval; null where the log does not determine it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Interval {
+pub struct Number95 {
     pub value: Option<f64>,
     pub std: Option<f64>,
     pub interval_95: Option<[f64; 2]>,
@@ -57,7 +57,7 @@ pub struct Interval {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct GainOff {
     pub joint: String,
-    pub error: Interval,
+    pub error: Number95,
 }
 
 /// The torque error of a joint.
@@ -75,11 +75,11 @@ pub struct LeftOfJoint {
 pub struct PayloadReading {
     /// Whether gain errors were free.
     pub gains_free: bool,
-    pub mass: Interval,
+    pub mass: Number95,
     /// Centre of gravity in the frame of the link \[m\].
-    pub centre: [Interval; 3],
+    pub centre: [Number95; 3],
     /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of gravity \[kg m^2\].
-    pub inertia: [Interval; 6],
+    pub inertia: [Number95; 6],
     pub gains: Vec<GainOff>,
     pub joints: Vec<LeftOfJoint>,
     /// Standard parameters of the body.
@@ -368,10 +368,10 @@ fn inverse(normal: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<bool>), IdentifyE
     ))
 }
 
-fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Interval {
+fn interval(value: f64, variance: f64, open: bool, unit: &str) -> Number95 {
     let std = variance.max(0.0).sqrt();
     let known = !open && std.is_finite();
-    Interval {
+    Number95 {
         value: known.then_some(value),
         std: known.then_some(std),
         interval_95: known.then(|| [value - NORMAL_95 * std, value + NORMAL_95 * std]),
