@@ -262,13 +262,7 @@ fn held_out(logs: &[LogSpec]) -> CampaignLogs {
             }
             Span::Seconds { .. } => None,
         };
-        let part = |span: Span| {
-            LogSpec {
-                span,
-                ..log.clone()
-            }
-            .to_string()
-        };
+        let part = |span: Span| log.of_span(span).to_string();
         match parted {
             Some((fitted, rest)) => {
                 out.identification.push(part(fitted));

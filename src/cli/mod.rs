@@ -367,7 +367,7 @@ mod tests {
         let args: super::convert::Args = parse("a.csv b.csv out.mcap").unwrap();
         assert_eq!((args.logs.len(), args.output), (2, "out.mcap".into()));
         let args: super::identify::Args = parse("").unwrap();
-        assert!(args.campaign.is_none());
+        assert!(args.robot.is_none());
         let args: super::simulate::Args = parse(
             "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
         )

@@ -146,6 +146,14 @@ impl LogSpec {
         Self::new(path.into(), Span::Whole)
     }
 
+    /// Another part of the same log.
+    pub fn of_span(&self, span: Span) -> Self {
+        Self {
+            span,
+            ..self.clone()
+        }
+    }
+
     fn new(path: PathBuf, span: Span) -> Self {
         let kept = Kept::of(&path);
         Self {
