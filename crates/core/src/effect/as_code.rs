@@ -7,7 +7,7 @@
 
 use super::law_text::exact;
 use super::site::{CodeSite, saturating};
-pub use super::site::{EffectsCode, Kept, Property};
+pub use super::site::{EffectsCode, Property, Remembered};
 use super::{Added, AugmentedModel, EffectError, Place, entry};
 use crate::robot::FormulaSignal;
 use crate::robot::model::JointFriction;

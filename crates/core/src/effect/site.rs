@@ -9,7 +9,7 @@ use crate::robot::standard::{Body, STANDARD};
 
 /// What a model remembers from sample to sample.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Kept {
+pub struct Remembered {
     /// Name of the field.
     pub name: String,
     /// Numbers in it; one that is not in a list for `None`.
@@ -28,7 +28,7 @@ pub struct EffectsCode {
     pub of_friction: Vec<usize>,
     /// After load and friction: other functions of q, v, a and load.
     pub added: Vec<String>,
-    pub memory: Vec<Kept>,
+    pub memory: Vec<Remembered>,
     /// In a step, after all that remembers nothing.
     pub steps: Vec<String>,
     /// Joints whose memory takes its inertia from a pose, with the field.
@@ -195,7 +195,7 @@ impl<'a> CodeSite<'a> {
     pub fn remember(&mut self, name: &str, size: Option<usize>, first: &str, by: &str) -> String {
         let name = format!("{name}_{}", self.number);
         let own = format!("state.{name}");
-        self.out.memory.push(Kept {
+        self.out.memory.push(Remembered {
             name,
             size,
             first: first.to_owned(),
