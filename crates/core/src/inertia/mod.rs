@@ -11,6 +11,7 @@ pub mod closed_loop;
 pub mod columns;
 mod condense;
 mod covariance;
+pub use covariance::bandwidth;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
