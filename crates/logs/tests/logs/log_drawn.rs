@@ -10,7 +10,7 @@ use cft_ident_logs::log::{Block, Layout, LogError, LogSpec, Reader};
 use cft_ident_logs::mapping::{Asked, ClockSource, Known, Mapping, look};
 use log_support::recording::{JointState, Recording};
 use mcap::WriteOptions;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const JOINTS: [&str; 3] = ["base_turn", "joint_2", "Z"];
