@@ -149,11 +149,13 @@ fn new_text(
     corrected: &RobotFile,
     path: &Path,
 ) -> Result<String, CliError> {
-    let text = config::text_of_kind(robot, config::Wanted::Robot)?;
+    // one that was drafted is no file yet
+    let text = config::text_of_kind(robot, config::Wanted::Robot);
     let name = path.to_string_lossy();
     // a URDF is named beside the file
     let folder = path.parent();
-    if let Some(text) = edited(&text, edits)
+    if let Ok(text) = text
+        && let Some(text) = edited(&text, edits)
         && let Ok(read) = RobotFile::parse_in(&name, &text, folder)
         && read == *corrected
     {

@@ -18,6 +18,14 @@ use crate::log::rows::LogRows;
 use crate::log::time::{Instant, Stamped};
 use crate::log::{LogError, source};
 
+/// What is wrong with a recording without joint states.
+const NO_STATES: &str = "no topic holds sensor_msgs/msg/JointState";
+
+/// Whether a recording was refused because it has no joint states at all.
+pub(in crate::log) fn has_none(error: &LogError) -> bool {
+    matches!(error, LogError::Topic { problem, .. } if problem == NO_STATES)
+}
+
 /// One topic and the columns that it fills.
 struct StateTopic {
     topic: String,
@@ -61,6 +69,9 @@ pub(in crate::log) struct JointStates {
     incomplete: u64,
     /// Messages that were stamped 0 before the clock was known.
     unstamped: u64,
+    /// Whether a message with a stamp was read, and whether one without came before it.
+    begun: bool,
+    begins_unstamped: bool,
     paths: Vec<PathBuf>,
 }
 
@@ -95,7 +106,7 @@ impl JointStates {
             }
             return Err(LogError::Topic {
                 file: source::shown_all(paths),
-                problem: "no topic holds sensor_msgs/msg/JointState".to_owned(),
+                problem: NO_STATES.to_owned(),
                 remedy: format!(
                     "say with a robot file (-r) which fields are the channels; the topics are {}",
                     list(other_topics.iter().map(String::as_str))
@@ -192,6 +203,8 @@ impl JointStates {
             recording: MessageFiles::open(paths, Wanted { names })?,
             paths: paths.to_vec(),
             unstamped: 0,
+            begun: false,
+            begins_unstamped: false,
             row: StateRow::new(columns.len(), sources.len()),
             ahead: StateRow::new(columns.len(), sources.len()),
             sources,
@@ -250,6 +263,7 @@ impl JointStates {
             }
             let Some(key) = one.key(&head) else {
                 self.unstamped += 1;
+                self.begins_unstamped |= !self.begun;
                 continue;
             };
             let own = one.first..one.first + one.values.len() - 2;
@@ -269,6 +283,7 @@ impl JointStates {
                 *to = value.number().unwrap_or(*to);
             }
             row.sources[at] = true;
+            self.begun = true;
             if !same {
                 row.full = true;
                 row.key = key;
@@ -298,6 +313,12 @@ impl LogRows for JointStates {
             Some(seconds) => Stamped::Seconds(seconds),
             None => Stamped::Exact(Instant::from_ns(self.row.key)),
         }))
+    }
+
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !Instant::from_ns(self.row.key).is_far();
+        (self.begins_unstamped && near).then_some(0.0)
     }
 
     fn logged(&self, column: usize) -> Option<f64> {

@@ -7,7 +7,9 @@ mod delay;
 mod encoding;
 mod fields;
 mod format;
+mod joined;
 mod joint_states;
+mod listing;
 mod message;
 mod pairing;
 mod partial;
@@ -20,11 +22,14 @@ mod survey;
 mod value;
 
 pub(super) use format::{FORMATS, format_of};
-pub(super) use joint_states::JointStates;
+pub(super) use joined::{JoinedTopics, of_topics};
+pub(super) use joint_states::{JointStates, has_none};
+pub(super) use listing::listing;
 pub(super) use rows::MessageRows;
 pub(super) use state_topics::state_groups;
 
 pub use delay::{DelayEstimate, DelayEstimator};
 pub use encoding::{CdrReader, DefinitionError, MalformedMessage};
+pub use listing::TopicFacts;
 pub use state_topics::StateGroup;
 pub use value::Value;

@@ -19,12 +19,19 @@ pub fn excite(judged: &Judgement, path: &str, name: &str) -> Report {
     let name = escape(name);
     let mut report = Report::new(&format!("Motion {name}"));
     let (text, good) = words(judged);
-    report.everywhere().paragraph(&judged.torques);
-    report.terminal().paragraph(&judged.not_checked);
-    report.brief().verdict(&judged.not_checked, false);
+    for told in judged.first_words() {
+        report.terminal().paragraph(told);
+        report.brief().verdict(told, false);
+    }
+    if judged.torques_first {
+        report.page().paragraph(&judged.torques);
+    }
     report.brief().verdict(&text, good);
     report.page().verdict(&text, good);
     report.page().paragraph(&judged.not_checked);
+    if !judged.torques_first {
+        report.page().paragraph(&judged.torques);
+    }
     report.terminal().table(limits(judged, path));
     report.page().table(limits(judged, &name));
     report.page().list(judged.broken());
@@ -174,7 +181,8 @@ fn expected(
         let std = p.std.map(|s| number::significant(s, 2));
         let mut row = vec![
             p.name.clone(),
-            p.value.map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
+            p.value
+                .map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
             std.unwrap_or(number::ABSENT.into()),
             relative(p.relative_std),
         ];
