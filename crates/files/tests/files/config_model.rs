@@ -108,6 +108,8 @@ fn model(values: &[f64]) -> ModelFile {
             largest: vec![1.7, 1.3],
         }),
         effects: vec![EffectSection {
+            shrinkage: None,
+            accepted_by_user: false,
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),
             parameters: BTreeMap::from([
