@@ -1,5 +1,6 @@
 //! `cft-ident identify`: the whole way from logs to a validated model.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -266,11 +267,7 @@ fn held_out(logs: &[LogSpec]) -> CampaignLogs {
             }
             Span::Seconds { .. } => None,
         };
-        let part = |span: Span| {
-            let mut part = log.clone();
-            part.span = span;
-            part.to_string()
-        };
+        let part = |span: Span| log.of_span(span).to_string();
         match parted {
             Some((fitted, rest)) => {
                 out.identification.push(part(fitted));
@@ -292,11 +289,17 @@ fn resolve(base: &Path, path: &str) -> PathBuf {
     }
 }
 
-fn logs(base: &Path, specs: &[String]) -> Result<Vec<LogSpec>, CliError> {
+fn logs(
+    base: &Path,
+    specs: &[String],
+    started: &BTreeMap<String, f64>,
+) -> Result<Vec<LogSpec>, CliError> {
     specs
         .iter()
         .map(|text| {
             let mut spec = LogSpec::from_str(text)?;
+            let name = spec.path.to_string_lossy();
+            spec.started_s = started.get(name.as_ref()).copied().unwrap_or(0.0);
             spec.path = base.join(&spec.path);
             Ok(spec)
         })
@@ -317,9 +320,9 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let (name, campaign, base) = (&*name, &campaign, &*base);
     let roles = &campaign.logs;
     let mut files: Vec<String> = Vec::new();
-    let one_joint = logs(base, &roles.friction)?;
-    let mut training = logs(base, &roles.identification)?;
-    let unseen = logs(base, &roles.validation)?;
+    let one_joint = logs(base, &roles.friction, &roles.started)?;
+    let mut training = logs(base, &roles.identification, &roles.started)?;
+    let unseen = logs(base, &roles.validation, &roles.started)?;
     let title = names_of(&unseen).join(", ");
     let role_logs = RoleLogs {
         friction: logs_of(&one_joint),
@@ -357,7 +360,7 @@ fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<
     let machine = checked.machine;
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
-        consistent: campaign.settings.feasible,
+        consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
         ..IdentifySettings::default()
     };

@@ -1,7 +1,7 @@
 //! Faults of the set-up, a few of the bench's (`examples/study_setup`) on measured machines: each is named with
 //! its kind and joint by `inspect`, and nothing is said of what is right.
 
-#[path = "../../examples/study_setup/bench/mod.rs"]
+#[path = "../../crates/studies/examples/study_setup/bench/mod.rs"]
 mod bench;
 
 use bench::faults::{Fault, Side};

@@ -4,7 +4,7 @@
 //!
 //! Files and tables have first moments in the place of the centre: mx = mass x.
 
-use super::as_code::Property;
+use super::site::Property;
 use super::law::{KeyValue, Law, Reparametrisation};
 use super::payload::{self, body};
 use crate::robot::standard::Body;

@@ -2,8 +2,8 @@
 //! know: a base that stands askew. Two numbers explain it on all joints; the columns are those of
 //! [`Tilt`](crate::robot::undeclared::Tilt).
 
-use super::as_code::Property;
-use super::as_code::Site;
+use super::site::Property;
+use super::site::CodeSite;
 use super::law_text::exact;
 use super::entry::{Entry, Family, Key};
 use super::law::Law;
@@ -83,7 +83,7 @@ fn along(scene: &Scene, mut take: impl FnMut(usize, &[[f64; 2]])) {
     }
 }
 
-impl Site<'_> {
+impl CodeSite<'_> {
     /// A base that stands askew: the recursion in another gravity, or the first moments of the closed form.
     fn tilted(&mut self) {
         let &[gx, gy] = self.linear() else { return };

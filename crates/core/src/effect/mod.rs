@@ -21,6 +21,7 @@ pub(crate) mod place;
 mod sampled;
 mod scene;
 mod signal;
+mod site;
 pub(crate) mod unit;
 mod values;
 

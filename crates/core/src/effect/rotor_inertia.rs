@@ -2,7 +2,7 @@
 //! actuator coordinates x_r and y_r the screws move with the pantograph's Jacobian:
 //! tau = J' m (J a + Jdot v).
 
-use super::as_code::Property;
+use super::site::Property;
 use super::entry::{Entry, Family, Key, Ladder};
 use super::law::Law;
 use super::physics::Rule;

@@ -11,11 +11,13 @@ pub mod closed_loop;
 pub mod columns;
 mod condense;
 mod covariance;
+pub use covariance::bandwidth;
 pub mod encoder;
 pub mod essential;
 pub mod feasible;
 pub mod gains;
 pub mod instruments;
+pub mod jumps;
 pub mod law_start;
 pub mod refine;
 pub mod robust;
@@ -71,13 +73,14 @@ pub fn accumulate_weighted<E>(
         columns.channels(),
         &|s, out| {
             columns.fill(robot, s.q, s.v, s.a, s.tau, out);
-            columns.weigh(s.weight, s.rests, out);
+            columns.weigh(s, out);
         },
         &mut |row| {
             let channels = match &mut weigher {
                 Some(weigher) => weigher.weigh(columns, row.filtered),
                 None => row.filtered,
             };
+            factors.at(row.t);
             factors.add(row.segment, row.step, channels);
         },
     )?;

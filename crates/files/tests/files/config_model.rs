@@ -23,6 +23,7 @@ fn parameter(
         theta,
         joint: joint.map(str::to_owned),
         value,
+        consistent: None,
         std,
         unit: "kg m^2".to_owned(),
         meaning: "a \"quoted\" meaning\\ with m1 + m2".to_owned(),

@@ -294,6 +294,11 @@ impl LogPass {
         self.samples += rows as u64;
     }
 
+    /// Time of the first row handed out [s].
+    pub(super) fn began(&self) -> Option<f64> {
+        self.used.map(|(first, _)| first)
+    }
+
     /// Time from the first to the last row handed out so far [s].
     pub(super) fn duration_s(&self) -> f64 {
         self.used.map_or(0.0, |(first, last)| last - first)
@@ -303,7 +308,7 @@ impl LogPass {
     pub(super) fn provenance(&self) -> Result<Provenance, LogError> {
         Ok(Provenance {
             name: self.spec.name(),
-            span: self.spec.span.label(),
+            span: self.spec.part(),
             sha256: match (self.rows.sha256(), &self.watch) {
                 (Some(known), _) => known.to_owned(),
                 (None, Some(watch)) => watch.sha256(),

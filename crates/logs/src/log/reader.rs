@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::arrays::{ArrayRows, Arrays};
 use super::layout::{Channel, Layout};
-use super::mend::{Bridging, Held, Mending, Unwrap};
+use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
 use super::pass::LogPass;
 use super::rows::Strictness;
 use super::source::{self, Provenance};
@@ -26,6 +26,7 @@ pub struct Reader {
     turning: Vec<(usize, Unwrap)>,
     held: Held,
     bridging: Bridging,
+    failed: Failed,
     /// Messages that repeat the one before them in everything.
     duplicates: u64,
     /// Rows at the end of the last block that may turn out to be stale.
@@ -97,6 +98,7 @@ impl Reader {
             turning: Vec::new(),
             held: Held::default(),
             bridging: Bridging::default(),
+            failed: Failed::default(),
             duplicates: 0,
             pending: Block::default(),
         };
@@ -121,6 +123,7 @@ impl Reader {
         };
         self.held = Held::new(mending.held);
         self.bridging = Bridging::new(Arc::clone(&mending.bridges));
+        self.failed = Failed::new(Arc::clone(&mending.failed));
         self.stale.keep(mending.keep_repeats);
     }
 
@@ -138,6 +141,12 @@ impl Reader {
     /// Whether the blocks hold logged velocities.
     pub fn has_velocities(&self) -> bool {
         self.pass.rows.has_velocities()
+    }
+
+    /// How long the machine had run when the rows that are read begin \[s\]; call it after the first block.
+    pub fn started_s(&self) -> f64 {
+        let before = |(first, _)| self.pass.began().map_or(0.0, |began| began - first);
+        self.pass.spec.started_s + self.seen.map_or(0.0, before)
     }
 
     /// Rows handed out so far.
@@ -189,7 +198,10 @@ impl Reader {
                 self.finish(block)?;
                 break;
             }
-            self.take(t, block)?;
+            let since = t - self.seen.map_or(t, |(first, _)| first);
+            if !self.failed.has(t) && !self.pass.spec.leaves_out(since) {
+                self.take(t, block)?;
+            }
         }
         if !self.finished {
             // What follows decides about the rows at the end.
@@ -235,6 +247,11 @@ impl Reader {
             (self.held.dropped, "sample-and-hold"),
             (self.stale.dropped(), "repeated-rows"),
         ]
+    }
+
+    /// Rows left out so far because nothing was read.
+    pub fn not_read(&self) -> u64 {
+        self.failed.dropped
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.

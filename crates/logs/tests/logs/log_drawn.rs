@@ -273,7 +273,7 @@ fn recording(rng: &mut ChaCha8Rng, motion: &Motion, path: &Path) -> bool {
             ..JointState::default()
         }
     };
-    let mut write = |out: &mut Recording, log_ns: u64, state: &JointState| match json {
+    let write = |out: &mut Recording, log_ns: u64, state: &JointState| match json {
         false => out.joint_state("/joint_states", log_ns, state),
         true => {
             let numbers = |x: &[f64]| {

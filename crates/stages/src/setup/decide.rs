@@ -487,8 +487,11 @@ pub(super) fn joints_below(of: &[Positive], deviations: f64) -> Vec<usize> {
 }
 
 pub(super) fn negative(of: &[Positive]) -> Vec<Negative> {
-    of.iter()
-        .filter(|p| p.quantity == Quantity::FrictionPower && p.value < NEGATIVE * p.std)
+    let powers = || of.iter().filter(|p| p.quantity == Quantity::FrictionPower);
+    // a joint that stands takes none but by rounding
+    let least = 1e-6 * powers().map(|p| p.value.abs()).fold(0.0, f64::max);
+    powers()
+        .filter(|p| p.value < NEGATIVE * p.std && p.value.abs() >= least)
         .map(|p| Negative {
             joint: p.joint,
             power: p.value,

@@ -4,6 +4,9 @@
 //! that difference is nothing, at a spike of one to three rows it is the spike's height. At a turn
 //! of smooth motion it is small but not nothing: what stands out there as well must also be off the
 //! cubic through the rows four and five away.
+//!
+//! What is usual is told by medians, which half of the rows would have to spoil. A peak of a torque is none where the
+//! speed of its joint changes at the same rows by more than the position's noise: an inertia explains it.
 
 use super::histogram::Histogram;
 
@@ -16,8 +19,16 @@ const REACH: usize = 5;
 const AROUND: usize = 25;
 /// Differences that are remembered.
 const RING: usize = 64;
+/// Rows to each side by which a change of the speed is seen.
+const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
 const MOST: usize = 4096;
+/// A difference may be a spike from so many usual ones on.
+const SUSPECT: f64 = 10.0;
+/// A speed changes where it does by so many usual changes, and by so many times the largest beside it: what it does in
+/// smooth motion it does in the next rows too.
+const MOVES: f64 = 6.0;
+const ALONE: f64 = 3.0;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +68,10 @@ pub(in crate::inspect) struct Spikes {
     values: [f64; RING],
     times: [f64; RING],
     differences: [f64; RING],
+    /// Positions of the joint, and how far its speed changes over three rows, but for what it does as steadily
+    /// before and after [positions per two rows].
+    positions: [f64; RING],
+    changes_seen: Histogram,
     /// Rows since the stretch began.
     count: usize,
     /// Rows whose difference was looked at as a spike.
@@ -75,6 +90,8 @@ impl Default for Spikes {
             values: [0.0; RING],
             times: [0.0; RING],
             differences: [0.0; RING],
+            positions: [f64::NAN; RING],
+            changes_seen: Histogram::default(),
             count: 0,
             judged: 0,
             differences_seen: Histogram::default(),
@@ -86,12 +103,13 @@ impl Default for Spikes {
 }
 
 impl Spikes {
-    /// Takes the next row.
+    /// Takes the next row of a channel, and the position of its joint where the channel is none itself.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64, position: f64) {
         let k = self.count;
         self.values[k % RING] = value;
         self.times[k % RING] = t;
+        self.positions[k % RING] = position;
         self.count += 1;
         if self.count < WIDTH {
             return;
@@ -101,6 +119,12 @@ impl Spikes {
         let difference = self.values[centre % RING] - median(window);
         self.differences[centre % RING] = difference;
         self.differences_seen.add(difference);
+        if position.is_finite() && k >= 2 * CHANGE {
+            let change = self.change(k - CHANGE);
+            if change.is_finite() {
+                self.changes_seen.add(change);
+            }
+        }
         if centre >= HALF + AROUND {
             self.judge(centre - AROUND, centre);
         }
@@ -120,7 +144,33 @@ impl Spikes {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = 3.0 * self.differences_seen.quantile(0.99);
+        self.suspect = SUSPECT * self.usual();
+    }
+
+    /// Usual difference of a row from the median about it.
+    pub(in crate::inspect) fn usual(&self) -> f64 {
+        self.differences_seen.quantile_not_zero(0.5)
+    }
+
+    /// Change of the joint's speed at a row, less half of those six rows before and after.
+    fn change(&self, row: usize) -> f64 {
+        let q = |k: usize| self.positions[k % RING];
+        let at = |k: usize| (q(k + 3) - q(k + 1)) - (q(k - 1) - q(k - 3));
+        at(row) - 0.5 * (at(row - 6) + at(row + 6))
+    }
+
+    /// Whether the joint's speed changes at a row.
+    fn moves(&self, row: usize) -> bool {
+        let usual = self.changes_seen.quantile_not_zero(0.5);
+        if row < CHANGE || row + CHANGE >= self.count || usual <= 0.0 {
+            return false;
+        }
+        let reach = CHANGE + HALF + 1;
+        let from = row.saturating_sub(AROUND).max(CHANGE);
+        let to = (row + AROUND).min(self.count - 1 - CHANGE);
+        let beside = (from..=to).filter(|k| k.abs_diff(row) >= reach);
+        let largest = beside.map(|k| self.change(k).abs()).fold(0.0, f64::max);
+        self.change(row).abs() > (MOVES * usual).max(ALONE * largest)
     }
 
     /// Looks whether a row stands alone among those up to `last`.
@@ -145,6 +195,9 @@ impl Spikes {
         let Some(height) = self.off_cubic(row, height) else {
             return;
         };
+        if self.moves(row) {
+            return;
+        }
         if self.found.len() == MOST {
             let mut heights: Vec<f64> = self.found.iter().map(|s| s.height.abs()).collect();
             heights.sort_by(f64::total_cmp);
@@ -220,7 +273,7 @@ mod tests {
             if k % 256 == 0 {
                 spikes.settle();
             }
-            spikes.take(k as f64, *value);
+            spikes.take(k as f64, *value, f64::NAN);
         }
         spikes.part();
         spikes
@@ -271,6 +324,34 @@ mod tests {
             );
         }
         assert_eq!(high[0].bridge(&|_| true), None);
+    }
+
+    #[test]
+    fn a_peak_of_a_torque_is_none_where_the_speed_of_its_joint_changes_and_one_where_it_only_turns()
+    {
+        let found = |peak: usize| -> usize {
+            let mut spikes = Spikes::default();
+            for k in 0..3000 {
+                if k % 256 == 0 {
+                    spikes.settle();
+                }
+                let t = k as f64 * 1e-3;
+                // a wave in counts, and a step of the speed at row 1000
+                let step = 0.8 * (t - 1.0).max(0.0);
+                let position = (((5.0 * t).sin() + step) * 1e5).round() * 1e-5;
+                let noise = f64::from((k as u32 * 7919) % 1000) * 1e-5;
+                let torque = (5.0 * t).cos() + noise + if k == peak { 20.0 } else { 0.0 };
+                spikes.take(t, torque, position);
+            }
+            spikes.part();
+            spikes
+                .found()
+                .iter()
+                .filter(|s| s.height.abs() > 10.0)
+                .count()
+        };
+        assert_eq!(found(1000), 0);
+        assert_eq!(found(314), 1);
     }
 
     #[test]

@@ -40,7 +40,7 @@ fn main() {
     let mut chance = Chance(17);
     let mut all = 0;
     let wanted = |name: &str| named.is_empty() || named.iter().any(|w| *w == name);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/study_setup");
+    let folder = Path::new(cft_ident_support::ROOT).join("target/study_setup");
     std::fs::create_dir_all(&folder).expect("the folder can be made");
     let path = folder.join("rows.jsonl");
     if words.iter().any(|w| w == "--again") {
@@ -94,7 +94,7 @@ fn main() {
     }
     let rows = finished(&path);
     let summary = summary::summary(&rows, all);
-    let out = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results/study_setup.json");
+    let out = Path::new(cft_ident_support::ROOT).join("docs/results/study_setup.json");
     std::fs::write(out, format!("{summary:#}\n")).expect("the summary is written");
     summary::print(&summary);
 }

@@ -1,0 +1,201 @@
+//! Stretches of a log in which several joints leave many times their usual residual: something pushes the robot there.
+
+use super::accumulate::{BlockFactor, BlockFactors};
+use super::solution::FitError;
+use super::solve::{Weighting, fit};
+
+/// Numbers that decide what a jump is.
+struct Limits {
+    /// Share of the blocks that are fitted, those with the least residuals: as many others may be spoilt.
+    fitted: f64,
+    /// Times that the blocks to be fitted are chosen anew; each time their residuals fall.
+    rounds: usize,
+    /// A residual jumps to so many times the median of its joint. Half of it shows what models of real arms lack;
+    /// a push that makes less than twice of it spoils a fit little.
+    times: f64,
+    /// So long at least \[s\]: a reversal is over sooner.
+    seconds: f64,
+    /// Of fewer blocks none is told from the others.
+    blocks: usize,
+}
+
+const LIMITS: Limits = Limits {
+    fitted: 0.7,
+    rounds: 3,
+    times: 8.0,
+    seconds: 0.25,
+    blocks: 40,
+};
+
+/// A stretch in which residuals jump.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Jump {
+    /// First and last time, as its rows have them \[s\].
+    pub span: [f64; 2],
+    /// Joints, and how many times the usual residual each of them has there.
+    pub joints: Vec<(usize, f64)>,
+}
+
+/// The stretches of a log in which at least two joints jump; none of a single joint, whose torque has other reasons.
+///
+/// # Errors
+/// [`FitError`].
+pub fn jumps(factors: &BlockFactors) -> Result<Vec<Jump>, FitError> {
+    let usable = |b: &&BlockFactor| b.span[1] > b.span[0] && b.scores.is_none();
+    let blocks: Vec<&BlockFactor> = factors.blocks.iter().filter(usable).collect();
+    if factors.columns.joints < 2 || blocks.len() < LIMITS.blocks {
+        return Ok(Vec::new());
+    }
+    let mut kept: Vec<BlockFactor> = blocks.iter().map(|b| BlockFactor::clone(b)).collect();
+    let mut ratios = Vec::new();
+    for round in 0..=LIMITS.rounds {
+        let part = BlockFactors {
+            blocks: std::mem::take(&mut kept),
+            ..factors.without_blocks()
+        };
+        let theta = fit(&part, Weighting::Wls)?.theta;
+        ratios = over_median(factors, &blocks, &theta);
+        if round == LIMITS.rounds {
+            break;
+        }
+        let worst = |of: &Vec<f64>| of.iter().copied().fold(0.0, f64::max);
+        let mut order: Vec<usize> = (0..blocks.len()).collect();
+        order.sort_by(|a, b| worst(&ratios[*a]).total_cmp(&worst(&ratios[*b])));
+        order.truncate((LIMITS.fitted * blocks.len() as f64) as usize);
+        order.sort_unstable();
+        kept = order.iter().map(|k| blocks[*k].clone()).collect();
+    }
+    Ok(joined(&blocks, &ratios))
+}
+
+/// Root mean square residual of each block and joint over the median of the joint; 0 where it does not move.
+fn over_median(
+    factors: &BlockFactors,
+    blocks: &[&BlockFactor],
+    theta: &nalgebra::DVector<f64>,
+) -> Vec<Vec<f64>> {
+    let n = factors.columns.joints;
+    let mut all = vec![vec![0.0; n]; blocks.len()];
+    for j in 0..n {
+        let own = factors.own_unknowns(theta, j);
+        let mut seen = Vec::with_capacity(blocks.len());
+        for (block, out) in blocks.iter().zip(&mut all) {
+            let r = &block.r[j];
+            if r.iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            let square = factors.parts(r, j).residual_square(&own);
+            out[j] = (square / block.rows.max(1) as f64).sqrt();
+            seen.push(out[j]);
+        }
+        seen.sort_by(f64::total_cmp);
+        let median = seen.get(seen.len() / 2).copied().unwrap_or(0.0);
+        for out in &mut all {
+            out[j] = if median > 0.0 { out[j] / median } else { 0.0 };
+        }
+    }
+    all
+}
+
+/// Blocks that jump, those next to each other as one.
+fn joined(blocks: &[&BlockFactor], ratios: &[Vec<f64>]) -> Vec<Jump> {
+    let mut found: Vec<Jump> = Vec::new();
+    for (block, ratios) in blocks.iter().zip(ratios) {
+        let high = ratios
+            .iter()
+            .enumerate()
+            .filter(|(_, r)| **r > LIMITS.times);
+        let joints: Vec<(usize, f64)> = high.map(|(j, r)| (j, *r)).collect();
+        if joints.len() < 2 {
+            continue;
+        }
+        let length = block.span[1] - block.span[0];
+        match found.last_mut() {
+            Some(last) if block.span[0] - last.span[1] < 3.0 * length => {
+                last.span[1] = block.span[1];
+                for (j, ratio) in joints {
+                    match last.joints.iter_mut().find(|(known, _)| *known == j) {
+                        Some((_, most)) => *most = most.max(ratio),
+                        None => last.joints.push((j, ratio)),
+                    }
+                }
+            }
+            _ => found.push(Jump {
+                span: block.span,
+                joints,
+            }),
+        }
+    }
+    for jump in &mut found {
+        jump.joints.sort_by_key(|(j, _)| *j);
+    }
+    found.retain(|jump| jump.span[1] - jump.span[0] >= LIMITS.seconds);
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inertia::accumulate::Accumulator;
+    use crate::inertia::columns::{Own, RegressorColumns};
+    use crate::robot::tree::{Coordinate, Link, Tree, space};
+    use crate::robot::{JointKind, Robot};
+
+    /// Two prismatic joints across each other for 20 s, pushed from 8 to 10 s by a force on both or on one.
+    fn pushed(force: [f64; 2]) -> Vec<Jump> {
+        let link = |axis: [f64; 3], joint: usize| Link {
+            name: format!("link_{joint}"),
+            parent: joint.checked_sub(1),
+            rotation: space::UNTURNED,
+            origin: [0.0; 3],
+            axis,
+            kind: JointKind::Prismatic,
+            coordinate: Coordinate::Joint(joint),
+        };
+        let links = vec![link([1.0, 0.0, 0.0], 0), link([0.0, 1.0, 0.0], 1)];
+        let tree = Tree::new(links, 2, [0.0; 3]).unwrap();
+        let robot = Robot::of_tree(tree, vec!["a".into(), "b".into()], false, Vec::new());
+        let columns = RegressorColumns {
+            joints: 2,
+            shared: robot.parameters().len(),
+            own: vec![vec![Own::Viscous, Own::Coulomb]; 2],
+            known: vec![None, None],
+            rest_speed: Vec::new(),
+        };
+        let mut rows = Accumulator::new(columns.clone(), 0.05);
+        let mut out = vec![0.0; columns.channels()];
+        for k in 0..2000 {
+            let t = 0.01 * f64::from(k);
+            let v = [(0.9 * t).sin(), (1.3 * t).cos()];
+            let a = [0.9 * (0.9 * t).cos(), -1.3 * (1.3 * t).sin()];
+            let noise = 0.01 * (f64::from(k * 7919 % 1000) / 500.0 - 1.0);
+            let pushes = (8.0..10.0).contains(&t);
+            let tau: [f64; 2] = std::array::from_fn(|j| {
+                let push = if pushes { force[j] } else { 0.0 };
+                3.0 * a[j] + 2.0 * v[j] + 0.7 * v[j].signum() + noise + push
+            });
+            columns.fill(&robot, &[0.0; 2], &v, &a, &tau, &mut out);
+            rows.at(t);
+            rows.add(0, 0.01, &out);
+        }
+        jumps(&rows.finish()).unwrap()
+    }
+
+    #[test]
+    fn a_push_at_two_joints_is_found_with_its_times() {
+        let found = pushed([2.0, -1.0]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let [from, to] = found[0].span;
+        assert!(
+            (from - 8.0).abs() < 0.1 && (to - 10.0).abs() < 0.1,
+            "{found:?}"
+        );
+        assert_eq!(found[0].joints.len(), 2);
+    }
+
+    #[test]
+    fn what_one_joint_leaves_alone_is_no_push_and_a_quiet_log_has_none() {
+        assert!(pushed([2.0, 0.0]).is_empty());
+        assert!(pushed([0.0, 0.0]).is_empty());
+    }
+}
