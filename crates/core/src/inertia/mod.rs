@@ -73,7 +73,7 @@ pub fn accumulate_weighted<E>(
         columns.channels(),
         &|s, out| {
             columns.fill(robot, s.q, s.v, s.a, s.tau, out);
-            columns.weigh(s.weight, s.rests, out);
+            columns.weigh(s, out);
         },
         &mut |row| {
             let channels = match &mut weigher {

@@ -93,7 +93,9 @@ pub(crate) fn resting(
         if model.model.friction[j] == JointFriction::None {
             return Ok(vec![false; rows]);
         }
-        let filtered = parallel.run(&[&parallel.weights(stretch, j, *speed)])?;
+        let speeds = stretch.v[j].iter();
+        let moving: Vec<f64> = speeds.map(|v| rest::movement(*v, *speed)).collect();
+        let filtered = parallel.run(&[&moving])?;
         Ok(filtered[0].iter().map(|m| rest::rests(*m)).collect())
     };
     rest_speed.iter().enumerate().map(of_joint).collect()
