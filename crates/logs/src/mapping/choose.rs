@@ -152,12 +152,17 @@ impl Mapping {
         }
         let [position, velocity, torque] = all;
         // words of a joint's name are no units
+        let short = without_common_head(&names);
         let beside = |columns: &[Option<LogColumn>]| -> Vec<Option<LogColumn>> {
-            let pairs = columns.iter().zip(&names);
+            let pairs = columns.iter().zip(names.iter().zip(&short));
             pairs
-                .map(|(column, joint)| {
+                .map(|(column, (joint, short))| {
                     let mut column = column.clone()?;
-                    column.name = without_joint(&column.name, joint);
+                    let bare = without_joint(&column.name, joint);
+                    column.name = match bare == column.name {
+                        true => without_joint(&bare, short),
+                        false => bare,
+                    };
                     Some(column)
                 })
                 .collect()
@@ -383,8 +388,44 @@ fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a
     })
 }
 
-/// The family of a role that fits the joints best.
+/// The names of joints without the words that all of them begin with: `left/upper` is `upper`.
+fn without_common_head(joints: &[&str]) -> Vec<String> {
+    let all: Vec<Vec<Word>> = joints.iter().map(|joint| words(joint)).collect();
+    let common = |k: usize| {
+        let first = all.first().and_then(|spoken| spoken.get(k));
+        let same = |spoken: &Vec<Word>| {
+            spoken.len() > k + 1 && first.is_some_and(|first| spoken[k].text == first.text)
+        };
+        all.iter().all(same)
+    };
+    let head = (0..).take_while(|k| joints.len() > 1 && common(*k)).count();
+    let short = |(joint, spoken): (&&str, &Vec<Word>)| {
+        let from = spoken.get(head).map_or(0, |word| word.at.start);
+        joint[from..].to_owned()
+    };
+    joints.iter().zip(&all).map(short).collect()
+}
+
+/// The family of a role that fits the joints best, by their names, else by what is left of those without the words
+/// that all begin with.
 fn best<'a>(
+    columns: &'a [LogColumn],
+    role: ChannelRole,
+    commanded: bool,
+    joints: &[&str],
+    beside: Option<&str>,
+) -> Option<Taken<'a>> {
+    let whole = best_by(columns, role, commanded, joints, beside);
+    let short = without_common_head(joints);
+    let short: Vec<&str> = short.iter().map(String::as_str).collect();
+    if whole.as_ref().is_some_and(|taken| taken.how == How::Fits) || short == joints {
+        return whole;
+    }
+    let by_short = best_by(columns, role, commanded, &short, beside);
+    by_short.filter(|taken| taken.how == How::Fits).or(whole)
+}
+
+fn best_by<'a>(
     columns: &'a [LogColumn],
     role: ChannelRole,
     commanded: bool,

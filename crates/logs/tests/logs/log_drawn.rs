@@ -10,7 +10,7 @@ use cft_ident_logs::log::{Block, Layout, LogError, LogSpec, Reader};
 use cft_ident_logs::mapping::{Asked, ClockSource, Known, Mapping, look};
 use log_support::recording::{JointState, Recording};
 use mcap::WriteOptions;
-use rand::{Rng, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const JOINTS: [&str; 3] = ["base_turn", "joint_2", "Z"];
@@ -268,7 +268,7 @@ fn recording(rng: &mut ChaCha8Rng, motion: &Motion, path: &Path) -> bool {
             ..JointState::default()
         }
     };
-    let mut write = |out: &mut Recording, log_ns: u64, state: &JointState| match json {
+    let write = |out: &mut Recording, log_ns: u64, state: &JointState| match json {
         false => out.joint_state("/joint_states", log_ns, state),
         true => {
             let numbers = |x: &[f64]| {

@@ -72,6 +72,9 @@ impl Publishers {
             }
             None => {
                 self.known = judged(paths, topic, fields)?;
+                if known(self).is_none() {
+                    self.known.push((publisher, true));
+                }
                 known(self).is_none_or(|(_, used)| used)
             }
         };
