@@ -472,6 +472,8 @@ impl PayloadReading {
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
             parameters,
+            shrinkage: None,
+            accepted_by_user: false,
         }
     }
 }
