@@ -471,6 +471,8 @@ impl PayloadReading {
         EffectSection {
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
+            shrinkage: None,
+            accepted_by_user: false,
             parameters,
             shrinkage: None,
             accepted_by_user: false,
