@@ -91,8 +91,9 @@ fn number(step: &Value, key: &str) -> (f64, f64) {
     (p["value"].as_f64().unwrap(), p["std"].as_f64().unwrap())
 }
 
+/// Each part of this log holds about one stroke, in which friction of one direction is a constant.
 #[test]
-fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_validate() {
+fn what_the_parts_of_a_short_log_do_not_agree_on_is_seen_and_the_model_stays_as_it_was() {
     let (Some(id), Some(unseen)) = (
         measured("emps/emps_id.csv"),
         measured("emps/emps_pulses_val.csv"),
@@ -101,105 +102,27 @@ fn emps_comes_from_seven_to_two_per_cent_and_the_refined_model_does_the_same_in_
     };
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    run(
-        at,
-        &[
-            "lsq",
-            &id,
-            "-r",
-            "configs/emps-symmetric.toml",
-            "-o",
-            "declared.toml",
-        ],
+    let symmetric = "configs/emps-symmetric.toml";
+    run(at, &["lsq", &id, "-r", symmetric, "-o", "declared.toml"]);
+    let mut arguments = vec!["diagnose", &id, "-m", "declared.toml"];
+    arguments.extend(["--holdout", &unseen, "-o", "refined.toml"]);
+    let found = run(at, &arguments);
+    assert_eq!(found["schema"], "cft-ident/diagnose/2");
+    let first = &found["steps"][0];
+    assert_eq!(first["effect"], "asymmetric-friction");
+    assert_eq!(
+        (&first["status"], &first["written"]),
+        (&"seen".into(), &false.into())
     );
-    let found = run(
-        at,
-        &[
-            "diagnose",
-            &id,
-            "-m",
-            "declared.toml",
-            "--holdout",
-            &unseen,
-            "-o",
-            "refined.toml",
-        ],
-    );
-    assert_eq!(found["verdict"], "effects-found");
-    let named = effects(&found);
-    // friction that does not jump at rest, and no Stribeck friction of a negative size
-    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
-        assert!(named.contains(&(effect, Some("q1"))), "{named:?}");
-    }
-    assert!((mean(&found, "before", "train") - 0.071).abs() < 0.002);
-    assert!((mean(&found, "before", "holdout") - 0.082).abs() < 0.002);
-    assert!(mean(&found, "after", "train") <= 0.022);
-    assert!(mean(&found, "after", "holdout") <= 0.035);
+    assert!(first["cv_gain"].as_f64().unwrap() > 0.5, "{first}");
+    assert_eq!(found["before"], found["after"]);
+    let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
+    assert_eq!(bytes("declared.toml"), bytes("refined.toml"));
     // what is left has its signals, the strongest first, each beyond chance
     let dependence = found["dependence"].as_array().unwrap();
     let share = |told: &Value| told["share"].as_f64().unwrap();
     assert!(!dependence.is_empty());
     assert!(dependence.windows(2).all(|w| share(&w[0]) >= share(&w[1])));
-    for told in dependence {
-        assert_eq!(told["joint"], "q1");
-        assert!(told["p_value"].as_f64().unwrap() <= 0.01, "{told}");
-    }
-    // the model file carries its effects: validate computes the same torque
-    let validated = run(at, &["validate", &unseen, "-m", "refined.toml"]);
-    let error = validated["overall"]["mean_relative_error"]
-        .as_f64()
-        .unwrap();
-    assert!(
-        (error / mean(&found, "after", "holdout") - 1.0).abs() < 0.01,
-        "{error}"
-    );
-    // and what is found once is not found again
-    let again = run(
-        at,
-        &["diagnose", &id, "-m", "refined.toml", "--holdout", &unseen],
-    );
-    for effect in ["asymmetric-friction", "delay", "smooth-coulomb"] {
-        assert!(!effects(&again).contains(&(effect, Some("q1"))), "{effect}");
-    }
-}
-
-#[test]
-fn cogging_is_named_by_its_orders_where_it_is_and_nothing_where_it_is_not() {
-    let Some(log) = measured("bldc-cogging/speed_test1.txt") else {
-        return;
-    };
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let span = |span: &str| format!("{log}@{span}");
-    let (on, unseen) = (span("15.2..23s"), span("23..29.5s"));
-    run(
-        at,
-        &["lsq", &on, "-r", "configs/bldc.toml", "-o", "on.toml"],
-    );
-    let found = run(
-        at,
-        &["diagnose", &on, "-m", "on.toml", "--holdout", &unseen],
-    );
-    let orders: Vec<f64> = found["steps"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|s| s["effect"] == "ripple")
-        .map(|s| number(s, "order").0)
-        .collect();
-    for known in [12.0, 18.0] {
-        assert!(orders.iter().any(|o| (o - known).abs() < 0.1), "{orders:?}");
-    }
-    assert!((mean(&found, "before", "holdout") - 0.30).abs() < 0.03);
-    assert!(mean(&found, "after", "holdout") <= 0.12);
-
-    let off = span("0.5..10s");
-    run(
-        at,
-        &["lsq", &off, "-r", "configs/bldc.toml", "-o", "off.toml"],
-    );
-    let found = run(at, &["diagnose", &off, "-m", "off.toml"]);
-    assert_eq!(effects(&found), []);
 }
 
 #[test]
@@ -222,11 +145,18 @@ fn a_simulated_effect_is_found_with_its_numbers_whatever_the_number_of_threads()
         .position(|e| *e == ("ripple", Some("q1")))
         .unwrap();
     let step = &found["steps"][at];
-    for (key, truth) in [("order", 20.0), ("sin", 1.5), ("cos", 0.5)] {
-        let (value, std) = number(step, key);
-        let off = (value - truth).abs();
-        assert!(off < 4.0 * std, "{key}: {value} +- {std}, {truth}");
-    }
+    let size = |key: &str| number(step, key).0;
+    let amplitude = size("sin").hypot(size("cos"));
+    assert!(
+        (amplitude / 1.5f64.hypot(0.5) - 1.0).abs() < 0.03,
+        "{amplitude}"
+    );
+    // the order stands on the grid of the residual's spectrum
+    let order = step["parameters"]["order"]["value"].as_f64().unwrap();
+    assert!((order - 20.0).abs() < 0.5, "{order}");
+    assert!(step["parameters"]["order"]["std"].is_null());
+    assert_eq!(step["parts"].as_array().unwrap().len(), 12);
+    assert!(step["shrinkage"].as_f64().unwrap() > 0.9);
     let (before, after) = (
         mean(&found, "before", "holdout"),
         mean(&found, "after", "holdout"),

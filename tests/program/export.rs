@@ -334,6 +334,7 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         parameters.push(parameter("offset", Some(joint), model.offset[j]));
     }
     ModelFile {
+        estimates: Vec::new(),
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,
@@ -696,6 +697,8 @@ fn the_command_writes_its_files_with_effects_and_refuses_what_is_no_torque() {
             .iter()
             .map(|(key, x)| ((*key).to_owned(), number(*x)));
         file.effects = vec![cft_ident::config::model_file::EffectSection {
+            shrinkage: None,
+            accepted_by_user: false,
             name: name.to_owned(),
             joint: Some("elbow".to_owned()),
             parameters: numbers.collect(),

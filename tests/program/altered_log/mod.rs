@@ -114,6 +114,7 @@ pub fn write_model(path: &Path) {
         seed: 11,
     });
     let model = ModelFile {
+        estimates: Vec::new(),
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

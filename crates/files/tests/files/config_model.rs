@@ -63,7 +63,6 @@ fn model(values: &[f64]) -> ModelFile {
     let names = vec!["theta_1".to_owned(), "viscous:q4".to_owned()];
     ModelFile {
         robot: robot.clone(),
-        estimates: Vec::new(),
         links: Vec::new(),
         drive_inertia: BTreeMap::new(),
         candidates: Vec::new(),
@@ -109,7 +108,7 @@ fn model(values: &[f64]) -> ModelFile {
             largest: vec![1.7, 1.3],
         }),
         effects: vec![EffectSection {
-            shrinkage: Some(0.5),
+            shrinkage: None,
             accepted_by_user: false,
             name: "ripple".to_owned(),
             joint: Some("q4".to_owned()),

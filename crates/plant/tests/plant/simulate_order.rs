@@ -253,6 +253,7 @@ fn truth_of_a_model_is_the_model_and_effects_are_added_to_it() {
     let mut parameters = synthetic.truth.parameters.clone();
     parameters[0].value = 130.0;
     let model = ModelFile {
+        estimates: Vec::new(),
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,
@@ -323,6 +324,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
         }
     };
     let model = ModelFile {
+        estimates: Vec::new(),
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,

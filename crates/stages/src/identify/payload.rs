@@ -467,6 +467,8 @@ impl PayloadReading {
             parameters.insert(key.to_owned(), parameter(self.body[6 + i], None, "kg m"));
         }
         EffectSection {
+            shrinkage: None,
+            accepted_by_user: false,
             name: cft_ident_core::effect::payload::ENTRY.name.to_owned(),
             joint: None,
             shrinkage: None,

@@ -223,6 +223,7 @@ fn units_follow_the_joint() {
 /// A model of the robot with the synthetic parameters.
 fn model(robot: &RobotFile, effects: Vec<EffectSection>) -> ModelFile {
     ModelFile {
+        estimates: Vec::new(),
         friction_prior: Vec::new(),
         held_out: Vec::new(),
         excesses: None,
@@ -253,6 +254,8 @@ fn effect(name: &str, joint: Option<&str>, numbers: &[(&str, f64)]) -> EffectSec
         ((*key).to_owned(), parameter)
     };
     EffectSection {
+        shrinkage: None,
+        accepted_by_user: false,
         name: name.to_owned(),
         joint: joint.map(str::to_owned),
         parameters: numbers.iter().map(number).collect(),
