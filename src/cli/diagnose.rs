@@ -93,7 +93,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let model = (name.as_str(), &file);
     // before the logs are looked at
     identify::check_candidates(&settings.candidates, &machine, model)?;
-    let report = setup::report(&machine, &train, None, context)?;
+    let report = setup::report(&machine, &train, context)?;
     let fault = report.refusals().next().map(DataFault::of_setup);
     let end = match fault {
         Some(fault) => DiagnoseEnd::DataFault(fault),

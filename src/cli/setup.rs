@@ -50,7 +50,6 @@ pub fn checked(
     machine: LoggedRobot,
     (robot, before): (&Path, &[Edit]),
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     args: &SetupArgs,
     context: &Context,
 ) -> Result<Checked, CliError> {
@@ -65,7 +64,7 @@ pub fn checked(
         report,
         corrected,
         edits,
-    } = check(&machine, asked, friction, context)?;
+    } = check(&machine, asked, context)?;
     let mut warnings: Vec<String> = report
         .findings
         .iter()
@@ -120,10 +119,9 @@ pub fn checked(
 fn check(
     machine: &LoggedRobot,
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     context: &Context,
 ) -> Result<CheckedSetup, CliError> {
-    match check_setup(machine, logs, friction, context.control()) {
+    match check_setup(machine, logs, context.control()) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
         found => Ok(found.unwrap_or_default()),
     }
@@ -136,10 +134,9 @@ fn check(
 pub fn report(
     machine: &LoggedRobot,
     logs: &[Log],
-    friction: Option<(&str, &ModelFile)>,
     context: &Context,
 ) -> Result<SetupReport, CliError> {
-    Ok(check(machine, logs, friction, context)?.report)
+    Ok(check(machine, logs, context)?.report)
 }
 
 /// Text of the new robot file: the user's with the lines that differ, else the whole anew.
