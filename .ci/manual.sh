@@ -21,7 +21,7 @@ cat > "$work/bin/cargo" <<'END'
 case "$*" in
   "build --release" | "test") echo "(cargo $*: done by other steps)" ;;
   "run --release -- "*) shift 3; exec cft-ident "$@" ;;
-  "run --release --example study_"*) echo "(cargo $*: a study, which takes long; not run)" ;;
+  "run --release -p cft-ident-studies "*) echo "(cargo $*: a study, which takes long; not run)" ;;
   *) echo "cargo $*: not known to .ci/manual.sh" >&2; exit 1 ;;
 esac
 END

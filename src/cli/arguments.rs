@@ -8,6 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use cft_ident_core::number::{LARGEST, SMALLEST, is_usable};
 use cft_ident_files::config::campaign::EstimatorKind;
+use cft_ident_logs::log::LogSpec;
 use cft_ident_logs::output::LogForm;
 
 /// Where a document goes: `-` is standard output.
@@ -44,6 +45,39 @@ impl fmt::Display for Destination {
             Destination::Stdout => f.write_str("-"),
             Destination::File(path) => write!(f, "{}", path.display()),
         }
+    }
+}
+
+/// Stretches of the logs that a command fits or judges which are to be left out.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct LeaveOut {
+    /// Leave out a stretch of every LOG, in seconds after its first row; may be given more than once
+    #[arg(long, value_name = "FROM..TOs", value_parser = stretch)]
+    pub leave_out: Vec<[f64; 2]>,
+}
+
+impl LeaveOut {
+    /// The logs without the stretches.
+    pub fn of(&self, logs: &[LogSpec]) -> Vec<LogSpec> {
+        let mut logs = logs.to_vec();
+        for log in &mut logs {
+            log.leave_out.clone_from(&self.leave_out);
+        }
+        logs
+    }
+}
+
+/// `8..10s`, or `8..10`.
+fn stretch(text: &str) -> Result<[f64; 2], String> {
+    let wrong = || "is no stretch in seconds, such as 8..10s".to_owned();
+    let (from, to) = text
+        .trim_end_matches('s')
+        .split_once("..")
+        .ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+    match (number(from), number(to)) {
+        (Some(from), Some(to)) if 0.0 <= from && from < to => Ok([from, to]),
+        _ => Err(wrong()),
     }
 }
 

@@ -36,7 +36,8 @@ pub(super) fn guessed(log: &mut RawReader) -> Result<(ColumnPlan, Vec<LogFault>)
 /// Where no column is a time.
 pub(super) fn time_column(log: &mut RawReader) -> Result<(usize, f64), CliError> {
     let names = log.names();
-    let time = names.iter().position(|name| is_time(name)).ok_or_else(|| {
+    let time = names.iter().position(|name| is_time(name));
+    let time = time.or(log.split_clock()).ok_or_else(|| {
         CliError::input(format!(
             "{}: no column is a time; the header has {}",
             log.log_name(),

@@ -27,6 +27,8 @@ pub struct Args {
     /// Logs; a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
+    #[command(flatten)]
+    pub leave_out: arguments::LeaveOut,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
@@ -71,8 +73,8 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     context.check_outputs(&inputs, &outputs)?;
     let given = files::model(&args.model, context)?;
     let (name, file) = (given.name, given.value);
-    let machine = LoggedRobot::new(&name, file.robot.clone());
-    let (train, veto) = (logs_of(&args.logs), logs_of(&args.veto));
+    let machine = LoggedRobot::of_model(&name, &file);
+    let (train, veto) = (logs_of(&args.leave_out.of(&args.logs)), logs_of(&args.veto));
     let logs = DiagnoseLogs {
         train: &train,
         veto: &veto,

@@ -1,15 +1,19 @@
 //! `cft-ident identify`: the whole way from logs to a validated model.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{CliError, Context, Outcome, campaign, logs_of, names_of, pictures, setup, validate};
+use super::{
+    CliError, Context, Outcome, campaign, logs_of, names_of, new, pictures, setup, validate,
+};
+use cft_ident_files::config::campaign::{CampaignLogs, CampaignSettings};
 use cft_ident_files::config::model_file::Parameter;
 use cft_ident_files::config::{self, Campaign, ModelFile};
-use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::log::{LogSpec, Span};
 use cft_ident_plant::simulate::TruthFile;
 use cft_ident_plant::simulate::effects::EffectValue;
 use cft_ident_report::report::json::Document;
@@ -26,19 +30,34 @@ use cft_ident_stages::setup::Finding;
 const EXAMPLE: &str = "\
 Example:
   cft-ident identify
+  cft-ident identify arm.urdf log.mcap -o run
   cft-ident identify campaign.toml -o runs/monday";
 
-/// Run a whole campaign: friction, inertias, validation, and a summary.
+/// Run everything: friction, inertias, validation, diagnosis, and one report.
 ///
-/// Without a file the built-in campaign of the CFT robot is simulated first, and the result is
-/// compared with its truth at the end.
+/// A robot, as a URDF or a robot file, is followed by its logs: columns are mapped, parts are held out, and what was
+/// guessed stands first in the report, with the line to change. One campaign file alone says all of it. Without a
+/// file the built-in campaign of the CFT robot is simulated first, and the result is compared with its truth at
+/// the end.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXAMPLE)]
 pub struct Args {
-    /// Campaign file: robot, logs by role, settings
-    #[arg(value_name = "CAMPAIGN.toml")]
-    pub campaign: Option<PathBuf>,
-    /// Folder to write into [default: cft-ident-run, or the campaign's name with .run]
+    /// Robot (URDF, robot file, or a built-in one such as configs/ur10.toml), or a campaign file
+    #[arg(value_name = "ROBOT|CAMPAIGN.toml")]
+    pub robot: Option<PathBuf>,
+    /// Logs of the robot; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(value_name = "LOG")]
+    pub logs: Vec<LogSpec>,
+    /// Link of the URDF where the chain ends, if it branches
+    #[arg(long, value_name = "LINK", requires = "logs")]
+    pub tip: Option<String>,
+    /// Rate of logs that have no column of times
+    #[arg(long, value_name = "HZ", requires = "logs", value_parser = new::rate)]
+    pub rate: Option<f64>,
+    /// Topic of the robot in a recording of several machines
+    #[arg(long, value_name = "NAME", requires = "logs")]
+    pub topic: Option<String>,
+    /// Folder to write into [default: cft-ident-run, or the file's name with .run]
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Seed of the simulation and of the starting points [default: the campaign's]
@@ -55,17 +74,47 @@ pub struct Args {
 const FOLDER: &str = "cft-ident-run";
 /// Seed where none is named.
 const SEED: u64 = 1;
+/// Share of each log that is fitted; the rest of it is held out \[percent\].
+const FITTED: f64 = 75.0;
+/// Logs from which on the last is held out whole.
+const SEVERAL: usize = 3;
+
+/// What is run.
+struct Work {
+    /// Name of it.
+    name: String,
+    campaign: Campaign,
+    /// Folder from which the campaign names its logs.
+    base: PathBuf,
+    machine: LoggedRobot,
+    /// The robot file.
+    robot: PathBuf,
+    /// Its text, where it was drafted here.
+    draft: Option<String>,
+    /// What was guessed in it.
+    guesses: Vec<String>,
+    warnings: Vec<String>,
+}
 
 /// Runs the command.
 ///
 /// # Errors
 /// Every [`CliError`]; nothing is written then but the logs of the built-in campaign, which it reads.
 pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
-    let folder = args.output.clone().unwrap_or_else(|| match &args.campaign {
+    let folder = args.output.clone().unwrap_or_else(|| match &args.robot {
         None => PathBuf::from(FOLDER),
-        Some(file) => file.with_extension("run"),
+        Some(file) => PathBuf::from(file.with_extension("run").file_name().unwrap_or_default()),
     });
-    if let Some(file) = &args.campaign {
+    let of_robot = !args.logs.is_empty();
+    if let (Some(file), false) = (&args.robot, of_robot) {
+        if is_urdf(file) {
+            let named = file.display();
+            return Err(
+                CliError::input(format!("{named}: a robot without a log")).hint(format!(
+                    "name its logs behind it: cft-ident identify {named} LOG.."
+                )),
+            );
+        }
         // read again below: no folder is made for a campaign that cannot be run
         Campaign::load(file)?;
     }
@@ -73,29 +122,156 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         CliError::output(format!("cannot make the folder {}: {e}", folder.display()))
             .hint("name another one with -o")
     })?;
-    let mut warnings = Vec::new();
-    let file = match &args.campaign {
-        Some(file) => file.clone(),
+    let work = match &args.robot {
+        Some(robot) if of_robot => Work::of_robot(robot, args, &folder, context)?,
+        Some(file) => Work::of_campaign(file, Vec::new())?,
         None => {
-            (_, warnings) = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
-            folder.join("campaign.toml")
+            let (_, warnings) = campaign::simulate(&folder, args.seed.unwrap_or(SEED), context)?;
+            Work::of_campaign(&folder.join("campaign.toml"), warnings)?
         }
     };
-    let campaign = Campaign::load(&file)?;
-    let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let mut outcome = execute(
-        (&name, &campaign),
-        &base,
-        &folder,
-        (args, context),
-        warnings,
-    )?;
+    let mut outcome = execute(work, &folder, args, context)?;
     outcome.text += &format!(
         "written to {0}/; open {0}/report.html in a browser\n",
         folder.display()
     );
     Ok(outcome)
+}
+
+/// Whether a file is the description of a robot and no file of this tool.
+fn is_urdf(file: &Path) -> bool {
+    file.extension().is_some_and(|end| end != "toml")
+}
+
+impl Work {
+    /// A campaign file.
+    fn of_campaign(file: &Path, warnings: Vec<String>) -> Result<Self, CliError> {
+        let campaign = Campaign::load(file)?;
+        let base = file.parent().unwrap_or(Path::new("")).to_path_buf();
+        let robot = resolve(&base, &campaign.robot);
+        Ok(Self {
+            name: file
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            machine: LoggedRobot::load(&robot.to_string_lossy())?,
+            campaign,
+            base,
+            robot,
+            draft: None,
+            guesses: Vec::new(),
+            warnings,
+        })
+    }
+
+    /// A robot and its logs.
+    fn of_robot(
+        file: &Path,
+        args: &Args,
+        folder: &Path,
+        context: &Context,
+    ) -> Result<Self, CliError> {
+        let Some(first) = args.logs.first() else {
+            return Err(CliError::input("no log is named"));
+        };
+        let (mut robot, mut draft, mut guesses) = (file.to_path_buf(), None, Vec::new());
+        let mut warnings = Vec::new();
+        let machine = match is_urdf(file) {
+            false => LoggedRobot::load(&file.to_string_lossy())?,
+            true => {
+                robot = folder.join("robot.toml");
+                let asked = new::Args {
+                    name: robot.clone(),
+                    urdf: Some(file.to_path_buf()),
+                    tip: args.tip.clone(),
+                    log: Some(first.clone()),
+                    rate: args.rate,
+                    topic: args.topic.clone(),
+                };
+                let found = new::describe(&asked, &robot, context)?;
+                guesses = found.guesses();
+                warnings = found.warnings;
+                draft = Some(found.text);
+                LoggedRobot::new(&robot.to_string_lossy(), found.file)
+            }
+        };
+        let logs = held_out(&args.logs);
+        if logs.validation.is_empty() {
+            warnings.push(
+                "no part of a log is held out: the error on data that were not fitted is not known"
+                    .to_owned(),
+            );
+        }
+        let names = names_of(&args.logs).join(", ");
+        let of = file.file_name().unwrap_or_default().to_string_lossy();
+        Ok(Self {
+            name: format!("{of} with {names}"),
+            campaign: Campaign {
+                robot: of.into_owned(),
+                truth: None,
+                logs,
+                settings: CampaignSettings {
+                    seed: args.seed,
+                    ..CampaignSettings::default()
+                },
+            },
+            base: PathBuf::new(),
+            machine,
+            robot,
+            draft,
+            guesses,
+            warnings,
+        })
+    }
+}
+
+/// Sets the last log aside where there are several, else the last part of each.
+fn held_out(logs: &[LogSpec]) -> CampaignLogs {
+    let mut out = CampaignLogs::default();
+    if let (Some((last, others)), true) = (logs.split_last(), logs.len() >= SEVERAL) {
+        out.identification = others.iter().map(LogSpec::to_string).collect();
+        out.validation = vec![last.to_string()];
+        return out;
+    }
+    for log in logs {
+        let parted = match log.span {
+            Span::Whole => Some((
+                Span::Percent {
+                    from: 0.0,
+                    to: FITTED,
+                },
+                Span::Percent {
+                    from: FITTED,
+                    to: 100.0,
+                },
+            )),
+            Span::Percent { from, to } => {
+                let middle = from + 0.01 * FITTED * (to - from);
+                Some((
+                    Span::Percent { from, to: middle },
+                    Span::Percent { from: middle, to },
+                ))
+            }
+            Span::Seconds { from, to } if to.is_finite() => {
+                let middle = from + 0.01 * FITTED * (to - from);
+                Some((
+                    Span::Seconds { from, to: middle },
+                    Span::Seconds { from: middle, to },
+                ))
+            }
+            Span::Seconds { .. } => None,
+        };
+        let part = |span: Span| log.of_span(span).to_string();
+        match parted {
+            Some((fitted, rest)) => {
+                out.identification.push(part(fitted));
+                out.validation.push(part(rest));
+            }
+            None => out.identification.push(log.to_string()),
+        }
+    }
+    out
 }
 
 /// A path of a campaign file: relative to the file's folder, or a file that comes with the tool.
@@ -108,31 +284,40 @@ fn resolve(base: &Path, path: &str) -> PathBuf {
     }
 }
 
-fn logs(base: &Path, specs: &[String]) -> Result<Vec<LogSpec>, CliError> {
+fn logs(
+    base: &Path,
+    specs: &[String],
+    started: &BTreeMap<String, f64>,
+) -> Result<Vec<LogSpec>, CliError> {
     specs
         .iter()
         .map(|text| {
             let mut spec = LogSpec::from_str(text)?;
+            let name = spec.path.to_string_lossy();
+            spec.started_s = started.get(name.as_ref()).copied().unwrap_or(0.0);
             spec.path = base.join(&spec.path);
             Ok(spec)
         })
         .collect()
 }
 
-fn execute(
-    (name, campaign): (&str, &Campaign),
-    base: &Path,
-    folder: &Path,
-    (args, context): (&Args, &Context),
-    mut warnings: Vec<String>,
-) -> Result<Outcome, CliError> {
-    let robot = resolve(base, &campaign.robot);
-    let machine = LoggedRobot::load(&robot.to_string_lossy())?;
+fn execute(work: Work, folder: &Path, args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let Work {
+        name,
+        campaign,
+        base,
+        machine,
+        robot,
+        draft,
+        mut guesses,
+        mut warnings,
+    } = work;
+    let (name, campaign, base) = (&*name, &campaign, &*base);
     let roles = &campaign.logs;
     let mut files: Vec<String> = Vec::new();
-    let one_joint = logs(base, &roles.friction)?;
-    let mut training = logs(base, &roles.identification)?;
-    let unseen = logs(base, &roles.validation)?;
+    let one_joint = logs(base, &roles.friction, &roles.started)?;
+    let mut training = logs(base, &roles.identification, &roles.started)?;
+    let unseen = logs(base, &roles.validation, &roles.started)?;
     let title = names_of(&unseen).join(", ");
     let role_logs = RoleLogs {
         friction: logs_of(&one_joint),
@@ -140,20 +325,36 @@ fn execute(
         validation: logs_of(&unseen),
     };
     training.extend(one_joint.iter().cloned());
+    let mut with_draft = args.setup.clone();
+    if draft.is_some() && !with_draft.as_declared {
+        // what was guessed of the columns gives way to what the torques say
+        with_draft.fix_setup = Some(robot.clone());
+    }
     let checked = setup::checked(
         machine,
         (&robot, &[]),
         &logs_of(&training),
-        None,
-        &args.setup,
+        &with_draft,
         context,
     )?;
-    checked.write(context)?;
     warnings.extend(checked.warnings.iter().cloned());
+    match (draft, &checked.new_file) {
+        (Some(text), None) => write((folder, context), "robot.toml", &text, &mut files)?,
+        (Some(_), Some((_, text))) => {
+            guesses.extend(checked.report.refusals().map(|found| {
+                format!(
+                    "the torques contradict the names of the columns, and were followed: {}",
+                    found.told()
+                )
+            }));
+            write((folder, context), "robot.toml", text, &mut files)?;
+        }
+        (None, _) => checked.write(context)?,
+    }
     let machine = checked.machine;
     let settings = IdentifySettings {
         estimator: campaign.settings.estimator,
-        consistent: campaign.settings.feasible,
+        consistent: !campaign.settings.unconstrained,
         hold_friction: args.hold_friction,
         ..IdentifySettings::default()
     };
@@ -187,6 +388,7 @@ fn execute(
         unseen: &unseen_names,
         truth: &|p| true_value(truth.as_ref(), p),
         limit: campaign.settings.max_relative_error,
+        guesses: &guesses,
     };
     let mut report = stages::identify::identify(&of);
     let numbers = (&found.model, &found.numbers);
@@ -207,7 +409,7 @@ fn execute(
     // the logs of the set-up have the one-joint logs among them
     let all = training.iter().chain(&unseen);
     let origin = stages::identify::Origin {
-        campaign: &toml::to_string(campaign).unwrap_or_default(),
+        campaign: &by_names(campaign),
         inputs: &found.inputs,
         warnings: &warnings,
         quality: &pictures::inspected(all, &machine, context)?,
@@ -226,6 +428,7 @@ fn execute(
     let latest = found.refined.as_ref().unwrap_or(&found.model);
     let result = Identified {
         setup: &checked.report.findings,
+        guesses: &guesses,
         friction: found.friction.as_ref().map(|(laws, _)| laws),
         lsq: &found.dynamics,
         validate: found.validated.as_ref(),
@@ -246,11 +449,35 @@ fn execute(
     })
 }
 
+/// A campaign as text, its files by their names alone.
+fn by_names(campaign: &Campaign) -> String {
+    let mut named = campaign.clone();
+    let logs = &mut named.logs;
+    for logs in [
+        &mut logs.friction,
+        &mut logs.identification,
+        &mut logs.validation,
+    ] {
+        for log in logs {
+            if let Ok(spec) = LogSpec::from_str(log) {
+                let span = spec
+                    .span
+                    .label()
+                    .map_or(String::new(), |span| format!("@{span}"));
+                *log = spec.name() + &span;
+            }
+        }
+    }
+    toml::to_string(&named).unwrap_or_default()
+}
+
 /// The results of all stages.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Identified<'a> {
     /// What the check of the set-up found.
     setup: &'a [Finding],
+    /// What was guessed of the robot file, each with the line to change.
+    guesses: &'a [String],
     /// Null where there is no one-joint log.
     friction: Option<&'a IdentifiedFriction>,
     lsq: &'a IdentifiedDynamics,

@@ -6,13 +6,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CliError, Context, Exit, Outcome, columns, logs_of, setup};
-use cft_ident_core::motion;
 use cft_ident_core::robot::model::Model;
+use cft_ident_core::{motion, number};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::inspect::{
     FaultKind, Findings, Inspection, LogFault, OrderComparison, look, look_again,
 };
-use cft_ident_logs::log::{LogSection, LogSpec, Provenance, RawReader, escape};
+use cft_ident_logs::log::{
+    LogSection, LogSpec, Provenance, RawReader, TopicFacts, escape, listing,
+};
+use cft_ident_report::report::Detail;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::stages;
 use cft_ident_stages::identify::{IdentifyError, LoggedRobot, repeated_rows};
@@ -49,6 +52,8 @@ pub struct InspectionResult {
     inspection: Inspection,
     /// What the torques say against the set-up that the robot file declares.
     setup: Vec<Finding>,
+    /// Topics of the recordings, in the order of the logs.
+    topics: Vec<TopicFacts>,
 }
 
 /// A robot as it was identified.
@@ -219,6 +224,39 @@ thread_local! {
     static CHANGED: std::cell::RefCell<[Vec<f64>; 3]> = const { std::cell::RefCell::new([const { Vec::new() }; 3]) };
 }
 
+/// Fields of a topic that a terminal shows.
+const SHOWN: usize = 12;
+
+/// The topics of recordings, in lines.
+fn topics_text(topics: &[TopicFacts]) -> String {
+    let mut out = String::new();
+    for topic in topics {
+        let rate = topic.rate_hz.map_or_else(String::new, |rate| {
+            format!(", {} Hz", number::significant(rate, 4))
+        });
+        let publishers = match topic.publishers {
+            1 => String::new(),
+            more => format!(", {more} publishers"),
+        };
+        out += &format!(
+            "topic {} ({}): {} messages{rate}{publishers}\n",
+            escape(&topic.name),
+            escape(&topic.kind),
+            topic.messages
+        );
+        if let Some(reason) = &topic.unreadable {
+            out += &format!("  not read: {reason}\n");
+        }
+        for path in topic.fields.iter().take(SHOWN) {
+            out += &format!("  {}\n", escape(path));
+        }
+        if topic.fields.len() > SHOWN {
+            out += &format!("  and {} more\n", topic.fields.len() - SHOWN);
+        }
+    }
+    out
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -229,6 +267,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = Known::load(args)?;
     let bar = context.progress("looking at logs", Some(args.logs.len() as u64));
     let (mut logs, mut provenance) = (Vec::new(), Vec::new());
+    let mut all_topics = Vec::new();
     let notes = known
         .as_ref()
         .map(|known| known.machine.file.notes.0.clone());
@@ -245,6 +284,18 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             0 | 1 => vec![None],
             _ => machines.into_iter().map(|of| Some(of.topic)).collect(),
         };
+        let listed = listing(spec)?;
+        // a recording of no joint states that is known is listed
+        let unknown = known.is_none() && topics == [None] && !listed.is_empty();
+        if unknown && let Err(error) = RawReader::open(spec, None) {
+            warnings.push(format!("{}: {error}", escape(&spec.name())));
+            provenance.push(Provenance::of_file(&spec.path)?);
+            logs.push((spec.name(), Findings::default()));
+            all_topics.extend(listed);
+            bar.advance(1);
+            continue;
+        }
+        all_topics.extend(listed);
         for topic in topics {
             let name = match &topic {
                 None => spec.name(),
@@ -274,9 +325,14 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let result = InspectionResult {
         inspection: Inspection::of(&logs),
         setup: report.findings,
+        topics: all_topics,
+    };
+    let shown = match known.is_some() || context.detail() == Detail::Brief {
+        true => String::new(),
+        false => topics_text(&result.topics),
     };
     Ok(Outcome {
-        text: text.text_for(context.detail()),
+        text: text.text_for(context.detail()) + &shown,
         document: Document::new("inspect", &provenance, &warnings, &result)?,
         missed: Vec::new(),
     })

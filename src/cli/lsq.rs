@@ -26,6 +26,8 @@ pub struct Args {
     /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
+    #[command(flatten)]
+    pub leave_out: arguments::LeaveOut,
     /// Robot file, or a built-in one such as configs/cft.toml
     #[arg(short, long, value_name = "ROBOT.toml")]
     pub robot: String,
@@ -42,13 +44,16 @@ pub struct Args {
     /// Leave the friction of the model file as it is; its covariance stays in the deviations
     #[arg(long, requires = "model")]
     pub hold_friction: bool,
-    /// Only parameters of links that can exist; the model file then holds the links too
+    /// The plain fit alone: no physically consistent parameters beside it, which torques are computed with
     #[arg(long)]
+    pub unconstrained: bool,
+    /// Accepted and without effect: physically consistent parameters are always there
+    #[arg(long, hide = true)]
     pub feasible: bool,
     /// Then fit a single axis to the motion that its torques make, in windows of so many seconds that begin
     /// at measured states [default: blocks set aside choose the length]
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, require_equals = true,
-          value_parser = arguments::positive, conflicts_with_all = ["model", "feasible", "fit_gains"])]
+          value_parser = arguments::positive, conflicts_with_all = ["model", "fit_gains"])]
     pub open_loop: Option<Option<f64>>,
     /// Model file to write
     #[arg(short, long, value_name = "MODEL.toml")]
@@ -95,7 +100,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     let known = friction
         .as_ref()
         .map(|(name, model)| (name.as_str(), model));
-    let logs = logs(&args.logs)?;
+    let logs = logs(&args.leave_out.of(&args.logs))?;
     let fitted = match &args.fit_gains {
         None => None,
         Some(payload) => {
@@ -115,7 +120,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     };
     let settings = LsqSettings {
         estimator: args.estimator,
-        consistent: args.feasible,
+        consistent: !args.unconstrained && args.open_loop.is_none(),
         friction: known,
         hold_friction: args.hold_friction,
         gains: gains.as_ref(),
@@ -133,7 +138,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     found
         .warnings
         .splice(0..0, checked.warnings.iter().cloned());
-    let model = found.model(machine, known.map(|k| k.1));
+    let mut model = found.model(machine, known.map(|k| k.1));
+    if args.open_loop.is_some() && !args.unconstrained {
+        identify::project(&mut model)?;
+    }
     let document = Document::new("lsq", &found.inputs, &found.warnings, &found)?;
     let names = names_of(&args.logs);
     let of = stages::lsq::Lsq {

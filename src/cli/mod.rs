@@ -17,6 +17,7 @@ pub mod inspect;
 pub mod lsq;
 pub mod new;
 pub mod reduce;
+pub mod show;
 pub mod simulate;
 pub mod torque;
 pub mod track;
@@ -158,6 +159,7 @@ commands! {
     Diagnose: diagnose,
     Track: track,
     Compare: compare,
+    Show: show,
     Torque: torque,
     Watch: watch,
     Simulate: simulate,
@@ -363,7 +365,7 @@ mod tests {
         let args: super::convert::Args = parse("a.csv b.csv out.mcap").unwrap();
         assert_eq!((args.logs.len(), args.output), (2, "out.mcap".into()));
         let args: super::identify::Args = parse("").unwrap();
-        assert!(args.campaign.is_none());
+        assert!(args.robot.is_none());
         let args: super::simulate::Args = parse(
             "-r cft.toml --move q4 --seconds 20 --effect payload:mass=1 --effect ripple:q5 --seed 3 -o q4.csv",
         )

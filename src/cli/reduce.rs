@@ -22,7 +22,7 @@ Example:
 /// Reduce logs to what a linear fit needs of them: a small file that stands where `lsq` and
 /// `validate` take a log.
 ///
-/// From it `lsq` fits by `wls` and `ols`, with --feasible too; the other estimators and everything that
+/// From it `lsq` fits by `wls` and `ols`; the other estimators and everything that
 /// looks at single rows need the logs. Friction that a model gives with -m is held. Reduced logs may be
 /// merged: give them instead of logs.
 #[derive(Debug, Clone, clap::Args)]
@@ -105,7 +105,6 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         machine,
         (Path::new(&args.robot), &[]),
         &logs,
-        known,
         &args.setup,
         context,
     )?;
@@ -171,7 +170,7 @@ fn report(found: &ReducedLogs, result: &Reduced, args: &Args) -> Report {
     terminal.table(table);
     terminal.line("");
     terminal.paragraph(
-        "From these `lsq` fits by wls and ols, also with --feasible, and `validate` tells the errors of \
+        "From these `lsq` fits by wls and ols, and `validate` tells the errors of \
          models that are linear in their columns; irls, iv, oe and everything that looks at single rows \
          need the logs.",
     );

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{CliError, Context};
 use cft_ident_files::config::correction::{Edit, edited};
-use cft_ident_files::config::{self, ModelFile, RobotFile};
+use cft_ident_files::config::{self, RobotFile};
 use cft_ident_stages::identify::{CheckedSetup, IdentifyError, Log, LoggedRobot, check_setup};
 use cft_ident_stages::setup::{Finding, FindingSeverity, SetupReport};
 
@@ -58,13 +58,11 @@ pub fn checked(
         false => machine,
     };
     machine.check_gains()?;
-    // a set-up that is kept whatever the torques say is not asked about: that reads all logs again
-    let asked = if args.as_declared { &[] } else { logs };
     let CheckedSetup {
         report,
         corrected,
         edits,
-    } = check(&machine, asked, context)?;
+    } = check(&machine, logs, context)?;
     let mut warnings: Vec<String> = report
         .findings
         .iter()
@@ -77,12 +75,7 @@ pub fn checked(
         warnings.push(power.sentence());
     }
     let refusals: Vec<&Finding> = report.refusals().collect();
-    if refusals.is_empty() || args.as_declared {
-        warnings.extend(
-            refusals
-                .iter()
-                .map(|f| format!("kept as declared: {}", f.told())),
-        );
+    if refusals.is_empty() {
         let new_file = match args.fix_setup.as_ref().filter(|_| !before.is_empty()) {
             Some(path) => {
                 let text = new_text(robot, before, &machine.file, path)?;
@@ -116,11 +109,7 @@ pub fn checked(
 }
 
 /// The check; logs that cannot be checked are told by the fit itself.
-fn check(
-    machine: &LoggedRobot,
-    logs: &[Log],
-    context: &Context,
-) -> Result<CheckedSetup, CliError> {
+fn check(machine: &LoggedRobot, logs: &[Log], context: &Context) -> Result<CheckedSetup, CliError> {
     match check_setup(machine, logs, context.control()) {
         Err(IdentifyError::Interrupted) => Err(CliError::interrupted()),
         found => Ok(found.unwrap_or_default()),
@@ -146,11 +135,13 @@ fn new_text(
     corrected: &RobotFile,
     path: &Path,
 ) -> Result<String, CliError> {
-    let text = config::text_of_kind(robot, config::Wanted::Robot)?;
+    // one that was drafted is no file yet
+    let text = config::text_of_kind(robot, config::Wanted::Robot);
     let name = path.to_string_lossy();
     // a URDF is named beside the file
     let folder = path.parent();
-    if let Some(text) = edited(&text, edits)
+    if let Ok(text) = text
+        && let Some(text) = edited(&text, edits)
         && let Ok(read) = RobotFile::parse_in(&name, &text, folder)
         && read == *corrected
     {

@@ -2,24 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
+use super::excite::LADDER_S;
 use super::{CliError, Context, Outcome, arguments, files};
 use cft_ident_core::number;
-use cft_ident_logs::log::LogSpec;
+use cft_ident_files::config::ModelFile;
+use cft_ident_logs::log::{LogSpec, Provenance};
 use cft_ident_logs::output::LogWriter;
+use cft_ident_plant::excite::{self, ExciteError, Motion};
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
 use cft_ident_stages::identify::{self, Log, LoggedRobot, refined};
 
 const EXAMPLE: &str = "\
 Example:
-  cft-ident torque unseen.csv -m model.toml -o feedforward.csv";
+  cft-ident torque unseen.csv -m model.toml -o feedforward.csv
+  cft-ident torque motion.toml -m model.toml -o feedforward.csv";
 
 /// Write the feed-forward torque along a motion, with its prediction band.
 #[derive(Debug, Clone, clap::Args)]
-#[command(after_help = EXAMPLE, override_usage = "cft-ident torque [OPTIONS] -m MODEL.toml -o OUT.csv|.mcap LOG")]
+#[command(after_help = EXAMPLE, override_usage = "cft-ident torque [OPTIONS] -m MODEL.toml -o OUT.csv|.mcap LOG|TRAJECTORY.toml")]
 pub struct Args {
-    /// Log or trajectory of q; a span is chosen by LOG@0..70% or LOG@15.2..23s
-    #[arg(value_name = "LOG")]
+    /// Log or trajectory (.toml, .csv) of q; a span is chosen by LOG@0..70% or LOG@15.2..23s
+    #[arg(value_name = "LOG|TRAJECTORY.toml")]
     pub log: LogSpec,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
@@ -27,6 +31,46 @@ pub struct Args {
     /// Log to write
     #[arg(short, long, value_name = "OUT.csv|.mcap", value_parser = arguments::log_file)]
     pub output: PathBuf,
+}
+
+/// Rate of a planned motion where the robot file names none \[Hz\].
+const RATE_HZ: f64 = 1000.0;
+/// Most samples of one: it is held in memory.
+const MOST_ROWS: f64 = 1e7;
+
+/// A trajectory file as a log of positions, and its entry among the inputs.
+fn planned(
+    path: &Path,
+    (name, file): (&str, &ModelFile),
+    context: &Context,
+) -> Result<(Log, Option<Provenance>), CliError> {
+    let given = files::trajectory(path)?;
+    let robot = excite::machine(&file.robot, Some((name, file)))?;
+    let motion = Motion::of_file(&robot, &given.value, LADDER_S, 1)?;
+    let rate = file.robot.control.rate_hz.unwrap_or(RATE_HZ);
+    let rows = (motion.seconds() * rate + 1e-6).floor() + 1.0;
+    if rows > MOST_ROWS {
+        return Err(CliError::input(format!(
+            "{}: {} s at {} Hz are more than {MOST_ROWS:e} samples",
+            given.name,
+            number::significant(motion.seconds(), 4),
+            number::significant(rate, 4)
+        ))
+        .hint("give a shorter motion, or a lower `rate_hz` in [control]"));
+    }
+    let n = robot.coordinates();
+    let (mut t, mut q) = (Vec::new(), Vec::new());
+    for k in 0..rows as usize {
+        if k % 4096 == 0 {
+            context.check()?;
+        }
+        let at = k as f64 / rate;
+        let state = robot.joints(&motion.at(at)).map_err(ExciteError::Robot)?;
+        t.push(at);
+        q.extend(&state.q[..n]);
+    }
+    let log = Log::of_rows(&given.name, &t, &q, &[])?;
+    Ok((log, Some(given.provenance)))
 }
 
 /// Runs the command.
@@ -52,12 +96,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .chain(named("tau_std"))
         .chain(band.into_iter().flat_map(named))
         .collect();
+    let (log, trajectory) = match args.log.path.extension().is_some_and(|end| end == "toml") {
+        true => planned(&args.log.path, (&name, &file), context)?,
+        false => (Log::from(&args.log), None),
+    };
     let mut out = LogWriter::create(&args.output, &columns)?;
     let mut failed = None;
     let found = identify::torque(
         &machine,
         (&file, &refined),
-        &Log::from(&args.log),
+        &log,
         context.control(),
         &mut |t, values, origin| {
             if failed.is_none() {
@@ -90,7 +138,9 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             &joint.unit,
         ]);
     }
-    let document = Document::new("torque", &found.inputs, &found.warnings, &found.along)?;
+    let mut inputs = found.inputs.clone();
+    inputs.splice(0..0, trajectory);
+    let document = Document::new("torque", &inputs, &found.warnings, &found.along)?;
     context.files().add_log(out)?;
     let written = format!("written: {}", args.output.display());
     Ok(Outcome {

@@ -27,6 +27,8 @@ pub struct Args {
     /// Logs, or reduced ones (PART.cfi); a span is chosen by LOG@0..70% or LOG@15.2..23s
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<LogSpec>,
+    #[command(flatten)]
+    pub leave_out: arguments::LeaveOut,
     /// Model file
     #[arg(short, long, value_name = "MODEL.toml")]
     pub model: PathBuf,
@@ -158,7 +160,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         )?),
     };
     let mut failed = None;
-    let logs = logs(&args.logs)?;
+    let logs = logs(&args.leave_out.of(&args.logs))?;
     let part = logs.iter().find(|log| matches!(log, Log::Reduced(_)));
     if let Some(part) = part
         && (args.output.is_some() || args.report.is_some() || !args.plot.is_empty())
@@ -191,7 +193,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         let simulated = identify::open_loop(&machine, &model, &logs, window, control)?;
         if simulated.astray > 0 {
             found.warnings.push(format!(
-                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit with `lsq --feasible`",
+                "open loop: {} of {} windows went astray: masses and inertias of a plain fit need not be those of links that can exist, and no motion follows from them; fit again without --unconstrained",
                 simulated.astray, simulated.windows
             ));
         }

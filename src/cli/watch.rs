@@ -1,11 +1,11 @@
 //! `cft-ident watch`: external torques row by row, with alarms.
 
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use super::{CliError, Context, Outcome, arguments, files};
+use super::{CliError, Context, Outcome, RunningBar, arguments, context, files};
 use cft_ident_core::number;
-use cft_ident_logs::log::LogSpec;
+use cft_ident_logs::log::{LogSpec, escape};
 use cft_ident_logs::output::LogWriter;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
@@ -19,8 +19,8 @@ Example:
 
 /// External torque of every joint row by row, with alarms, from a log or from rows as they come.
 ///
-/// Prints one JSON object a line: {"t", "joints": [{"joint", "external", "std"}], "alarm"}; with -o or
-/// `--json -` none. External torque is what was measured less the model's, both behind the same causal
+/// On a terminal a line for each alarm as it begins; piped, one JSON object a row: {"t", "joints":
+/// [{"joint", "external", "std"}], "alarm"}; with -o or `--json -` none. External torque is what was measured less the model's, both behind the same causal
 /// filters: the summary says by how much it is late. Rows on standard input are CSV with a header line,
 /// or JSON lines: {"t": 0.1, "q": [..], "tau": [..]}, or columns by their names.
 #[derive(Debug, Clone, clap::Args)]
@@ -47,8 +47,52 @@ pub struct Args {
 /// Where rows go.
 enum Sink {
     Lines(Lines),
+    /// A line an alarm, and where the watch stands.
+    People(People),
     File(Box<LogWriter>),
     None,
+}
+
+/// What a person at a terminal sees.
+struct People {
+    /// Whether an alarm is on.
+    on: bool,
+    alarms: u64,
+    status: RunningBar,
+    units: Vec<(String, &'static str)>,
+    rows: u64,
+}
+
+/// Rows between two looks at the status line.
+const STATUS: u64 = 200;
+
+impl People {
+    fn take(&mut self, line: &WatchLine) {
+        let t = line.origin.seconds() + line.t;
+        self.rows += 1;
+        if self.rows % STATUS == 1 {
+            let plural = if self.alarms == 1 { "" } else { "s" };
+            self.status.label(&format!(
+                "watching, {t:.1} s, {} alarm{plural}",
+                self.alarms
+            ));
+        }
+        match line.alarm {
+            Some(alarm) if !self.on => {
+                (self.on, self.alarms) = (true, self.alarms + 1);
+                let joints = alarm.joints.iter().map(|of| {
+                    let unit = self.units.iter().find(|(joint, _)| *joint == of.joint);
+                    let size = number::significant(of.external, 3);
+                    format!("{} {size} {}", of.joint, unit.map_or("", |(_, unit)| unit))
+                });
+                let joints: Vec<String> = joints.collect();
+                let text = format!("{t:.3} s: ALARM {}", joints.join(", "));
+                context::above_bars(&text);
+            }
+            None => self.on = false,
+            Some(_) => {}
+        }
+    }
 }
 
 /// JSON lines on standard output.
@@ -136,6 +180,15 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             Sink::File(Box::new(LogWriter::create(path, &columns)?))
         }
         None if context.prints_document() => Sink::None,
+        None if io::stdout().is_terminal() => Sink::People(People {
+            on: false,
+            alarms: 0,
+            rows: 0,
+            status: context.progress("watching", None),
+            units: (joints.iter().enumerate())
+                .map(|(j, joint)| (joint.clone(), machine.file.torque_unit(j)))
+                .collect(),
+        }),
         None => Sink::Lines(Lines {
             out: BufWriter::new(io::stdout()),
             joints: joints.iter().map(|j| in_json(j)).collect(),
@@ -189,7 +242,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             text.trim_end().lines().for_each(|line| context.note(line));
             String::new()
         }
-        Sink::None => text,
+        Sink::None | Sink::People(_) => text,
     };
     Ok(Outcome {
         text,
@@ -202,6 +255,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
 fn put(sink: &mut Sink, line: &WatchLine) -> Result<bool, CliError> {
     match sink {
         Sink::None => Ok(true),
+        Sink::People(people) => {
+            people.take(line);
+            Ok(true)
+        }
         Sink::File(log) => {
             log.set_origin(line.origin);
             let alarm = f64::from(u8::from(line.alarm.is_some()));
@@ -238,15 +295,26 @@ fn told(found: &Watched, log: &str) -> String {
         ("joint", Align::Left),
         ("threshold", Align::Left),
         ("unit", Align::Left),
+        ("force [N]", Align::Decimal),
+        ("", Align::Left),
     ])
     .caption(&format!(
-        "external torques of {log}: thresholds for {} false alarms an hour, by speed",
-        found.false_alarms_per_hour
+        "external torques of {log}: thresholds for {} false alarms an hour, by speed; the least as a force at the {}",
+        found.false_alarms_per_hour,
+        escape(&found.point)
     ));
     for joint in &found.joints {
         let [low, high] = joint.threshold.map(|x| number::significant(x, 3));
         let both = format!("{low} .. {high}");
-        table.row([joint.joint.as_str(), &both, &joint.unit]);
+        let force = joint.force_n.map(|force| number::significant(force, 2));
+        let blind = if joint.blind { "cannot be watched" } else { "" };
+        table.row([
+            joint.joint.as_str(),
+            &both,
+            &joint.unit,
+            force.as_deref().unwrap_or(number::ABSENT),
+            blind,
+        ]);
     }
     let mut text = table.to_string();
     if let Some(delay) = found.delay_s {

@@ -305,6 +305,7 @@ fn file_of(robot: RobotFile, model: &Model) -> ModelFile {
         theta: None,
         joint: joint.cloned(),
         value,
+        consistent: None,
         std: Some(0.1),
         unit: String::new(),
         meaning: String::new(),

@@ -187,7 +187,9 @@ fn friction_in_code_takes_power_at_every_speed_and_is_the_models_own_where_that_
         let program = Program::with_effects(&case.model).unwrap();
         assert!(program.drives_at[0].is_some(), "{}", case.name);
     }
-    let sound = Program::with_effects(&AugmentedModel::plain(model(cases[0].model.model.robot.clone())));
+    let sound = Program::with_effects(&AugmentedModel::plain(model(
+        cases[0].model.model.robot.clone(),
+    )));
     assert_eq!(sound.unwrap().drives_at, [None]);
 }
 

@@ -55,6 +55,7 @@ fn known(values: [f64; 5], covariance: [[f64; 5]; 5]) -> ModelFile {
         theta: None,
         joint: Some("q1".to_owned()),
         value: values[k],
+        consistent: None,
         std: Some(covariance[k][k].sqrt()),
         unit: "1".to_owned(),
         meaning: String::new(),

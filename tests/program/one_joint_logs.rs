@@ -1,6 +1,6 @@
 //! Friction from one-joint logs as laboratories have them.
 
-#[path = "../../examples/study_one_joint/bench.rs"]
+#[path = "../../crates/studies/examples/study_one_joint/bench.rs"]
 mod bench;
 
 use bench::{ASKED, CASES, error_at_plateaus, estimated, off};

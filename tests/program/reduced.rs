@@ -180,6 +180,7 @@ fn friction_that_a_model_gave_is_held_and_its_uncertainty_stays_in_the_deviation
                 theta: None,
                 joint: Some("slide".to_owned()),
                 value: values[k],
+                consistent: None,
                 std: Some(0.05 * values[k].abs()),
                 unit: "1".to_owned(),
                 meaning: String::new(),

@@ -129,7 +129,7 @@ pub struct Args {
     #[arg(long, value_name = "HZ", value_parser = arguments::positive)]
     pub rate: Option<f64>,
     /// Duration of a one-joint experiment, or of a checked motion that sets none [s]
-    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = LADDER_S, value_parser = seconds)]
     pub seconds: f64,
     /// Draw positions, speeds and volts with their limits
     #[arg(long, value_name = "FILE.svg|.png", value_parser = arguments::picture_file)]
@@ -151,6 +151,9 @@ pub enum CriterionName {
     /// Sum of the parameters' variances, given each joint's noise
     AOptimal,
 }
+
+/// Duration of a one-joint experiment where nothing says \[s\].
+pub(super) const LADDER_S: f64 = 20.0;
 
 /// A duration of a motion: some hours at most.
 fn seconds(text: &str) -> Result<f64, String> {

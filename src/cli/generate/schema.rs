@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use serde_json::Value;
 
 use crate::cli::{
-    CliError, Outcome, convert, example, export, identify, inspect, new, reduce, simulate,
+    CliError, Outcome, convert, example, export, identify, inspect, new, reduce, show, simulate,
 };
 use cft_ident_files::config::schema::{campaign, model, robot, trajectory};
 use cft_ident_plant::excite::Judgements;
@@ -53,6 +53,8 @@ pub enum Kind {
     Simulate,
     /// JSON document of `inspect`
     Inspect,
+    /// JSON document of `show`
+    Show,
     /// JSON document of `torque`
     Torque,
     /// JSON document of `watch`
@@ -98,6 +100,7 @@ pub fn schema(kind: Kind) -> Value {
         Kind::Excite => json::schema::<Judgements>("excite"),
         Kind::Simulate => json::schema::<simulate::SimulationResult>("simulate"),
         Kind::Inspect => json::schema::<inspect::InspectionResult>("inspect"),
+        Kind::Show => json::schema::<show::ShownModel>("show"),
         Kind::Torque => json::schema::<TorqueAlong>("torque"),
         Kind::Watch => json::schema::<Watched>("watch"),
         Kind::Convert => json::schema::<convert::Converted>("convert"),

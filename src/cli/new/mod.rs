@@ -12,7 +12,9 @@ use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::{Capsules, RobotFile, UrdfChain};
 use cft_ident_logs::inspect::{LogFault, Severity};
 use cft_ident_logs::log::{LogSpec, Provenance, Reader, escape};
-use cft_ident_logs::mapping::{Asked, JointColumns, Known, Mapping, look};
+use cft_ident_logs::mapping::{
+    Asked, ClockSource, JointColumns, Known, Mapping, SeenColumns, look,
+};
 use cft_ident_plant::excite::space::always_touching;
 use cft_ident_report::report::json::Document;
 use cft_ident_report::report::table::{Align, Table};
@@ -53,7 +55,7 @@ pub struct Args {
     pub topic: Option<String>,
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+pub(super) fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     rate.filter(|rate| rate.is_finite() && *rate > 0.0)
         .ok_or_else(|| "give a number above 0".to_owned())
@@ -118,70 +120,16 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
     .flatten()
     .collect();
     context.check_outputs(&inputs, &[&target])?;
-    let (mut chain, mut capsules) = (None, Capsules::default());
-    if let Some(path) = &args.urdf {
-        let found = UrdfChain::load(path, args.tip.as_deref())?;
-        capsules = found.capsules(path);
-        chain = Some(found);
-    }
-    let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
-    let asked = Asked {
-        rate_hz: args.rate,
-        topic: args.topic.clone(),
-    };
-    let bar = context.progress("looking at the log", None);
-    let joints = known.as_ref().map(Vec::len);
-    let seen = match &args.log {
-        Some(spec) => Some(look(spec, &asked, joints, &|| context.interrupted())?),
-        None => None,
-    };
-    drop(bar);
-    let mapping = Mapping::of(known.as_deref(), seen.as_ref());
-    let shape = match (&args.urdf, mapping.joints.len()) {
-        (Some(path), _) => Shape::Urdf {
-            path: beside(path, &target),
-            tip: args.tip.clone(),
-        },
-        (None, 0 | 1) => Shape::Single(mapping.kind()),
-        (None, _) => Shape::Rows,
-    };
-    let mut draft = Draft {
-        name: target
-            .file_stem()
-            .map(|stem| escape(&stem.to_string_lossy()))
-            .unwrap_or_default(),
+    let Described {
+        text,
+        file,
+        mapping,
+        seen,
         shape,
-        mapping: &mapping,
-        seen: seen.as_ref(),
-        chain: chain.as_ref(),
-        capsules,
-        touching: Vec::new(),
-    };
-    // what is written must be readable, and the log by it
-    let folder = target.parent();
-    let read = |draft: &Draft| {
-        // rows that are to be filled in are read as if they were
-        let filled = draft.text().replace("= nan ", "= 1.0 ");
-        RobotFile::parse_in(&target.display().to_string(), &filled, folder)
-    };
-    let mut file = read(&draft)?;
-    draft.touching = always_touching(&file);
-    if !draft.touching.is_empty() {
-        file = read(&draft)?;
-    }
-    let text = draft.text();
-    let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
-    warnings.extend(unheld(&draft.capsules));
-    if let Some(seen) = &seen
-        && args.topic.is_none()
-        && let Some(topic) = &seen.topic
-    {
-        warnings.push(format!(
-            "topic {} is read, for it holds positions and torques and is no leader's and no command's; the others are {}",
-            escape(topic),
-            cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
-        ));
-    }
+        model,
+        cutoff_hz,
+        mut warnings,
+    } = describe(args, &target, context)?;
     let (mut unread, mut faults) = (false, None);
     if let Some(spec) = &args.log {
         if let Err(error) = Reader::open(spec, &file.layout()) {
@@ -226,7 +174,7 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         .flatten()
         .any(|f| f.severity == Severity::Error);
     let next = match &args.log {
-        _ if draft.shape == Shape::Rows => format!(
+        _ if shape == Shape::Rows => format!(
             "next: fill in the modified Denavit-Hartenberg rows ([[robot.link]]) of {place}\n"
         ),
         None => format!("next: cft-ident inspect LOG -r {place}\n"),
@@ -251,10 +199,10 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned(),
-        model: draft.model(),
+        model,
         joints: mapping.joints.clone(),
         rate_hz: seen.as_ref().and_then(|s| s.rate_hz),
-        cutoff_hz: draft.cutoff_hz(),
+        cutoff_hz,
         topic: seen.as_ref().and_then(|s| s.topic.clone()),
         checks: all.iter().map(|check| (*check).clone()).collect(),
         faults,
@@ -267,6 +215,129 @@ pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
         text: context.text(format!("{table}{checks}{found}{next}"), &brief),
         document: Document::new("new", &provenance, &warnings, &result)?,
         missed: Vec::new(),
+    })
+}
+
+/// A robot file as it was drafted.
+pub(super) struct Described {
+    pub text: String,
+    pub file: RobotFile,
+    pub mapping: Mapping,
+    pub seen: Option<SeenColumns>,
+    shape: Shape,
+    model: &'static str,
+    cutoff_hz: Option<f64>,
+    pub warnings: Vec<String>,
+}
+
+impl Described {
+    /// What is a guess, each with the line to change.
+    pub fn guesses(&self) -> Vec<String> {
+        let mapping = &self.mapping;
+        let of_joints = mapping.checks.iter().map(|check| {
+            let place = "[log.joint] of robot.toml";
+            format!("{check} ({place})")
+        });
+        let torque = mapping.torque_check.iter();
+        let torque = torque.map(|check| format!("{check} (torque_is in [log] of robot.toml)"));
+        let clock = self.seen.iter().filter_map(|seen| match &seen.clock {
+            ClockSource::Column {
+                name,
+                guessed: true,
+                ..
+            } => Some(format!(
+                "`{}` is the time, for it runs evenly (time in [log] of robot.toml)",
+                escape(name)
+            )),
+            _ => None,
+        });
+        of_joints.chain(torque).chain(clock).collect()
+    }
+}
+
+/// Drafts the robot file `target` from what a URDF and a log show; nothing is written.
+///
+/// # Errors
+/// A URDF or log that cannot be used.
+pub(super) fn describe(
+    args: &Args,
+    target: &Path,
+    context: &Context,
+) -> Result<Described, CliError> {
+    let (mut chain, mut capsules) = (None, Capsules::default());
+    if let Some(path) = &args.urdf {
+        let found = UrdfChain::load(path, args.tip.as_deref())?;
+        capsules = found.capsules(path);
+        chain = Some(found);
+    }
+    let known: Option<Vec<Known>> = chain.as_ref().map(joints_of);
+    let asked = Asked {
+        rate_hz: args.rate,
+        topic: args.topic.clone(),
+    };
+    let bar = context.progress("looking at the log", None);
+    let joints = known.as_ref().map(Vec::len);
+    let seen = match &args.log {
+        Some(spec) => Some(look(spec, &asked, joints, &|| context.interrupted())?),
+        None => None,
+    };
+    drop(bar);
+    let mapping = Mapping::of(known.as_deref(), seen.as_ref());
+    let shape = match (&args.urdf, mapping.joints.len()) {
+        (Some(path), _) => Shape::Urdf {
+            path: beside(path, target),
+            tip: args.tip.clone(),
+        },
+        (None, 0 | 1) => Shape::Single(mapping.kind()),
+        (None, _) => Shape::Rows,
+    };
+    let mut draft = Draft {
+        name: target
+            .file_stem()
+            .map(|stem| escape(&stem.to_string_lossy()))
+            .unwrap_or_default(),
+        shape,
+        mapping: &mapping,
+        seen: seen.as_ref(),
+        chain: chain.as_ref(),
+        capsules,
+        touching: Vec::new(),
+    };
+    // what is written must be readable, and the log by it
+    let folder = target.parent();
+    let read = |draft: &Draft| {
+        // rows that are to be filled in are read as if they were
+        let filled = draft.text().replace("= nan ", "= 1.0 ");
+        RobotFile::parse_in(&target.display().to_string(), &filled, folder)
+    };
+    let mut file = read(&draft)?;
+    draft.touching = always_touching(&file);
+    if !draft.touching.is_empty() {
+        file = read(&draft)?;
+    }
+    let text = draft.text();
+    let mut warnings = [file.notes.0.clone(), mapping.warnings.clone()].concat();
+    warnings.extend(unheld(&draft.capsules));
+    if let Some(seen) = &seen
+        && args.topic.is_none()
+        && let Some(topic) = &seen.topic
+    {
+        warnings.push(format!(
+            "topic {} is read, for it holds positions and torques and is no leader's and no command's; the others are {}",
+            escape(topic),
+            cft_ident_logs::log::list(seen.other_topics.iter().map(String::as_str))
+        ));
+    }
+    let (shape, model, cutoff_hz) = (draft.shape.clone(), draft.model(), draft.cutoff_hz());
+    Ok(Described {
+        text,
+        file,
+        shape,
+        model,
+        cutoff_hz,
+        warnings,
+        mapping,
+        seen,
     })
 }
 

@@ -16,10 +16,12 @@ use crate::math::rfactor::RFactor;
 const MOST_BLOCKS: usize = 512;
 
 /// One block of time: the R factor of each joint's rows.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BlockFactor {
     /// Uninterrupted stretch that the block belongs to; correlation ends at its borders.
     pub stretch: usize,
+    /// Times of the first and the last row [s]; equal where they are not known.
+    pub span: [f64; 2],
     /// Instants.
     pub rows: u64,
     /// Upper triangle per joint, or its rows where they are fewer than the columns, which are those of
@@ -35,6 +37,9 @@ pub struct Accumulator {
     columns: RegressorColumns,
     open: Vec<RFactor>,
     open_rows: u64,
+    /// Times of the open block, and that of the row to come [s].
+    open_span: [f64; 2],
+    now: f64,
     stretch: usize,
     /// Length of a block now [s], and in rows once the first is there.
     block_seconds: f64,
@@ -83,12 +88,19 @@ impl Accumulator {
             columns,
             open,
             open_rows: 0,
+            open_span: [0.0; 2],
+            now: 0.0,
             stretch: 0,
             block_seconds,
             block_rows: None,
             blocks: Vec::new(),
             rows: 0,
         }
+    }
+
+    /// Says at which time the row to come is [s].
+    pub fn at(&mut self, t: f64) {
+        self.now = t;
     }
 
     /// Adds one row of every joint, `step` \[s\] after the one before; `channels` as [`RegressorColumns::fill`]
@@ -126,6 +138,10 @@ impl Accumulator {
             }
             at += c;
         }
+        if self.open_rows == 0 {
+            self.open_span[0] = self.now;
+        }
+        self.open_span[1] = self.now;
         self.open_rows += 1;
         self.rows += 1;
     }
@@ -138,9 +154,10 @@ impl Accumulator {
         self.open.iter_mut().for_each(RFactor::clear);
         self.blocks.push(BlockFactor {
             stretch: self.stretch,
+            span: self.open_span,
             rows: self.open_rows,
             r,
-            scores: None,
+            ..BlockFactor::default()
         });
         self.open_rows = 0;
         if self.blocks.len() > MOST_BLOCKS {
@@ -185,6 +202,7 @@ fn merge_pairs(
                 *a = stacked([&*a, b], columns.row_width(j)).short();
             }
             first.rows += second.rows;
+            first.span[1] = second.span[1];
         }
         blocks.push(first);
     }
@@ -307,6 +325,7 @@ impl BlockFactors {
         let chosen = |r: &DMatrix<f64>, j: usize| r.select_columns(&places[j]);
         let blocks = self.blocks.iter().map(|b| BlockFactor {
             stretch: b.stretch,
+            span: b.span,
             rows: b.rows,
             r: b.r.iter().enumerate().map(|(j, r)| chosen(r, j)).collect(),
             scores: None,
@@ -327,16 +346,28 @@ impl BlockFactors {
         }
     }
 
+    /// The same without its blocks, for a part of them.
+    pub(super) fn without_blocks(&self) -> BlockFactors {
+        BlockFactors {
+            columns: self.columns.clone(),
+            blocks: Vec::new(),
+            block_seconds: self.block_seconds,
+            moving: self.moving.clone(),
+            resting: self.resting.clone(),
+            at_rest: self.at_rest.clone(),
+            rows: self.rows,
+        }
+    }
+
     /// The same rows in one block: enough for a fit, too little for its covariance.
     pub fn in_one_block(&self) -> BlockFactors {
         let r = (0..self.columns.joints).map(|j| self.joint(j)).collect();
         BlockFactors {
             columns: self.columns.clone(),
             blocks: vec![BlockFactor {
-                stretch: 0,
                 rows: self.rows,
                 r,
-                scores: None,
+                ..BlockFactor::default()
             }],
             block_seconds: self.block_seconds,
             moving: self.moving.clone(),

@@ -51,6 +51,7 @@ impl BlockFactors {
             rows: self.blocks.iter().map(|b| b.rows).sum(),
             r,
             scores: Some(scores.rounded()),
+            ..BlockFactor::default()
         }];
         self
     }

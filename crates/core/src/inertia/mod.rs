@@ -16,6 +16,7 @@ pub mod essential;
 pub mod feasible;
 pub mod gains;
 pub mod instruments;
+pub mod jumps;
 pub mod law_start;
 pub mod refine;
 pub mod robust;
@@ -78,6 +79,7 @@ pub fn accumulate_weighted<E>(
                 Some(weigher) => weigher.weigh(columns, row.filtered),
                 None => row.filtered,
             };
+            factors.at(row.t);
             factors.add(row.segment, row.step, channels);
         },
     )?;

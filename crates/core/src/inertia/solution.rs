@@ -21,10 +21,6 @@ pub enum FitError {
         "no column of the regressor is excited by these logs: every joint stands still, or its torque is zero; log a motion of every joint"
     )]
     NothingExcited,
-    #[error(
-        "the prior of {link} is no body that can exist: its pseudo-inertia is not positive definite; correct `mass` and `inertia` in its `inertial`, or leave `inertial` out"
-    )]
-    Prior { link: String },
     #[error(transparent)]
     Math(#[from] crate::math::MathError),
 }

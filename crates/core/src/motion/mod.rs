@@ -150,7 +150,7 @@ pub enum MotionError {
 
     /// Every stretch without a gap is too short to filter.
     #[error(
-        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed; raise the cut-off or the gap factor, or record longer"
+        "no stretch of the log is long enough to filter: {segments} stretches between gaps, the longest of {longest} samples, {needed} are needed; bridge gaps that are short beside the motion by `gap_factor = 8` in [filter], raise `cutoff_hz`, or record longer"
     )]
     NoSegment {
         /// Stretches between gaps.

@@ -20,8 +20,8 @@
 
 pub mod bodies;
 pub mod cft;
-pub mod double_pendulum;
 pub mod deviation;
+pub mod double_pendulum;
 pub mod drive;
 pub mod dynamics;
 pub mod error;

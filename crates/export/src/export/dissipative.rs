@@ -69,7 +69,10 @@ pub(super) fn driving(refined: &AugmentedModel, of_friction: &[usize]) -> Vec<Op
                 *sum += x;
             }
         }
-        let drives = friction.iter().zip(&speeds).filter(|(f, v)| **f * **v < 0.0);
+        let drives = friction
+            .iter()
+            .zip(&speeds)
+            .filter(|(f, v)| **f * **v < 0.0);
         drives.map(|(_, v)| v.abs()).fold(None, |range, v| {
             let [low, high] = range.unwrap_or([v, v]);
             Some([f64::min(low, v), f64::max(high, v)])
@@ -104,10 +107,10 @@ pub fn below_zero(file: &ModelFile, model: &Model) -> Vec<String> {
     }
     for j in model.robot.standard_map().drives {
         let name = format!("Ia{}", j + 1);
-        let found = file.find(&name, None).filter(|p| p.value < 0.0);
+        let found = file.find(&name, None).filter(|p| p.in_use() < 0.0);
         if let (Some(p), Some(joint)) = (found, names.get(j)) {
             out.push(format!(
-                "the drive inertia of {joint} is {}, and no drive has one below zero: such a file is made of the model's consistent parameters where it holds them",
+                "the drive inertia of {joint} is {}, and no drive has one below zero: fit without --unconstrained",
                 told(&name, None, p.value)
             ));
         }

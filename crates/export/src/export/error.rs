@@ -28,7 +28,7 @@ pub enum ExportError {
     /// A link that no body can be, which simulators refuse or integrate into nonsense.
     #[error(
         "link `{link}` can be no body: its pseudo-inertia has the eigenvalue {eigenvalue:.3e}; identify with \
-         `lsq --feasible`, whose links can exist"
+         `lsq` without --unconstrained, whose links can exist"
     )]
     Impossible { link: String, eigenvalue: f64 },
     /// The user's URDF is of another robot, or its frames are others.

@@ -156,12 +156,12 @@ fn feasible(file: &ModelFile, robot: &Robot) -> Option<(Vec<Option<InertialSecti
 const NEAREST: [&str; 3] = [
     "Inertials: of all that give the identified torques, those nearest to the prior of the robot",
     "file (1 kg in the origin of a link that has none). They need not be those of a body that can",
-    "be: `lsq --feasible` finds links that can.",
+    "be: a fit without --unconstrained finds links that can.",
 ];
 /// Of those of a feasible fit.
 const FEASIBLE: [&str; 2] = [
     "Inertials: those of the [[link]] tables of the model, of links that can exist and give the",
-    "identified torques, as `lsq --feasible` found them.",
+    "torques of the model's consistent parameters.",
 ];
 /// Of a feasible fit whose parameters were changed afterwards.
 const NEAR_FEASIBLE: [&str; 3] = [

@@ -269,6 +269,7 @@ fn side_file(
             theta: None,
             joint: robot.joint_names().get(j).cloned(),
             value: *value,
+            consistent: None,
             std: None,
             unit: robot.joint_kind(j).inertia_unit().to_owned(),
             meaning: "inertia of the drive at the joint".to_owned(),

@@ -1,5 +1,7 @@
 //! Campaign files: the robot and the logs by role, for `identify`.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +28,10 @@ pub struct CampaignLogs {
     /// Logs that are evaluated once, after everything is decided.
     #[serde(default)]
     pub holdout: Vec<String>,
+    /// How long the machine had run when a log began [s], by the log's name as it stands above, without a span: what
+    /// warms up or drifts goes on from there.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub started: BTreeMap<String, f64>,
 }
 
 /// `[lsq] estimator`.
@@ -65,7 +71,10 @@ pub struct CampaignSettings {
     /// Estimator of the inertial parameters.
     #[serde(default)]
     pub estimator: EstimatorKind,
-    /// Only physically consistent parameters.
+    /// The parameters of the plain fit alone, without the physically consistent ones beside them.
+    #[serde(default)]
+    pub unconstrained: bool,
+    /// Accepted and without effect: physically consistent parameters are always there.
     #[serde(default)]
     pub feasible: bool,
     /// Limit on every joint's relative validation error, a fraction.
@@ -121,6 +130,12 @@ impl Campaign {
                         &error.to_string(),
                     ));
                 }
+            }
+        }
+        for (log, seconds) in &logs.started {
+            if !(*seconds >= 0.0 && seconds.is_finite()) {
+                let at = ["logs", "started", log.as_str()];
+                return Err(document.value(&at, "is no time", "give seconds, 0 or more"));
             }
         }
         if let Some(limit) = campaign.settings.max_relative_error {

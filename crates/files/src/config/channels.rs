@@ -20,13 +20,24 @@ impl RobotFile {
     pub fn layout(&self) -> Layout {
         let actuator = || (self.robot.model == ModelKind::Cft).then(|| self.actuator_layout());
         match self.log.channels {
-            ChannelChoice::Joint => self.joint_layout(),
+            ChannelChoice::Joint => Layout {
+                otherwise: self.own_columns(),
+                ..self.joint_layout()
+            },
             ChannelChoice::Actuator => actuator().unwrap_or_else(|| self.joint_layout()),
             ChannelChoice::Auto => Layout {
-                otherwise: actuator().map(Box::new),
+                otherwise: actuator().map(Box::new).or_else(|| self.own_columns()),
                 ..self.joint_layout()
             },
         }
+    }
+
+    /// Columns as this tool writes them itself, for a robot whose own logs call them otherwise: what `simulate` and
+    /// `excite --samples` write is read with the robot's file too.
+    fn own_columns(&self) -> Option<Box<Layout>> {
+        let renamed = !self.log.joint.is_empty() || self.log.time.is_some();
+        let names = self.joint_names();
+        renamed.then(|| Box::new(Layout::joint_columns(&names)))
     }
 
     /// Time and volts u_1..u_4 alone [V], unconverted: blocks have an empty `q`.

@@ -32,6 +32,9 @@ pub struct Parameter {
     /// Standard deviation in `unit`; absent where the data say nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub std: Option<f64>,
+    /// The same parameter of the nearest model that can exist: torques are computed with it where it is there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistent: Option<f64>,
     /// SI unit.
     pub unit: String,
     /// What it is, in words.
@@ -49,6 +52,11 @@ impl Parameter {
             Some(joint) => format!("{}:{joint}", self.name),
             None => self.name.clone(),
         }
+    }
+
+    /// The value that torques are computed with.
+    pub fn in_use(&self) -> f64 {
+        self.consistent.unwrap_or(self.value)
     }
 
     /// Whether its torque is not worth mentioning: rated identified though its value is uncertain.
@@ -146,7 +154,7 @@ pub struct EffectSection {
     pub parameters: BTreeMap<String, EffectParameter>,
 }
 
-/// Mass properties of a physically consistent link, as `lsq --feasible` finds them: keys as in `inertial` of
+/// Mass properties of a physically consistent link: keys as in `inertial` of
 /// a robot file's link.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -170,6 +178,9 @@ pub struct ModelProvenance {
     /// Command that wrote the file.
     #[serde(default)]
     pub command: String,
+    /// The set-up was kept as it is declared, whatever the torques said of it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub as_declared: bool,
     /// Seed, where chance played.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
@@ -199,7 +210,7 @@ pub struct ModelFile {
     pub candidates: Vec<CandidateSection>,
     /// Effects added to the declared model.
     pub effects: Vec<EffectSection>,
-    /// Physically consistent links that give these parameters, where they were asked for.
+    /// Physically consistent links that give the consistent parameters.
     pub links: Vec<LinkBody>,
     /// Inertia of the drives beside them, by joint [kg m^2 or kg].
     pub drive_inertia: BTreeMap<String, f64>,
@@ -208,6 +219,27 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
+    /// Leaves out what physical consistency put beside the plain fit.
+    pub fn forget_consistent(&mut self) {
+        for p in &mut self.parameters {
+            p.consistent = None;
+        }
+        self.links.clear();
+        self.drive_inertia.clear();
+    }
+
+    /// Whether physically consistent parameters stand beside those of the plain fit.
+    pub fn is_consistent(&self) -> bool {
+        self.parameters.iter().any(|p| p.consistent.is_some())
+    }
+
+    /// The model of the plain fit alone.
+    pub fn as_fitted(&self) -> Self {
+        let mut plain = self.clone();
+        plain.forget_consistent();
+        plain
+    }
+
     /// A parameter by name, of one joint or of none; `file` names the model in the error.
     ///
     /// # Errors
@@ -248,7 +280,7 @@ impl ModelFile {
         let robot = self.robot.robot();
         let needed = robot.parameters().iter();
         needed
-            .map(|info| Ok(self.parameter(file, &info.name, None)?.value))
+            .map(|info| Ok(self.parameter(file, &info.name, None)?.in_use()))
             .collect()
     }
 
@@ -259,7 +291,7 @@ impl ModelFile {
     pub fn double_tanh(&self, file: &str, joint: &str) -> Result<DoubleTanh, ConfigError> {
         let mut values = [0.0; 5];
         for (value, name) in values.iter_mut().zip(DoubleTanh::NAMES) {
-            *value = self.parameter(file, name, Some(joint))?.value;
+            *value = self.parameter(file, name, Some(joint))?.in_use();
         }
         Ok(DoubleTanh::from_parameters(values))
     }
@@ -269,7 +301,7 @@ impl ModelFile {
     /// # Errors
     /// [`ConfigError::MissingParameter`].
     pub fn viscous_coulomb(&self, file: &str, joint: &str) -> Result<ViscousCoulomb, ConfigError> {
-        let value = |name| Ok(self.parameter(file, name, Some(joint))?.value);
+        let value = |name| Ok(self.parameter(file, name, Some(joint))?.in_use());
         Ok(ViscousCoulomb {
             viscous: value("viscous")?,
             coulomb: value("coulomb")?,
@@ -278,7 +310,8 @@ impl ModelFile {
 
     /// Constant torque offset of one joint [N or Nm]; 0 where the model has none.
     pub fn offset(&self, joint: &str) -> f64 {
-        self.find("offset", Some(joint)).map_or(0.0, |p| p.value)
+        self.find("offset", Some(joint))
+            .map_or(0.0, Parameter::in_use)
     }
 
     /// Covariance of the parameters with these keys ([`Parameter::key`]), row-major; 0 where unknown.

@@ -169,7 +169,7 @@ impl ModelFile {
         text.push_str(&toml::to_string_pretty(&contents).map_err(unwritable)?);
         text.push('\n');
         text.push_str(&toml::to_string(&self.robot).map_err(unwritable)?);
-        text.push_str("\n# Parameters: value and standard deviation in `unit`, theta as in the report's Table 4.\n");
+        text.push_str("\n# Parameters: value and standard deviation of the fit in `unit`, theta as in the report's Table 4. Torques are computed\n# with `consistent` where it stands: the nearest numbers of links, drives and friction that can exist.\n");
         for parameter in &self.parameters {
             text.push_str("\n[[parameter]]\n");
             text.push_str(&toml::to_string(parameter).map_err(unwritable)?);
@@ -218,7 +218,7 @@ impl ModelFile {
             text.push_str(&toml::to_string(&effects).map_err(unwritable)?);
         }
         if !self.links.is_empty() {
-            text.push_str("\n# Links that can exist and give the parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
+            text.push_str("\n# Links that can exist and give the consistent parameters above: kg, centre of gravity in the link's frame in m,\n# Ixx, Ixy, Ixz, Iyy, Iyz, Izz about it in kg m^2.\n");
         }
         for link in &self.links {
             text.push_str("\n[[link]]\n");

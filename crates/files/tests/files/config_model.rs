@@ -23,6 +23,7 @@ fn parameter(
         theta,
         joint: joint.map(str::to_owned),
         value,
+        consistent: None,
         std,
         unit: "kg m^2".to_owned(),
         meaning: "a \"quoted\" meaning\\ with m1 + m2".to_owned(),
@@ -133,6 +134,7 @@ fn model(values: &[f64]) -> ModelFile {
         provenance: ModelProvenance {
             version: "0.1.0".to_owned(),
             command: "lsq".to_owned(),
+            as_declared: false,
             seed: Some(7),
             inputs: vec![
                 Provenance {

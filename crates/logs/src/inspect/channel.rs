@@ -17,6 +17,8 @@ pub struct InspectedChannel {
     pub limits: Option<[f64; 2]>,
     /// Whether a number at its limit is what was really applied: the volts of an amplifier.
     pub saturates: bool,
+    /// What a 0 of the column stands for.
+    pub zero: f64,
     /// Unit of its numbers per unit of the column, so that what is to be written into a robot file
     /// can be told in the column's.
     pub factor: f64,
@@ -42,6 +44,7 @@ impl InspectedChannel {
             unit: unit.map(str::to_owned),
             limits: None,
             saturates: false,
+            zero: 0.0,
             factor: 1.0,
         }
     }

@@ -12,6 +12,8 @@ pub(super) struct FaultList {
     pub(super) cuts: Vec<([f64; 2], FaultKind)>,
     /// Numbers to put in the place of spikes: time [s], place of the channel, number.
     pub(super) bridges: Vec<(f64, usize, f64)>,
+    /// Times of rows that were not read [s].
+    pub(super) failed: Vec<f64>,
     /// Positions that begin anew, by their places, and their ranges.
     pub(super) wraps: Vec<(usize, f64)>,
     /// Torques that are exactly 0 in motion, by their places: from, to [s].
@@ -33,6 +35,7 @@ impl FaultList {
             faults: Vec::new(),
             cuts: Vec::new(),
             bridges: Vec::new(),
+            failed: Vec::new(),
             wraps: Vec::new(),
             off: Vec::new(),
             stalls: Vec::new(),

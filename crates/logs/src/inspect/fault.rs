@@ -65,6 +65,8 @@ pub enum FaultKind {
     Quantisation,
     /// Single rows far off their neighbours.
     Spike,
+    /// Rows in which every channel reads 0.
+    FailedRead,
     /// A channel that is another one's copy.
     CopiedChannel,
     /// A channel that holds what was commanded.
@@ -109,6 +111,7 @@ impl FaultKind {
             Self::BeyondLimits => "beyond-limits",
             Self::Quantisation => "quantisation",
             Self::Spike => "spike",
+            Self::FailedRead => "failed-read",
             Self::CopiedChannel => "copied-channel",
             Self::CommandAsMeasurement => "command-as-measurement",
             Self::WrongSignOrOrder => "wrong-sign-or-order",
@@ -126,7 +129,7 @@ impl FaultKind {
     /// Whether `[log] keep` says that its rows stay as they were logged.
     pub(super) fn kept(self, keep: &[RowFault]) -> bool {
         let of = match self {
-            Self::Spike => RowFault::Spike,
+            Self::Spike | Self::FailedRead => RowFault::Spike,
             Self::StuckChannel => RowFault::StuckChannel,
             Self::Saturation => RowFault::Saturation,
             Self::Clipping => RowFault::Clipping,

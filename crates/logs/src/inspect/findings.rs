@@ -102,6 +102,9 @@ pub struct Findings {
     /// order of time.
     #[serde(skip)]
     pub bridges: Vec<(f64, usize, f64)>,
+    /// Times of the rows that a fit leaves out because nothing was read [s].
+    #[serde(skip)]
+    pub failed: Vec<f64>,
     /// Positions that begin anew though no range is known, by the places of their channels.
     #[serde(skip)]
     pub wraps: Vec<(usize, f64)>,

@@ -87,6 +87,7 @@ impl Gate {
             .into_iter()
             .map(bridge)
             .collect();
+        mending.failed = std::mem::take(&mut found.failed).into();
         let off_told = found.of(Severity::Info);
         let off_told = off_told.filter(|fault| fault.kind == FaultKind::MotorOff);
         let off_told = off_told.cloned().collect();
@@ -239,6 +240,9 @@ impl Gate {
                     .to_owned()
             }
             FaultKind::Spike => "bridged by the rows beside them".to_owned(),
+            FaultKind::FailedRead => {
+                "left out, and the log is interpolated over a few of them".to_owned()
+            }
             _ => "left out, and nothing is differentiated across".to_owned(),
         };
         format!("{}{of}: {then}", kind.word())
@@ -302,6 +306,7 @@ fn channels(reader: &Reader) -> Vec<InspectedChannel> {
             seen.saturates =
                 role == ChannelRole::Torque && layout.channels == DeclaredChannels::Actuator;
             seen.factor = channel.factor;
+            seen.zero = channel.offset;
             seen
         })
     });

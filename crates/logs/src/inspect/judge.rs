@@ -4,13 +4,14 @@ use super::channel::InspectedChannel;
 use super::detectors::clock::{LogClock, RowStep, typical_step};
 use super::detectors::copies::Copies;
 use super::detectors::excitation::Excitation;
+use super::detectors::failed::FailedReads;
 use super::detectors::flat::Flat;
 use super::detectors::repeats::Repeats;
 use super::detectors::spike::Spikes;
 use super::detectors::step::{FreshRows, Freshness, Leaps};
 use super::detectors::turn::Turns;
 use super::detectors::windows::Windows;
-use super::fault::Episodes;
+use super::fault::{Episodes, FaultKind};
 use super::words::ChannelRole;
 use crate::log::RowFault;
 
@@ -145,7 +146,7 @@ impl Track {
             }
             let position = positions.map_or(f64::NAN, |positions| positions[k]);
             self.flat.take(t, value, position);
-            self.spikes.take(t, value);
+            self.spikes.take(t, value, position);
             if self.channel.role == ChannelRole::Position {
                 self.turns.take(t, value);
                 match fresh[k] {
@@ -200,6 +201,7 @@ pub struct LogJudge {
     pub(super) depth: Depth,
     pub(super) clock: LogClock,
     pub(super) tracks: Vec<Track>,
+    pub(super) failed: FailedReads,
     pub(super) repeats: Repeats,
     pub(super) copies: Copies,
     /// Channels whose copies are looked for.
@@ -277,6 +279,7 @@ impl LogJudge {
             fresh_rows: FreshRows::new(positions.len()),
             keep: Vec::new(),
             band_hz: BAND_HZ,
+            failed: FailedReads::new(positions.len()),
             repeats: Repeats::new(positions.len(), others.len()),
             copies: Copies::new(compared.len()),
             compared,
@@ -314,6 +317,7 @@ impl LogJudge {
         }
         let mut steps = std::mem::take(&mut self.steps);
         self.clock.take(times, &mut steps);
+        self.leave_out_failed(times, &mut steps, columns);
         // What happens again within a few rows is one event.
         let join = 10.5 * self.clock.step_so_far();
         self.look_for_fresh(times, columns);
@@ -350,6 +354,22 @@ impl LogJudge {
                 *value = columns[*index][k];
             }
             self.fresh.push(self.fresh_rows.look(t, row));
+        }
+    }
+
+    /// Marks rows that were not read.
+    fn leave_out_failed(&mut self, times: &[f64], steps: &mut [RowStep], columns: &[&[f64]]) {
+        let kept = FaultKind::FailedRead.kept(&self.keep);
+        for (k, (&t, step)) in times.iter().zip(steps).enumerate() {
+            let [positions, others] = &mut self.row;
+            let logged = |index: &usize| columns[*index][k] - self.tracks[*index].channel.zero;
+            for (row, indices) in [(positions, &self.positions), (others, &self.others)] {
+                row.clear();
+                row.extend(indices.iter().map(logged));
+            }
+            if self.failed.take(t, &self.row[0], &self.row[1]) && !kept {
+                *step = RowStep::Unusable;
+            }
         }
     }
 

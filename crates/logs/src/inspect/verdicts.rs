@@ -33,6 +33,7 @@ fn conclude(judge: &LogJudge) -> Findings {
     let first = judge.clock.first.unwrap_or(0.0);
     let mut draft = FaultList::new(first, first + judge.clock.duration().max(0.0), &judge.keep);
     time_faults(judge, &clock, &mut draft);
+    failed_reads(judge, &clock, &mut draft);
     together::stalls(judge, &clock, &mut draft);
     for (place, track) in judge.tracks.iter().enumerate() {
         number_faults(track, &mut draft);
@@ -44,6 +45,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         mut faults,
         cuts,
         mut bridges,
+        failed,
         wraps,
         off,
         held,
@@ -82,6 +84,7 @@ fn conclude(judge: &LogJudge) -> Findings {
         costs,
         cuts: joined(cuts.into_iter().map(|(span, _)| span).collect()),
         bridges,
+        failed,
         wraps,
         off,
         held,
@@ -116,6 +119,13 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
             fate: RowFate::Bridged,
         });
     }
+    if !draft.failed.is_empty() {
+        costs.push(RowCost {
+            kind: FaultKind::FailedRead,
+            rows: draft.failed.len() as u64,
+            fate: RowFate::LeftOut,
+        });
+    }
     let held = draft
         .faults
         .iter()
@@ -127,6 +137,27 @@ fn costs(draft: &FaultList, clock: &ClockFacts) -> Vec<RowCost> {
     }));
     costs.sort_by(|a, b| b.rows.cmp(&a.rows).then(a.kind.cmp(&b.kind)));
     costs
+}
+
+/// Rows in which every channel reads 0.
+fn failed_reads(judge: &LogJudge, clock: &ClockFacts, draft: &mut FaultList) {
+    let times = judge.failed.times();
+    let mut episodes = Episodes::default();
+    for t in times {
+        episodes.add(*t, *t, 1, 1.5 * clock.dt);
+    }
+    let effect = |rows: u64, times: usize| {
+        format!(
+            "{} in which every channel reads 0 while the robot is elsewhere: nothing was read, and a fit leaves them out",
+            rows_text(rows, times)
+        )
+    };
+    let remedy = "look for lost messages of the bus; log rows that were read, and no others";
+    let kind = FaultKind::FailedRead;
+    draft.stretches(kind, Warning, None, &episodes, &effect, remedy);
+    if !times.is_empty() && draft.acts(kind, None) {
+        draft.failed = times.to_vec();
+    }
 }
 
 fn channel_facts(judge: &LogJudge, index: usize, track: &Track, rate: Option<f64>) -> ChannelFacts {

@@ -399,6 +399,17 @@ const NOISE: [&str; 55] = [
     "amperes",
 ];
 
+/// A name without the words of a joint, where it has them in a row.
+pub fn without_joint(name: &str, joint: &str) -> String {
+    let (spoken, joint) = (words(name), words(joint));
+    let same = |at: &&[Word]| at.iter().zip(&joint).all(|(a, b)| a.text == b.text);
+    match spoken.windows(joint.len().max(1)).find(same) {
+        Some([first, .., last]) => format!("{}#{}", &name[..first.at.start], &name[last.at.end..]),
+        Some([only]) => format!("{}#{}", &name[..only.at.start], &name[only.at.end..]),
+        _ => name.to_owned(),
+    }
+}
+
 /// The signs of a name without the words of units, `#` kept: columns that differ in their units alone look the
 /// same.
 pub fn without_units(name: &str) -> String {

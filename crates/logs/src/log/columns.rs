@@ -40,7 +40,7 @@ impl Header<'_> {
         };
         let time = match layout.section.rate_hz {
             Some(_) => None,
-            None => Some(self.find(&layout.time, "time")?),
+            None => Some(self.find(&of_one_column(self.names, &layout.time), "time")?),
         };
         let positions = each(&layout.positions, layout.what())?;
         let torques = each(&layout.torques, "torque")?;
@@ -129,6 +129,22 @@ impl Header<'_> {
     }
 }
 
+/// A clock of two columns, `sec+nanosec`, by the first of them; its name finds the other.
+fn of_one_column(names: &[String], time: &Channel) -> Channel {
+    let mut first = time.clone();
+    if position_of(names, time).is_none()
+        && let Some((seconds, _)) = time.column.split_once('+')
+    {
+        first.column = seconds.to_owned();
+    }
+    first
+}
+
+/// The place of a channel; of a clock of two columns that of the first.
+pub(super) fn time_of(names: &[String], time: &Channel) -> Option<usize> {
+    position_of(names, &of_one_column(names, time))
+}
+
 /// Places of the columns that a channel may be.
 fn positions_of<'n>(names: &'n [String], channel: &'n Channel) -> impl Iterator<Item = usize> + 'n {
     let number = column_number(&channel.column);
@@ -157,7 +173,7 @@ pub(super) fn choose(names: &[String], layout: &Layout) -> Layout {
 }
 
 /// `q1 [deg]` and `q1 (deg)` are q1 in deg.
-fn name_and_unit(name: &str) -> (&str, Option<&str>) {
+pub(super) fn name_and_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((base, unit)) = name
             .strip_suffix(close)
@@ -178,6 +194,17 @@ pub fn unit_of(name: &str) -> Option<&str> {
 fn suffix_unit(name: &str) -> Option<&str> {
     let unit = name.rsplit_once('_')?.1;
     ["deg", "degrees", "mm"].contains(&unit).then_some(unit)
+}
+
+/// Units of quantities that no channel is of.
+const OTHERS: [&str; 18] = [
+    "%", "c", "°c", "degc", "k", "rpm", "hz", "w", "j", "ma", "mrad", "kg", "bar", "pa", "um",
+    "min", "h", "date",
+];
+
+/// Whether a text is a unit.
+pub(super) fn is_unit(text: &str) -> bool {
+    known_unit(text).is_some() || OTHERS.contains(&&*text.to_lowercase())
 }
 
 /// One spelling for the units that headers state; a rate is known by its numerator.

@@ -58,6 +58,37 @@ pub struct Mending {
     pub keep_repeats: bool,
     /// Numbers to replace, in the order of time.
     pub bridges: Arc<[Bridge]>,
+    /// Times of rows that were not read and are left out, in order [s].
+    pub failed: Arc<[f64]>,
+}
+
+/// Leaves out rows by their times, row after row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Failed {
+    all: Arc<[f64]>,
+    next: usize,
+    /// Rows that were left out.
+    pub(super) dropped: u64,
+}
+
+impl Failed {
+    pub(super) fn new(all: Arc<[f64]>) -> Self {
+        Self {
+            all,
+            ..Self::default()
+        }
+    }
+
+    /// Whether the row at time `t` was not read [s].
+    #[inline]
+    pub(super) fn has(&mut self, t: f64) -> bool {
+        while self.all.get(self.next).is_some_and(|failed| *failed < t) {
+            self.next += 1;
+        }
+        let failed = self.all.get(self.next) == Some(&t);
+        self.dropped += u64::from(failed);
+        failed
+    }
 }
 
 /// Finds rows that repeat the one before, in a log that holds its samples.

@@ -30,6 +30,7 @@ mod temperatures;
 mod text;
 mod time;
 mod time_unit;
+mod two_clocks;
 
 pub use arrays::Arrays;
 pub use cft_ident_core::block::Block;
@@ -38,10 +39,11 @@ pub use error::LogError;
 pub use layout::{Channel, Conversion, DeclaredChannels, Layout};
 pub use mend::{Bridge, Mending, Unwrap};
 pub use names::{escape, escape_whole, nearest};
-pub use raw::{RawBlock, RawReader, topics};
+pub use raw::{RawBlock, RawReader, listing, topics};
 pub use reader::Reader;
 pub use recording::{
-    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup, Value,
+    CdrReader, DefinitionError, DelayEstimate, DelayEstimator, MalformedMessage, StateGroup,
+    TopicFacts, Value,
 };
 pub use section::{
     ActuatorChannels, ChannelChoice, ColumnName, Delimiter, JointChannels, LogSection,

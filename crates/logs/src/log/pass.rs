@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::columns::{choose, position_of, unit_of};
+use super::columns::{choose, time_of, unit_of};
 use super::content::{Content, RawBytes};
 use super::layout::Layout;
 use super::recording::{JointStates, MessageRows, format_of};
@@ -14,6 +14,7 @@ use super::stream::Watch;
 use super::tape::{Tape, TapeRows};
 use super::text::{JsonRows, TextRows};
 use super::time::Instant;
+use super::two_clocks::rest_of;
 use super::{LogError, LogSpec, Span};
 
 /// Rows by whose times a unit is recognised.
@@ -82,7 +83,7 @@ impl LogPass {
         let stated = section.time_unit.is_some()
             || section.rate_hz.is_some()
             || pass.layout.joints.is_empty();
-        if !stated && let Some(column) = position_of(pass.rows.names(), &pass.layout.time) {
+        if !stated && let Some(column) = time_of(pass.rows.names(), &pass.layout.time) {
             pass.recognise(column)?;
         }
         Ok(pass)
@@ -91,7 +92,9 @@ impl LogPass {
     /// Takes the unit of a column of times from its numbers, where its name states none.
     pub(super) fn recognise(&mut self, column: usize) -> Result<(), LogError> {
         let name = &self.rows.names()[column];
-        let stated = unit_of(name).is_some() || TimeUnit::of_suffix(name).is_some();
+        let stated = unit_of(name).is_some()
+            || TimeUnit::of_suffix(name).is_some()
+            || rest_of(self.rows.names(), column).is_some();
         if stated || self.rows.is_recording() {
             return Ok(());
         }
@@ -226,7 +229,10 @@ impl LogPass {
         }
         let span = match self.spec.span {
             Span::Whole => (f64::NEG_INFINITY, f64::INFINITY),
-            Span::Seconds { from, to } => (first + from, first + to),
+            Span::Seconds { from, to } => {
+                let zero = self.rows.begins().unwrap_or(first);
+                (zero + from, zero + to)
+            }
             Span::Percent { from, to } => {
                 let last = self.last_time()?.unwrap_or(first);
                 let at = |percent: f64| first + (last - first) * percent / 100.0;
@@ -255,10 +261,42 @@ impl LogPass {
         Ok(last)
     }
 
+    /// The least step of a clock that stands still from row to row, and the rate of the rows: `None` where they are
+    /// no rows of a clock that is only too coarse.
+    pub(super) fn coarse_clock(&self) -> Option<(f64, f64)> {
+        let mut rows = open(&self.files, &self.layout, self.strictness).ok()?.rows;
+        if let Some((column, seconds)) = self.time {
+            rows.set_time(column, seconds);
+        }
+        let (mut origin, mut first, mut last) = (self.origin, None, f64::NAN);
+        let (mut count, mut still, mut least) = (0_u64, 0_u64, f64::INFINITY);
+        while let Some(stamp) = rows.next().ok()? {
+            let t = stamp.seconds(&mut origin);
+            let step = t - last;
+            if step < 0.0 || t.is_nan() {
+                return None;
+            }
+            still += u64::from(step == 0.0);
+            least = if step > 0.0 { least.min(step) } else { least };
+            (count, last) = (count + 1, t);
+            first.get_or_insert(t);
+        }
+        let duration = last - first?;
+        let rate = count.saturating_sub(1) as f64 / duration;
+        // a clock that stands still now and then is another fault
+        let coarse = 4 * still > count && duration > 10.0 * least;
+        coarse.then(|| (least, round_within(rate, rate * 2.0 * least / duration)))
+    }
+
     /// Counts rows that are handed out, by the times of the first and the last of them.
     pub(super) fn count(&mut self, rows: usize, first: f64, last: f64) {
         self.used = Some((self.used.map_or(first, |(first, _)| first), last));
         self.samples += rows as u64;
+    }
+
+    /// Time of the first row handed out [s].
+    pub(super) fn began(&self) -> Option<f64> {
+        self.used.map(|(first, _)| first)
     }
 
     /// Time from the first to the last row handed out so far [s].
@@ -270,7 +308,7 @@ impl LogPass {
     pub(super) fn provenance(&self) -> Result<Provenance, LogError> {
         Ok(Provenance {
             name: self.spec.name(),
-            span: self.spec.span.label(),
+            span: self.spec.part(),
             sha256: match (self.rows.sha256(), &self.watch) {
                 (Some(known), _) => known.to_owned(),
                 (None, Some(watch)) => watch.sha256(),
@@ -281,6 +319,16 @@ impl LogPass {
             role: None,
         })
     }
+}
+
+/// The shortest number that is as near to `x` as `within`.
+fn round_within(x: f64, within: f64) -> f64 {
+    let shorter = (1..=6).map(|digits| {
+        let place = 10_f64.powi(digits - 1 - x.abs().log10().floor() as i32);
+        (x * place).round() / place
+    });
+    let mut near = shorter.filter(|short| (short - x).abs() <= within);
+    near.next().unwrap_or(x)
 }
 
 /// A log that was opened.

@@ -1,14 +1,15 @@
 //! A log as it stands in its files: every column, with its errors. What a strict reader refuses, or
 //! passes over, can be looked at here.
 
-use super::columns::{position_of, unit_of};
+use super::columns::{time_of, unit_of};
 use super::content::Content;
 use super::layout::{Channel, Layout};
 use super::pass::LogPass;
-use super::recording::{StateGroup, format_of, state_groups};
+use super::recording::{self, StateGroup, TopicFacts, format_of, state_groups};
 use super::rows::Strictness;
 use super::source::Provenance;
 use super::time::Instant;
+use super::two_clocks::rest_of;
 use super::{LogError, LogSection, LogSpec};
 use cft_ident_core::number::is_usable;
 
@@ -22,6 +23,20 @@ pub fn topics(spec: &LogSpec) -> Result<Vec<StateGroup>, LogError> {
     for file in &files {
         if format_of(Content::open(file)?.head()).is_some() {
             return state_groups(&files);
+        }
+    }
+    Ok(Vec::new())
+}
+
+/// The topics of a recording, with the numbers in their messages; none of a text log.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn listing(spec: &LogSpec) -> Result<Vec<TopicFacts>, LogError> {
+    let files = spec.files()?;
+    for file in &files {
+        if format_of(Content::open(file)?.head()).is_some() {
+            return recording::listing(&files);
         }
     }
     Ok(Vec::new())
@@ -120,7 +135,13 @@ impl RawReader {
 
     /// Which column a channel of a robot file is.
     pub fn find(&self, channel: &Channel) -> Option<usize> {
-        position_of(self.names(), channel)
+        time_of(self.names(), channel)
+    }
+
+    /// The column of whole seconds of a clock that has another column for what is beyond them.
+    pub fn split_clock(&self) -> Option<usize> {
+        let names = self.names();
+        (0..names.len()).find(|column| rest_of(names, *column).is_some())
     }
 
     /// The layout of those offered that this log has.

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use super::arrays::{ArrayRows, Arrays};
 use super::layout::{Channel, Layout};
-use super::mend::{Bridging, Held, Mending, Unwrap};
+use super::mend::{Bridging, Failed, Held, Mending, Unwrap};
 use super::pass::LogPass;
 use super::rows::Strictness;
 use super::source::{self, Provenance};
 use super::stale::Stale;
 use super::time::Instant;
 use super::{Block, LogError, LogSpec, Span};
+use cft_ident_core::number::significant;
 
 /// A log that is being read, and refused where anything is wrong with it.
 #[derive(Debug)]
@@ -25,6 +26,7 @@ pub struct Reader {
     turning: Vec<(usize, Unwrap)>,
     held: Held,
     bridging: Bridging,
+    failed: Failed,
     /// Messages that repeat the one before them in everything.
     duplicates: u64,
     /// Rows at the end of the last block that may turn out to be stale.
@@ -96,6 +98,7 @@ impl Reader {
             turning: Vec::new(),
             held: Held::default(),
             bridging: Bridging::default(),
+            failed: Failed::default(),
             duplicates: 0,
             pending: Block::default(),
         };
@@ -120,6 +123,7 @@ impl Reader {
         };
         self.held = Held::new(mending.held);
         self.bridging = Bridging::new(Arc::clone(&mending.bridges));
+        self.failed = Failed::new(Arc::clone(&mending.failed));
         self.stale.keep(mending.keep_repeats);
     }
 
@@ -137,6 +141,12 @@ impl Reader {
     /// Whether the blocks hold logged velocities.
     pub fn has_velocities(&self) -> bool {
         self.pass.rows.has_velocities()
+    }
+
+    /// How long the machine had run when the rows that are read begin \[s\]; call it after the first block.
+    pub fn started_s(&self) -> f64 {
+        let before = |(first, _)| self.pass.began().map_or(0.0, |began| began - first);
+        self.pass.spec.started_s + self.seen.map_or(0.0, before)
     }
 
     /// Rows handed out so far.
@@ -188,7 +198,10 @@ impl Reader {
                 self.finish(block)?;
                 break;
             }
-            self.take(t, block)?;
+            let since = t - self.seen.map_or(t, |(first, _)| first);
+            if !self.failed.has(t) && !self.pass.spec.leaves_out(since) {
+                self.take(t, block)?;
+            }
         }
         if !self.finished {
             // What follows decides about the rows at the end.
@@ -234,6 +247,11 @@ impl Reader {
             (self.held.dropped, "sample-and-hold"),
             (self.stale.dropped(), "repeated-rows"),
         ]
+    }
+
+    /// Rows left out so far because nothing was read.
+    pub fn not_read(&self) -> u64 {
+        self.failed.dropped
     }
 
     /// Name, span, checksum, rows and duration of what was read; call it after the last block.
@@ -283,7 +301,15 @@ impl Reader {
         } else {
             let remedy = remedy.unwrap_or_else(|| {
                 let column = super::escape(&self.pass.layout.time.column);
-                format!("check the clock of the recorder or the time column `{column}`")
+                match self.pass.coarse_clock() {
+                    Some((step, rate)) => format!(
+                        "the clock of `{column}` moves in steps of {} s, too coarse for rows at {rate} Hz: set `rate_hz = {rate}` in [log] of the robot file, in place of `time`",
+                        significant(step, 3)
+                    ),
+                    None => format!(
+                        "check the clock of the recorder or the time column `{column}`; where rows lie evenly, `rate_hz = ..` in [log] of the robot file says so, in place of `time`"
+                    ),
+                }
             });
             LogError::TimeStandsStill { at, t, remedy }
         })

@@ -41,6 +41,11 @@ pub(super) trait LogRows: Debug + Send {
         false
     }
 
+    /// The time from which spans in seconds count, where that is not the first row's [s].
+    fn begins(&self) -> Option<f64> {
+        None
+    }
+
     /// Says which column is the time, and how many seconds its unit has, where rows carry none.
     fn set_time(&mut self, _column: usize, _seconds: f64) {}
 

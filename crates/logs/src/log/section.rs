@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{Deserializer, Error, Visitor};
+use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
 /// Unit of a logged position.
@@ -370,7 +370,8 @@ pub struct ActuatorChannels {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSection {
-    /// Column of the time, or field of a message; `t` where absent.
+    /// Column of the time, or field of a message; `t` where absent. A column of whole seconds with one of their
+    /// nanoseconds, milli- or microseconds beside it, `["sec", "nanosec"]`, is one clock.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnName>,
     /// Unit of the time column; where absent the header's, else by the size of the numbers and of
@@ -387,6 +388,9 @@ pub struct LogSection {
     /// What parts the columns.
     #[serde(default, skip_serializing_if = "is_default")]
     pub delimiter: Delimiter,
+    /// Line of a text log that names its columns, from 1; found where absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub header_line: Option<u64>,
     /// Topic of a recording that holds the positions; found where absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
@@ -446,13 +450,14 @@ impl JsonSchema for ColumnName {
         json_schema!({"anyOf": [
             {"type": "string"},
             {"type": "integer", "format": "uint32", "minimum": 0},
+            {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
         ]})
     }
 }
 
 struct NameOrNumber;
 
-impl Visitor<'_> for NameOrNumber {
+impl<'de> Visitor<'de> for NameOrNumber {
     type Value = ColumnName;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -461,6 +466,19 @@ impl Visitor<'_> for NameOrNumber {
 
     fn visit_str<E: Error>(self, name: &str) -> Result<ColumnName, E> {
         Ok(ColumnName(name.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<ColumnName, A::Error> {
+        let mut names: Vec<String> = Vec::new();
+        while let Some(name) = seq.next_element()? {
+            names.push(name);
+        }
+        match names.len() {
+            2 => Ok(ColumnName(names.join("+"))),
+            n => Err(A::Error::custom(format!(
+                "{n} columns; a clock has two at most: seconds and their nanoseconds"
+            ))),
+        }
     }
 
     fn visit_i64<E: Error>(self, number: i64) -> Result<ColumnName, E> {

@@ -36,6 +36,9 @@ pub enum Span {
     },
 }
 
+/// Parts the span from the stretches that are left out, in outputs.
+const WITHOUT: &str = " without ";
+
 impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -58,7 +61,8 @@ impl Span {
 
     /// The span that a label tells; the whole log where it tells none.
     pub(super) fn read(label: &str) -> Self {
-        Self::parse(label).unwrap_or_default()
+        let span = label.split_once(WITHOUT).map_or(label, |(span, _)| span);
+        Self::parse(span).unwrap_or_default()
     }
 
     /// Whether two spans of one log can have rows in common; those in other units can.
@@ -121,13 +125,18 @@ pub struct LogSpec {
     pub path: PathBuf,
     /// The part that is used.
     pub span: Span,
+    /// Stretches of it that are left out, in seconds after the log's first sample.
+    pub leave_out: Vec<[f64; 2]>,
+    /// How long the machine had run when the log began \[s\].
+    pub started_s: f64,
     /// What is kept of it, so that it is read once.
     pub(super) kept: Arc<Kept>,
 }
 
 impl PartialEq for LogSpec {
     fn eq(&self, other: &Self) -> bool {
-        (&self.path, self.span) == (&other.path, other.span)
+        let parts = (&self.path, self.span, &self.leave_out);
+        parts == (&other.path, other.span, &other.leave_out)
     }
 }
 
@@ -137,9 +146,43 @@ impl LogSpec {
         Self::new(path.into(), Span::Whole)
     }
 
+    /// Another part of the same log.
+    pub fn of_span(&self, span: Span) -> Self {
+        Self {
+            span,
+            ..self.clone()
+        }
+    }
+
     fn new(path: PathBuf, span: Span) -> Self {
         let kept = Kept::of(&path);
-        Self { path, span, kept }
+        Self {
+            path,
+            span,
+            leave_out: Vec::new(),
+            started_s: 0.0,
+            kept,
+        }
+    }
+
+    /// What is read of the file, as it stands in outputs; `None` for the whole of it.
+    pub fn part(&self) -> Option<String> {
+        let without = self.leave_out.iter();
+        let without: Vec<String> = without.map(|[from, to]| format!("{from}..{to}s")).collect();
+        match (self.span.label(), without.is_empty()) {
+            (span, true) => span,
+            (span, false) => Some(format!(
+                "{}{WITHOUT}{}",
+                span.unwrap_or_default(),
+                without.join(", ")
+            )),
+        }
+    }
+
+    /// Whether a row so many seconds after the log's first one is left out.
+    pub(super) fn leaves_out(&self, since: f64) -> bool {
+        let inside = |[from, to]: &[f64; 2]| *from <= since && since < *to;
+        self.leave_out.iter().any(inside)
     }
 
     /// File name without folders: the only form in which a path enters an output.
@@ -225,8 +268,8 @@ fn natural(name: &str) -> Vec<(usize, String)> {
 impl fmt::Display for LogSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.path.display())?;
-        match self.span.label() {
-            Some(span) => write!(f, "@{span}"),
+        match self.part() {
+            Some(part) => write!(f, "@{part}"),
             None => Ok(()),
         }
     }

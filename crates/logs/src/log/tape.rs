@@ -577,6 +577,20 @@ impl LogRows for TapeRows {
         lock(&self.tape.inner).source.warnings()
     }
 
+    fn contradictions(&self) -> Vec<(u64, String)> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.contradictions()
+    }
+
+    fn uneven(&self) -> Vec<(u64, String)> {
+        self.tape.to_the_end();
+        lock(&self.tape.inner).source.uneven()
+    }
+
+    fn begins(&self) -> Option<f64> {
+        lock(&self.tape.inner).source.begins()
+    }
+
     fn breaks(&self) -> Vec<String> {
         self.tape.to_the_end();
         lock(&self.tape.inner).source.breaks()

@@ -66,6 +66,13 @@ impl Instant {
         self.fs.unsigned_abs() >= (FAR_S as u128) * SECOND as u128
     }
 
+    /// The sum with an instant that counts from it.
+    pub(super) fn and(self, rest: Self) -> Self {
+        Self {
+            fs: self.fs.saturating_add(rest.fs),
+        }
+    }
+
     /// Later by `s` seconds, rounded to the femtosecond.
     pub(super) fn plus(self, s: f64) -> Self {
         Self {

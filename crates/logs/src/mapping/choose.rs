@@ -4,11 +4,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::column::LogColumn;
-use super::family::{Family, How, Key, families, fit};
+use super::family::{Family, How, Key, families, fit, penalty};
 use super::look::{ClockSource, SeenColumns};
 use super::units::{of_positions, of_torques, other_velocity, stated_position, stated_torque};
 use crate::inspect::ChannelRole;
-use crate::inspect::words::{Word, joint, slides, words};
+use crate::inspect::words::{Word, joint, slides, without_joint, words};
 use crate::log::escape;
 use cft_ident_core::robot::JointKind;
 
@@ -148,17 +148,30 @@ impl Mapping {
             out.how = "by what they hold, for they have no names: CHECK IT";
         }
         let [position, velocity, torque] = all;
+        // words of a joint's name are no units
+        let beside = |columns: &[Option<LogColumn>]| -> Vec<Option<LogColumn>> {
+            let pairs = columns.iter().zip(&names);
+            pairs
+                .map(|(column, joint)| {
+                    let mut column = column.clone()?;
+                    column.name = without_joint(&column.name, joint);
+                    Some(column)
+                })
+                .collect()
+        };
         let columns_of = |taken: &Option<Taken>| -> Vec<Option<LogColumn>> {
             let none = vec![None; names.len()];
             let cloned = |t: &Taken| t.columns.iter().map(|c| c.cloned()).collect();
             taken.as_ref().map_or(none, cloned)
         };
-        let (mut q, mut dq, mut tau) = (
+        let (q, mut dq, tau) = (
             columns_of(&position),
             columns_of(&velocity),
             columns_of(&torque),
         );
-        out.units(&joints, [&mut q, &mut dq, &mut tau]);
+        if out.units(&joints, [&beside(&q), &beside(&dq), &beside(&tau)]) {
+            dq.iter_mut().for_each(|column| *column = None);
+        }
         let warm = temperatures(columns, &names);
         for (k, joint) in out.joints.iter_mut().enumerate() {
             joint.temperature = warm.as_ref().map(|columns| columns[k].clone());
@@ -208,8 +221,8 @@ impl Mapping {
         self.others.extend(others);
     }
 
-    /// Units of positions and torques, and velocities of units that do not go with them taken out.
-    fn units(&mut self, known: &[Known], [q, dq, tau]: [&mut Vec<Option<LogColumn>>; 3]) {
+    /// Units of positions and torques; whether velocities are in units that do not go with those of the positions.
+    fn units(&mut self, known: &[Known], [q, dq, tau]: [&[Option<LogColumn>]; 3]) -> bool {
         let paired = |columns: &[Option<LogColumn>]| -> Vec<usize> {
             (0..columns.len())
                 .filter(|k| columns[*k].is_some())
@@ -228,9 +241,7 @@ impl Mapping {
             let velocity = dq[*k].as_ref();
             velocity.is_some_and(|velocity| other_velocity(velocity, position(k)))
         };
-        if paired(dq).iter().any(other) {
-            dq.iter_mut().for_each(|column| *column = None);
-        }
+        let apart = paired(dq).iter().any(other);
         let found = paired(tau);
         let columns: Vec<&LogColumn> = found.iter().filter_map(|k| tau[*k].as_ref()).collect();
         let limits: Vec<Option<f64>> = found.iter().map(|k| known[*k].torque).collect();
@@ -249,6 +260,7 @@ impl Mapping {
                 self.checks.push("torques: motor currents; give torque_scale of each joint, torque constant times gear ratio".to_owned());
             }
         }
+        apart
     }
 
     /// Notes what is to be looked at, once.
@@ -324,6 +336,45 @@ struct Fitting<'a> {
     columns: Vec<Option<&'a LogColumn>>,
 }
 
+/// For every joint the column that has its name, whatever else the names say: a joint that slides has a force where
+/// others have torques.
+fn by_names<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Option<Fitting<'a>> {
+    let mut worst = 0;
+    let mut own = |joint: &&str| {
+        let has = |column: &&LogColumn| {
+            let longer = |other: &&str| {
+                other.len() > joint.len() && without_joint(&column.name, other) != column.name
+            };
+            without_joint(&column.name, joint) != column.name && !joints.iter().any(longer)
+        };
+        let of = columns.iter().copied().filter(has);
+        let with = of.map(|column| {
+            let bare = without_joint(&column.name, joint);
+            (penalty(&words(&bare), column.role), column)
+        });
+        let mut all: Vec<(i32, &LogColumn)> = with.collect();
+        all.sort_by_key(|(penalty, _)| *penalty);
+        let (first, column) = *all.first()?;
+        // two that are as good are no answer
+        let sure = all.get(1).is_none_or(|(second, _)| *second > first);
+        worst = worst.max(first);
+        sure.then_some(Some(column))
+    };
+    let columns = joints.iter().map(&mut own).collect::<Option<Vec<_>>>()?;
+    let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
+    let apart = names
+        .iter()
+        .collect::<std::collections::BTreeSet<_>>()
+        .len()
+        == names.len();
+    (apart && joints.len() > 1).then(|| Fitting {
+        rank: (worst, i32::MAX),
+        pattern: names.join(", "),
+        how: How::Fits,
+        columns,
+    })
+}
+
 /// The family of a role that fits the joints best.
 fn best<'a>(
     columns: &'a [LogColumn],
@@ -354,6 +405,9 @@ fn best<'a>(
             });
         }
     }
+    if let Some(named) = by_names(&of_role, joints) {
+        found.push(named);
+    }
     // the first of equals
     found.sort_by_key(|fitting| fitting.rank);
     let mut found = found.into_iter();
@@ -365,11 +419,19 @@ fn best<'a>(
     } = found.next()?;
     let taken: Vec<&str> = given.iter().flatten().map(|c| c.name.as_str()).collect();
     let (mut others, mut tie) = (Vec::new(), false);
+    let mut told: Vec<Vec<&str>> = Vec::new();
     for other in found {
         // another reading of the same columns is no other family
         let same = |c: &&LogColumn| taken.contains(&c.name.as_str());
+        let mut known = |columns: &[Option<&'a LogColumn>]| {
+            let names: Vec<&str> = columns.iter().flatten().map(|c| c.name.as_str()).collect();
+            let known = told.contains(&names);
+            told.push(names);
+            known
+        };
         if other.columns.iter().flatten().all(same)
             || other.how == How::InPart
+            || known(&other.columns)
             || others.contains(&other.pattern)
         {
             continue;
@@ -513,6 +575,12 @@ fn own_name(column: &str) -> Option<&str> {
 fn kind_of(position: &LogColumn, torque: Option<&LogColumn>) -> JointKind {
     let force = torque.and_then(stated_torque);
     let pushed = torque.is_some_and(|torque| slides(&words(&torque.name)));
+    // the joint of `q_base_turn` is not in turns
+    let bare = |column: &LogColumn| LogColumn {
+        name: own_name(&column.name).map_or_else(|| column.name.clone(), |_| "q_#".to_owned()),
+        ..column.clone()
+    };
+    let position = &bare(position);
     let slid = match (stated_position(position), force) {
         (Some("m" | "mm" | "cm"), _) => true,
         (Some(_), _) => false,

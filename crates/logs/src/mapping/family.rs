@@ -95,7 +95,7 @@ const PENALTIES: [(&[&str], i32); 4] = [
     ),
 ];
 
-fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
+pub(super) fn penalty(pattern: &[Word], role: ChannelRole) -> i32 {
     let of = |known: &[&str]| {
         pattern
             .iter()
@@ -162,15 +162,13 @@ pub(super) fn families<'a>(columns: &[&'a LogColumn], joints: &[&str]) -> Vec<Fa
             continue;
         }
         // axes may be called S, L, U or X, Y, Z
-        for word in spoken
-            .iter()
-            .filter(|word| word.text.len() == 1 && word.number().is_none())
-        {
-            add(
-                without(word.at.clone()),
-                Key::Name(word.text.clone()),
-                column,
-            );
+        let numbered = |k: usize| spoken.get(k).is_some_and(|word| word.number().is_some());
+        for (k, word) in spoken.iter().enumerate() {
+            let alone = !numbered(k + 1) && !k.checked_sub(1).is_some_and(numbered);
+            if word.text.len() == 1 && word.number().is_none() && alone {
+                let key = Key::Name(word.text.clone());
+                add(without(word.at.clone()), key, column);
+            }
         }
         if column.joint.is_empty() {
             add(name.clone(), Key::Name(String::new()), column);

@@ -207,6 +207,7 @@ fn time_of(
     name: &str,
 ) -> Result<(usize, f64, bool), MappingError> {
     let named = log.names().iter().position(|name| inspect::is_time(name));
+    let named = named.or(log.split_clock());
     let found = match named {
         Some(at) => Some((at, false)),
         None => {

@@ -75,10 +75,7 @@ impl TorqueSource {
                 let friction = friction.iter().any(|law| *law != JointFriction::None);
                 (theta, Self::Declared { friction })
             }
-            Err(links) => (
-                vec![0.0; robot.parameters().len()],
-                Self::Nothing { links },
-            ),
+            Err(links) => (vec![0.0; robot.parameters().len()], Self::Nothing { links }),
         };
         Ok((of(theta, friction), source))
     }
@@ -167,7 +164,12 @@ fn declared_friction(file: &RobotFile, robot: &Robot) -> Vec<JointFriction> {
 /// Inertial parameters by the mass properties of every moving link, or the links that have none.
 fn declared_inertia(file: &RobotFile, robot: &Robot) -> Result<Vec<f64>, Vec<String>> {
     let names = robot.tree().links().iter().map(|link| &link.name);
-    let given = |i: usize| file.robot.link.get(i).and_then(|link| link.inertial.as_ref());
+    let given = |i: usize| {
+        file.robot
+            .link
+            .get(i)
+            .and_then(|link| link.inertial.as_ref())
+    };
     let bare = names.enumerate().filter(|(i, _)| given(*i).is_none());
     let bare: Vec<String> = bare.map(|(_, name)| name.clone()).collect();
     if !bare.is_empty() {

@@ -49,7 +49,7 @@ pub enum SimulateError {
     /// Parameters of no physical robot.
     #[error(
         "the inertia matrix is not positive definite at the pose {x:.4?}; no physical robot has these inertial \
-         parameters, so take others: an unconstrained fit can be so, one with `lsq --feasible` is not"
+         parameters, so take others: a fit with --unconstrained can be so, a fit without it is not"
     )]
     NotPositiveDefinite { x: Vec<f64> },
     /// Volts to play back that are no series.

@@ -91,6 +91,7 @@ fn parameter(name: &str, joint: Option<&str>, value: f64, unit: &str, meaning: &
         theta: None,
         joint: joint.map(str::to_owned),
         value,
+        consistent: None,
         std: None,
         unit: unit.to_owned(),
         meaning: meaning.to_owned(),

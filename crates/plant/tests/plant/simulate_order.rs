@@ -314,6 +314,7 @@ fn single_joint_robot_runs_a_ladder_over_its_declared_travel() {
             theta: None,
             joint: joint.map(str::to_owned),
             value,
+            consistent: None,
             std: None,
             unit: String::new(),
             meaning: String::new(),

@@ -32,7 +32,7 @@ pub struct RoleLogs {
 pub struct IdentifySettings {
     /// Estimator of the inertial parameters.
     pub estimator: EstimatorKind,
-    /// Only physically consistent parameters.
+    /// Physically consistent parameters beside those of the plain fit.
     pub consistent: bool,
     /// The friction of the one-joint logs stays as it is.
     pub hold_friction: bool,

@@ -1,5 +1,7 @@
-//! Physically consistent links: parameters of bodies that can exist, and by how much the fit suffers.
+//! Physically consistent parameters beside those of the plain fit: bodies and drives that can exist, friction that
+//! takes power. They are the nearest in the metric of the fit's information matrix.
 
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -7,12 +9,17 @@ use super::error::IdentifyError;
 use super::estimate::Estimated;
 use super::logged_robot::LoggedRobot;
 use super::residual::RelativeError;
-use cft_ident_core::inertia::feasible::{ConsistencyProblem, PRIOR_WEIGHT, feasible};
+use cft_ident_core::inertia::columns::{Own, RegressorColumns};
+use cft_ident_core::inertia::feasible::{
+    ConsistencyProblem, Feasible, FrictionColumns, PRIOR_WEIGHT, with_friction,
+};
 use cft_ident_core::inertia::solve::{factor, residual_of, weights_of};
 use cft_ident_core::math::descent::Ending;
+use cft_ident_core::robot::Robot;
+use cft_ident_core::robot::bodies::StandardMap;
 use cft_ident_core::robot::standard::{Body, STANDARD, pseudo_inertia};
-use cft_ident_files::config::ModelFile;
-use cft_ident_files::config::model_file::LinkBody;
+use cft_ident_files::config::model_file::{LinkBody, Parameter};
+use cft_ident_files::config::{ModelFile, RobotFile};
 
 /// Physically consistent links, and what they cost.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -27,6 +34,14 @@ pub struct ConsistentLinks {
     pub prior_weight: f64,
     pub iterations: usize,
     pub status: Ending,
+    /// Links whose mass properties in the robot file no body can have, so that a plain body stands for them.
+    pub impossible_priors: Vec<String>,
+    /// The unknowns of the fit, in their order.
+    #[serde(skip)]
+    pub(super) values: Vec<f64>,
+    /// How much the residual of each joint grows.
+    #[serde(skip)]
+    growth: Vec<f64>,
 }
 
 /// A link that can exist.
@@ -62,48 +77,25 @@ pub struct DriveInertia {
     pub inertia: f64,
 }
 
-/// Puts the feasible parameters that are nearest in torque in place of the free ones. The
-/// covariance stays that of the free fit.
-///
-/// # Errors
-/// A prior that is no body, and [`cft_ident_core::inertia::solution::FitError`].
-pub(super) fn consistent(
-    machine: &LoggedRobot,
-    estimated: &mut Estimated,
-) -> Result<ConsistentLinks, IdentifyError> {
-    let map = machine.robot.standard_map();
-    let body = |i: usize| {
-        let given = machine.file.robot.link.get(i)?.inertial.as_ref()?;
-        Some(given.body())
-    };
-    let bodies: Vec<Option<Body>> = (0..map.links.len()).map(body).collect();
-    let basis = &estimated.basis;
-    let fit = &mut estimated.fit;
-    let weights = weights_of(
-        &basis.sums,
-        &residual_of(&basis.sums, &(&fit.theta - &basis.shift))?,
-    );
-    let found = feasible(&ConsistencyProblem {
-        map: &map,
-        bodies: &bodies,
-        factor: &factor(&basis.sums, &weights)?,
-        effective: fit.effective_rows / fit.rows as f64,
-    })?;
-    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
-    let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
-    let bound = residual_of(&basis.sums, &found.theta)?;
-    let before: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
-    for j in 0..bound.len() {
-        let growth = if free[j] > 0.0 {
-            bound[j] / free[j]
-        } else {
-            1.0
-        };
-        fit.residual_std[j] *= growth;
-        fit.relative_error[j].grow(growth);
-    }
-    let after: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
-    fit.theta = &found.theta + &basis.shift;
+/// Mass properties that the robot file gives of each link.
+fn bodies(file: &RobotFile, map: &StandardMap) -> Vec<Option<Body>> {
+    let body = |i: usize| Some(file.robot.link.get(i)?.inertial.as_ref()?.body());
+    (0..map.links.len()).map(body).collect()
+}
+
+/// Links whose prior is no body that can exist.
+fn impossible(map: &StandardMap, bodies: &[Option<Body>], given: &[bool]) -> Vec<String> {
+    let each = map.links.iter().zip(bodies).zip(given);
+    let bad = each.filter(|((_, body), given)| body.is_some() && !**given);
+    bad.map(|((name, _), _)| name.clone()).collect()
+}
+
+/// Links and drives that were found, as they are told.
+fn told(
+    robot: &Robot,
+    map: &StandardMap,
+    found: &Feasible,
+) -> (Vec<ConsistentLink>, Vec<DriveInertia>) {
     let links = map.links.iter().zip(&found.links).zip(&found.given);
     let link = |((name, s), given): ((&String, &[f64; STANDARD]), &bool)| {
         let body = Body::of(s);
@@ -119,55 +111,222 @@ pub(super) fn consistent(
             },
         }
     };
-    let joints = machine.robot.joint_names();
+    let joints = robot.joint_names();
     let drives = map.drives.iter().zip(&found.drives);
     let drive = |(j, inertia): (&usize, &f64)| DriveInertia {
         joint: joints.get(*j).cloned().unwrap_or_default(),
         inertia: *inertia,
     };
+    (links.map(link).collect(), drives.map(drive).collect())
+}
+
+/// Writes links and drives into a model.
+fn write(links: &[ConsistentLink], drives: &[DriveInertia], model: &mut ModelFile) {
+    let body = |link: &ConsistentLink| LinkBody {
+        name: link.name.clone(),
+        mass: link.mass,
+        centre: link.centre,
+        inertia: link.inertia,
+    };
+    model.links = links.iter().map(body).collect();
+    let drives = drives.iter();
+    let drives = drives.map(|drive| (drive.joint.clone(), drive.inertia));
+    model.drive_inertia = drives.collect();
+}
+
+/// Columns of viscous and Coulomb friction that are fitted, with the speed that each joint reached.
+fn friction_of(columns: &RegressorColumns, fastest: &[f64]) -> Vec<FrictionColumns> {
+    let of = |(j, own): (usize, &Vec<Own>)| {
+        let at = |wanted: Own| own.iter().position(|own| *own == wanted);
+        let first = columns.first_own(j);
+        Some(FrictionColumns {
+            viscous: first + at(Own::Viscous)?,
+            coulomb: first + at(Own::Coulomb)?,
+            speed: fastest.get(j).copied().unwrap_or(f64::INFINITY),
+        })
+    };
+    let each = columns.own.iter().enumerate();
+    each.filter_map(of).collect()
+}
+
+/// The consistent parameters nearest to a fit, on its rows; `fastest` are the speeds that the joints reached.
+///
+/// # Errors
+/// [`cft_ident_core::inertia::solution::FitError`].
+pub(super) fn consistent(
+    machine: &LoggedRobot,
+    estimated: &Estimated,
+    fastest: &[f64],
+) -> Result<ConsistentLinks, IdentifyError> {
+    let map = machine.robot.standard_map();
+    let bodies = bodies(&machine.file, &map);
+    let (basis, fit) = (&estimated.basis, &estimated.fit);
+    let free = residual_of(&basis.sums, &(&fit.theta - &basis.shift))?;
+    let weights = weights_of(&basis.sums, &free);
+    let mut rows = factor(&basis.sums, &weights)?;
+    // towards the fit itself, whatever weights it gave the rows; they are linear about a shift
+    let u = fit.theta.len();
+    let towards = rows.columns(0, u) * (&fit.theta - &basis.shift);
+    rows.set_column(u, &towards);
+    let task = ConsistencyProblem {
+        map: &map,
+        bodies: &bodies,
+        factor: &rows,
+        effective: fit.effective_rows / fit.rows as f64,
+    };
+    let found = with_friction(&task, &friction_of(&basis.sums.columns, fastest))?;
+    // on the rows of the fit, which a robust one has weighted; the residual of all rows grows alike
+    let bound = residual_of(&basis.sums, &found.theta)?;
+    let growth = |(free, bound): (&f64, &f64)| if *free > 0.0 { bound / free } else { 1.0 };
+    let growth: Vec<f64> = free.iter().zip(&bound).map(growth).collect();
+    let before: Vec<f64> = fit.relative_error.iter().map(|e| e.all).collect();
+    let after: Vec<f64> = before.iter().zip(&growth).map(|(e, g)| e * g).collect();
+    let (links, drives) = told(&machine.robot, &map, &found);
     Ok(ConsistentLinks {
-        links: links.map(link).collect(),
-        drives: drives.map(drive).collect(),
+        links,
+        drives,
         relative_error_before: RelativeError::each(machine, &before),
         relative_error_after: RelativeError::each(machine, &after),
         prior_weight: PRIOR_WEIGHT,
         iterations: found.iterations,
         status: found.ending,
+        impossible_priors: impossible(&map, &bodies, &found.given),
+        values: (&found.theta + &basis.shift).iter().copied().collect(),
+        growth,
     })
 }
 
 impl ConsistentLinks {
     /// What did not come as it should, as warnings.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let given = self.links.iter();
-        let given = given.filter(|l| l.prior == LinkPrior::RobotFile).count();
-        let mut out = vec![format!(
-            "parameters are those of links that can exist; standard deviations are those of the free fit, and what the torques do not determine of the links is set by {}",
-            match given {
-                0 => "a plain body each (2 kg, radius of gyration 0.1 m)".to_owned(),
-                n if n == self.links.len() => "the robot file's `inertial`".to_owned(),
-                n => format!(
-                    "the robot file's `inertial` of {n} links and a plain body for the others"
-                ),
-            }
-        )];
+        let mut out = Vec::new();
+        if !self.impossible_priors.is_empty() {
+            out.push(format!(
+                "the `inertial` of {} in the robot file is that of no body that can exist (a negative mass or moment, or a moment above the sum of the other two): a plain body stands for it where the torques say nothing",
+                self.impossible_priors.join(", ")
+            ));
+        }
         if self.status == Ending::IterationLimit {
-            out.push("the search for feasible links did not settle; its last result stands".into());
+            out.push(
+                "the search for physically consistent links did not settle; its last result stands"
+                    .into(),
+            );
         }
         out
     }
 
-    /// Writes the links into a model.
+    /// Writes the parameters beside those of a model whose first ones are the unknowns of the fit.
     pub(super) fn write_into(&self, model: &mut ModelFile) {
-        let body = |link: &ConsistentLink| LinkBody {
-            name: link.name.clone(),
-            mass: link.mass,
-            centre: link.centre,
-            inertia: link.inertia,
-        };
-        model.links = self.links.iter().map(body).collect();
-        let drives = self.drives.iter();
-        let drives = drives.map(|drive| (drive.joint.clone(), drive.inertia));
-        model.drive_inertia = drives.collect();
+        for (p, value) in model.parameters.iter_mut().zip(&self.values) {
+            p.consistent = Some(*value);
+        }
+        let names = model.robot.joint_names();
+        for (joint, growth) in names.iter().zip(&self.growth) {
+            if let Some(std) = model.residual_std.get_mut(joint) {
+                *std *= growth;
+            }
+        }
+        write(&self.links, &self.drives, model);
     }
+}
+
+/// Share of the largest variance (parameters scaled by their deviations) below which a direction is none that
+/// a covariance tells of: rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// Puts beside the parameters of a model the physically consistent ones nearest to them in the metric of their
+/// covariance: for a model whose rows are gone. Nothing where it holds no covariance of inertial parameters.
+///
+/// # Errors
+/// [`cft_ident_core::inertia::solution::FitError`].
+pub fn project(model: &mut ModelFile) -> Result<(), IdentifyError> {
+    model.forget_consistent();
+    let robot = model.robot.robot();
+    let inertial = robot.parameters().iter().map(|info| info.name.to_string());
+    let mut keys: Vec<String> = inertial.collect();
+    let shared = keys.len();
+    let Some(covariance) = &model.covariance else {
+        return Ok(());
+    };
+    let missing = |key: &String| !model.parameters.iter().any(|p| p.key() == *key);
+    if keys.iter().any(missing) {
+        return Ok(());
+    }
+    let others = covariance.names.iter();
+    let others: Vec<String> = others
+        .filter(|name| !keys.contains(name))
+        .cloned()
+        .collect();
+    keys.extend(others);
+    let value = |key: &String| {
+        let p = model.parameters.iter().find(|p| p.key() == *key);
+        p.map_or(0.0, |p| p.value)
+    };
+    let theta = DVector::from_iterator(keys.len(), keys.iter().map(value));
+    let rows = information(&model.covariance_of(&keys), &theta);
+    let place = |name: &str, joint: &str| {
+        let key = format!("{name}:{joint}");
+        keys.iter().position(|k| *k == key)
+    };
+    let names = robot.joint_names().iter().enumerate();
+    let friction = names.filter_map(|(j, joint)| {
+        Some(FrictionColumns {
+            viscous: place("viscous", joint)?,
+            coulomb: place("coulomb", joint)?,
+            speed: model
+                .held_out
+                .get(j)
+                .map_or(f64::INFINITY, |held| held.speed_seen),
+        })
+    });
+    let friction: Vec<FrictionColumns> = friction.filter(|of| of.viscous >= shared).collect();
+    let map = robot.standard_map();
+    let task = ConsistencyProblem {
+        map: &map,
+        bodies: &bodies(&model.robot, &map),
+        factor: &rows,
+        effective: 1.0,
+    };
+    let found = with_friction(&task, &friction)?;
+    let (links, drives) = told(&robot, &map, &found);
+    for (key, value) in keys.iter().zip(&found.theta) {
+        let of_key = |p: &&mut Parameter| p.key() == *key;
+        if let Some(p) = model.parameters.iter_mut().find(of_key) {
+            p.consistent = Some(*value);
+        }
+    }
+    write(&links, &drives, model);
+    Ok(())
+}
+
+/// A factor of the information matrix, with the values beside it as a target; what has no variance of its own has
+/// no row.
+fn information(covariance: &[f64], theta: &DVector<f64>) -> DMatrix<f64> {
+    let u = theta.len();
+    let variance = |i: usize| covariance[i * u + i].max(0.0).sqrt();
+    let scale: Vec<f64> = (0..u)
+        .map(|i| {
+            if variance(i) > 0.0 {
+                1.0 / variance(i)
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let correlation = DMatrix::from_fn(u, u, |i, j| covariance[i * u + j] * scale[i] * scale[j]);
+    let parts = SymmetricEigen::new(correlation);
+    let largest = parts.eigenvalues.amax();
+    let mut rows = DMatrix::zeros(u, u + 1);
+    for k in 0..u {
+        let size = parts.eigenvalues[k];
+        if size <= ROUNDING * largest {
+            continue;
+        }
+        for i in 0..u {
+            rows[(k, i)] = parts.eigenvectors[(i, k)] * scale[i] / size.sqrt();
+        }
+    }
+    let target = rows.columns(0, u) * theta;
+    rows.set_column(u, &target);
+    rows
 }

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::consistent::project;
+use super::contact::contacts;
 use super::control::{Control, Progress};
 use super::error::IdentifyError;
 use super::hold_out::{Held, hold_out, or_warning};
@@ -127,8 +129,18 @@ pub fn diagnose(
     settings: &DiagnoseSettings,
     control: &Control,
 ) -> Result<DiagnoseEnd, IdentifyError> {
+    // what is looked for stands beside the plain fit
+    let plain = file.as_fitted();
+    let file = &plain;
     let given = refined(file, name)?;
     check_candidates(&settings.candidates, machine, (name, file))?;
+    let judged = |p: &&Parameter| p.std.is_some() && p.verdict.is_some();
+    let mut judged = file.parameters.iter().filter(judged).peekable();
+    if judged.peek().is_some() && !judged.any(|p| p.verdict == Some(Verdict::Identified)) {
+        return Err(IdentifyError::NothingIdentified {
+            model: name.to_owned(),
+        });
+    }
     if let Some(fault) = without_gains(machine).or(refused(machine, logs.train, control)?) {
         return Ok(DiagnoseEnd::DataFault(fault));
     }
@@ -153,6 +165,8 @@ pub fn diagnose(
     let each = machine.settings_of_each(&all, &laws, &together, control)?;
     let machine = &together;
     let mut in_memory = read_each(machine, &each, &all, control)?;
+    let contact = contacts(machine, logs.train, control)?;
+    in_memory.warnings.splice(0..0, contact);
     let mut taken = temperatures::of_model(&given);
     taken.extend(temperatures::of_laws(&own_laws(
         &settings.candidates,
@@ -395,6 +409,7 @@ impl Diagnosed {
         }
         let mut model = new_model(machine, "diagnose", &self.in_memory.inputs);
         model.parameters.clone_from(&file.parameters);
+        model.forget_consistent();
         model.friction_prior.clone_from(&self.friction_prior);
         let (mut keys, mut places, mut widened) = (Vec::new(), Vec::new(), Vec::new());
         let mut undetermined = Vec::new();
@@ -440,6 +455,9 @@ impl Diagnosed {
             }
         }
         self.held.write_into(&mut model);
+        if file.is_consistent() && project(&mut model).is_err() {
+            model.forget_consistent();
+        }
         model
     }
 

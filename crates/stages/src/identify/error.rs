@@ -45,6 +45,16 @@ pub enum IdentifyError {
     /// A fault of the data for which a fit refuses a log; its remedy is a message of its own.
     #[error("{log}: column `{}` {}", .fault.channel.as_deref().map(escape).unwrap_or_default(), .fault.effect)]
     Refused { log: String, fault: Box<LogFault> },
+    /// Positions where a joint of the robot cannot stand.
+    #[error(
+        "positions of {joint} run over {positions} {unit}, and its limits are {limits}: this is a log of another robot, or in another unit or with another zero; give the log of this robot, or correct [log.joint] or [limits] of its file"
+    )]
+    OtherRobotLog {
+        joint: String,
+        positions: String,
+        limits: String,
+        unit: &'static str,
+    },
     /// The motion of a log, or the processing that a robot file asks for.
     #[error("{of}: {error}")]
     Motion { of: String, error: MotionError },
@@ -74,6 +84,29 @@ pub enum IdentifyError {
         "these data determine none of the parameters; excite every joint with more speed and acceleration"
     )]
     NothingDetermined,
+    #[error(
+        "these data determine nothing: the noise is as large as the torque, {} of which is left at every joint; move faster, or filter more by a lower `cutoff_hz` in [filter]", cft_ident_core::number::percent(*.left)
+    )]
+    OnlyNoise { left: f64 },
+    #[error(
+        "{model}: none of its parameters is identified, so that nothing can be said of effects beside it; fit it to data that determine it"
+    )]
+    NothingIdentified { model: String },
+    #[error(
+        "{log}: rows are poses and no motion: {rate_hz:.3} Hz, and positions leap from row to row; this tool needs a log in time: record the way from pose to pose too, at 100 Hz or more"
+    )]
+    Poses { log: String, rate_hz: f64 },
+    #[error(
+        "{joint}: the model makes a torque of {torque:.4} {unit} at {t:.3} s of {log}, where no more than {measured:.4} {unit} was measured anywhere: it does not hold there; see what its parameters were fitted to, and the clock and units of this log"
+    )]
+    Impossible {
+        joint: String,
+        log: String,
+        t: f64,
+        torque: f64,
+        measured: f64,
+        unit: &'static str,
+    },
     /// Channels of several joints in a unit that is no torque.
     #[error(
         "{robot}: the torques of {joints} are logged in {unit}, and nothing says what torque that is at each joint: gains differ from joint to joint, and masses and inertias need them; give `torque_scale` (N or Nm per {unit} at the joint: torque constant times gear ratio) in [log.joint.NAME]; or let `lsq` find them from a log with a known payload, `--fit-gains LOG:mass=KG`; or go on with one gain for all joints, and a model in {unit}, by `--as-declared`"
@@ -149,6 +182,8 @@ impl IdentifyError {
             Self::Fit(FitError::TooFewRows { .. } | FitError::NothingExcited)
             | Self::Friction { .. }
             | Self::ByMotion(_)
+            | Self::OnlyNoise { .. }
+            | Self::NothingIdentified { .. }
             | Self::NothingDetermined => ErrorKind::Undetermined,
             Self::Diagnose(DiagnoseError::Motion(_)) => ErrorKind::Input,
             Self::Diagnose(_) => ErrorKind::Undetermined,
@@ -159,8 +194,11 @@ impl IdentifyError {
             | Self::WithoutGains { .. }
             | Self::Log(_)
             | Self::Config(_)
-            | Self::Fit(FitError::Math(_) | FitError::Prior { .. })
+            | Self::Fit(FitError::Math(_))
+            | Self::Poses { .. }
+            | Self::Impossible { .. }
             | Self::Refused { .. }
+            | Self::OtherRobotLog { .. }
             | Self::SameRows { .. }
             | Self::Motion { .. }
             | Self::TooManyRows { .. }

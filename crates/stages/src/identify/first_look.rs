@@ -13,4 +13,8 @@ pub(super) struct FirstLook {
     pub(super) fastest: Vec<f64>,
     /// Its first and last time, from where its times are counted [s].
     pub(super) bounds: [f64; 2],
+    /// Rate of a log whose rows are poses [Hz].
+    pub(super) poses_hz: Option<f64>,
+    /// How many times the derivative of its position each joint's velocity column is, where it follows that.
+    pub(super) velocities: Vec<Option<f64>>,
 }

@@ -412,6 +412,7 @@ fn file_parameters(found: &FrictionOfJoint) -> Vec<Parameter> {
             theta: p.theta,
             joint: Some(found.joint.clone()),
             value: law[k],
+            consistent: None,
             std: v.std.is_finite().then_some(v.std),
             unit: p.unit.clone(),
             meaning,

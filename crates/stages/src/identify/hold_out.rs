@@ -198,6 +198,7 @@ impl<'a> Trial<'a> {
                 Ok(more)
             })
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+            open.count_run_time(&mut found);
             if self.model.takes_temperatures() {
                 let temperatures =
                     (self.machine).temperatures_for(self.model, log, open.origin())?;

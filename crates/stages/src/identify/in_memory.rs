@@ -64,6 +64,7 @@ pub(super) fn read_wider(
         let mut open = machine.open(log, control)?;
         let (mut found, _) = stretches(index, n, &wide, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
+        open.count_run_time(&mut found);
         machine.put_temperatures(log, open.origin(), &mut found)?;
         all.extend(found);
     }
@@ -91,6 +92,7 @@ pub(super) fn read_each(
         averaged |= open.is_centred();
         let (mut found, summary) = stretches(index, n, settings, &mut |block| open.read(block))
             .map_err(|e| IdentifyError::of_run(&name, e))?;
+        open.count_run_time(&mut found);
         for stretch in &mut found {
             stretch.zero = open.origin().seconds();
         }

@@ -19,8 +19,8 @@ use cft_ident_core::motion::{
 };
 use cft_ident_core::robot::{JointKind, Robot};
 use cft_ident_core::validate::TorqueErrors;
-use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::robot_file::{DifferencesKind, FilterKind};
+use cft_ident_files::config::{ModelFile, RobotFile};
 use cft_ident_logs::inspect::{Gate, LogFault};
 use cft_ident_logs::log::{Block, Layout, LogError, Reader, RowFault, escape};
 
@@ -71,6 +71,14 @@ impl LoggedRobot {
             position_cutoffs_hz: Arc::default(),
             looks: Arc::default(),
             as_declared: false,
+        }
+    }
+
+    /// The robot of a model, its set-up kept as it is declared where that of the model was.
+    pub fn of_model(name: &str, model: &ModelFile) -> Self {
+        LoggedRobot {
+            as_declared: model.provenance.as_declared,
+            ..Self::new(name, model.robot.clone())
         }
     }
 
@@ -127,6 +135,12 @@ impl LoggedRobot {
         if !off.is_empty() && look.gate.refusal().is_none() {
             let freely = kept || self.moves_freely(log, layout, (&look, &off), control)?;
             look.gate.set_freely(freely);
+        }
+        if let Some(rate_hz) = look.poses_hz {
+            return Err(IdentifyError::Poses {
+                log: escape(&log.name()),
+                rate_hz,
+            });
         }
         let look = Arc::new(look);
         if let Some(fault) = look.gate.refusal() {
@@ -199,6 +213,40 @@ impl LoggedRobot {
         Ok(look.bounds.map(|t| zero + t))
     }
 
+    /// Time of the first row that is read of a log, as its rows have it [s].
+    ///
+    /// # Errors
+    /// Those of [`Self::rest_speeds`].
+    pub(super) fn first_row(&self, log: &Log, control: &Control) -> Result<f64, IdentifyError> {
+        let look = self.first_look(log, &self.file.layout(), control)?;
+        Ok(look.bounds[0])
+    }
+
+    /// Whether numbers of these logs are bridged.
+    ///
+    /// # Errors
+    /// Those of [`Self::rest_speeds`].
+    pub(super) fn bridges(&self, logs: &[Log], control: &Control) -> Result<bool, IdentifyError> {
+        for log in logs {
+            let look = self.first_look(log, &self.file.layout(), control)?;
+            if !look.gate.mending().bridges.is_empty() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The same robot whose logs are not mended of a fault.
+    pub(super) fn keeping(&self, fault: RowFault) -> LoggedRobot {
+        let mut file = self.file.clone();
+        file.log.keep.push(fault);
+        LoggedRobot {
+            file,
+            looks: Arc::default(),
+            ..self.clone()
+        }
+    }
+
     /// Whether the robot moves as without its motors where torques are exactly 0.
     fn moves_freely(
         &self,
@@ -258,6 +306,8 @@ impl LoggedRobot {
             rest_speed: speeds.borrow().resting(),
             fastest: speeds.borrow().fastest(),
             bounds: speeds.borrow().bounds(),
+            poses_hz: speeds.borrow().poses_hz(),
+            velocities: speeds.borrow().velocities(),
         })
     }
 

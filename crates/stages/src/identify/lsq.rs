@@ -5,9 +5,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::consistent::{ConsistentLinks, consistent};
+use super::contact::hangs_on_bridged;
 use super::control::Control;
 use super::error::IdentifyError;
-use super::estimate::{Account, Estimated, estimate};
+use super::estimate::{Account, Basis, Estimated, estimate};
 use super::gain_error::GainError;
 use super::gains::{CurrentGains, Gain};
 use super::geometry::geometry;
@@ -27,7 +28,8 @@ use super::residual::{JointResidual, RelativeError};
 use super::unknowns::{FittedUnknown, columns, unknowns};
 use super::weakest::{WeakestPart, weakest};
 use crate::setup::Finding;
-use cft_ident_core::inertia::columns::RegressorColumns;
+use cft_ident_core::inertia::accumulate::RelativeResidual;
+use cft_ident_core::inertia::columns::{Own, RegressorColumns};
 use cft_ident_core::inertia::essential::{Essential, essential};
 use cft_ident_core::inertia::gains::by_gains;
 use cft_ident_core::inertia::instruments::ReferenceSource;
@@ -51,7 +53,7 @@ use cft_ident_logs::log::Provenance;
 pub struct LsqSettings<'a> {
     /// How parameters are estimated from the rows.
     pub estimator: EstimatorKind,
-    /// Only physically consistent parameters.
+    /// Physically consistent parameters beside those of the plain fit.
     pub consistent: bool,
     /// The model that holds the friction of every joint, and its name for messages; without one,
     /// friction is fitted together with the inertias.
@@ -74,7 +76,7 @@ pub struct IdentifiedDynamics {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gains: Vec<Gain>,
     pub essential: EssentialFit,
-    /// Physically consistent links, where they were asked for.
+    /// Physically consistent links and what they cost, where they were asked for.
     #[serde(rename = "feasible")]
     pub consistent: Option<ConsistentLinks>,
     pub condition: ConditionNumbers,
@@ -161,7 +163,7 @@ pub fn lsq(
         return Err(ReducedError::NeedsLog {
             log: part.name().to_owned(),
             what: format!("what the estimator {} reads", estimator.name()),
-            remedy: "give the log itself, or take `--estimator wls` or `ols`, with `--feasible` if wanted",
+            remedy: "give the log itself, or take `--estimator wls` or `ols`",
         }
         .into());
     }
@@ -186,14 +188,20 @@ pub fn lsq(
     let own = machine.own_settings(logs, &laws, control)?;
     let costs: Vec<CutoffCosts> = own.iter().map(|own| own.costs.clone()).collect();
     let mut passes = Passes::new(machine, logs, control).each_by_itself(own);
-    let mut estimated = estimate(&mut passes, linear, estimator, law)?;
+    let mut estimated = estimate(&mut passes, linear.clone(), estimator, law)?;
     if let Some(gains) = settings.gains {
         share_uncertainty(&mut estimated, gains)?;
     }
     let (essential, essential_error) = essentials(&estimated)?;
     let resting = estimated.basis.sums.resting_shares();
     let consistent = match settings.consistent {
-        true => Some(consistent(machine, &mut estimated)?),
+        true => {
+            let fastest = match below_zero(&estimated) {
+                true => machine.fastest(logs, control)?,
+                false => Vec::new(),
+            };
+            Some(consistent(machine, &estimated, &fastest)?)
+        }
         false => None,
     };
     let Estimated {
@@ -201,7 +209,7 @@ pub fn lsq(
         fit,
         mut covariance,
         account,
-        ..
+        basis: Basis { sums, .. },
     } = estimated;
     let u = fit.theta.len();
     covariance
@@ -216,6 +224,7 @@ pub fn lsq(
     warnings.extend(account.warnings());
     warnings.extend(held_by_parts(settings, &reduced));
     warnings.append(&mut passes.warnings);
+    warnings.splice(0..0, passes.contacts()?);
     warnings.extend(rests(machine, &resting));
     let mut friction_of_fit = Vec::new();
     let mut friction_prior = Vec::new();
@@ -232,6 +241,11 @@ pub fn lsq(
     let mut inputs = std::mem::take(&mut passes.inputs);
     inputs.extend(settings.gains.iter().flat_map(|g| g.inputs.clone()));
     let unknowns = unknowns(machine, &columns, &fit, &essential);
+    let plain = matches!(estimator, EstimatorKind::Ols | EstimatorKind::Wls) && !law;
+    if plain && before.is_none() && reduced.is_empty() {
+        let rows = (&linear, &sums);
+        warnings.extend(hangs_on_bridged(machine, logs, rows, &unknowns, control)?);
+    }
     warnings.extend(confounded(&fit, &unknowns));
     warnings.extend(negative(&unknowns));
     let costs: Vec<&CutoffCosts> = costs.iter().collect();
@@ -242,6 +256,16 @@ pub fn lsq(
         .all(|u| u.verdict == Verdict::NotIdentifiable)
     {
         return Err(IdentifyError::NothingDetermined);
+    }
+    let known = |u: &&FittedUnknown| u.verdict == Verdict::Identified && !u.negligible;
+    let left = |e: &RelativeResidual| e.moving.unwrap_or(e.all);
+    let least = fit
+        .relative_error
+        .iter()
+        .map(left)
+        .fold(f64::INFINITY, f64::min);
+    if !unknowns.iter().any(|u| known(&u)) && least > NOISE {
+        return Err(IdentifyError::OnlyNoise { left: least });
     }
     let of_geometry = geometry(machine, fit.condition.normalised, &unknowns);
     let told = of_geometry.iter().map(|finding| &finding.meaning);
@@ -360,6 +384,9 @@ impl Account {
     }
 }
 
+/// Share of the torque that a fit leaves of every joint where noise is as large as the torque: noise alone leaves 0.7 of
+/// the sum of two that are equal.
+const NOISE: f64 = 0.7;
 /// Share of a joint's rows at rest from which on they are told.
 const TOLD: f64 = 0.01;
 
@@ -372,10 +399,25 @@ fn rests(machine: &LoggedRobot, shares: &[f64]) -> Option<String> {
         .collect();
     (!told.is_empty()).then(|| {
         format!(
-            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted",
+            "at rest in a part of the rows: {}; friction takes any torque up to its Coulomb level there, and these rows are not fitted; where a joint turns its samples weigh nothing",
             told.join(", ")
         )
     })
+}
+
+/// Whether some friction of a fit is below zero, so that its sign over the speeds of the logs is to be looked at.
+fn below_zero(estimated: &Estimated) -> bool {
+    let columns = &estimated.basis.sums.columns;
+    let own = columns.own.iter().enumerate();
+    let mut places = own.flat_map(|(j, own)| {
+        let first = columns.first_own(j);
+        let of_friction = |(_, own): &(usize, &Own)| **own != Own::Offset;
+        own.iter()
+            .enumerate()
+            .filter(of_friction)
+            .map(move |(k, _)| first + k)
+    });
+    places.any(|at| estimated.fit.theta[at] < 0.0)
 }
 
 /// Friction and inertias that are below zero by more than two deviations, as a warning.
@@ -386,14 +428,18 @@ fn negative(unknowns: &[FittedUnknown]) -> Option<String> {
         .iter()
         .filter(positive)
         .filter(below)
-        .map(|u| match &u.joint {
-            Some(joint) => format!("{}:{joint}", u.key),
-            None => u.key.clone(),
+        .map(|u| {
+            let (value, std) = number::value_and_std(u.fitted, u.fitted_std);
+            let joint = u
+                .joint
+                .as_ref()
+                .map_or(String::new(), |joint| format!(":{joint}"));
+            format!("{}{joint} {value} +- {std} {}", u.key, u.unit)
         })
         .collect();
     (!names.is_empty()).then(|| {
         format!(
-            "below zero by more than two standard deviations, where friction and inertia are positive: {}; `lsq --feasible` fits physically consistent links and drives; the cause may be a torque that the model lacks (`diagnose`), or a motion that does not separate these parameters from others",
+            "these data want what no machine has, friction or an inertia below zero: {}; a torque is missing or a gain is wrong (`diagnose` looks for it), or the motion does not separate these parameters from others",
             names.join(", ")
         )
     })

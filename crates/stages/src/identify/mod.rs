@@ -22,6 +22,7 @@ mod by_motion;
 mod campaign;
 mod compare;
 mod consistent;
+mod contact;
 mod control;
 mod curve;
 mod diagnose;
@@ -37,6 +38,7 @@ mod gains;
 mod geometry;
 mod hold_out;
 mod in_memory;
+mod in_use;
 mod known_friction;
 mod log;
 mod logged_robot;
@@ -75,7 +77,7 @@ pub use campaign::{Campaigned, IdentifySettings, RoleLogs, StageEnd, identify};
 pub use compare::{
     Compared, ComparisonResult, Curves, DIFFERENT, GivenModel, Side, TriedOnLogs, compare,
 };
-pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior};
+pub use consistent::{ConsistentLink, ConsistentLinks, DriveInertia, LinkPrior, project};
 pub use control::{Control, Progress};
 pub use curve::friction_curve;
 pub use diagnose::{
@@ -92,6 +94,7 @@ pub use gain_error::GainError;
 pub use gains::{CurrentGains, FittedGains, Gain, PayloadLog, fit_gains};
 pub use hold_out::Held;
 pub use in_memory::{InMemory, read_whole};
+pub use in_use::{BANDWIDTH_HZ, JointInUse, in_use, levers};
 pub use known_friction::{FrictionOfFit, FrictionParameter};
 pub use log::Log;
 pub use logged_robot::{LoggedRobot, narrowed};
@@ -117,7 +120,7 @@ pub use track::{
 };
 pub use track_error::TrackError;
 pub use unknowns::FittedUnknown;
-pub use validate::{ErrorsByUse, ErrorsOfLogs, Validated, used_for, validate};
+pub use validate::{ErrorsByUse, ErrorsOfLogs, Validated, not_a_validation, used_for, validate};
 pub use watch::{
     STREAM, WatchLine, WatchSettings, Watchable, Watched, WatchedJoint, watch, watch_recipe,
 };

@@ -5,11 +5,14 @@ use std::sync::Arc;
 use super::control::Control;
 use super::error::{IdentifyError, ReadError};
 use super::first_look::FirstLook;
-use cft_ident_core::motion::{Summary, ZeroOrderHold};
-use cft_ident_core::number::clock;
+use cft_ident_core::motion::{Stretch, Summary, ZeroOrderHold};
+use cft_ident_core::number::{self, clock};
 use cft_ident_core::robot::Robot;
 use cft_ident_logs::inspect::Cutter;
 use cft_ident_logs::log::{Block, Instant, Layout, Provenance, Reader};
+
+/// A velocity column is off by more than filters and steps make of it.
+const OFF: f64 = 0.1;
 
 /// A log that is being read.
 pub struct OpenLog<'a> {
@@ -52,6 +55,13 @@ impl OpenLog<'_> {
         self.reader.layout()
     }
 
+    /// Counts stretches from where the machine began to run, as far as that is known: a part of a log begins later.
+    pub(super) fn count_run_time(&self, stretches: &mut [Stretch]) {
+        for stretch in stretches {
+            stretch.began += self.reader.started_s();
+        }
+    }
+
     /// The instant from which the times of the blocks are counted.
     pub fn origin(&self) -> Instant {
         self.look.gate.origin()
@@ -66,8 +76,47 @@ impl OpenLog<'_> {
     /// The same with what the processing left out.
     pub fn told(&self, summary: &Summary) -> Vec<String> {
         let mut out = self.costs_and_places(summary.skipped.samples);
+        out.extend(self.velocities());
         out.extend(summary_warnings(&self.name, self.origin(), summary));
         out
+    }
+
+    /// Velocity columns that are no derivatives of the positions, as a warning: by one factor where it is the clock.
+    fn velocities(&self) -> Option<String> {
+        let names = &self.layout().joints;
+        let off = |(j, factor): (usize, &Option<f64>)| {
+            let factor = factor.filter(|x| (x - 1.0).abs() > OFF)?;
+            Some((names.get(j)?.as_str(), factor))
+        };
+        let off: Vec<(&str, f64)> = self
+            .look
+            .velocities
+            .iter()
+            .enumerate()
+            .filter_map(off)
+            .collect();
+        let known = self.look.velocities.iter().flatten().count();
+        let (first, others) = off.split_first()?;
+        let alike = |(_, x): &(&str, f64)| (x / first.1 - 1.0).abs() < OFF;
+        let each: Vec<String> = off
+            .iter()
+            .map(|(j, x)| format!("{j} {}", number::significant(*x, 3)))
+            .collect();
+        let cause = match off.len() == known && known > 1 && others.iter().all(alike) {
+            true => format!(
+                "all by one factor: the clock of the log runs at {} of its rate (`time_unit` in [log], or the rate), or the unit of the velocities is another",
+                number::significant(first.1.recip(), 3)
+            ),
+            false => {
+                "its unit, sign or gear, or its joint, is another; give it in [log.joint.NAME]"
+                    .to_owned()
+            }
+        };
+        Some(format!(
+            "{}: velocity columns are so many times the derivative of the positions: {}; {cause}",
+            self.name,
+            each.join(", ")
+        ))
     }
 
     fn costs_and_places(&self, too_short: u64) -> Vec<String> {
@@ -85,6 +134,7 @@ impl OpenLog<'_> {
         let mut out = Vec::new();
         if !costs.is_empty() {
             let dropped: u64 = by_reader.iter().map(|(rows, _)| rows).sum();
+            let dropped = dropped + self.reader.not_read();
             let rows = self.reader.samples() + dropped;
             let told = match self.cutter.removed() + dropped + too_short {
                 0 => format!("none of {rows} rows is left out in all"),

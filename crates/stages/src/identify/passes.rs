@@ -15,6 +15,7 @@ use cft_ident_core::inertia::closed_loop::LoopGains;
 use cft_ident_core::inertia::columns::RegressorColumns;
 use cft_ident_core::inertia::encoder::{GRIDS, accumulate_shifted};
 use cft_ident_core::inertia::instruments::{self, ReferenceSource};
+use cft_ident_core::inertia::jumps::{Jump, jumps};
 use cft_ident_core::inertia::robust::Weigher;
 use cft_ident_core::motion::{FilterSettings, Summary};
 use cft_ident_logs::log::{Block, Provenance};
@@ -44,11 +45,13 @@ pub(super) enum PositionFilter {
 /// Readings of the same logs, one after the other.
 pub struct Passes<'a> {
     pub(super) machine: &'a LoggedRobot,
-    logs: &'a [Log],
-    control: &'a Control,
+    pub(super) logs: &'a [Log],
+    pub(super) control: &'a Control,
     pub(super) work: Work,
     pub inputs: Vec<Provenance>,
     pub warnings: Vec<String>,
+    /// Stretches in which something pushes the robot, by the places of the logs, by the first reading.
+    pub(super) jumps: Vec<(usize, Jump)>,
     /// Of the first log, by the first reading.
     pub summary: Option<Summary>,
     /// Sampling step of each log, by the first reading [s].
@@ -69,6 +72,7 @@ impl<'a> Passes<'a> {
             work: control.begin("least squares", None),
             inputs: Vec::new(),
             warnings: Vec::new(),
+            jumps: Vec::new(),
             summary: None,
             steps: Vec::new(),
             own: Vec::new(),
@@ -173,6 +177,10 @@ impl<'a> Passes<'a> {
             .map_err(|e| IdentifyError::of_run(&log.name(), e))?;
             let samples = open.provenance()?.samples;
             if first {
+                // what cannot be fitted is told by the fit itself
+                let found = jumps(&sums).unwrap_or_default();
+                self.jumps
+                    .extend(found.into_iter().map(|jump| (index, jump)));
                 self.warnings.extend(open.told(&summary));
                 self.saw(open.provenance()?, summary);
             }

@@ -77,7 +77,7 @@ impl Log {
     /// Name and span, for messages.
     fn shown(&self) -> String {
         match self {
-            Self::File(spec) => match spec.span.label() {
+            Self::File(spec) => match spec.part() {
                 Some(span) => format!("{}@{span}", escape(&spec.name())),
                 None => escape(&spec.name()),
             },
@@ -92,7 +92,7 @@ impl Log {
     /// What tells its rows from others, where it can be read.
     fn provenance(&self) -> Option<Provenance> {
         let (span, sha256) = match self {
-            Self::File(spec) => (spec.span.label(), sha256(&spec.path).ok()?),
+            Self::File(spec) => (spec.part(), sha256(&spec.path).ok()?),
             Self::Arrays(arrays) => (None, arrays.sha256().to_owned()),
             Self::Reduced(part) => return Some(part.provenance.clone()),
         };

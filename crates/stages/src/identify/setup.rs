@@ -14,8 +14,8 @@ use super::error::IdentifyError;
 use super::gains;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
-use super::{setup_file, setup_words};
 use super::unknowns::columns;
+use super::{setup_file, setup_words};
 use cft_ident_files::config::RobotFile;
 use cft_ident_files::config::correction::Edit;
 
@@ -39,6 +39,9 @@ pub fn check_setup(
     logs: &[Log],
     control: &Control,
 ) -> Result<CheckedSetup, IdentifyError> {
+    if machine.as_declared {
+        return Ok(CheckedSetup::default());
+    }
     let findings = gains::findings(machine);
     if !findings.is_empty() {
         // gains that differ look like signs, scales and loads
@@ -74,7 +77,10 @@ pub fn check_setup(
 fn known(machine: &LoggedRobot) -> Known {
     let file = &machine.file;
     let links = file.robot.link.iter();
-    let bodies: Option<Vec<_>> = links.map(|link| link.inertial.as_ref()).collect();
+    let bodies: Vec<Option<[f64; 10]>> = links
+        .map(|link| Some(link.inertial.as_ref()?.body().standard()))
+        .collect();
+    let weighs = bodies.iter().any(Option::is_some);
     let scales = |name: &String| {
         let of = file.log.joint.get(name);
         of.map_or([None; 2], |c| [c.position_scale, c.torque_scale])
@@ -90,9 +96,9 @@ fn known(machine: &LoggedRobot) -> Known {
         ratios: (written.flat_map(either))
             .filter(|x| x.is_finite() && *x > 1.0)
             .collect(),
-        inertial: bodies.filter(|bodies| !bodies.is_empty()).map(|bodies| {
+        inertial: weighs.then(|| {
             let mut standard = vec![0.0; machine.robot.standard_parameters()];
-            let of = bodies.iter().flat_map(|given| given.body().standard());
+            let of = (bodies.iter()).flat_map(|body| body.unwrap_or_default());
             standard.iter_mut().zip(of).for_each(|(to, x)| *to = x);
             machine.robot.base_of(&standard)
         }),

@@ -12,11 +12,7 @@ use cft_ident_core::robot::cft::COORDINATES;
 use cft_ident_files::config::RobotFile;
 
 /// The entries of the key `setup`, and the joints whose friction drives them.
-pub(super) fn report(
-    machine: &LoggedRobot,
-    problem: &Problem,
-    searched: &Searched,
-) -> SetupReport {
+pub(super) fn report(machine: &LoggedRobot, problem: &Problem, searched: &Searched) -> SetupReport {
     let motors = problem.channels.drive == Drive::Motors;
     let joints = machine.robot.joint_names();
     let words = Words {
@@ -32,15 +28,22 @@ pub(super) fn report(
     let mut findings: Vec<Finding> = (searched.found.iter())
         .flat_map(|found| words.findings(found))
         .collect();
-    findings.extend(searched.factor.iter().map(|(factor, errors)| words.factor(factor, errors)));
+    findings.extend(
+        searched
+            .factor
+            .iter()
+            .map(|(factor, errors)| words.factor(factor, errors)),
+    );
     findings.extend(words.weight(&searched.weights, searched.without_gravity.as_ref()));
     findings.extend(words.limits(problem));
-    let power = |driven: &crate::setup::Driven| FrictionPower {
+    let power = |driven: &crate::setup::Driven| {
+        FrictionPower {
         joint: joints[driven.joint].clone(),
         power: driven.power,
         std: driven.std,
         unit: power_unit(machine, driven.joint),
         cause: "the sign of its torque or position may be turned, or the model lacks a torque that grows with speed; compare the robot file with the machine".to_owned(),
+    }
     };
     SetupReport {
         findings,
@@ -82,7 +85,12 @@ impl Words<'_> {
                 other => vec![other.clone()],
             }
         };
-        let tied: Vec<Alternative> = found.tied.iter().take(3).map(|c| self.alternative(c)).collect();
+        let tied: Vec<Alternative> = found
+            .tied
+            .iter()
+            .take(3)
+            .map(|c| self.alternative(c))
+            .collect();
         let [before, after] = found.errors.each_ref().map(|e| overall(e));
         let finding = |change: Change| {
             let (kind, channel, joint, with) = self.place(&change);
@@ -116,8 +124,11 @@ impl Words<'_> {
             .map(|(joint, (before, after))| JointErrors {
                 joint: joint.clone(),
                 before: before.is_finite().then_some(*before),
-                // equal within what thinned rows resolve is equal
-                after: if *after > *before && *after <= *before + LIMITS.same { *before } else { *after },
+                // what no block bears out is no rise
+                after: match *after <= *before * (1.0 + LIMITS.same) {
+                    true => after.min(*before),
+                    false => *after,
+                },
             })
             .collect()
     }
@@ -150,7 +161,11 @@ impl Words<'_> {
             "{joint} fits {} times the {channel} (95 % CI {low} to {high}; error of {joint} {before} as declared, {after} with it): an estimate and no unit or ratio of a list; compare the gain of this channel with the machine",
             number::significant(factor.value, 4)
         );
-        let place = (FindingKind::Scale, Some(factor.channel), Some(joint.clone()));
+        let place = (
+            FindingKind::Scale,
+            Some(factor.channel),
+            Some(joint.clone()),
+        );
         Finding {
             found_std: Some((factor.interval_95[1] - factor.interval_95[0]) / 3.92),
             error_before: overall(&errors[0]),
@@ -167,7 +182,10 @@ impl Words<'_> {
 
     /// What the file's own masses say of the torques, and whether they hold a weight at all.
     fn weight(&self, weights: &[Weight], without: Option<&[Vec<f64>; 2]>) -> Vec<Finding> {
-        let told: Vec<&Weight> = weights.iter().filter(|w| w.share > LIMITS.doubtful).collect();
+        let told: Vec<&Weight> = weights
+            .iter()
+            .filter(|w| w.share > LIMITS.doubtful)
+            .collect();
         let below = |w: &&&Weight| w.interval_95[1] * LIMITS.yardstick < 1.0;
         let gravity = [self.gravity, [0.0; 3]].map(Setting::Vector);
         let of_masses = !told.is_empty() && told.iter().filter(below).count() == told.len();
@@ -188,7 +206,12 @@ impl Words<'_> {
                 error_before: overall(&errors[0]),
                 error_after: overall(&errors[1]),
                 joints: self.errors(errors),
-                ..self.word((FindingKind::Gravity, None, None), gravity, meaning.to_owned(), severity)
+                ..self.word(
+                    (FindingKind::Gravity, None, None),
+                    gravity,
+                    meaning.to_owned(),
+                    severity,
+                )
             };
             if severity == FindingSeverity::Warning {
                 finding.remedy = self.remedy(&Change::Gravity([0.0; 3]));
@@ -203,7 +226,10 @@ impl Words<'_> {
         let of = |w: &&Weight| {
             let [low, high] = w.interval_95.map(|x| number::significant(x, 3));
             let gain = number::significant(w.gain, 3);
-            format!("{} {gain} times (95 % CI {low} to {high})", self.joints[w.joint])
+            format!(
+                "{} {gain} times (95 % CI {low} to {high})",
+                self.joints[w.joint]
+            )
         };
         let list: Vec<String> = told.iter().map(of).collect();
         let meaning = format!(
@@ -239,7 +265,12 @@ impl Words<'_> {
         let place = (FindingKind::Scale, Some(ChannelKind::Torque), joint);
         Some(Finding {
             remedy: self.remedy(&Change::Scale(ChannelKind::Torque, joints, 1e-3)),
-            ..self.word(place, [1.0, 1e-3].map(Setting::Number), meaning, FindingSeverity::Warning)
+            ..self.word(
+                place,
+                [1.0, 1e-3].map(Setting::Number),
+                meaning,
+                FindingSeverity::Warning,
+            )
         })
     }
 
@@ -384,7 +415,10 @@ impl Words<'_> {
                 g.map(|x| number::significant(x, 3)).join(", ")
             ),
         };
-        let [before, after] = found.errors.each_ref().map(|e| overall(e).map(number::percent));
+        let [before, after] = found
+            .errors
+            .each_ref()
+            .map(|e| overall(e).map(number::percent));
         match (before, after) {
             (Some(before), Some(after)) => format!(
                 "{what}: as declared the model misses {before} of the torque, with that put right {after}{}",
@@ -400,9 +434,11 @@ impl Words<'_> {
     /// Errors of the joints that change.
     fn by_joint(&self, [before, after]: &[Vec<f64>; 2]) -> String {
         let pairs = self.joints.iter().zip(before.iter().zip(after));
-        let changed = pairs.filter(|(_, (b, a))| **a < **b - LIMITS.same);
+        let changed = pairs.filter(|(_, (b, a))| **a < **b * (1.0 - LIMITS.same));
         let each: Vec<String> = changed
-            .map(|(joint, (b, a))| format!("{joint} {} -> {}", number::percent(*b), number::percent(*a)))
+            .map(|(joint, (b, a))| {
+                format!("{joint} {} -> {}", number::percent(*b), number::percent(*a))
+            })
             .collect();
         match each.is_empty() {
             true => ", and friction drives no joint any more".to_owned(),

@@ -9,8 +9,59 @@ const ROUNDED: f64 = 0.999;
 /// Speed up to which a joint rests, over its rms speed.
 const RESTING: f64 = 0.01;
 
+/// Steps from which on rows may be poses [s]: no machine is logged in motion so slowly.
+const POSE_S: f64 = 0.2;
+/// Correlation from which on a velocity column follows the position.
+const FOLLOWS: f64 = 0.9;
+
+/// Sums of a joint's velocity column v and the derivative d of its position.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pair {
+    vv: f64,
+    dd: f64,
+    vd: f64,
+}
+
+/// Sums of the differences of positions from row to row, and of those of the differences.
+#[derive(Debug, Clone, Default)]
+struct Rows {
+    last: [Vec<f64>; 2],
+    times: [f64; 2],
+    count: u64,
+    seconds: f64,
+    first: Vec<f64>,
+    second: Vec<f64>,
+}
+
+impl Rows {
+    fn take(&mut self, t: f64, q: &[f64]) {
+        self.first.resize(q.len(), 0.0);
+        self.second.resize(q.len(), 0.0);
+        if self.count > 0 {
+            self.seconds += t - self.times[1];
+        }
+        for (j, q) in q.iter().enumerate() {
+            let [a, b] = [&self.last[0], &self.last[1]].map(|row| row.get(j).copied());
+            if let Some(b) = b {
+                self.first[j] += (q - b).powi(2);
+                self.second[j] += a.map_or(0.0, |a| (q - 2.0 * b + a).powi(2));
+            }
+        }
+        self.last.swap(0, 1);
+        self.last[1].clear();
+        self.last[1].extend_from_slice(q);
+        self.times = [self.times[1], t];
+        self.count += 1;
+    }
+}
+
 /// Root mean square of every joint's speed, from positions as logged.
 pub(super) struct SpeedMeter {
+    rows: Rows,
+    /// Velocities between two positions whose speed is formed, summed, and how many they are.
+    between: Vec<f64>,
+    rows_between: u64,
+    pairs: Vec<Pair>,
     last: Option<f64>,
     before: Vec<f64>,
     now: Vec<f64>,
@@ -23,6 +74,10 @@ pub(super) struct SpeedMeter {
 impl SpeedMeter {
     pub(super) fn new() -> Self {
         SpeedMeter {
+            rows: Rows::default(),
+            between: Vec::new(),
+            rows_between: 0,
+            pairs: Vec::new(),
             last: None,
             before: Vec::new(),
             now: Vec::new(),
@@ -44,7 +99,17 @@ impl SpeedMeter {
         }
         self.squares.resize(n, 0.0);
         self.fastest.resize(n, 0.0);
-        for (t, q) in block.t.iter().zip(block.q.chunks_exact(n)) {
+        self.pairs.resize(n, Pair::default());
+        self.between.resize(n, 0.0);
+        for (k, (t, q)) in block.t.iter().zip(block.q.chunks_exact(n)).enumerate() {
+            self.rows.take(*t, q);
+            if let Some(v) = block.dq.get(k * n..(k + 1) * n) {
+                self.between
+                    .iter_mut()
+                    .zip(v)
+                    .for_each(|(sum, v)| *sum += v);
+                self.rows_between += 1;
+            }
             let step = self.last.map_or(f64::INFINITY, |last| t - last);
             // times are rounded, and otherwise where the clock's zero lies
             let short = ROUNDED * SPACING_S;
@@ -67,10 +132,51 @@ impl SpeedMeter {
                     *fastest = fastest.max((now - before).abs() / step);
                 }
                 self.seconds += step;
+                self.compare(step);
             }
+            self.rows_between = 0;
+            self.between.fill(0.0);
             self.last = known.then_some(*t);
             std::mem::swap(&mut self.now, &mut self.before);
         }
+    }
+
+    /// Compares the velocities of the last step with the derivative of the positions.
+    fn compare(&mut self, step: f64) {
+        if self.rows_between == 0 {
+            return;
+        }
+        for (j, pair) in self.pairs.iter_mut().enumerate() {
+            let v = self.between[j] / self.rows_between as f64;
+            let d = (self.now[j] - self.before[j]) / step;
+            if v.is_finite() {
+                pair.vv += v * v;
+                pair.dd += d * d;
+                pair.vd += v * d;
+            }
+        }
+    }
+
+    /// How many times the derivative of its position each joint's velocity column is; none where it does not
+    /// follow that.
+    pub(super) fn velocities(&self) -> Vec<Option<f64>> {
+        let factor = |p: &Pair| {
+            let follows = p.vd.abs() > FOLLOWS * (p.vv * p.dd).sqrt() && p.dd > 0.0;
+            follows.then(|| p.vd / p.dd)
+        };
+        self.pairs.iter().map(factor).collect()
+    }
+
+    /// Rate of a log whose positions leap from row to row, joint for joint [Hz].
+    pub(super) fn poses_hz(&self) -> Option<f64> {
+        let Rows { first, second, .. } = &self.rows;
+        let steps = self.rows.count.saturating_sub(1) as f64;
+        let leaps = |(first, second): (&f64, &f64)| *first == 0.0 || second > first;
+        let poses = steps >= 2.0
+            && first.iter().any(|x| *x > 0.0)
+            && first.iter().zip(second).all(leaps)
+            && self.rows.seconds >= POSE_S * steps;
+        poses.then(|| steps / self.rows.seconds)
     }
 
     /// First and last time [s].

@@ -60,6 +60,7 @@ impl FittedUnknown {
             theta: self.theta,
             joint: self.joint.clone(),
             value: self.fitted,
+            consistent: None,
             std: self.fitted_std.is_finite().then_some(self.fitted_std),
             unit: self.unit.clone(),
             meaning: self.meaning.clone(),

@@ -20,7 +20,7 @@ use cft_ident_core::inertia::columns::Own;
 use cft_ident_core::number;
 use cft_ident_core::robot::model::JointFriction;
 use cft_ident_core::validate::{
-    HalfWidths, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
+    HalfWidths, JointError, Reconstructed, Reconstruction, SummedRows, TorqueErrors, Validation,
 };
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{DataRole, Instant, Provenance};
@@ -114,7 +114,11 @@ pub fn validate(
     let band = file.and_then(|file| Band::new(file, &refined.model));
     let as_held = band.as_ref().and_then(|band| machine.as_held(band.held()));
     let mut reach = band.as_ref().map(|band| Reach::new(band.held()));
+    let mut places = Places::new(&machine);
+    let mut beyond = Beyond::new(machine.robot.joints());
     let mut seen = |r: &Reconstructed, origin: Instant| {
+        places.take(r.q);
+        beyond.take(r, origin);
         if let Some(reach) = &mut reach {
             reach.take(r.q, r.v, r.reconstructed);
         }
@@ -135,12 +139,135 @@ pub fn validate(
             found
         }
     };
+    if let Some(other) = places.refused(&machine) {
+        return Err(other);
+    }
+    if let Some(error) = beyond.impossible(&machine, logs) {
+        return Err(error);
+    }
+    if let Some(text) = not_a_validation(found.judged()) {
+        found.warnings.insert(0, text);
+    }
     match &reach {
         Some(reach) => found.warnings.extend(reach.told()),
         None if file.is_some() => found.warnings.push(NO_BAND.to_owned()),
         None => {}
     }
     Ok(found)
+}
+
+/// Share of its travel by which a joint of the same robot may stand beyond its limits: stops give way, zeros drift.
+const BEYOND: f64 = 0.1;
+/// Share of the rows beyond from which on it is no spike.
+const ROWS: f64 = 0.01;
+
+/// Where joints stand along logs, beside where they can.
+struct Places {
+    /// Limits of each joint that has some, widened.
+    limits: Vec<Option<[f64; 2]>>,
+    seen: Vec<[f64; 2]>,
+    beyond: Vec<u64>,
+    rows: u64,
+}
+
+impl Places {
+    fn new(machine: &LoggedRobot) -> Self {
+        let limits = machine.robot.joint_names().iter().map(|joint| {
+            let [low, high] = machine.file.limits.get(joint)?.position?;
+            let room = BEYOND * (high - low);
+            Some([low - room, high + room])
+        });
+        let limits: Vec<Option<[f64; 2]>> = limits.collect();
+        Self {
+            seen: vec![[f64::INFINITY, f64::NEG_INFINITY]; limits.len()],
+            beyond: vec![0; limits.len()],
+            rows: 0,
+            limits,
+        }
+    }
+
+    fn take(&mut self, q: &[f64]) {
+        self.rows += 1;
+        for (j, q) in q.iter().enumerate() {
+            let Some([low, high]) = self.limits[j] else {
+                continue;
+            };
+            let seen = &mut self.seen[j];
+            *seen = [seen[0].min(*q), seen[1].max(*q)];
+            self.beyond[j] += u64::from(*q < low || *q > high);
+        }
+    }
+
+    /// The refusal of positions where a joint of this robot cannot stand.
+    fn refused(&self, machine: &LoggedRobot) -> Option<IdentifyError> {
+        let far = |j: &usize| self.beyond[*j] as f64 > ROWS * self.rows as f64;
+        let j = (0..self.limits.len()).find(far)?;
+        let joint = machine.robot.joint_names().get(j)?;
+        let shown = |range: [f64; 2]| range.map(|x| number::significant(x, 4)).join("..");
+        Some(IdentifyError::OtherRobotLog {
+            joint: joint.clone(),
+            positions: shown(self.seen[j]),
+            limits: shown(machine.file.limits.get(joint)?.position?),
+            unit: machine.robot.joint_kind(j).position_unit(),
+        })
+    }
+}
+
+/// A torque of so many times the largest that was measured is of a model that does not hold.
+const IMPOSSIBLE: f64 = 10.0;
+
+/// The largest torques of every joint, measured and reconstructed, and when.
+struct Beyond {
+    measured: Vec<f64>,
+    reconstructed: Vec<(f64, f64)>,
+}
+
+impl Beyond {
+    fn new(joints: usize) -> Self {
+        Beyond {
+            measured: vec![0.0; joints],
+            reconstructed: vec![(0.0, 0.0); joints],
+        }
+    }
+
+    fn take(&mut self, row: &Reconstructed, origin: Instant) {
+        for (most, x) in self.measured.iter_mut().zip(row.measured) {
+            *most = most.max(x.abs());
+        }
+        for (most, x) in self.reconstructed.iter_mut().zip(row.reconstructed) {
+            if x.abs() > most.0 {
+                *most = (x.abs(), origin.seconds() + row.t);
+            }
+        }
+    }
+
+    /// The joint whose torque the model makes impossibly large.
+    fn impossible(&self, machine: &LoggedRobot, logs: &[Log]) -> Option<IdentifyError> {
+        let pairs = self.measured.iter().zip(&self.reconstructed).enumerate();
+        let mut off = pairs.filter(|(_, (m, r))| **m > 0.0 && r.0 > IMPOSSIBLE * **m);
+        let (j, (measured, (torque, t))) = off.next()?;
+        let names: Vec<String> = logs.iter().map(Log::name).collect();
+        Some(IdentifyError::Impossible {
+            joint: machine.robot.joint_names()[j].clone(),
+            log: names.join(", "),
+            t: *t,
+            torque: *torque,
+            measured: *measured,
+            unit: machine.file.torque_unit(j),
+        })
+    }
+}
+
+/// The word about errors as large as the torque, where a joint moves.
+pub fn not_a_validation(errors: &TorqueErrors) -> Option<String> {
+    let moving = |e: &&JointError| e.relative_error_moving.is_some_and(|error| error > 1.0);
+    let worst = errors.joints.iter().filter(moving);
+    let worst = worst.max_by(|a, b| a.relative_error.total_cmp(&b.relative_error))?;
+    Some(format!(
+        "this is no validation: the torque of {} is off by {} of itself; the log is of another robot, unit, sign or order of joints, or the set-up changed (`cft-ident inspect` with the robot file looks for it)",
+        worst.joint,
+        number::percent(worst.relative_error)
+    ))
 }
 
 /// Refuses reduced logs that were smoothed otherwise than validation smooths logs: by one cut-off of each joint for all.

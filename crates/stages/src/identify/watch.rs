@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::control::Control;
 use super::error::IdentifyError;
 use super::hold_out::{Held, on_other_logs};
+use super::in_use::levers;
 use super::log::Log;
 use super::logged_robot::LoggedRobot;
 use super::temperatures;
@@ -16,6 +17,8 @@ use crate::band::Directions;
 use crate::observe::{Alarm, Alarms, Explainer, Explanation, Observer, Recipe, recipe};
 use cft_ident_core::effect::AugmentedModel;
 use cft_ident_core::motion::{FilterSettings, ZeroOrderHold};
+use cft_ident_core::number;
+use cft_ident_core::robot::JointKind;
 use cft_ident_files::config::ModelFile;
 use cft_ident_files::config::held_out::{Excesses, HeldOut};
 use cft_ident_logs::log::{Block, Instant, LogSpec, Provenance, Reader};
@@ -62,12 +65,22 @@ pub struct WatchedJoint {
     pub unit: String,
     /// Least and greatest threshold over the ranges of speed, where the logs of the fit tell the parameters \[unit\].
     pub threshold: [f64; 2],
+    /// Force at `Watched::point` that the least threshold stands for [N]; null where the joint has no lever there.
+    pub force_n: Option<f64>,
+    /// Its threshold is so large beside its own torque that hardly anything is seen.
+    pub blind: bool,
 }
+
+/// Share of the greatest torque of a joint from which on a threshold hardly shows anything: a push that needs half of
+/// what the drive gives is a crash.
+const BLIND: f64 = 0.5;
 
 /// What was seen along a log or a stream.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Watched {
     pub joints: Vec<WatchedJoint>,
+    /// The point that forces are told at.
+    pub point: String,
     /// False alarms an hour that were asked for.
     pub false_alarms_per_hour: f64,
     /// Time of unloaded motion from which the threshold was found [s].
@@ -239,21 +252,31 @@ pub fn watch(
     inputs.insert(0, reader.provenance()?);
     let mut warnings = reader.warnings();
     warnings.extend(far(excesses, settings.per_hour));
+    let middle: Vec<f64> = (held.joints.iter())
+        .map(|held| 0.5 * (held.positions_seen[0] + held.positions_seen[1]))
+        .collect();
+    let (levers, point) = levers(machine, &middle);
     let names = held.joints.iter().enumerate();
     let joints = names.map(|(j, held)| {
         let sizes = held.external_std.iter();
         let sizes = sizes.map(|std| threshold * std * held.external_99);
+        let least = sizes.clone().fold(f64::INFINITY, f64::min);
         WatchedJoint {
             joint: held.joint.clone(),
             unit: machine.file.torque_unit(j).to_owned(),
-            threshold: [
-                sizes.clone().fold(f64::INFINITY, f64::min),
-                sizes.fold(0.0, f64::max),
-            ],
+            threshold: [least, sizes.fold(0.0, f64::max)],
+            force_n: match machine.robot.joint_kind(j) {
+                JointKind::Prismatic => Some(least),
+                JointKind::Revolute => levers[j].map(|lever| least / lever),
+            },
+            blind: least > BLIND * held.torque_seen,
         }
     });
+    let joints: Vec<WatchedJoint> = joints.collect();
+    warnings.extend(blind(&joints, &held.joints));
     Ok(Watched {
-        joints: joints.collect(),
+        point,
+        joints,
         false_alarms_per_hour: settings.per_hour,
         calibrated_s: excesses.observed_s,
         delay_s: observer.delay_s(),
@@ -285,6 +308,19 @@ fn is_json(log: &Log) -> Option<std::fs::File> {
         Ok(true) => std::fs::File::open(path).ok(),
         _ => None,
     }
+}
+
+/// The word about joints that cannot be watched.
+fn blind(joints: &[WatchedJoint], held: &[HeldOut]) -> Vec<String> {
+    let each = joints.iter().zip(held).filter(|(of, _)| of.blind);
+    let told = each.map(|(of, held)| {
+        let [limit, torque] = [of.threshold[0], held.torque_seen].map(|x| number::significant(x, 3));
+        format!(
+            "cannot watch {}: an alarm takes {limit} {} from outside, and the greatest torque of the joint along the logs of the fit is {torque} {}; a better model (`diagnose`), or more --false-alarms, narrows it",
+            of.joint, of.unit, of.unit
+        )
+    });
+    told.collect()
 }
 
 /// A word on a rate that the calibration is too short for.

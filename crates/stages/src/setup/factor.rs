@@ -52,9 +52,12 @@ pub(super) fn factors(
     [few_rows, rows]: [(&[usize], usize); 2],
 ) -> Vec<Factor> {
     let sides = [Torque, Position, Both];
-    let cases: Vec<(ChannelKind, usize)> = joints
-        .iter()
+    let errors = whole.errors();
+    // a position in another unit leaves nothing explained
+    let may = |(side, j): &(ChannelKind, usize)| *side == Torque || errors[*j] > LIMITS.unexplained;
+    let cases: Vec<(ChannelKind, usize)> = (joints.iter())
         .flat_map(|j| sides.map(|side| (side, *j)))
+        .filter(may)
         .collect();
     let all: Vec<usize> = (0..few.power.len()).collect();
     let of = |(side, j): &(ChannelKind, usize)| {

@@ -56,7 +56,11 @@ fn units(problem: &Problem, moving: &[usize]) -> Vec<Change> {
         }
     };
     for &j in moving {
-        out.extend(factors(j).iter().map(|f| Change::Scale(Position, vec![j], *f)));
+        out.extend(
+            factors(j)
+                .iter()
+                .map(|f| Change::Scale(Position, vec![j], *f)),
+        );
         out.extend(THOUSANDS.map(|f| Change::Scale(Torque, vec![j], f)));
         let percent = problem.known.torque.get(j).copied().flatten();
         out.extend(percent.map(|most| Change::Scale(Torque, vec![j], most / 100.0)));

@@ -36,8 +36,8 @@ mod trial;
 mod weight;
 
 pub use channels::{Channels, Drive};
-pub use factor::Factor;
 pub use correction::{Change, Correction};
+pub use factor::Factor;
 pub use finding::{
     Alternative, ChannelKind, Finding, FindingKind, FindingSeverity, FrictionPower, JointErrors,
     Setting, SetupReport,
@@ -67,7 +67,8 @@ pub struct Limits {
     /// Another reading is far where it leaves so many times the squared error. One: what chance prefers is certain;
     /// twice: readings of neighbouring joints hide each other.
     pub far: f64,
-    /// Errors closer than this are the same, in shares of the torque: what thinned rows resolve.
+    /// Errors closer than this share of themselves are the same: half of it is the luck of a few blocks, twice hides
+    /// harm.
     pub same: f64,
     /// Torques of the robot file's own masses, and its limits of torque, are right within this factor.
     pub yardstick: f64,
@@ -85,7 +86,7 @@ pub const LIMITS: Limits = Limits {
     floor: 0.5,
     sure: 3.0,
     far: 1.5,
-    same: 2e-3,
+    same: 0.1,
     yardstick: 3.0,
     blocks: 24,
     short_list: 12,

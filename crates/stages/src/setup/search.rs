@@ -115,14 +115,24 @@ impl<'a> Look<'a> {
         }
     }
 
-    fn whole(&self, base: &Correction, change: Option<&Change>, same: Option<&Trial>) -> Option<Judged> {
+    fn whole(
+        &self,
+        base: &Correction,
+        change: Option<&Change>,
+        same: Option<&Trial>,
+    ) -> Option<Judged> {
         let rows = (&self.all[..], LIMITS.blocks);
         let trial = Trial::new(self.problem, (base, change), rows, same)?;
-        let broken = Broken::of(self.problem, &trial, &self.all);
+        let broken = Broken::of(self.problem, &trial);
         Some(Judged { trial, broken })
     }
 
-    fn quick(&self, base: &Correction, change: Option<&Change>, same: Option<&Trial>) -> Option<Trial> {
+    fn quick(
+        &self,
+        base: &Correction,
+        change: Option<&Change>,
+        same: Option<&Trial>,
+    ) -> Option<Trial> {
         match (self.stopped)() {
             true => None,
             false => Trial::new(self.problem, (base, change), (&self.few, FEW_BLOCKS), same),
@@ -135,7 +145,9 @@ impl<'a> Look<'a> {
             None => moving.clone(),
             Some(d) => {
                 let errors = d.trial.errors();
-                (moving.iter().copied()).filter(|j| errors[*j] > LIMITS.doubtful).collect()
+                (moving.iter().copied())
+                    .filter(|j| errors[*j] > LIMITS.doubtful)
+                    .collect()
             }
         };
         let turned = declared.map_or_else(Vec::new, |d| d.broken.turned());
@@ -143,7 +155,11 @@ impl<'a> Look<'a> {
             return Round::default();
         }
         let few = self.quick(base, None, None);
-        let mut list = self.judged(base, hypotheses::all(self.problem), (few.as_ref(), declared));
+        let mut list = self.judged(
+            base,
+            hypotheses::all(self.problem),
+            (few.as_ref(), declared),
+        );
         let mut fitted = None;
         if let (Some(few), Some(whole), true) = (&few, declared, moving.len() > 1) {
             fitted = self.fitted(base, &doubt, (few, whole), &mut list);
@@ -155,12 +171,14 @@ impl<'a> Look<'a> {
             let both = self.decide(declared, &list, None);
             found = both.filter(|f| f.sure).or(found);
         }
-        let factor = fitted.filter(|_| found.is_none()).and_then(|(factor, trial)| {
-            let before = &declared?.trial;
-            let (better, no_worse) = compared(before, &trial);
-            let clear = no_worse && gain(before, &trial, &better) > LIMITS.sure;
-            clear.then(|| (factor, [before.errors(), trial.errors()]))
-        });
+        let factor = fitted
+            .filter(|_| found.is_none())
+            .and_then(|(factor, trial)| {
+                let before = &declared?.trial;
+                let (better, no_worse) = compared(before, &trial);
+                let clear = no_worse && gain(before, &trial, &better) > LIMITS.sure;
+                clear.then(|| (factor, [before.errors(), trial.errors()]))
+            });
         Round { found, factor }
     }
 
@@ -205,9 +223,13 @@ impl<'a> Look<'a> {
         let mut estimates: Vec<(Factor, Trial)> = Vec::new();
         for factor in found {
             let (own, round) = factor.changes(&self.problem.known.ratios);
-            let known = |change: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(change));
+            let known =
+                |change: &Change| list.iter().any(|j| j.trial.change.as_ref() == Some(change));
             let new: Vec<Change> = round.into_iter().filter(|c| !known(c)).collect();
-            list.extend(new.iter().filter_map(|c| self.whole(base, Some(c), Some(&whole.trial))));
+            list.extend(
+                new.iter()
+                    .filter_map(|c| self.whole(base, Some(c), Some(&whole.trial))),
+            );
             if let Some(judged) = self.whole(base, Some(&own), Some(&whole.trial)) {
                 estimates.push((factor, judged.trial));
             }
@@ -222,12 +244,22 @@ impl<'a> Look<'a> {
     fn pairs(&self, list: &[Judged]) -> Vec<Change> {
         let everyone: Vec<usize> = (0..self.problem.robot.joints()).collect();
         let mut best: Vec<&Judged> = list.iter().collect();
-        best.sort_by(|a, b| a.trial.square(&everyone).total_cmp(&b.trial.square(&everyone)));
-        let firsts: Vec<&Change> = best.iter().take(FIRST).filter_map(|j| j.trial.change.as_ref()).collect();
+        best.sort_by(|a, b| {
+            a.trial
+                .square(&everyone)
+                .total_cmp(&b.trial.square(&everyone))
+        });
+        let firsts: Vec<&Change> = best
+            .iter()
+            .take(FIRST)
+            .filter_map(|j| j.trial.change.as_ref())
+            .collect();
         let all = hypotheses::all(self.problem);
         let with = |first: &Change| -> Vec<Change> {
             let own = first.joints();
-            let other = |c: &&Change| **c != *first && !(c.joints() == own && c.is_of_torques() == first.is_of_torques());
+            let other = |c: &&Change| {
+                **c != *first && !(c.joints() == own && c.is_of_torques() == first.is_of_torques())
+            };
             let pair = |c: &Change| Change::Two(Box::new(first.clone()), Box::new(c.clone()));
             all.iter().filter(other).map(pair).collect()
         };
@@ -235,29 +267,34 @@ impl<'a> Look<'a> {
     }
 
     /// The reading of the list that is told, if any. `fitted` is the best factor that is no round number.
-    fn decide(&self, declared: Option<&Judged>, list: &[Judged], fitted: Option<&Trial>) -> Option<Found> {
+    fn decide(
+        &self,
+        declared: Option<&Judged>,
+        list: &[Judged],
+        fitted: Option<&Trial>,
+    ) -> Option<Found> {
         let n = self.problem.robot.joints();
         let everyone: Vec<usize> = (0..n).collect();
         let turned = declared.map_or_else(Vec::new, |d| d.broken.turned());
-        let allowed = |j: &&Judged| match declared {
-            None => true,
-            Some(d) => {
-                let (_, no_worse) = compared(&d.trial, &j.trial);
-                no_worse && j.broken.is_within(&d.broken)
-            }
-        };
         // what physics breaks counts first, then the error; the simplest of equals is first in the list
         let broken = |j: &Judged| j.broken.turned().len();
-        let mut order: Vec<&Judged> = list.iter().filter(allowed).collect();
+        let mut order: Vec<&Judged> = list.iter().collect();
         order.sort_by(|a, b| {
-            let errors = a.trial.square(&everyone).total_cmp(&b.trial.square(&everyone));
+            let errors = (a.trial.square(&everyone)).total_cmp(&b.trial.square(&everyone));
             broken(a).cmp(&broken(b)).then(errors)
         });
         let best = *order.first()?;
         let after = best.trial.errors();
         let whole = broken(best) < turned.len();
         let (better, before) = match declared {
-            Some(d) => (compared(&d.trial, &best.trial).0, d.trial.errors()),
+            Some(d) => {
+                // the best one makes a joint worse: nothing on the list is it, and no lesser one takes its place
+                let (better, no_worse) = compared(&d.trial, &best.trial);
+                if !no_worse {
+                    return None;
+                }
+                (better, d.trial.errors())
+            }
             None => (self.problem.channels_that_move(), vec![f64::NAN; n]),
         };
         let of_errors = declared.is_none_or(|d| {
@@ -268,22 +305,31 @@ impl<'a> Look<'a> {
             return None;
         }
         // physics alone tells where no error changes
-        let seen = if better.is_empty() { &everyone } else { &better };
+        let seen = if better.is_empty() {
+            &everyone
+        } else {
+            &better
+        };
         let near = |j: &Trial| {
             let (own, other) = (best.trial.square(seen), j.square(seen));
-            other < LIMITS.far * own.max(LIMITS.same * LIMITS.same) || gain(j, &best.trial, seen) < LIMITS.sure
+            other < LIMITS.far * own || gain(j, &best.trial, seen) < LIMITS.sure
         };
         let others = (order.iter().skip(1)).filter(|j| broken(j) <= broken(best) && near(&j.trial));
         let tied: Vec<Change> = others.filter_map(|j| j.trial.change.clone()).collect();
         let change = best.trial.change.clone()?;
         let alike = tied.iter().all(|other| same_line(&change, other));
         let beside = fitted.is_some_and(|f| {
-            let own = f.change.as_ref().is_some_and(|c| c.joints() == change.joints());
+            let own = f
+                .change
+                .as_ref()
+                .is_some_and(|c| c.joints() == change.joints());
             !own && near(f) || f.square(seen) * LIMITS.far < best.trial.square(seen)
         });
         let absurd: Vec<usize> = match declared {
             None => self.problem.channels_that_move(),
-            Some(_) => (better.iter().copied()).filter(|j| before[*j] > LIMITS.unexplained).collect(),
+            Some(_) => (better.iter().copied())
+                .filter(|j| before[*j] > LIMITS.unexplained)
+                .collect(),
         };
         let repaired = absurd.iter().all(|j| after[*j] <= LIMITS.sound)
             && (!absurd.is_empty() || whole && broken(best) == 0);
@@ -301,7 +347,9 @@ impl<'a> Look<'a> {
             return None;
         }
         let base = Correction::none(self.problem.robot.joints());
-        let none = self.whole(&base, Some(&Change::Gravity([0.0; 3])), None)?.trial;
+        let none = self
+            .whole(&base, Some(&Change::Gravity([0.0; 3])), None)?
+            .trial;
         let fewer = none.robot.parameters().len() < declared.robot.parameters().len();
         let sound = none.errors().iter().all(|e| *e <= LIMITS.unexplained);
         let (_, no_worse) = compared(declared, &none);

@@ -100,7 +100,11 @@ impl Trial {
     fn system(&self, sums: &[DMatrix<f64>]) -> (DMatrix<f64>, DVector<f64>) {
         let u = self.rows.unknowns;
         let (mut normal, mut right) = (DMatrix::zeros(u, u), DVector::zeros(u));
-        for (j, sums) in sums.iter().enumerate().filter(|(j, _)| self.power[*j] > 0.0) {
+        for (j, sums) in sums
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| self.power[*j] > 0.0)
+        {
             let (places, w) = (&self.rows.places[j], self.power[j].recip());
             for (k, &at) in places.iter().enumerate() {
                 right[at] += w * sums[(k, places.len())];
@@ -134,15 +138,16 @@ impl Trial {
         self.sums.iter().map(of).collect()
     }
 
-    /// Unknowns of a joint's columns.
-    pub fn places(&self, j: usize) -> &[usize] {
-        &self.rows.places[j]
-    }
-
     /// Error of each joint in blocks left out, a share of its torque.
     pub fn errors(&self) -> Vec<f64> {
         let joints = self.power.len();
-        let of = |j: usize| self.left_out.iter().map(|block| block[j]).sum::<f64>().sqrt();
+        let of = |j: usize| {
+            self.left_out
+                .iter()
+                .map(|block| block[j])
+                .sum::<f64>()
+                .sqrt()
+        };
         (0..joints).map(of).collect()
     }
 
@@ -161,21 +166,26 @@ pub(super) fn gain(before: &Trial, after: &Trial, joints: &[usize]) -> f64 {
     let count = gains.len() as f64;
     let sum: f64 = gains.iter().sum();
     let scatter: f64 = gains.iter().map(|g| (g - sum / count).powi(2)).sum();
-    sum / (scatter / (count - 1.0) * count).sqrt().max(f64::MIN_POSITIVE)
+    sum / (scatter / (count - 1.0) * count)
+        .sqrt()
+        .max(f64::MIN_POSITIVE)
 }
 
 /// Joints whose error a change makes smaller, and whether it makes none larger.
 pub(super) fn compared(before: &Trial, after: &Trial) -> (Vec<usize>, bool) {
     let (b, a) = (before.errors(), after.errors());
-    let better = (0..b.len()).filter(|j| a[*j] < b[*j] - LIMITS.same).collect();
-    let worse = b.iter().zip(&a).any(|(b, a)| *a > *b + LIMITS.same);
+    let better = (0..b.len())
+        .filter(|j| a[*j] < b[*j] * (1.0 - LIMITS.same))
+        .collect();
+    let worse = b.iter().zip(&a).any(|(b, a)| *a > *b * (1.0 + LIMITS.same));
     (better, !worse)
 }
 
 fn mixed(gram: &DMatrix<f64>, mix: &DVector<f64>) -> DMatrix<f64> {
     let c = gram.nrows() - mix.len();
     let mut out = DMatrix::zeros(c + 1, c + 1);
-    out.view_mut((0, 0), (c, c)).copy_from(&gram.view((0, 0), (c, c)));
+    out.view_mut((0, 0), (c, c))
+        .copy_from(&gram.view((0, 0), (c, c)));
     let across = gram.view((0, c), (c, mix.len())) * mix;
     out.view_mut((0, c), (c, 1)).copy_from(&across);
     out.view_mut((c, 0), (1, c)).copy_from(&across.transpose());

@@ -24,7 +24,9 @@ pub struct Weight {
 
 /// The weight that each joint shows, beside friction and a constant; joints that hold next to none are left out.
 pub(super) fn weights(problem: &Problem, rows: &[usize]) -> Vec<Weight> {
-    let Some(theta) = &problem.known.inertial else { return Vec::new() };
+    let Some(theta) = &problem.known.inertial else {
+        return Vec::new();
+    };
     let (robot, n) = (problem.robot, problem.robot.joints());
     let by = Correction::none(n);
     let mix = problem.channels.mix(&by);
@@ -32,7 +34,10 @@ pub(super) fn weights(problem: &Problem, rows: &[usize]) -> Vec<Weight> {
     let (mut whole, mut weight) = (vec![0.0; n], vec![0.0; n]);
     let mut grams = vec![vec![DMatrix::<f64>::zeros(WIDTH, WIDTH); n]; LIMITS.blocks];
     for (i, &k) in rows.iter().enumerate() {
-        if !problem.channels.carry(robot, problem.sample.row(k), &by, &mut carried) {
+        if !problem
+            .channels
+            .carry(robot, problem.sample.row(k), &by, &mut carried)
+        {
             continue;
         }
         robot.torque(theta, &carried.q, &still, &still, &mut weight);
@@ -46,7 +51,9 @@ pub(super) fn weights(problem: &Problem, rows: &[usize]) -> Vec<Weight> {
         }
     }
     let of = |j: usize| -> Option<Weight> {
-        let total = grams.iter().fold(DMatrix::zeros(WIDTH, WIDTH), |sum, block| sum + &block[j]);
+        let total = grams
+            .iter()
+            .fold(DMatrix::zeros(WIDTH, WIDTH), |sum, block| sum + &block[j]);
         let varies = total[(0, 0)] - total[(0, 4)].powi(2) / total[(4, 4)];
         let by_masses = total[(0, 0)] + total[(1, 1)] + 2.0 * total[(0, 1)];
         let share = (varies.max(0.0) / by_masses).sqrt();

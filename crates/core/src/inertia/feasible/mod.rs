@@ -6,7 +6,10 @@
 //! do. What torques do not tell is filled by a prior: the mass properties that the robot file gives,
 //! or a plain body, with a small weight in the same ten numbers.
 
+mod friction;
 mod log_cholesky;
+
+pub use friction::{FrictionColumns, with_friction};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -69,20 +72,23 @@ pub struct Feasible {
 
 /// Least squares over physically consistent links.
 ///
+/// A given prior that no body can have counts as none.
+///
 /// # Errors
-/// [`FitError::Prior`] where a given prior is not physically consistent.
+/// [`FitError`].
 pub fn feasible(task: &ConsistencyProblem) -> Result<Feasible, FitError> {
     let links = task.map.links.len();
     let drives = task.map.drives.len();
     let size = STANDARD * links + drives;
     let mut prior = DVector::zeros(size);
     let mut given = Vec::with_capacity(links);
-    for (i, name) in task.map.links.iter().enumerate() {
-        let body = task.bodies.get(i).copied().flatten();
-        given.push(body.is_some());
-        let x = log_cholesky::of(&pseudo_inertia(&body.unwrap_or(PLAIN).standard()));
-        let x = x.ok_or_else(|| FitError::Prior { link: name.clone() })?;
-        prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
+    for i in 0..links {
+        let of = |body: Body| log_cholesky::of(&pseudo_inertia(&body.standard()));
+        let own = task.bodies.get(i).copied().flatten().and_then(of);
+        given.push(own.is_some());
+        if let Some(x) = own.or_else(|| of(PLAIN)) {
+            prior.rows_mut(STANDARD * i, STANDARD).copy_from_slice(&x);
+        }
     }
     prior
         .rows_mut(STANDARD * links, drives)

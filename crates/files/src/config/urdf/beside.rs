@@ -59,6 +59,7 @@ pub(in crate::config) fn base_parameters(
             theta: None,
             joint: None,
             value,
+            consistent: None,
             std: None,
             unit: info.unit.to_string(),
             meaning: info.meaning.to_string(),

@@ -7,6 +7,7 @@
 //! | `shapes` | collision shapes |
 //! | [`mesh`] | files of meshes: where they are, and their vertices; COLLADA in `collada` |
 //! | [`capsules`] | capsules that hold the shapes |
+//! | `possible` | inertials that no body has, and the nearest that one has |
 //! | [`source`] | a URDF with other inertials and friction |
 //! | `beside` | model files that leave links and inertials to a URDF |
 //! | `tree` | links and joints as a tree of moving links, fixed ones lumped |
@@ -21,6 +22,7 @@ pub mod capsules;
 mod collada;
 pub mod mesh;
 mod parts;
+mod possible;
 mod shapes;
 pub(super) mod source;
 mod tree;
@@ -137,7 +139,8 @@ impl UrdfChain {
             file: file.clone(),
             remedy: match source.kind() {
                 std::io::ErrorKind::InvalidData => {
-                    "give a URDF file in UTF-8, below 16 MB".to_owned()
+                    "give a URDF file in UTF-8, below 16 MB: `iconv -f LATIN1 -t UTF-8 IN > OUT`"
+                        .to_owned()
                 }
                 std::io::ErrorKind::NotFound => {
                     format!("{}{}", remedy(&source), named_beside(path, &["urdf"]))

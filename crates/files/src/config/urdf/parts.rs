@@ -1,12 +1,15 @@
 //! What a URDF says: links with their inertials, joints with their placements.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use super::possible;
 use super::shapes::{Shape, of_link};
 use super::xml::{EXPAND, Element, MACRO};
 use super::{Angles, Place};
 use crate::config::ConfigError;
 use crate::config::angles::Changes;
+use crate::config::document::is_plain_name;
 use crate::config::robot_file::CoordinateLimits;
 use cft_ident_core::number::is_usable;
 use cft_ident_core::robot::tree::space::{Rotation, Vector, of_roll_pitch_yaw};
@@ -79,6 +82,10 @@ pub(super) struct Parts {
     pub joints: Vec<Joint>,
     /// Angles and axes that were taken for what they stand for.
     pub changes: Changes,
+    /// What was said of inertials that no body has.
+    pub impossible: Option<String>,
+    /// Joints whose names are written otherwise here, as the URDF has them.
+    pub renamed: Vec<String>,
 }
 
 /// Reads what stands in a `<robot>`.
@@ -95,6 +102,8 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
         links: Vec::new(),
         joints: Vec::new(),
         changes: Changes::default(),
+        impossible: None,
+        renamed: Vec::new(),
     };
     let mut links: BTreeMap<&str, usize> = BTreeMap::new();
     let mut joints: BTreeMap<&str, usize> = BTreeMap::new();
@@ -133,7 +142,19 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
         if child.name() == "link" {
             parts.links.push(link(child, name, place)?);
         } else {
-            let joint = joint(child, name, place, &mut parts.changes)?;
+            let clean = clean_name(name);
+            if let Some(other) = parts.joints.iter().find(|joint| joint.name == *clean) {
+                return Err(place.wrong(
+                    child.line(),
+                    &format!("joint {}", escape(name)),
+                    &format!("is written {clean}, as that of line {}", other.line),
+                    "give each joint a name of its own in letters, digits, `_`, `-` and `.`",
+                ));
+            }
+            if clean != name {
+                parts.renamed.push(name.to_owned());
+            }
+            let joint = joint(child, &clean, place, &mut parts.changes)?;
             parts.joints.push(joint);
         }
     }
@@ -145,6 +166,7 @@ pub(super) fn parts(root: Element, place: &Place) -> Result<Parts, ConfigError> 
             "give the URDF of a whole robot",
         ));
     }
+    parts.impossible = possible::mended(&mut parts.links);
     if let Some(root) = undeclared_root(&parts, &links) {
         parts.links.insert(0, root);
     }
@@ -289,6 +311,16 @@ fn joint(
     })
 }
 
+/// A joint's name as files hold it: `_` for what is no letter, digit, `_`, `-` or `.`.
+pub(super) fn clean_name(name: &str) -> Cow<'_, str> {
+    if is_plain_name(name) {
+        return Cow::Borrowed(name);
+    }
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    let clean = name.trim().chars();
+    Cow::Owned(clean.map(|c| if plain(c) { c } else { '_' }).collect())
+}
+
 /// The three words of a text.
 fn words(text: &str) -> Option<[&str; 3]> {
     let words: Vec<&str> = text.split_whitespace().collect();
@@ -398,9 +430,7 @@ impl Reading<'_> {
         };
         let followed = mimic.attribute("joint");
         Ok(Some(Mimic {
-            joint: followed
-                .ok_or_else(|| self.lacks(mimic, "joint"))?
-                .to_owned(),
+            joint: clean_name(followed.ok_or_else(|| self.lacks(mimic, "joint"))?).into_owned(),
             multiplier: self.number(mimic, "multiplier", Some(1.0))?,
             offset: self.number(mimic, "offset", Some(0.0))?,
         }))

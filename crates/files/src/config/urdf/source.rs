@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use super::parts::clean_name;
 use super::xml;
 use crate::config::ConfigError;
 
@@ -37,7 +38,7 @@ pub fn replaced(file: &str, text: &str, with: &Replacement) -> Result<String, Co
         let name = element.attribute("name").unwrap_or_default();
         let (kind, anew) = match element.name() {
             "link" => ("inertial", with.inertials.get(name)),
-            "joint" => ("dynamics", with.dynamics.get(name)),
+            "joint" => ("dynamics", with.dynamics.get(&*clean_name(name))),
             _ => continue,
         };
         let goes = anew.is_some() || (kind == "inertial" && with.bare.contains(name));

@@ -116,7 +116,7 @@ pub(super) fn chain(
     fixed.sort_by_key(|(_, seat)| seat.on);
     let frames = frames(&fixed, &moving);
     Ok(UrdfChain {
-        notes: parts.changes.told(place.file).into_iter().collect(),
+        notes: notes(parts, place),
         collisions,
         ..finish(moving, frames, place)?
     })
@@ -340,6 +340,22 @@ fn unused(link: &str, moving: &[Moving]) -> String {
         name.push_str("_link");
     }
     name
+}
+
+/// What was taken otherwise than it is written.
+fn notes(parts: &Parts, place: &Place) -> Vec<String> {
+    let renamed = parts.renamed.first().map(|_| {
+        let names = parts.renamed.iter().map(String::as_str);
+        format!(
+            "{}: joints {} are written with `_` for what is no letter, digit, `_`, `-` or `.`; `name` in [log.joint] says what messages call them",
+            place.file,
+            list(names)
+        )
+    });
+    let impossible = parts.impossible.as_ref();
+    let impossible = impossible.map(|text| format!("{}: {text}", place.file));
+    let told = parts.changes.told(place.file).into_iter();
+    told.chain(renamed).chain(impossible).collect()
 }
 
 /// Lumps the bodies and lets mimic joints follow.

@@ -3,6 +3,7 @@
 pub(super) mod clock;
 pub(super) mod copies;
 pub(super) mod excitation;
+pub(super) mod failed;
 pub(super) mod flat;
 pub(super) mod grain;
 pub(super) mod histogram;

@@ -4,6 +4,9 @@
 //! that difference is nothing, at a spike of one to three rows it is the spike's height. At a turn
 //! of smooth motion it is small but not nothing: what stands out there as well must also be off the
 //! cubic through the rows four and five away.
+//!
+//! What is usual is told by medians, which half of the rows would have to spoil. A peak of a torque is none where the
+//! speed of its joint changes at the same rows by more than the position's noise: an inertia explains it.
 
 use super::histogram::Histogram;
 
@@ -16,8 +19,14 @@ const REACH: usize = 5;
 const AROUND: usize = 25;
 /// Differences that are remembered.
 const RING: usize = 64;
+/// Rows to each side by which a change of the speed is seen.
+const CHANGE: usize = 9;
 /// Spikes that are kept, the highest.
 const MOST: usize = 4096;
+/// A difference may be a spike from so many usual ones on.
+const SUSPECT: f64 = 10.0;
+/// A speed changes where it does by so many usual changes.
+const MOVES: f64 = 6.0;
 
 /// A row that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +66,10 @@ pub(in crate::inspect) struct Spikes {
     values: [f64; RING],
     times: [f64; RING],
     differences: [f64; RING],
+    /// Positions of the joint, and how far its speed changes over three rows, but for what it does as steadily
+    /// before and after [positions per two rows].
+    positions: [f64; RING],
+    changes_seen: Histogram,
     /// Rows since the stretch began.
     count: usize,
     /// Rows whose difference was looked at as a spike.
@@ -75,6 +88,8 @@ impl Default for Spikes {
             values: [0.0; RING],
             times: [0.0; RING],
             differences: [0.0; RING],
+            positions: [f64::NAN; RING],
+            changes_seen: Histogram::default(),
             count: 0,
             judged: 0,
             differences_seen: Histogram::default(),
@@ -86,12 +101,13 @@ impl Default for Spikes {
 }
 
 impl Spikes {
-    /// Takes the next row.
+    /// Takes the next row of a channel, and the position of its joint where the channel is none itself.
     #[inline]
-    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64) {
+    pub(in crate::inspect) fn take(&mut self, t: f64, value: f64, position: f64) {
         let k = self.count;
         self.values[k % RING] = value;
         self.times[k % RING] = t;
+        self.positions[k % RING] = position;
         self.count += 1;
         if self.count < WIDTH {
             return;
@@ -101,6 +117,12 @@ impl Spikes {
         let difference = self.values[centre % RING] - median(window);
         self.differences[centre % RING] = difference;
         self.differences_seen.add(difference);
+        if position.is_finite() && k >= 2 * CHANGE {
+            let change = self.change(k - CHANGE);
+            if change.is_finite() {
+                self.changes_seen.add(change);
+            }
+        }
         if centre >= HALF + AROUND {
             self.judge(centre - AROUND, centre);
         }
@@ -120,7 +142,28 @@ impl Spikes {
 
     /// Brings the suspicion up to date with what was seen so far.
     pub(in crate::inspect) fn settle(&mut self) {
-        self.suspect = 3.0 * self.differences_seen.quantile(0.99);
+        self.suspect = SUSPECT * self.usual();
+    }
+
+    /// Usual difference of a row from the median about it.
+    pub(in crate::inspect) fn usual(&self) -> f64 {
+        self.differences_seen.quantile_not_zero(0.5)
+    }
+
+    /// Change of the joint's speed at a row, less half of those six rows before and after.
+    fn change(&self, row: usize) -> f64 {
+        let q = |k: usize| self.positions[k % RING];
+        let at = |k: usize| (q(k + 3) - q(k + 1)) - (q(k - 1) - q(k - 3));
+        at(row) - 0.5 * (at(row - 6) + at(row + 6))
+    }
+
+    /// Whether the joint's speed changes at a row.
+    fn moves(&self, row: usize) -> bool {
+        let usual = self.changes_seen.quantile_not_zero(0.5);
+        row >= CHANGE
+            && row + CHANGE < self.count
+            && usual > 0.0
+            && self.change(row).abs() > MOVES * usual
     }
 
     /// Looks whether a row stands alone among those up to `last`.
@@ -145,6 +188,9 @@ impl Spikes {
         let Some(height) = self.off_cubic(row, height) else {
             return;
         };
+        if self.moves(row) {
+            return;
+        }
         if self.found.len() == MOST {
             let mut heights: Vec<f64> = self.found.iter().map(|s| s.height.abs()).collect();
             heights.sort_by(f64::total_cmp);
@@ -220,7 +266,7 @@ mod tests {
             if k % 256 == 0 {
                 spikes.settle();
             }
-            spikes.take(k as f64, *value);
+            spikes.take(k as f64, *value, f64::NAN);
         }
         spikes.part();
         spikes

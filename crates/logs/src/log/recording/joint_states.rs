@@ -61,6 +61,9 @@ pub(in crate::log) struct JointStates {
     incomplete: u64,
     /// Messages that were stamped 0 before the clock was known.
     unstamped: u64,
+    /// Whether a message with a stamp was read, and whether one without came before it.
+    begun: bool,
+    begins_unstamped: bool,
     paths: Vec<PathBuf>,
 }
 
@@ -192,6 +195,8 @@ impl JointStates {
             recording: MessageFiles::open(paths, Wanted { names })?,
             paths: paths.to_vec(),
             unstamped: 0,
+            begun: false,
+            begins_unstamped: false,
             row: StateRow::new(columns.len(), sources.len()),
             ahead: StateRow::new(columns.len(), sources.len()),
             sources,
@@ -250,6 +255,7 @@ impl JointStates {
             }
             let Some(key) = one.key(&head) else {
                 self.unstamped += 1;
+                self.begins_unstamped |= !self.begun;
                 continue;
             };
             let own = one.first..one.first + one.values.len() - 2;
@@ -269,6 +275,7 @@ impl JointStates {
                 *to = value.number().unwrap_or(*to);
             }
             row.sources[at] = true;
+            self.begun = true;
             if !same {
                 row.full = true;
                 row.key = key;
@@ -298,6 +305,12 @@ impl LogRows for JointStates {
             Some(seconds) => Stamped::Seconds(seconds),
             None => Stamped::Exact(Instant::from_ns(self.row.key)),
         }))
+    }
+
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !Instant::from_ns(self.row.key).is_far();
+        (self.begins_unstamped && near).then_some(0.0)
     }
 
     fn logged(&self, column: usize) -> Option<f64> {

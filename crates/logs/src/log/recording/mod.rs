@@ -8,6 +8,7 @@ mod encoding;
 mod fields;
 mod format;
 mod joint_states;
+mod listing;
 mod message;
 mod pairing;
 mod partial;
@@ -21,10 +22,12 @@ mod value;
 
 pub(super) use format::{FORMATS, format_of};
 pub(super) use joint_states::JointStates;
+pub(super) use listing::listing;
 pub(super) use rows::MessageRows;
 pub(super) use state_topics::state_groups;
 
 pub use delay::{DelayEstimate, DelayEstimator};
 pub use encoding::{CdrReader, DefinitionError, MalformedMessage};
+pub use listing::TopicFacts;
 pub use state_topics::StateGroup;
 pub use value::Value;

@@ -44,6 +44,9 @@ struct SampleReader {
     unreadable: LeftOut,
     /// Messages that were stamped 0 before the clock was known.
     unstamped: u64,
+    /// Whether a message with a stamp was read, and whether one without came before it.
+    begun: bool,
+    begins_unstamped: bool,
     /// Files of the recording, and who publishes on the topics of positions and of torques.
     paths: Vec<PathBuf>,
     publishers: [Publishers; 2],
@@ -116,6 +119,8 @@ impl MessageRows {
                 incomplete: LeftOut::default(),
                 unreadable: LeftOut::default(),
                 unstamped: 0,
+                begun: false,
+                begins_unstamped: false,
                 paths: paths.to_vec(),
                 publishers: Default::default(),
                 parts: Default::default(),
@@ -191,6 +196,12 @@ impl LogRows for MessageRows {
 
     fn has_velocities(&self) -> bool {
         self.reading.choice.velocities
+    }
+
+    fn begins(&self) -> Option<f64> {
+        // the clock began at 0, before it was published
+        let near = !self.row.stamp.instant().is_far();
+        (self.reading.begins_unstamped && near).then_some(0.0)
     }
 
     fn repeats(&self) -> bool {
@@ -311,6 +322,7 @@ impl SampleReader {
         let unset = self.choice.time == TimeSource::Header && !self.choice.zero_is_time;
         if unset && self.fields.header_ns(&self.values) == Some(0) {
             self.unstamped += 1;
+            self.begins_unstamped |= !self.begun;
             return Ok(None);
         }
         let part = match &self.choice.torque_topic {
@@ -377,6 +389,7 @@ impl SampleReader {
             }
         }
         sample.stamp = stamp;
+        self.begun = true;
         sample.number = head.number;
         if sample.path != *path {
             sample.path = (*path).to_owned();

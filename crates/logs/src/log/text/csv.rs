@@ -67,6 +67,11 @@ pub(super) struct TextFile {
     ahead: bool,
     strictness: Strictness,
     malformed: u64,
+    /// Rows without any value.
+    blank: u64,
+    /// Bytes and lines before the table.
+    before: (u64, u64),
+    told: Vec<String>,
     /// What is known of a stream.
     watch: Option<Watch>,
 }
@@ -81,18 +86,24 @@ impl TextFile {
     ) -> Result<Self, LogError> {
         let begin = content.head();
         head::refuse_other_formats(path, begin)?;
-        let found = head::look_at(path, begin, layout.section.delimiter, layout.by_number())?;
+        let wanted = head::Wanted {
+            delimiter: layout.section.delimiter,
+            header_line: layout.section.header_line,
+            by_number: layout.by_number(),
+        };
+        let found = head::look_at(path, begin, &wanted)?;
         let watch = content.watch.clone();
+        let mut inner = content.into_bytes();
+        let (before, _) = found.before;
+        let passed = io::copy(&mut (&mut inner).take(before), &mut io::sink());
+        passed.map_err(|error| source::failed(path, error))?;
         let reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .comment(Some(found.comment))
             .delimiter(found.delimiter)
             .buffer_capacity(BUFFER)
-            .from_reader(Guard {
-                inner: content.into_bytes(),
-                pending: 0,
-            });
+            .from_reader(Guard { inner, pending: 0 });
         let mut rows = Self {
             path: path.to_owned(),
             reader,
@@ -105,11 +116,15 @@ impl TextFile {
             ahead: found.headerless,
             strictness,
             malformed: 0,
+            blank: 0,
+            before: found.before,
+            told: found.told,
             watch,
         };
         if let Some((names, _)) = found.header_in_comment {
             let parts = head::split(&names, found.delimiter, found.spaces);
             rows.header = parts.into_iter().map(str::to_owned).collect();
+            rows.add_units(&found.units);
             return Ok(rows);
         }
         while rows.advance()? && rows.is_blank() {}
@@ -125,7 +140,36 @@ impl TextFile {
         if rows.header.last().is_some_and(String::is_empty) {
             rows.header.pop();
         }
+        if found.second_row {
+            while rows.advance()? && rows.is_blank() {}
+        }
+        rows.add_units(&found.units);
         Ok(rows)
+    }
+
+    /// Puts the units of a row of their own behind the names that state none.
+    fn add_units(&mut self, units: &[String]) {
+        for (name, unit) in self.header.iter_mut().zip(units) {
+            let unit = unit.trim_matches(['"', ' ', '[', ']', '(', ')', '<', '>']);
+            if !matches!(unit, "" | "-" | "1") && !name.ends_with([']', ')']) {
+                *name = format!("{name} [{unit}]");
+            }
+        }
+    }
+
+    /// What was taken for what, and what was passed over, one sentence each.
+    pub(super) fn told(&self) -> Vec<String> {
+        let mut out = match self.told.is_empty() {
+            true => Vec::new(),
+            false => vec![self.told.join("; ")],
+        };
+        if self.blank > 0 {
+            out.push(format!(
+                "{} rows without any value are passed over",
+                self.blank
+            ));
+        }
+        out
     }
 
     /// Column names, trimmed.
@@ -149,15 +193,15 @@ impl TextFile {
                 return Ok(false);
             }
             if let Some(watch) = &self.watch
-                && watch.is_cut_at(self.reader.position().byte())
+                && watch.is_cut_at(self.before.0 + self.reader.position().byte())
             {
                 return Err(LogError::CutLine { at: self.place() });
             }
-            if self.fields() == self.header.len() || self.is_row() {
+            if (self.fields() == self.header.len() && !self.is_without_values()) || self.is_row() {
                 return Ok(true);
             }
             match self.strictness {
-                _ if self.is_blank() => {}
+                _ if self.is_blank() => self.blank += u64::from(self.fields() > 1),
                 Strictness::Record => self.malformed += 1,
                 Strictness::Refuse => return Err(self.wrong_width()),
             }
@@ -221,6 +265,12 @@ impl TextFile {
                 "the line is cut off or a field is missing: complete or delete it"
             },
         }
+    }
+
+    /// Whether all fields are empty; looked at only where the first one is.
+    #[inline]
+    fn is_without_values(&self) -> bool {
+        self.field(0).is_none_or(<[u8]>::is_empty) && self.is_blank()
     }
 
     fn is_blank(&self) -> bool {
@@ -340,13 +390,14 @@ impl TextFile {
             // a stream cannot be read again
             return self.line_hint();
         }
-        let end = self.reader.position().byte().saturating_sub(1);
+        let end = (self.before.0 + self.reader.position().byte()).saturating_sub(1);
         count_lines(&self.path, end).unwrap_or_else(|_| self.reader.position().line())
     }
 
     /// Line of the current row where no comment or blank line stands right before it.
     pub(super) fn line_hint(&self) -> u64 {
-        self.record.position().map_or(0, csv::Position::line)
+        let line = self.record.position().map_or(0, csv::Position::line);
+        self.before.1 + line
     }
 }
 

@@ -1,11 +1,11 @@
 //! What the first bytes of a file tell: its format, comment sign, delimiter and header.
 
+use std::borrow::Cow;
 use std::path::Path;
 
-use super::number;
+use super::table::{self, Found};
 use crate::log::content::HEAD;
 use crate::log::section::Delimiter;
-use crate::log::time::Instant;
 use crate::log::{LogError, source};
 
 /// What the head of a file tells.
@@ -18,12 +18,85 @@ pub(super) struct Head {
     pub(super) header_line: u64,
     /// The first line holds numbers, and columns are given by number.
     pub(super) headerless: bool,
+    /// Bytes and lines before the table.
+    pub(super) before: (u64, u64),
+    /// Units that a row of their own states.
+    pub(super) units: Vec<String>,
+    /// Whether the row after the header holds no numbers.
+    pub(super) second_row: bool,
+    /// What was taken for what, where a log is not the table alone.
+    pub(super) told: Vec<String>,
 }
+
+/// Formats that are not read: how a file begins, what it is, and the way out.
+const OTHERS: [(&[u8], &str, &str); 11] = [
+    (
+        b"\xff\xfe",
+        "UTF-16 text",
+        "save it as UTF-8: `iconv -f UTF-16 -t UTF-8 IN > OUT`",
+    ),
+    (
+        b"\xfe\xff",
+        "UTF-16 text",
+        "save it as UTF-8: `iconv -f UTF-16 -t UTF-8 IN > OUT`",
+    ),
+    (
+        b"#ROSBAG V",
+        "a bag of ROS 1",
+        "convert it: `mcap convert IN.bag OUT.mcap`, or `rosbags-convert --src IN.bag --dst OUT`",
+    ),
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file (.h5, or .mat of MATLAB 7.3)",
+        "write its arrays as CSV: `python -c \"import h5py, pandas; f = h5py.File('IN'); pandas.DataFrame({k: f[k][:] for k in f}).to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"MATLAB 5.0 MAT-file",
+        "a MAT-file",
+        "write a table from MATLAB: `writetable(T, 'OUT.csv')`; or read it in Python with scipy.io.loadmat and write CSV",
+    ),
+    (
+        b"PAR1",
+        "a Parquet file",
+        "write it as CSV: `python -c \"import pandas; pandas.read_parquet('IN').to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"ARROW1",
+        "an Arrow file",
+        "write it as CSV: `python -c \"import pandas; pandas.read_feather('IN').to_csv('OUT.csv', index=False)\"`",
+    ),
+    (
+        b"PK\x03\x04",
+        "a zip archive, as .npz and .xlsx are",
+        "write its arrays as CSV, in Python: `a = numpy.load('IN.npz')`, then numpy.savetxt with a header; save a sheet of a spreadsheet as CSV",
+    ),
+    (
+        b"\x93NUMPY",
+        "an array of numpy",
+        "write it as CSV: `python -c \"import numpy; numpy.savetxt('OUT.csv', numpy.load('IN'), delimiter=',', header='t,q_q1,tau_q1', comments='')\"`",
+    ),
+    (b"%PDF", "a PDF document", "give the log itself"),
+    (
+        b"BZh",
+        "compressed with bzip2",
+        "unpack it first: `bunzip2 IN.bz2`",
+    ),
+];
 
 /// Names a file that is no plain text, by its first bytes.
 pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogError> {
-    let (kind, remedy) = if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-        ("UTF-16 text", "save it as UTF-8")
+    let known = OTHERS.iter().find(|(begins, ..)| head.starts_with(begins));
+    let echo = ["header:\n", "---\nheader:\n"];
+    let (kind, remedy) = if let Some((_, kind, remedy)) = known {
+        (*kind, *remedy)
+    } else if echo
+        .iter()
+        .any(|begins| head.starts_with(begins.as_bytes()))
+    {
+        (
+            "what `ros2 topic echo` prints",
+            "record the topic instead, `ros2 bag record /joint_states`; or print a table, `ros2 topic echo --csv`",
+        )
     } else if head.iter().take(4096).any(|byte| *byte == 0) {
         (
             "binary, and neither an MCAP recording nor a rosbag2 database",
@@ -39,37 +112,36 @@ pub(super) fn refuse_other_formats(path: &Path, head: &[u8]) -> Result<(), LogEr
     })
 }
 
-/// Finds comment sign, delimiter and header; a log may lack one where columns are given `by_number`.
-pub(super) fn look_at(
-    path: &Path,
-    head: &[u8],
-    wanted: Delimiter,
-    by_number: bool,
-) -> Result<Head, LogError> {
+/// What the robot file says of the table.
+pub(super) struct Wanted {
+    pub(super) delimiter: Delimiter,
+    /// Line of the header, from 1.
+    pub(super) header_line: Option<u64>,
+    /// Columns are given by number, so that no header is needed.
+    pub(super) by_number: bool,
+}
+
+/// Finds comment sign, delimiter and header.
+pub(super) fn look_at(path: &Path, head: &[u8], wanted: &Wanted) -> Result<Head, LogError> {
     let file = || source::shown(path);
-    let bytes = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
-    let text = String::from_utf8_lossy(bytes);
-    let mut comment = None;
-    let mut last_comment: Option<(&str, u64)> = None;
-    let mut first: Option<(&str, u64)> = None;
-    let end = if text.contains('\n') { '\n' } else { '\r' };
-    for (index, line) in text.split(end).enumerate() {
-        let line = line.trim_end_matches('\r');
-        let number = index as u64 + 1;
-        match line.bytes().next() {
+    let lines = lines_of(head);
+    let (mut comment, mut comments) = (None, Vec::new());
+    let mut first = None;
+    for (at, line) in lines.iter().enumerate() {
+        match line.text.bytes().next() {
             Some(sign @ (b'#' | b'%')) if comment.is_none_or(|known| known == sign) => {
                 comment = Some(sign);
-                last_comment = Some((&line[1..], number));
+                comments.push(at);
             }
-            _ if line.trim().is_empty() => {}
+            _ if line.text.trim().is_empty() => {}
             _ => {
-                first = Some((line, number));
+                first = Some(at);
                 break;
             }
         }
     }
-    let Some((line, number)) = first else {
-        return Err(match last_comment {
+    let Some(first) = first else {
+        return Err(match comments.last() {
             Some(_) => LogError::TooFewRows {
                 file: file(),
                 rows: 0,
@@ -82,21 +154,53 @@ pub(super) fn look_at(
             None => LogError::Empty { file: file() },
         });
     };
-    let (delimiter, spaces) = delimiter_of(line, wanted);
+    let comment = comment.unwrap_or(b'#');
+    let found = table::find(&lines, (first, comment), wanted);
+    let Found {
+        at,
+        parting: (delimiter, spaces),
+        second_row,
+        mut units,
+        mut told,
+    } = found;
+    let (line, number) = (&lines[at].text, lines[at].number);
     let fields = split(line, delimiter, spaces);
-    let mut header_in_comment = None;
-    let mut header_line = number;
-    let mut headerless = false;
-    if fields.iter().all(|field| is_datum(field)) {
+    let mut out = Head {
+        comment,
+        delimiter,
+        spaces,
+        header_in_comment: None,
+        header_line: number,
+        headerless: false,
+        before: match at > first || wanted.header_line.is_some() {
+            true => (lines[at].begins, number - 1),
+            false => (0, 0),
+        },
+        units: Vec::new(),
+        second_row,
+        told: Vec::new(),
+    };
+    if fields.iter().all(|field| table::is_datum(field)) {
         // numpy.savetxt puts the names into a comment.
-        let named =
-            last_comment.filter(|(names, _)| split(names, delimiter, spaces).len() == fields.len());
+        let of = |k: &usize| {
+            let names = &lines[*k].text[1..];
+            let names = split(names, delimiter, spaces);
+            (names.len() == fields.len()).then_some((*k, names))
+        };
+        let all: Vec<(usize, Vec<&str>)> = comments.iter().filter_map(of).collect();
+        let is_units = |(_, names): &&(usize, Vec<&str>)| table::are_units(names);
+        let named = all.iter().rfind(|one| !is_units(one)).or(all.last());
         match named {
-            Some((names, at)) => {
-                header_in_comment = Some((names.to_owned(), at));
-                header_line = at;
+            Some((k, _)) => {
+                out.header_in_comment = Some((lines[*k].text[1..].to_owned(), lines[*k].number));
+                out.header_line = lines[*k].number;
+                let below = all.iter().find(|one| one.0 > *k && is_units(one));
+                if let Some((k, found)) = below {
+                    units = found.iter().map(|unit| (*unit).to_owned()).collect();
+                    told.push(format!("units are those of line {}", lines[*k].number));
+                }
             }
-            None if by_number => headerless = true,
+            None if wanted.by_number => out.headerless = true,
             None => {
                 return Err(LogError::NoHeader {
                     file: file(),
@@ -105,23 +209,42 @@ pub(super) fn look_at(
             }
         }
     }
-    Ok(Head {
-        comment: comment.unwrap_or(b'#'),
-        delimiter,
-        spaces,
-        header_in_comment,
-        header_line,
-        headerless,
-    })
+    (out.units, out.told) = (units, told);
+    Ok(out)
 }
 
-/// Whether a field is a number or a date, and so no name of a column.
-fn is_datum(field: &str) -> bool {
-    number::parse(field.as_bytes()).is_some() || Instant::parse_iso(field.as_bytes()).is_some()
+/// A line of the head.
+pub(super) struct Line<'h> {
+    pub(super) text: Cow<'h, str>,
+    /// Its number, from 1, and the byte of the file at which it begins.
+    pub(super) number: u64,
+    begins: u64,
+}
+
+/// The lines of the head; its last one where it is all of the file.
+fn lines_of(head: &[u8]) -> Vec<Line<'_>> {
+    const MARK: &[u8] = b"\xef\xbb\xbf";
+    let bytes = head.strip_prefix(MARK).unwrap_or(head);
+    let mut begins = (head.len() - bytes.len()) as u64;
+    let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    let mut out = Vec::new();
+    for (index, line) in bytes.split(|byte| *byte == end).enumerate() {
+        let text = line.strip_suffix(b"\r").unwrap_or(line);
+        out.push(Line {
+            text: String::from_utf8_lossy(text),
+            number: index as u64 + 1,
+            begins,
+        });
+        begins += line.len() as u64 + 1;
+    }
+    if head.len() == HEAD && out.len() > 1 {
+        out.pop();
+    }
+    out
 }
 
 /// The delimiter byte, and whether runs of it count as one.
-fn delimiter_of(line: &str, wanted: Delimiter) -> (u8, bool) {
+pub(super) fn delimiter_of(line: &str, wanted: Delimiter) -> (u8, bool) {
     match wanted {
         Delimiter::Comma => (b',', false),
         Delimiter::Semicolon => (b';', false),

@@ -4,6 +4,7 @@ mod csv;
 mod head;
 mod json_lines;
 mod number;
+mod table;
 
 use std::path::Path;
 
@@ -14,7 +15,8 @@ use super::content::Content;
 use super::layout::Layout;
 use super::rows::{LogRows, Strictness};
 use super::time::{FAR_S, Stamped};
-use super::{Block, LogError};
+use super::two_clocks::rest_of;
+use super::{Block, LogError, escape};
 use cft_ident_core::number::is_usable;
 
 /// The time of a text log.
@@ -23,6 +25,8 @@ struct TimeColumn {
     index: usize,
     /// Seconds per unit.
     seconds: f64,
+    /// Column of what is beyond whole seconds, and the power of ten of a second that it counts.
+    rest: Option<(usize, i32)>,
     /// Read exactly, in units of 10^power s: dates, and numbers far from zero. Known from the first
     /// row that has a time.
     exact: Option<Option<i32>>,
@@ -82,6 +86,10 @@ impl TextRows {
             return Some(Stamped::Seconds(t));
         }
         let (file, time) = (&self.file, self.time.as_mut()?);
+        if let Some((rest, power)) = time.rest {
+            let whole = file.instant(time.index, 0)?;
+            return Some(Stamped::Exact(whole.and(file.instant(rest, power)?)));
+        }
         let seconds = || {
             let seconds = file.number(time.index)? * time.seconds;
             is_usable(seconds).then_some(seconds)
@@ -113,6 +121,7 @@ impl LogRows for TextRows {
         self.time = Some(TimeColumn {
             index,
             seconds,
+            rest: rest_of(self.file.header(), index),
             exact: None,
         });
     }
@@ -179,6 +188,19 @@ impl LogRows for TextRows {
 
     fn malformed(&self) -> u64 {
         self.file.malformed()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let mut out = self.file.told();
+        if let Some((time, (rest, _))) = self.time.and_then(|time| Some((time, time.rest?))) {
+            let name = |column: usize| escape(&self.names()[column]);
+            out.push(format!(
+                "times are those of `{}` and `{}` together",
+                name(time.index),
+                name(rest)
+            ));
+        }
+        out
     }
 
     fn place(&self) -> String {

@@ -119,8 +119,8 @@ pub fn section(page: &mut Writer, model: &ModelFile, truth: &dyn Fn(&Parameter) 
     {
         page.paragraph(
             "Below zero: friction and inertia are positive in every machine. The cause may be a torque that \
-             the model lacks, or a motion that does not separate these parameters from others; `lsq \
-             --feasible` fits physically consistent links and drives.",
+             the model lacks, or a motion that does not separate these parameters from others. Torques are \
+             computed with the nearest numbers that can exist, where the model holds them.",
         );
     }
     effects(page, model);

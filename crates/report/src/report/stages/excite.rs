@@ -174,7 +174,8 @@ fn expected(
         let std = p.std.map(|s| number::significant(s, 2));
         let mut row = vec![
             p.name.clone(),
-            p.value.map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
+            p.value
+                .map_or(number::ABSENT.into(), |v| number::significant(v, 5)),
             std.unwrap_or(number::ABSENT.into()),
             relative(p.relative_std),
         ];

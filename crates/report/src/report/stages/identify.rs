@@ -25,6 +25,8 @@ pub struct Identify<'a> {
     pub truth: &'a dyn Fn(&Parameter) -> Option<f64>,
     /// Limit that the user set on every joint's relative error.
     pub limit: Option<f64>,
+    /// What was guessed of the robot file, with the lines to change.
+    pub guesses: &'a [String],
 }
 
 impl Identify<'_> {
@@ -52,6 +54,9 @@ impl Identify<'_> {
     }
 
     fn verdicts(&self, page: &mut Writer) {
+        for guess in self.guesses {
+            page.verdict(&format!("Guessed, CHECK IT: {guess}."), false);
+        }
         if let Some(fault) = self.fault() {
             let text = diagnose::at_fault(fault);
             page.verdict(&format!("{text} What to do: {}.", fault.remedy), false);

@@ -463,5 +463,8 @@ fn consistent(terminal: &mut Writer, found: &ConsistentLinks) {
         unbroken(&format!("{} {from} to {to}", before.joint))
     });
     let change: Vec<String> = change.collect();
-    terminal.paragraph(&format!("the fit suffers: {}", change.join(", ")));
+    terminal.paragraph(&format!(
+        "what consistency costs the fit: {}",
+        change.join(", ")
+    ));
 }

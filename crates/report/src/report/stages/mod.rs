@@ -12,6 +12,7 @@ pub mod identify;
 pub mod inspect;
 pub mod lsq;
 pub mod setup;
+pub mod show;
 mod step_words;
 pub mod track;
 pub mod validate;

@@ -10,7 +10,7 @@ use cft_ident_core::number;
 use cft_ident_core::validate::{JointError, TorqueErrors, Validation};
 use cft_ident_files::config::ModelFile;
 use cft_ident_logs::log::{Provenance, escape};
-use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, used_for};
+use cft_ident_stages::identify::{ErrorsByUse, LoggedRobot, Validated, not_a_validation, used_for};
 use cft_ident_stages::replay::Replayed;
 
 /// What the report is made from.
@@ -37,7 +37,11 @@ pub fn validate(of: &Validate) -> Report {
     ));
     let by_use = of.found.by_use.as_ref();
     let logs = by_use.map_or(of.logs, |by_use| &by_use.unseen.logs);
-    let (text, good) = words(judged, of.limit, &escaped(logs));
+    let (mut text, mut good) = words(judged, of.limit, &escaped(logs));
+    if let Some(told) = not_a_validation(judged) {
+        text = format!("NOT A VALIDATION: {told}.");
+        good = false;
+    }
     report.everywhere().verdict(&text, good);
     used_before(&mut report.everywhere(), of);
     report.terminal().line("");

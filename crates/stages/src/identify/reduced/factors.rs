@@ -149,6 +149,7 @@ impl Factors {
             rows: *rows,
             r: r.to_vec(),
             scores: scores.clone(),
+            ..BlockFactor::default()
         });
         let blocks = blocks.collect();
         let at_rest = match joints.next() {

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::tool::run;
 
-const CFT: &str = include_str!("../../configs/cft.toml");
+const CFT: &str = include_str!("../../../../configs/cft.toml");
 const ARM_URDF: &str = include_str!("../study_setup/arm.urdf");
 /// Names of the arm's joints.
 const ARM: [&str; 4] = ["turn", "lift", "elbow", "roll"];

@@ -25,7 +25,7 @@ const SLIDE: &str = r#"
     friction = { law = "viscous-coulomb", fitted_with_inertias = true, offset = true }
     filter = { cutoff_hz = 10.0, position_cutoff_hz = 40.0 }
 "#;
-const UR10: &str = include_str!("../configs/ur10.toml");
+const UR10: &str = include_str!("../../../configs/ur10.toml");
 /// Robot, sampling rate [Hz], logs, seconds of each, and time in which the disturbance forgets [s].
 const CASES: [(&str, f64, usize, f64, f64); 8] = [
     ("slide", 200.0, 1, 10.0, 0.1),

@@ -63,7 +63,7 @@ fn motion(name: &str, seed: u64) -> Reference<4> {
         "slow" => along(slowed(campaign(), 0.3)),
         "0.2 Hz" => along(campaign()),
         "0.4 Hz designed" => {
-            along(series("examples/study_rows/designed.toml").at_random_phase(seed))
+            along(series("crates/studies/examples/study_rows/designed.toml").at_random_phase(seed))
         }
         _ => points(seed),
     }
@@ -148,7 +148,7 @@ impl Driven {
             robot.torque(theta, q, v, a, &mut tau);
             for j in 0..4 {
                 channels[j].push(self.log.tau[4 * k + j] - tau[j] - laws[j].torque(v[j]));
-                channels[4 + j].push(rest::movement(self.v[4 * k + j], self.rest[j]));
+                channels[4 + j].push(f64::from(self.v[4 * k + j].abs() > self.rest[j]));
             }
         }
         let parallel = Parallel::design(&FilterSettings::default(), DT).expect("usual filters");

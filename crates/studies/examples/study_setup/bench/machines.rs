@@ -150,11 +150,11 @@ fn each(mut machine: Machine, change: impl Fn(Table, &[String]) -> Table) -> Mac
 
 /// Folder of the measured logs.
 pub fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data")
+    Path::new(cft_ident_support::ROOT).join("../shared/data")
 }
 
 pub fn robot(name: &str) -> toml::Table {
-    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let configs = Path::new(cft_ident_support::ROOT).join("configs");
     let text = std::fs::read_to_string(configs.join(format!("{name}.toml")));
     toml::from_str(&text.expect("it comes with the tool")).expect("a robot file")
 }

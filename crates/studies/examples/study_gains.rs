@@ -10,7 +10,7 @@
 //! target/study_gains.jsonl as it goes and, at the end, into FOLDER the summary that
 //! docs/how-to-currents.md is generated from.
 
-#[path = "../tests/program/currents_arm/mod.rs"]
+#[path = "../../../tests/program/currents_arm/mod.rs"]
 mod currents_arm;
 #[allow(dead_code, reason = "each study uses its share")]
 mod study;

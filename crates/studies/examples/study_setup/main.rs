@@ -4,7 +4,7 @@
 //! Each case leaves its line in target/study_setup/rows.jsonl as soon as it is done: a stopped study
 //! goes on where it was. `--again` begins anew. `--every=K` takes a sample, every K-th case of each machine from a
 //! place on that chance chose, and `--minutes=M` begins no case after that time. The summary goes to
-//! docs/results/study_setup.json, from which docs/setup.md has its tables; it says of how many cases it is.
+//! docs/results/study_setup.json; it says of how many cases it is.
 
 mod bench;
 mod summary;
@@ -40,7 +40,7 @@ fn main() {
     let mut chance = Chance(17);
     let mut all = 0;
     let wanted = |name: &str| named.is_empty() || named.iter().any(|w| *w == name);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/study_setup");
+    let folder = Path::new(cft_ident_support::ROOT).join("target/study_setup");
     std::fs::create_dir_all(&folder).expect("the folder can be made");
     let path = folder.join("rows.jsonl");
     if words.iter().any(|w| w == "--again") {
@@ -94,7 +94,7 @@ fn main() {
     }
     let rows = finished(&path);
     let summary = summary::summary(&rows, all);
-    let out = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results/study_setup.json");
+    let out = Path::new(cft_ident_support::ROOT).join("docs/results/study_setup.json");
     std::fs::write(out, format!("{summary:#}\n")).expect("the summary is written");
     summary::print(&summary);
 }

@@ -1,0 +1,96 @@
+//! Rows in which every channel reads 0 although the row before was not near it: reads that failed.
+
+/// A position that goes to 0 was no further from it than so many of its steps before, or of its smallest ones.
+const NEAR: f64 = 10.0;
+/// Rows that are remembered.
+const MOST: usize = 65_536;
+
+/// Looks for failed reads, row by row.
+#[derive(Debug, Clone)]
+pub(in crate::inspect) struct FailedReads {
+    /// Positions of the last row that was read, and how far they went to it.
+    before: Vec<f64>,
+    steps: Vec<f64>,
+    /// Smallest step of each that is not 0.
+    grains: Vec<f64>,
+    failing: bool,
+    times: Vec<f64>,
+}
+
+impl FailedReads {
+    pub(in crate::inspect) fn new(positions: usize) -> Self {
+        Self {
+            before: vec![f64::NAN; positions],
+            steps: vec![0.0; positions],
+            grains: vec![f64::INFINITY; positions],
+            failing: false,
+            times: Vec::new(),
+        }
+    }
+
+    /// Whether the next row is none that was read; positions and others less what a logged 0 stands for.
+    pub(in crate::inspect) fn take(&mut self, t: f64, positions: &[f64], others: &[f64]) -> bool {
+        let zero = |x: &f64| *x == 0.0;
+        let empty = !others.is_empty() && positions.iter().all(zero) && others.iter().all(zero);
+        if empty && (self.failing || self.far()) {
+            self.failing = true;
+            if self.times.len() < MOST {
+                self.times.push(t);
+            }
+            return true;
+        }
+        self.failing = false;
+        for (j, q) in positions.iter().enumerate() {
+            let step = (q - self.before[j]).abs();
+            if step > 0.0 {
+                self.grains[j] = self.grains[j].min(step);
+            }
+            self.steps[j] = step;
+            self.before[j] = *q;
+        }
+        false
+    }
+
+    /// Whether a position cannot go to 0 from where it was.
+    fn far(&self) -> bool {
+        let pairs = self.before.iter().zip(&self.steps).zip(&self.grains);
+        let mut far = pairs.map(|((q, step), grain)| q.abs() > NEAR * step.max(*grain));
+        far.any(|far| far)
+    }
+
+    /// Times of the rows that failed, in order \[s\].
+    pub(in crate::inspect) fn times(&self) -> &[f64] {
+        &self.times
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn failed(rows: impl Iterator<Item = [f64; 3]>) -> Vec<f64> {
+        let mut reads = FailedReads::new(2);
+        for (k, row) in rows.enumerate() {
+            reads.take(k as f64, &row[..2], &row[2..]);
+        }
+        reads.times().to_vec()
+    }
+
+    #[test]
+    fn rows_of_zeros_between_others_are_reads_that_failed() {
+        let row = |k: usize| match k {
+            7 | 20 | 21 | 39 => [0.0; 3],
+            k => [0.5 + 0.01 * k as f64, (0.1 * k as f64).sin(), 0.0],
+        };
+        assert_eq!(failed((0..40).map(row)), [7.0, 20.0, 21.0, 39.0]);
+    }
+
+    #[test]
+    fn joints_that_come_to_their_zero_without_a_torque_are_read() {
+        // through it, to it in counts, and at rest there
+        let through = |k: usize| [0.01 * (k as f64 - 20.0), 0.0, 0.0];
+        assert!(failed((0..40).map(through)).is_empty());
+        let counts = |k: usize| [(20 - k.min(40) / 2) as f64 * 1e-4, 0.0, 0.0];
+        assert!(failed((0..90).map(counts)).is_empty());
+    }
+}

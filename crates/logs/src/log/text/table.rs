@@ -1,0 +1,204 @@
+//! Where the table begins in a text: after a preamble, with a row of units, or right away.
+
+use super::head::{Line, Wanted, delimiter_of, split};
+use super::number;
+use crate::log::columns;
+use crate::log::time::Instant;
+
+/// Where the table begins.
+pub(super) struct Found {
+    /// Index of the line that names the columns.
+    pub(super) at: usize,
+    /// What parts its fields, and whether runs of it count as one.
+    pub(super) parting: (u8, bool),
+    /// Whether the row after it holds no numbers.
+    pub(super) second_row: bool,
+    /// Units in that row.
+    pub(super) units: Vec<String>,
+    /// What was taken for what.
+    pub(super) told: Vec<String>,
+}
+
+/// Whether a field is a number or a date, and so no name of a column.
+pub(super) fn is_datum(field: &str) -> bool {
+    number::parse(field.as_bytes()).is_some() || Instant::parse_iso(field.as_bytes()).is_some()
+}
+
+/// Whether fields are units: each is one, or nothing.
+pub(super) fn are_units(fields: &[&str]) -> bool {
+    let bare = |field: &&str| field.trim_matches(['"', ' ']).to_owned();
+    let fields: Vec<String> = fields.iter().map(bare).collect();
+    let nothing = |field: &String| matches!(field.as_str(), "" | "-" | "1" | "[]");
+    let bracket = |field: &String| {
+        let pairs = [('[', ']'), ('(', ')'), ('<', '>')];
+        pairs
+            .iter()
+            .any(|(open, close)| field.starts_with(*open) && field.ends_with(*close))
+    };
+    let unit = |field: &String| nothing(field) || bracket(field) || columns::is_unit(field);
+    fields.iter().all(unit) && !fields.iter().all(nothing)
+}
+
+/// Finds the line that names the columns: the first one that rows of as many numbers follow, at once or after one
+/// row of units; the first line where there is none.
+pub(super) fn find(lines: &[Line<'_>], (first, comment): (usize, u8), wanted: &Wanted) -> Found {
+    let sign = char::from(comment);
+    let is_row = |line: &Line<'_>| {
+        let text = line.text.trim();
+        !text.is_empty() && !text.starts_with(sign)
+    };
+    let rows: Vec<usize> = (first..lines.len())
+        .filter(|k| is_row(&lines[*k]))
+        .collect();
+    let mut told = Vec::new();
+    let mut parting = None;
+    let mut from = 0;
+    let separator = lines[first].text.trim().trim_matches('"');
+    if let Some(sign) = separator
+        .strip_prefix("sep=")
+        .or(separator.strip_prefix("SEP="))
+        && let Some(sign) = sign.bytes().next().filter(u8::is_ascii)
+    {
+        parting = Some((sign, sign == b' '));
+        from = 1;
+    }
+    let asked = wanted.header_line.and_then(|number| {
+        rows.iter()
+            .position(|k| lines[*k].number == number)
+            .or_else(|| rows.iter().position(|k| lines[*k].number > number))
+    });
+    let table = |row: usize| Table::at(lines, &rows[row..], parting, wanted);
+    let plain = |row: usize| {
+        let line = rows.get(row).map_or("", |k| &lines[*k].text);
+        Table {
+            parting: parting.unwrap_or_else(|| delimiter_of(line, wanted.delimiter)),
+            second: None,
+        }
+    };
+    let (row, found) = match asked {
+        Some(row) => (row, table(row).unwrap_or_else(|| plain(row))),
+        None => {
+            let headless = |row: usize| {
+                let (sign, spaces) = plain(row).parting;
+                let fields = split(&lines[rows[row]].text, sign, spaces);
+                row == from && fields.iter().all(|field| is_datum(field))
+            };
+            let fits = |row: &usize| headless(*row) || table(*row).is_some();
+            let row = (from..rows.len()).find(fits).unwrap_or(from);
+            let row = row.min(rows.len().saturating_sub(1));
+            (row, table(row).unwrap_or_else(|| plain(row)))
+        }
+    };
+    let at = rows.get(row).copied().unwrap_or(first);
+    let number = lines[at].number;
+    if row > 0 || asked.is_some() {
+        told.push(format!(
+            "the table begins at line {number}: {} before it are passed over (`header_line` in [log] of the robot file says another)",
+            match number - 1 {
+                1 => "1 line".to_owned(),
+                more => format!("{more} lines"),
+            }
+        ));
+    }
+    let mut units = Vec::new();
+    if let Some(second) = found.second {
+        let (sign, spaces) = found.parting;
+        let below = &lines[rows[row + 1]];
+        let fields = split(&below.text, sign, spaces);
+        if second == Second::Units {
+            units = fields.iter().map(|unit| (*unit).to_owned()).collect();
+            told.push(format!("units are those of line {}", below.number));
+        } else {
+            told.push(format!(
+                "line {} holds words and is passed over",
+                below.number
+            ));
+        }
+    }
+    Found {
+        at,
+        parting: found.parting,
+        second_row: found.second.is_some(),
+        units,
+        told,
+    }
+}
+
+/// What the row after the header holds, where it holds no numbers.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Second {
+    Units,
+    Words,
+}
+
+/// A table that begins with a line of names.
+struct Table {
+    parting: (u8, bool),
+    second: Option<Second>,
+}
+
+impl Table {
+    /// The table whose names stand in the first of these rows; `None` where no rows of numbers follow it.
+    fn at(
+        lines: &[Line<'_>],
+        rows: &[usize],
+        parting: Option<(u8, bool)>,
+        wanted: &Wanted,
+    ) -> Option<Self> {
+        let line = |row: usize| Some(&*lines[*rows.get(row)?].text);
+        let (sign, spaces) =
+            parting.unwrap_or_else(|| delimiter_of(line(0).unwrap_or_default(), wanted.delimiter));
+        let fields = |row: usize| Some(split(line(row)?, sign, spaces));
+        let names = fields(0)?;
+        let width = |fields: &[&str]| {
+            fields.len() - usize::from(fields.len() > 1 && fields.last() == Some(&""))
+        };
+        let n = width(&names);
+        if names.iter().any(|name| is_datum(name)) {
+            return None;
+        }
+        let as_wide = |fields: &[&str]| {
+            [fields.len(), width(fields)]
+                .iter()
+                .any(|w| [n, names.len()].contains(w))
+        };
+        let is_number = |field: &&str| {
+            // a decimal comma is told later on, with the line
+            let point = field.replace(',', ".");
+            is_datum(field) || (sign != b',' && number::parse(point.as_bytes()).is_some())
+        };
+        let data = |row: usize| {
+            let Some(fields) = fields(row) else {
+                return false;
+            };
+            let numbers = fields.iter().filter(|field| is_number(field)).count();
+            as_wide(&fields) && numbers > 0 && 2 * numbers >= fields.len()
+        };
+        if data(1) {
+            return Some(Self {
+                parting: (sign, spaces),
+                second: None,
+            });
+        }
+        let below = fields(1)?;
+        if !data(2) || !as_wide(&below) || below.iter().any(is_number) {
+            return None;
+        }
+        let distinct = |fields: &[&str]| {
+            let mut all: Vec<&str> = fields.iter().copied().filter(|f| !f.is_empty()).collect();
+            all.sort_unstable();
+            all.dedup();
+            all.len()
+        };
+        let second = match are_units(&below) {
+            true => Second::Units,
+            // names that stand under those of groups are the names
+            false if distinct(&below) > distinct(&names) => return None,
+            false => Second::Words,
+        };
+        Some(Self {
+            parting: (sign, spaces),
+            second: Some(second),
+        })
+    }
+}

@@ -1,0 +1,92 @@
+//! What a plant has beyond rigid bodies and friction: the truths that studies plant.
+
+use serde::Serialize;
+
+use crate::chain::Joints;
+
+/// Shape of an addition; `size` scales it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "shape", rename_all = "kebab-case")]
+pub enum Shape {
+    Offset,
+    /// Coulomb friction that is larger in the positive direction.
+    Asymmetric,
+    Stribeck {
+        vs: f64,
+    },
+    Quadratic,
+    /// A torque that is periodic in the position, so many times a radian or metre.
+    Ripple {
+        order: f64,
+        phase: f64,
+    },
+    Spring {
+        zero: f64,
+    },
+    /// Friction that is periodic in the position.
+    PositionFriction {
+        order: f64,
+        phase: f64,
+    },
+    /// Friction by the load.
+    LoadFriction,
+    /// Loss in the gear where the drive pushes the load.
+    Efficiency,
+    /// Viscous friction of another joint's speed.
+    Coupling {
+        other: usize,
+    },
+    /// Friction that starts higher and settles [s].
+    WarmUp {
+        time_s: f64,
+    },
+    Drift,
+    /// Outside every catalogue: a torque that follows the square of the position's swing and the speed's sign.
+    Stray,
+}
+
+/// One addition at one joint.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Added {
+    pub joint: usize,
+    #[serde(flatten)]
+    pub shape: Shape,
+    pub size: f64,
+}
+
+/// What additions make of a joint now: a torque against the motion, and a change of the friction's level.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Share {
+    pub torque: f64,
+    pub level: f64,
+}
+
+impl Added {
+    /// `load` is the torque that the bodies asked for a step before.
+    pub fn share(&self, t: f64, q: &Joints, v: &Joints, load: f64, friction: f64) -> Share {
+        let (k, q_own, v_own) = (self.size, q[self.joint], v[self.joint]);
+        let torque = |torque: f64| Share { torque, level: 0.0 };
+        let level = |level: f64| Share { torque: 0.0, level };
+        match self.shape {
+            Shape::Offset => torque(k),
+            Shape::Asymmetric => level(if v_own > 0.0 { k } else { 0.0 }),
+            Shape::Stribeck { vs } => level(k * (-(v_own / vs).powi(2)).exp()),
+            Shape::Quadratic => torque(k * v_own * v_own.abs()),
+            Shape::Ripple { order, phase } => torque(k * (order * q_own + phase).sin()),
+            Shape::Spring { zero } => torque(k * (q_own - zero)),
+            Shape::PositionFriction { order, phase } => level(k * (order * q_own + phase).sin()),
+            Shape::LoadFriction => level(k * load.abs()),
+            Shape::Efficiency => torque(if load * v_own > 0.0 { k * load } else { 0.0 }),
+            Shape::Coupling { other } => torque(k * v[other]),
+            Shape::WarmUp { time_s } => {
+                let cold = k * (-t / time_s).exp();
+                Share {
+                    torque: cold * (friction * v_own),
+                    level: cold,
+                }
+            }
+            Shape::Drift => torque(k * t),
+            Shape::Stray => torque(k * (3.0 * q_own).sin() * (2.5 * v_own).cos()),
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Plants of another make than `simulate`, and studies that judge the `cft-ident` binary by what it writes.
+//!
+//! Nothing here uses code of `cft-ident`: bodies ([`chain`]), friction with an ideal stick ([`plant`]), drives and
+//! controllers ([`drive`]), motions ([`path`]) and sensors are the studies' own. A study writes logs and robot files
+//! as a laboratory would have them ([`files`]), runs the binary on them ([`tool`]), and compares its documents with
+//! the truth, which no estimator sees.
+//!
+//! | study | asks |
+//! |---|---|
+//! | [`coverage`] | do 95 % intervals hold the truth, where the verdict is "identified"? |
+//! | [`clean`] | is an effect written where nothing is missing? |
+//! | [`planted`] | is what was planted named, and does the model predict as well as the truth? |
+//! | [`setup`] | is a right robot file left in peace, and a mistake named? |
+
+#![forbid(unsafe_code)]
+
+pub mod added;
+pub mod arms;
+pub mod cft;
+pub mod chain;
+pub mod chance;
+pub mod clean;
+pub mod cover;
+pub mod coverage;
+pub mod drive;
+pub mod files;
+pub mod friction;
+pub mod judge;
+pub mod lab;
+pub mod machine;
+pub mod model;
+pub mod page;
+pub mod path;
+pub mod plant;
+pub mod planted;
+pub mod setup;
+pub mod signal;
+pub mod space;
+pub mod study;
+pub mod tool;

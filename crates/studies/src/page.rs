@@ -1,0 +1,44 @@
+//! The page of the studies: its tables are made from the runs, between `<!-- study: NAME -->` and
+//! `<!-- end of study -->`.
+
+use std::path::Path;
+
+use crate::study::{Rows, StudyError};
+use crate::{clean, coverage, planted, setup};
+
+/// The page with the tables of all runs in a folder of results; a study without runs keeps what stands there.
+pub fn rendered(page: &Path, results: &Path) -> Result<String, StudyError> {
+    let mut text = std::fs::read_to_string(page).map_err(|source| StudyError::File {
+        path: page.to_owned(),
+        source,
+    })?;
+    for (name, table) in [
+        ("coverage", coverage::table as fn(&Rows) -> String),
+        ("clean", clean::table),
+        ("planted", planted::table),
+        ("setup", setup::table),
+    ] {
+        let rows = Rows::open(results, &format!("independent_{name}"))?;
+        if !rows.rows.is_empty() {
+            text = filled(page, &text, name, &table(&rows))?;
+        }
+    }
+    Ok(text)
+}
+
+fn filled(page: &Path, whole: &str, name: &str, table: &str) -> Result<String, StudyError> {
+    const END: &str = "<!-- end of study -->";
+    let mark = format!("<!-- study: {name} -->");
+    let (before, rest) = whole.split_once(&mark).ok_or_else(|| StudyError::NoPlace {
+        path: page.to_owned(),
+        mark: mark.clone(),
+    })?;
+    let (_, after) = rest.split_once(END).ok_or_else(|| StudyError::NoPlace {
+        path: page.to_owned(),
+        mark: mark.clone(),
+    })?;
+    Ok(format!(
+        "{before}{mark}\n\n{}\n\n{END}{after}",
+        table.trim()
+    ))
+}

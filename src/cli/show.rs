@@ -1,0 +1,92 @@
+//! `cft-ident show`: a model file as a person wants to know it.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CliError, Context, Outcome, arguments, files};
+use cft_ident_files::config::model_file::{EffectSection, Parameter};
+use cft_ident_report::report::json::Document;
+use cft_ident_report::report::sections::provenance;
+use cft_ident_report::report::stages;
+use cft_ident_stages::identify::{JointInUse, LoggedRobot, in_use, refined};
+
+const EXAMPLE: &str = "\
+Example:
+  cft-ident show model.toml
+  cft-ident show model.toml --report model.html";
+
+/// Show a model: what its error means in use, its parameters, friction, effects, and for what motion it holds.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLE)]
+pub struct Args {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Write the same as a page
+    #[arg(long, value_name = "FILE.html", value_parser = arguments::html_file)]
+    pub report: Option<PathBuf>,
+}
+
+/// A model as it is shown.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ShownModel {
+    /// Joints in the order of every vector.
+    joints: Vec<String>,
+    /// Physically consistent parameters stand beside those of the plain fit.
+    consistent: bool,
+    parameters: Vec<Parameter>,
+    effects: Vec<EffectSection>,
+    /// What the errors mean in use; empty where the file does not hold what it left of data set aside.
+    in_use: Vec<JointInUse>,
+    /// The point that forces are told at.
+    point: Option<String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every [`CliError`]; nothing is written then.
+pub fn run(args: &Args, context: &Context) -> Result<Outcome, CliError> {
+    let outputs: Vec<&Path> = args.report.as_deref().into_iter().collect();
+    context.check_outputs(&[&args.model], &outputs)?;
+    let given = files::model(&args.model, context)?;
+    let (name, file) = (given.name, given.value);
+    let model = refined(&file, &name)?;
+    let machine = LoggedRobot::new(&name, file.robot.clone());
+    let found = in_use(&machine, &file, &model.model);
+    let of = stages::show::Show {
+        machine: &machine,
+        file: &file,
+        model: &model,
+        in_use: found.as_ref(),
+    };
+    let mut report = stages::show::show(&of);
+    let inputs = vec![given.provenance];
+    if let Some(path) = &args.report {
+        let made_from = &file.provenance.inputs;
+        let (page, command) = (&mut report.page(), context.command());
+        provenance::section(page, &file.robot, &inputs, made_from, None, command);
+        context.write_text(path, &report.html())?;
+        let written = format!("written: {}", path.display());
+        report.terminal().line(&written);
+    }
+    let (in_use, point) = match found {
+        Some((joints, point)) => (joints, Some(point)),
+        None => (Vec::new(), None),
+    };
+    let shown = ShownModel {
+        joints: machine.robot.joint_names().to_vec(),
+        consistent: file.is_consistent(),
+        parameters: file.parameters,
+        effects: file.effects,
+        in_use,
+        point,
+    };
+    Ok(Outcome {
+        text: report.text_for(context.detail()),
+        document: Document::new("show", &inputs, &[], &shown)?,
+        missed: Vec::new(),
+    })
+}
